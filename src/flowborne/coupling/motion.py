@@ -1,0 +1,62 @@
+"""What the joints are told to do during a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Motion(Protocol):
+    """A prescribed motion of some dofs, known for all time.
+
+    dofs  (k,) indices into v; hinge and slide dofs, whose positions are scalars
+    """
+
+    dofs: NDArray[np.int64]
+
+    def position(self, time: float) -> Array:
+        """(k,) joint positions at `time` (s), rad or m."""
+        ...
+
+    def velocity(self, time: float) -> Array:
+        """(k,) joint velocities at `time` (s), rad/s or m/s."""
+        ...
+
+
+@dataclass
+class Drive:
+    """Which dofs are driven in a step and how; arrays over all nv dofs.
+
+    prescribed    (nv,) bool
+    move          (nv,) velocity with which a driven dof moves during the step
+    hold          (nv,) velocity that a driven dof has at the end of the step
+    torque_limit  (nv,) largest |generalised force| the drive may use; inf keeps the promise
+    """
+
+    prescribed: NDArray[np.bool_]
+    move: Array
+    hold: Array
+    torque_limit: Array
+
+    @classmethod
+    def none(cls, nv: int) -> Drive:
+        """Drive that leaves every dof free."""
+        return cls(np.zeros(nv, bool), np.zeros(nv), np.zeros(nv), np.full(nv, np.inf))
+
+    def set(
+        self,
+        dofs: NDArray[np.int64],
+        move: Array | float,
+        hold: Array | float,
+        torque_limit: Array | float = np.inf,
+    ) -> None:
+        """Drive `dofs` with these velocities."""
+        self.prescribed[dofs] = True
+        self.move[dofs] = move
+        self.hold[dofs] = hold
+        self.torque_limit[dofs] = torque_limit

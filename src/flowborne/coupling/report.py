@@ -1,0 +1,79 @@
+"""What a step says about itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Outcome(Enum):
+    """How a step ended, as a sentence."""
+
+    DONE = "the step is done"
+    NOT_CONVERGED = "the pressure solve did not reach its tolerance"
+    NOT_FINITE = "a velocity or a pressure is not a finite number"
+
+
+@dataclass
+class Momentum:
+    """Linear momentum budget of a step, N s, each (3,); angular parts are about the origin.
+
+    solid            momentum of the bodies after the step
+    fluid            momentum of the fluid (open fraction x density x volume of each face)
+    exchanged        impulse that the pressure solve gave to the bodies
+    exchange_error   |impulse given to the bodies + impulse taken from the fluid and the walls|
+                     relative to the impulse exchanged
+    advection        change of the fluid's momentum in advection that no boundary accounts for
+    boundary         impulse of the sides of the domain on the fluid in the pressure solve
+    """
+
+    solid: Array = field(default_factory=lambda: np.zeros(3))
+    fluid: Array = field(default_factory=lambda: np.zeros(3))
+    exchanged: Array = field(default_factory=lambda: np.zeros(3))
+    exchange_error: float = 0.0
+    advection: Array = field(default_factory=lambda: np.zeros(3))
+    boundary: Array = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass
+class StepReport:
+    """What `step` did.
+
+    dt               s
+    actuator         (nv,) generalised force of the drives (and of locked dofs), N or N m
+    pressure_wrench  (nbody, 6) force and torque about the world origin of the dynamic pressure
+    viscous_wrench   (nbody, 6) the same of the shear stress
+    buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
+    wind_wrench      (nbody, 6) the same of the simple winds
+    iterations       of the pressure solve
+    residual         its true relative residual
+    divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
+    momentum         the budget
+    seconds          where the time went: advection, viscosity, projection, geometry, solids
+    contacts         number of active contacts
+    limited          (k,) dofs whose torque limit was reached
+    """
+
+    dt: float
+    outcome: Outcome
+    actuator: Array
+    pressure_wrench: Array
+    viscous_wrench: Array
+    buoyancy_wrench: Array
+    wind_wrench: Array
+    iterations: int = 0
+    residual: float = 0.0
+    divergence: float = 0.0
+    momentum: Momentum = field(default_factory=Momentum)
+    seconds: dict[str, float] = field(default_factory=dict)
+    contacts: int = 0
+    limited: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def fluid_wrench(self) -> Array:
+        """(nbody, 6) everything that the fluid and the winds do to each body."""
+        return self.pressure_wrench + self.viscous_wrench + self.buoyancy_wrench + self.wind_wrench

@@ -1,0 +1,116 @@
+"""The world: all the state there is, and the fixed things that it is stepped with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flowborne.coupling.motion import Motion
+from flowborne.fluid.boundary import Boundaries, Source
+from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.state import FluidState
+from flowborne.solids.model import SolidModel
+from flowborne.solids.state import SolidState
+from flowborne.solids.wind import Wind
+
+
+@dataclass(frozen=True)
+class Fluid:
+    """The fluid's fixed properties.
+
+    grid          where the fluid is
+    density       rho, kg/m^3 (any slab world is per unit depth)
+    viscosity     dynamic viscosity mu, Pa s; 0 is inviscid, and bodies are then free slip
+    boundaries    the six sides
+    sources       interior sources
+    scalars       names of the carried scalars
+    body_force    (3,) uniform force per mass on the fluid, m/s^2, besides gravity
+    advection     "maccormack" or "semi-lagrangian"
+    tolerance     relative residual of the pressure solve
+    """
+
+    grid: Grid
+    density: float
+    viscosity: float = 0.0
+    boundaries: Boundaries = field(default_factory=Boundaries)
+    sources: tuple[Source, ...] = ()
+    scalars: tuple[str, ...] = ()
+    body_force: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    advection: str = "maccormack"
+    tolerance: float = 1e-9
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What never changes during a run, shared by all copies of a world.
+
+    solid    the articulated bodies, or None
+    fluid    the fluid, or None (simple wind and gravity only)
+    motions  prescribed motions of some dofs
+    winds    simple winds (paper eq. 2, or a uniform force)
+    """
+
+    solid: SolidModel | None
+    fluid: Fluid | None = None
+    motions: tuple[Motion, ...] = ()
+    winds: tuple[Wind, ...] = ()
+
+
+@dataclass
+class World:
+    """All the state there is. Copies are cheap and share nothing but `setup`.
+
+    time    s
+    steps   number of steps taken
+    fluid   None when the setup has no fluid
+    solid   None when the setup has no bodies
+    memory  the controller's own arrays, by name
+    """
+
+    setup: Setup
+    time: float = 0.0
+    steps: int = 0
+    fluid: FluidState | None = None
+    solid: SolidState | None = None
+    memory: dict[str, Array] = field(default_factory=dict)
+
+    def copy(self) -> World:
+        return World(
+            self.setup,
+            self.time,
+            self.steps,
+            None if self.fluid is None else self.fluid.copy(),
+            None if self.solid is None else self.solid.copy(),
+            {name: values.copy() for name, values in self.memory.items()},
+        )
+
+    def arrays(self) -> dict[str, Array]:
+        """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""
+        named: dict[str, Array] = {"clock": np.array([self.time, float(self.steps)])}
+        if self.solid is not None:
+            named |= {"solid/q": self.solid.q, "solid/v": self.solid.v}
+        if self.fluid is not None:
+            named |= {f"fluid/{k}": v for k, v in self.fluid.arrays().items()}
+        return named | {f"memory/{k}": v for k, v in self.memory.items()}
+
+    @classmethod
+    def from_arrays(cls, setup: Setup, arrays: dict[str, Array]) -> World:
+        """World of `setup` in the state that `arrays` gave. Raises KeyError when one is missing."""
+
+        def part(prefix: str) -> dict[str, Array]:
+            return {
+                name.removeprefix(prefix): values
+                for name, values in arrays.items()
+                if name.startswith(prefix)
+            }
+
+        time, steps = arrays["clock"]
+        return cls(
+            setup,
+            float(time),
+            int(steps),
+            None if setup.fluid is None else FluidState.from_arrays(part("fluid/")),
+            None if setup.solid is None else SolidState(arrays["solid/q"], arrays["solid/v"]),
+            part("memory/"),
+        )

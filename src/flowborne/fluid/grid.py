@@ -1,0 +1,97 @@
+"""The MAC grid: where cells and faces are, and how large they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Faces = tuple[Array, Array, Array]
+"""One array per axis: u (nx+1, ny, nz), v (nx, ny+1, nz), w (nx, ny, nz+1)."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Uniform MAC grid of cubic cells.
+
+    A grid one cell thick in z is a *slab*: a two-dimensional world whose cell layer is centred on
+    z = 0 and whose areas, volumes, masses and forces are all per unit depth.
+
+    shape    (nx, ny, nz) cells
+    spacing  h, edge of a cell in m
+    origin   (x, y, z) of the lower corner in m
+    """
+
+    shape: tuple[int, int, int]
+    spacing: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def slab(cls, nx: int, ny: int, spacing: float, origin: tuple[float, float]) -> Grid:
+        """Two-dimensional grid of nx by ny cells with its lower left corner at `origin`."""
+        return cls((nx, ny, 1), spacing, (*origin, -0.5 * spacing))
+
+    @property
+    def is_slab(self) -> bool:
+        return self.shape[2] == 1
+
+    @property
+    def depth(self) -> float:
+        """Extent of a cell in z that enters areas and volumes: 1 in a slab, else h."""
+        return 1.0 if self.is_slab else self.spacing
+
+    @property
+    def cell_volume(self) -> float:
+        return self.spacing**2 * self.depth
+
+    @property
+    def face_area(self) -> float:
+        """Area of a face across x or y (and across z in three dimensions)."""
+        return self.spacing * self.depth
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes along which fluid can move."""
+        return (0, 1) if self.is_slab else (0, 1, 2)
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """(x, y, z) of the upper corner in m."""
+        o, n, h = self.origin, self.shape, self.spacing
+        return (o[0] + n[0] * h, o[1] + n[1] * h, o[2] + n[2] * h)
+
+    def face_shape(self, axis: int) -> tuple[int, int, int]:
+        """Shape of the array of faces across `axis`."""
+        n = list(self.shape)
+        n[axis] += 1
+        return (n[0], n[1], n[2])
+
+    def zeros_faces(self) -> Faces:
+        """Zero on every face."""
+        return (
+            np.zeros(self.face_shape(0)),
+            np.zeros(self.face_shape(1)),
+            np.zeros(self.face_shape(2)),
+        )
+
+    def cell_coordinates(self) -> tuple[Array, Array, Array]:
+        """x (nx,), y (ny,), z (nz,) of the cell centres in m."""
+        return self._coordinates((0.5, 0.5, 0.5), self.shape)
+
+    def face_coordinates(self, axis: int) -> tuple[Array, Array, Array]:
+        """x, y, z of the centres of the faces across `axis` in m, one vector per axis."""
+        offset = [0.5, 0.5, 0.5]
+        offset[axis] = 0.0
+        return self._coordinates((offset[0], offset[1], offset[2]), self.face_shape(axis))
+
+    def _coordinates(
+        self, offset: tuple[float, float, float], count: tuple[int, int, int]
+    ) -> tuple[Array, Array, Array]:
+        h = self.spacing
+        x, y, z = (
+            self.origin[i] + h * (np.arange(count[i], dtype=np.float64) + offset[i])
+            for i in range(3)
+        )
+        return x, y, z

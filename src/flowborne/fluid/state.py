@@ -1,0 +1,68 @@
+"""The fluid's part of the state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flowborne.fluid.grid import Array, Faces, Grid
+
+
+@dataclass
+class FluidState:
+    """Everything that the fluid carries from one step to the next.
+
+    velocity      u on the faces, m/s; zero where a face is wholly closed
+    acceleration  (u - u after advection) / dt of the last step, m/s^2
+    carrier       leak-proof field of the last step, m/s: u through the open and the body's
+                  velocity through the closed part of each face
+    pressure      (nx, ny, nz) dynamic pressure, Pa (hydrostatic part left out)
+    scalars       name -> (nx, ny, nz), carried for pictures
+    """
+
+    velocity: Faces
+    acceleration: Faces
+    carrier: Faces
+    pressure: Array
+    scalars: dict[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def at_rest(cls, grid: Grid, scalars: tuple[str, ...] = ()) -> FluidState:
+        """Still fluid without pressure or dye."""
+        return cls(
+            grid.zeros_faces(),
+            grid.zeros_faces(),
+            grid.zeros_faces(),
+            np.zeros(grid.shape),
+            {name: np.zeros(grid.shape) for name in scalars},
+        )
+
+    def copy(self) -> FluidState:
+        return FluidState.from_arrays({k: v.copy() for k, v in self.arrays().items()})
+
+    def arrays(self) -> dict[str, Array]:
+        """Every array by a name; `from_arrays` is the way back."""
+        named: dict[str, Array] = {"pressure": self.pressure}
+        for name in ("velocity", "acceleration", "carrier"):
+            for axis, values in zip("xyz", getattr(self, name), strict=True):
+                named[f"{name}_{axis}"] = values
+        named.update({f"scalar_{name}": values for name, values in self.scalars.items()})
+        return named
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, Array]) -> FluidState:
+        def faces(name: str) -> Faces:
+            return arrays[f"{name}_x"], arrays[f"{name}_y"], arrays[f"{name}_z"]
+
+        return cls(
+            faces("velocity"),
+            faces("acceleration"),
+            faces("carrier"),
+            arrays["pressure"],
+            {
+                name.removeprefix("scalar_"): values
+                for name, values in arrays.items()
+                if name.startswith("scalar_")
+            },
+        )

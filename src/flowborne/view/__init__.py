@@ -1,0 +1,1 @@
+"""Pictures, films and plots of run folders; never touches a live solver."""
