@@ -1,0 +1,287 @@
+"""The pressure equation with bodies in it.
+
+    ( K + G^T M G ) p = rhs        K  weighted cell Laplacian (see `levels`)
+                                   G  wrench of a pressure field on every body
+                                   M  twist that a unit wrench impulse gives them
+
+Equation (9) of the paper with the bodies' velocities eliminated: symmetric positive definite but
+for the pressures that push nothing (see `regions`).
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+
+from flowborne.fluid.aggregates import OWN
+from flowborne.fluid.arrays import Hierarchy, Integers, Labels, Marks, Places, Real, Rows
+from flowborne.fluid.body_modes import body_modes, mode_answers, mode_fields, nearby_mass
+from flowborne.fluid.conjugate_gradients import Finest, solve
+from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.jit import kernel, parallel_kernels
+from flowborne.fluid.levels import LEAN, coarsen, finest_weights, largest, level_table, scaled
+from flowborne.fluid.regions import label_regions, null_basis, region_wrenches
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """How pressure moves the bodies: rows of G^T per cut cell, and M.
+
+    cells      (m,) flat index of the cell of each row; a cell may have several rows
+    row_start  (m+1,) where each row's entries begin
+    columns    (nnz,) column of M, 6 body + component
+    values     (nnz,) wrench component that unit pressure in the cell exerts, m^2 or m^3
+    response   (k, k) M, symmetric positive semidefinite
+    """
+
+    cells: Integers
+    row_start: Integers
+    columns: Integers
+    values: Array
+    response: Array
+
+
+UNCOUPLED = Coupling(
+    np.zeros(0, np.int64),
+    np.zeros(1, np.int64),
+    np.zeros(0, np.int64),
+    np.zeros(0),
+    np.zeros((0, 0)),
+)
+"""No bodies, or none that the fluid can move."""
+
+
+@dataclass(frozen=True)
+class PressureSolution:
+    """What a solve gave.
+
+    pressure    (nx, ny, nz); 0 in cells without an open face, and with no part along null vectors
+    iterations  of conjugate gradients
+    residual    |rhs - A p| / |rhs| over the active cells, computed from p; rhs without its part
+                along the null vectors, which no pressure can balance
+    converged   whether the residual asked for was reached
+    """
+
+    pressure: Array
+    iterations: int
+    residual: float
+    converged: bool
+
+
+NO_VECTORS = np.zeros((0, 0))
+NO_FIELDS = np.zeros((0, 0, 0, 0), np.float32)
+
+
+def zeros(shape: tuple[int, int, int]) -> Array:
+    return np.zeros(shape)
+
+
+def packed(size: int) -> Real:
+    return np.zeros(size, np.float32)
+
+
+class Buffers:
+    """Arrays of one hierarchy and of one solve, kept for the next system of the same kind."""
+
+    def __init__(self, shape: tuple[int, int, int]) -> None:
+        self.table = level_table(shape)
+        total = int(self.table[-1, 0])
+        n0, n1, n2 = shape
+        padded = (n0 + 2 if n0 > 1 else 1, n1 + 2, n2 + 2)
+        self.finest = zeros(padded), zeros(padded), zeros(padded), zeros(padded)
+        self.weights = packed(total), packed(total), packed(total)
+        self.inverse = packed(total)
+        self.lean = packed(int(self.table[-1, LEAN]))
+        self.marks: Marks = np.full(total, OWN, np.uint8)
+        self.guests: Places = np.zeros(total, np.int32)
+        self.hosts: Places = np.zeros(total, np.int32)
+        self.cycle = packed(total), packed(total), packed(total)
+        self.vectors = zeros(padded), zeros(padded), zeros(padded), zeros(padded), zeros(padded)
+        self.label: Labels = np.zeros(padded, np.int32)
+        self.parent: Labels = np.zeros(self.label.size + 1, np.int32)
+        self.count: Labels = np.zeros(self.label.size + 1, np.int32)
+
+
+Kind = tuple[tuple[int, int, int], tuple[bool, bool, bool]]
+"""Cells and which axes are periodic: what decides the ghosts that buffers are left with."""
+
+_spare: dict[Kind, list[Buffers]] = {}
+
+
+def borrow(kind: Kind, owner: object) -> Buffers:
+    """Buffers that go back into store when `owner` is gone."""
+    store = _spare.setdefault(kind, [])
+    try:
+        buffers = store.pop()
+    except IndexError:
+        buffers = Buffers(kind[0])
+    weakref.finalize(owner, store.append, buffers)
+    return buffers
+
+
+def prepare(
+    hierarchy: Hierarchy,
+    faces: tuple[Array, Array, Array],
+    finest: Finest,
+    label: Labels,
+    parent: Labels,
+    count: Labels,
+) -> tuple[int, float]:
+    """Fill finest level, hierarchy and region labels from the weights on the faces.
+
+    returns  number of regions without an open side, scale of the hierarchy's weights
+    """
+    *weights, diagonal = finest
+    finest_weights(faces, (weights[0], weights[1], weights[2]), diagonal)
+    most = largest(diagonal)
+    scale = 1.0 / most if most > 0.0 else 1.0
+    for source, target in zip(weights, hierarchy[2], strict=True):
+        scaled(source, target[: source.size], scale)
+    coarsen(hierarchy)
+    return label_regions(finest, hierarchy[1], label, parent, count), scale
+
+
+@kernel
+def load(target: Array, source: Array, diagonal: Array) -> None:
+    """Cells into a padded array; 0 in ghosts and in cells without an open face."""
+    d = 1 if target.shape[0] > 1 else 0
+    n1, n2 = source.shape[1], source.shape[2]
+    for i in range(target.shape[0]):
+        target[i] = 0.0
+        if d == 0 or 0 < i < target.shape[0] - 1:
+            for j in range(n1):
+                for k in range(n2):
+                    if diagonal[i, j + 1, k + 1] > 0.0:
+                        target[i, j + 1, k + 1] = source[i - d, j, k]
+
+
+@kernel
+def padded_rows(rows: Rows, diagonal: Array) -> Rows:
+    """The rows of a coupling in active cells, with padded flat indices."""
+    cells, row_start, columns, values = rows
+    p0, p1, p2 = diagonal.shape
+    d = 1 if p0 > 1 else 0
+    n1, n2 = p1 - 2, p2 - 2
+    flat = diagonal.reshape(-1)
+    kept = np.empty_like(cells)
+    starts = np.zeros_like(row_start)
+    places, entries = np.empty_like(columns), np.empty_like(values)
+    count, used = 0, 0
+    for n in range(cells.size):
+        c = cells[n]
+        at = ((c // (n1 * n2) + d) * p1 + (c // n2) % n1 + 1) * p2 + c % n2 + 1
+        if flat[at] > 0.0:
+            kept[count] = at
+            for e in range(row_start[n], row_start[n + 1]):
+                places[used], entries[used] = columns[e], values[e]
+                used += 1
+            count += 1
+            starts[count] = used
+    return kept[:count], starts[: count + 1], places[:used], entries[:used]
+
+
+class PressureSystem:
+    """The matrix for one geometry: build once, solve for any right-hand side and coupling.
+
+    weights   face weights (nx+1, ny, nz), (nx, ny+1, nz), (nx, ny, nz+1), at least 0. On the outer
+              faces of an axis that is not periodic a weight above 0 is an open side, p = 0 on it,
+              at the distance that the weight was made with; a periodic axis has the same weights on
+              its first and last face. A cell is active when one of its weights is above 0.
+    periodic  of each axis
+    parallel  use all cores; only from one thread of the process at a time
+    raises    ValueError for one cell along x or y in 3D, which the ghost layout has no room for
+    """
+
+    def __init__(
+        self,
+        weights: Faces,
+        periodic: tuple[bool, bool, bool] = (False, False, False),
+        parallel: bool = False,
+    ) -> None:
+        nx, ny, nz = weights[1].shape[0], weights[0].shape[1], weights[0].shape[2]
+        self.shape = (nx, ny, nz)
+        if nz > 1 and nx == 1:
+            raise ValueError(
+                f"a grid of {nx} x {ny} x {nz} cells is one cell thick along x. "
+                "Turn it so that its thin axis is z."
+            )
+        self.slab = nz == 1
+        inner = (1, nx, ny) if self.slab else self.shape
+        wraps = (False, periodic[0], periodic[1]) if self.slab else periodic
+        self.periodic = np.array(wraps, np.uint8)
+        self.parallel = parallel
+        x, y, z = (np.ascontiguousarray(w, np.float64) for w in weights)
+        faces = (x, y, z)
+        if self.slab:
+            faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
+        self.buffers = borrow((inner, wraps), self)
+        b = self.buffers
+        self.hierarchy = (
+            b.table,
+            self.periodic,
+            b.weights,
+            b.inverse,
+            b.lean,
+            b.marks,
+            b.guests,
+            b.hosts,
+        )
+        with parallel_kernels(parallel):
+            self.regions, self.scale = prepare(
+                self.hierarchy, faces, b.finest, b.label, b.parent, b.count
+            )
+
+    def solve(
+        self,
+        rhs: Array,
+        guess: Array | None = None,
+        coupling: Coupling = UNCOUPLED,
+        tolerance: float = 1e-9,
+        absolute: float = 0.0,
+    ) -> PressureSolution:
+        """Solve to  |rhs - A p| <= max(tolerance |rhs|, absolute).
+
+        rhs, guess  (nx, ny, nz); values in cells without an open face are ignored
+        """
+        b = self.buffers
+        inner = b.label.shape
+        cells = (inner[0] - 2 if inner[0] > 1 else 1, inner[1] - 2, inner[2] - 2)
+        diagonal = b.finest[3]
+        x, right = b.vectors[:2]
+        first = np.zeros(self.shape) if guess is None else np.ascontiguousarray(guess, np.float64)
+        load(x, first.reshape(cells), diagonal)
+        load(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
+        rows = padded_rows(
+            (coupling.cells, coupling.row_start, coupling.columns, coupling.values), diagonal
+        )
+        response = np.ascontiguousarray(coupling.response)
+        null, answers, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
+        if self.regions:
+            wrench = region_wrenches(b.label, self.regions, response.shape[0], rows)
+            null = null_basis(b.count[: self.regions], wrench, response)
+        modes = body_modes(response, nearby_mass(rows, diagonal, response.shape[0]), max(cells))
+        modes *= np.sqrt(self.scale)
+        with parallel_kernels(self.parallel):
+            if modes.size:
+                fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
+                answers = mode_answers(modes, gram)
+            iterations, residual, converged = solve(
+                self.hierarchy,
+                b.cycle,
+                b.finest,
+                b.vectors,
+                rows,
+                response,
+                b.label,
+                null,
+                fields,
+                answers,
+                tolerance,
+                absolute,
+            )
+        start = (1 if inner[0] > 1 else 0, 1, 1)
+        inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
+        pressure = x[inside].copy().reshape(self.shape)
+        return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
