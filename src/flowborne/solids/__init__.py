@@ -1,4 +1,4 @@
-"""The articulated body: model, kinematics, assembled A and b, prescribed joints, effort, simple wind.
+"""The articulated body: model, assembled A and b, prescribed joints, effort, simple wind.
 
 Knows no fluid. Paper: sections 2 and 3 (eqs. 1-4), rigid clusters of sections 3.3 and 5.
 """

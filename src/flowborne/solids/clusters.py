@@ -1,0 +1,52 @@
+"""Rigid clusters: bodies outboard of a joint that move as one while the joint is tried out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.solids.dynamics import mass_matrix
+from flowborne.solids.model import SolidModel
+from flowborne.solids.prescribed import symmetric_inverse
+from flowborne.solids.state import SolidState
+
+Array = NDArray[np.float64]
+
+
+def outboard_dofs(model: SolidModel, dof: int) -> NDArray[np.int64]:
+    """Dofs of all joints on the bodies below the body that `dof` moves, none of that body's own."""
+    body = int(model.dof_body[dof])
+    carried = model.moves[:, dof][model.dof_body] & (model.dof_body != body)
+    return np.flatnonzero(carried)
+
+
+def rigidify(
+    model: SolidModel,
+    state: SolidState,
+    dofs: NDArray[np.int64],
+    fixed: NDArray[np.bool_] | None = None,
+) -> SolidState:
+    """State whose joints `dofs` do not move, by impulses at these joints alone.
+
+    With c the joints and f the other dofs, the impulse changes v_f by M_ff^-1 M_fc v_c: linear and
+    angular momentum of a floating creature stay as they are, which they would not if v_c were just
+    set to zero.
+
+    dofs     (k,) joints whose relative velocity is removed
+    fixed    (nv,) dofs that keep their velocity whatever it takes (driven or locked ones)
+    returns  new state with the same positions
+    source   Lentine et al. 2011, sections 3.3 and 5
+    """
+    velocity = state.v.copy()
+    velocity[dofs] = 0.0
+    free = np.ones(model.nv, bool)
+    free[dofs] = False
+    free &= ~model.locked
+    if fixed is not None:
+        free &= ~fixed
+    others = np.flatnonzero(free)
+    if others.size:
+        M = mass_matrix(model, state.q)
+        lost = M[np.ix_(others, dofs)] @ state.v[dofs]
+        velocity[others] += symmetric_inverse(M[np.ix_(others, others)]) @ lost
+    return SolidState(state.q.copy(), velocity)

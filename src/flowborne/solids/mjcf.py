@@ -1,0 +1,216 @@
+"""Reading an MJCF model and compiling it for the coupled solve, as a slab if wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.solids.slab import Mesh, Section, section
+
+Array = NDArray[np.float64]
+
+HIDDEN_GROUP = 3
+"""Geometries in this group and above collide but displace no fluid (MuJoCo's convention)."""
+
+KINDS = {
+    mujoco.mjtGeom.mjGEOM_PLANE: "plane",
+    mujoco.mjtGeom.mjGEOM_HFIELD: "hfield",
+    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
+    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    mujoco.mjtGeom.mjGEOM_BOX: "box",
+    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
+    mujoco.mjtGeom.mjGEOM_SDF: "sdf",
+}
+CONTACT_ONLY = ("plane", "hfield")
+
+
+def compiled(
+    source: str | Path,
+    slab: bool,
+    gravity: tuple[float, float, float],
+    density: float | None,
+    densities: Mapping[str, float],
+) -> mujoco.MjModel:
+    """MuJoCo's model of an MJCF file (a Path) or text (a str).
+
+    MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
+    motions and the controller take their places. raises ValueError for a bad model.
+    """
+    where = f"model {source}" if isinstance(source, Path) else "model text"
+    try:
+        if isinstance(source, Path):
+            spec = mujoco.MjSpec.from_file(str(source))
+        else:
+            spec = mujoco.MjSpec.from_string(source)
+        _set_options(spec, gravity)
+        for geom in spec.geoms:
+            given = densities.get(geom.parent.name, density)
+            if given is not None:
+                geom.density, geom.mass = given, np.nan
+        mj = spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.") from error
+    _refuse_unsupported(mj, where)
+    if slab:
+        _set_slab_inertias(spec, mj)
+        try:
+            mj = spec.compile()
+        except ValueError as error:
+            raise ValueError(f"{where} cannot be made a slab: {error}.") from error
+    return mj
+
+
+def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> None:
+    option = spec.option
+    option.gravity = gravity
+    option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.iterations = 500
+    option.tolerance = 1e-14
+    option.noslip_iterations = 0
+    option.density = option.viscosity = 0.0
+    option.wind = (0.0, 0.0, 0.0)
+    disable, enable = mujoco.mjtDisableBit, mujoco.mjtEnableBit
+    option.disableflags |= disable.mjDSBL_ACTUATION | disable.mjDSBL_WARMSTART
+    option.disableflags |= disable.mjDSBL_SENSOR | disable.mjDSBL_ISLAND
+    option.disableflags &= ~int(disable.mjDSBL_GRAVITY)
+    option.enableflags &= ~int(enable.mjENBL_SLEEP)
+
+
+def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
+    if mj.nflex:
+        raise ValueError(
+            f"{where} has {mj.nflex} flex element(s), which this version does not simulate. "
+            "Remove them."
+        )
+    for geom in displacing_geoms(mj):
+        name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
+        if kind_of(mj, geom) == "sdf":
+            raise ValueError(
+                f"{where}: geom '{name}' is a signed distance plugin. "
+                f"Use a mesh, or put it into group {HIDDEN_GROUP} or above."
+            )
+        mesh = mesh_of(mj, geom)
+        if mesh is not None and not is_closed(mesh):
+            raise ValueError(
+                f"{where}: the mesh of geom '{name}' is not a closed surface with outward faces. "
+                f"Close it, or put the geom into group {HIDDEN_GROUP} or above."
+            )
+
+
+def kind_of(mj: mujoco.MjModel, geom: int) -> str:
+    """Type of a geometry as MJCF spells it."""
+    return KINDS[mujoco.mjtGeom(int(mj.geom_type[geom]))]
+
+
+def displacing_geoms(mj: mujoco.MjModel) -> list[int]:
+    """MuJoCo ids of the geometries that displace fluid: no planes, no hfields, no group >= 3."""
+    return [
+        g
+        for g in range(mj.ngeom)
+        if mj.geom_group[g] < HIDDEN_GROUP and kind_of(mj, g) not in CONTACT_ONLY
+    ]
+
+
+def element_name(mj: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
+    """Name in the MJCF, or the kind and number of a nameless element."""
+    name = mujoco.mj_id2name(mj, kind, index)
+    return str(name) if name else f"{kind.name.removeprefix('mjOBJ_').lower()}{index}"
+
+
+def mesh_of(mj: mujoco.MjModel, geom: int) -> Mesh | None:
+    """Vertices in the geometry's frame and faces of a mesh geometry; None for the others."""
+    if kind_of(mj, geom) != "mesh":
+        return None
+    m = mj.geom_dataid[geom]
+    vertex, face = mj.mesh_vertadr[m], mj.mesh_faceadr[m]
+    vertices = mj.mesh_vert[vertex : vertex + mj.mesh_vertnum[m]]
+    faces = mj.mesh_face[face : face + mj.mesh_facenum[m]]
+    return vertices.astype(np.float64), faces.astype(np.int64)
+
+
+def is_closed(mesh: Mesh) -> bool:
+    """Whether every edge is used once in each direction and the enclosed volume is positive."""
+    vertices, faces = mesh
+    welded = np.unique(vertices, axis=0, return_inverse=True)[1].ravel()[faces]
+    edges = np.concatenate([welded[:, [0, 1]], welded[:, [1, 2]], welded[:, [2, 0]]])
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    forward = np.sort(edges[:, 0] * len(vertices) + edges[:, 1])
+    backward = np.sort(edges[:, 1] * len(vertices) + edges[:, 0])
+    return bool(np.array_equal(forward, backward) and np.linalg.det(vertices[faces]).sum() > 0.0)
+
+
+def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:
+    """World poses at rest: body positions and rotations, geometry positions and rotations."""
+    data = mujoco.MjData(mj)
+    mujoco.mj_kinematics(mj, data)
+    return (
+        data.xpos.copy(),
+        data.xmat.reshape(-1, 3, 3).copy(),
+        data.geom_xpos.copy(),
+        data.geom_xmat.reshape(-1, 3, 3).copy(),
+    )
+
+
+def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> Section:
+    """Cross-section of a geometry at its rest pose; ValueError that names it when there is none."""
+    kind, mesh = kind_of(mj, geom), mesh_of(mj, geom)
+    try:
+        return section(kind, mj.geom_size[geom], rotation, float(position[2]), mesh)
+    except ValueError as error:
+        name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
+        raise ValueError(
+            f"geom '{name}' ({kind}) {error}. In a slab every geom crosses z = 0 with a local axis "
+            "along z: turn or move it."
+        ) from error
+
+
+def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
+    """Give each body of `spec` the mass, centre and inertia per unit depth of its sections.
+
+    A body's own <inertial> stays as it is, and is per unit depth.
+    """
+    body_position, body_rotation, geom_position, geom_rotation = rest_poses(mj)
+    off = np.flatnonzero(np.abs(body_position[:, 2]) > 1e-9)
+    if off.size:
+        name = element_name(mj, mujoco.mjtObj.mjOBJ_BODY, off[0])
+        raise ValueError(
+            f"body '{name}' is at z = {body_position[off[0], 2]:g} m in a slab. "
+            "Put every body at z = 0."
+        )
+    always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    lowest, highest = spec.compiler.inertiagrouprange
+    for body in spec.bodies:
+        if body.id == 0 or (body.explicitinertial and not always):
+            continue
+        mass, moment, parts = 0.0, np.zeros(3), []
+        for geom in spec.geoms:
+            if geom.parent.id != body.id or not lowest <= geom.group <= highest:
+                continue
+            g = geom.id
+            weightless = geom.mass == 0.0 or (np.isnan(geom.mass) and geom.density == 0.0)
+            if kind_of(mj, g) in CONTACT_ONLY or weightless:
+                continue
+            cut = slab_section(mj, g, geom_position[g], geom_rotation[g])
+            m = geom.density * cut.area if np.isnan(geom.mass) else geom.mass
+            world = geom_position[g] + geom_rotation[g] @ cut.centroid
+            centre = body_rotation[body.id].T @ (world - body_position[body.id])
+            parts.append((m, centre, m * cut.polar_moment / cut.area))
+            mass += m
+            moment = moment + m * centre
+        if mass > 0.0:
+            centre = moment / mass
+            about_z = sum(i + m * float((c - centre) @ (c - centre)) for m, c, i in parts)
+            body.explicitinertial = True
+            body.mass, body.ipos, body.iquat = mass, centre, (1.0, 0.0, 0.0, 0.0)
+            body.inertia = (about_z, about_z, about_z)
+            body.fullinertia = (np.nan, 0.0, 0.0, 0.0, 0.0, 0.0)
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO

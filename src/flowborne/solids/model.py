@@ -1,0 +1,308 @@
+"""The articulated body as it is built: immutable, shared by all copies of a world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.solids import displaced, mjcf
+from flowborne.solids.slab import Mesh, Section
+from flowborne.solids.state import SolidState
+
+Array = NDArray[np.float64]
+
+FREE, BALL, SLIDE, HINGE = (
+    int(mujoco.mjtJoint.mjJNT_FREE),
+    int(mujoco.mjtJoint.mjJNT_BALL),
+    int(mujoco.mjtJoint.mjJNT_SLIDE),
+    int(mujoco.mjtJoint.mjJNT_HINGE),
+)
+SUFFIXES = {
+    FREE: (":x", ":y", ":z", ":rx", ":ry", ":rz"),
+    BALL: (":rx", ":ry", ":rz"),
+    SLIDE: ("",),
+    HINGE: ("",),
+}
+WIDTHS = {FREE: 7, BALL: 4, SLIDE: 1, HINGE: 1}
+
+
+class SolidModel:
+    """Bodies, joints and geometries. Build with `from_file` or `from_string`; never changed after.
+
+    Geometries here are those that displace fluid: MuJoCo's planes, hfields and geoms in group 3
+    or above take part in contact alone. In a slab everything is per unit depth.
+
+    mj             MuJoCo's model
+    slab           whether the solids are cross-sections at z = 0
+    gravity        (3,) m/s^2
+    nq, nv         numbers of positions and velocities
+    nbody, ngeom   numbers of bodies (0 is the world) and of geometries
+    body_names, joint_names, dof_names, geom_names
+                   nameless elements are called by kind and number; the dofs of a free joint have
+                   the joint's name with :x :y :z (world axes) :rx :ry :rz (body axes)
+    locked         (nv,) dofs of a slab that would leave the plane
+    dof_position   (nv,) place in q of a hinge's or slide's position, -1 for other dofs
+    dof_range      (nv, 2) limits of hinges and slides, rad or m; infinite where there are none
+    dof_body       (nv,) body that the dof moves
+    dof_root       (nv,) ancestor of that body that hangs on the world
+    moves          (nbody, nv) whether a dof moves a body
+    conserved      (nv,) dofs along which the bodies' momentum changes by outer forces alone
+    armature       (nv,) inertia of the joints themselves, kg m^2 or kg
+    body_mass      (nbody,) kg
+    subtree_mass   (nbody,) kg, of the body and all below
+    volume         (nbody,) displaced volume, m^3 (area in a slab), each region counted once where
+                   geometries of a body overlap; see displaced.united. 0 for the world body
+    centroid       (nbody, 3) centroid of that volume in the body's frame, m
+    geom_id        (ngeom,) MuJoCo's number
+    geom_type      (ngeom,) "sphere", "capsule", "cylinder", "box", "ellipsoid" or "mesh"
+    geom_size      (ngeom, 3) MuJoCo's half sizes, m
+    geom_body      (ngeom,) body
+    geom_offset    (ngeom, 3) centre in the body's frame, m
+    geom_rotation  (ngeom, 3, 3) geometry's frame to the body's
+    geom_rgba      (ngeom, 4) colour
+    """
+
+    def __init__(self, mj: mujoco.MjModel, slab: bool) -> None:
+        self.mj = mj
+        self.slab = slab
+        self.gravity: Array = np.array(mj.opt.gravity)
+        self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), int(mj.nbody)
+        self.body_mass: Array = np.array(mj.body_mass)
+        self.subtree_mass: Array = np.array(mj.body_subtreemass)
+        self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, mj.nbody)
+        self._set_dofs()
+        self._set_geoms()
+        self._set_displaced()
+
+    @classmethod
+    def from_file(
+        cls,
+        path: str | Path,
+        *,
+        slab: bool = False,
+        gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+        density: float | None = None,
+        densities: Mapping[str, float] = MappingProxyType({}),
+    ) -> SolidModel:
+        """Model of an MJCF file.
+
+        slab     take the cross-sections at z = 0, per unit depth
+        gravity  (3,) m/s^2, in place of the file's own
+        density  kg/m^3, in place of every geom's own density or mass
+        densities  body -> kg/m^3 of its geoms, in place of `density`
+        raises   ValueError when the model is bad
+        """
+        return cls(mjcf.compiled(Path(path), slab, gravity, density, densities), slab)
+
+    @classmethod
+    def from_string(
+        cls,
+        xml: str,
+        *,
+        slab: bool = False,
+        gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+        density: float | None = None,
+        densities: Mapping[str, float] = MappingProxyType({}),
+    ) -> SolidModel:
+        """Model of an MJCF text; as `from_file`."""
+        return cls(mjcf.compiled(xml, slab, gravity, density, densities), slab)
+
+    @classmethod
+    def empty(cls, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SolidModel:
+        """Model without bodies, for a fluid alone."""
+        return cls.from_string("<mujoco/>", slab=True, gravity=gravity)
+
+    def rest(self) -> SolidState:
+        """The model's own pose, at rest."""
+        return SolidState(np.array(self.mj.qpos0), np.zeros(self.nv))
+
+    def integrate(self, q: Array, velocity: Array, dt: float) -> Array:
+        """(nq,) positions after moving with constant velocity (nv,) for dt s; quaternions turn."""
+        moved = np.array(q, dtype=np.float64)
+        mujoco.mj_integratePos(self.mj, moved, velocity, dt)
+        return moved
+
+    def dofs_of(self, joint: str) -> NDArray[np.int64]:
+        """Dofs of a joint. Raises ValueError for an unknown name."""
+        j = self.joint(joint)
+        first = int(self.mj.jnt_dofadr[j])
+        return np.arange(first, first + len(SUFFIXES[int(self.mj.jnt_type[j])]))
+
+    def positions_of(self, joint: str) -> NDArray[np.int64]:
+        """Places in q of a joint: 7 for a free joint, 4 for a ball, else 1."""
+        j = self.joint(joint)
+        first = int(self.mj.jnt_qposadr[j])
+        return np.arange(first, first + WIDTHS[int(self.mj.jnt_type[j])])
+
+    def joint(self, name: str) -> int:
+        """Number of a joint. Raises ValueError for an unknown name."""
+        return _index(self.joint_names, name, "joint")
+
+    def body(self, name: str) -> int:
+        """Number of a body. Raises ValueError for an unknown name."""
+        return _index(self.body_names, name, "body")
+
+    def mesh_of(self, geom: int) -> Mesh:
+        """Vertices (k, 3) in the geometry's frame and faces (m, 3) of a mesh geometry."""
+        mesh = mjcf.mesh_of(self.mj, int(self.geom_id[geom]))
+        if mesh is None:
+            raise ValueError(f"geom '{self.geom_names[geom]}' is no mesh.")
+        return mesh
+
+    def rest_geom_rotation(self) -> Array:
+        """(ngeom, 3, 3) geometries' frames to the world's at rest."""
+        return np.asarray(mjcf.rest_poses(self.mj)[3][self.geom_id])
+
+    def section_of(self, geom: int) -> Section:
+        """Cross-section of a slab's geometry, in the geometry's frame."""
+        g = int(self.geom_id[geom])
+        _, _, position, rotation = mjcf.rest_poses(self.mj)
+        return mjcf.slab_section(self.mj, g, position[g], rotation[g])
+
+    def _set_dofs(self) -> None:
+        mj = self.mj
+        self.joint_names = _names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)
+        names: list[str] = []
+        self.dof_position: NDArray[np.int64] = np.full(self.nv, -1)
+        self.dof_range: Array = np.tile([-np.inf, np.inf], (self.nv, 1))
+        for j, name in enumerate(self.joint_names):
+            kind, first = int(mj.jnt_type[j]), int(mj.jnt_dofadr[j])
+            names += [name + suffix for suffix in SUFFIXES[kind]]
+            if kind in (SLIDE, HINGE):
+                self.dof_position[first] = mj.jnt_qposadr[j]
+                if mj.jnt_limited[j]:
+                    self.dof_range[first] = mj.jnt_range[j]
+        self.dof_names = tuple(names)
+        self.dof_body: NDArray[np.int64] = np.array(mj.dof_bodyid, dtype=np.int64)
+        self.dof_root: NDArray[np.int64] = mj.body_rootid[self.dof_body].astype(np.int64)
+        self.moves: NDArray[np.bool_] = np.zeros((self.nbody, self.nv), bool)
+        for body in range(1, self.nbody):
+            self.moves[body] = self.moves[mj.body_parentid[body]] | (self.dof_body == body)
+        self.armature: Array = np.array(mj.dof_armature)
+        self.conserved = _conserved(mj)
+        self.locked: NDArray[np.bool_] = np.zeros(self.nv, bool)
+        if self.slab:
+            self.locked = _locked(mj, self.dof_names)
+
+    def _set_geoms(self) -> None:
+        mj = self.mj
+        chosen = mjcf.displacing_geoms(mj)
+        self.geom_id: NDArray[np.int64] = np.array(chosen, dtype=np.int64)
+        self.ngeom = len(chosen)
+        names = _names(mj, mujoco.mjtObj.mjOBJ_GEOM, mj.ngeom)
+        self.geom_names = tuple(names[g] for g in chosen)
+        self.geom_type = tuple(mjcf.kind_of(mj, g) for g in chosen)
+        self.geom_size: Array = np.array(mj.geom_size[self.geom_id])
+        self.geom_body: NDArray[np.int64] = mj.geom_bodyid[self.geom_id].astype(np.int64)
+        self.geom_offset: Array = np.array(mj.geom_pos[self.geom_id])
+        self.geom_rotation: Array = _rotations(mj.geom_quat[self.geom_id])
+        self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
+
+    def _set_displaced(self) -> None:
+        self.volume: Array = np.zeros(self.nbody)
+        self.centroid: Array = np.zeros((self.nbody, 3))
+        body_position, body_rotation, position, rotation = mjcf.rest_poses(self.mj)
+        for body in range(self.nbody):
+            solids = [
+                self._solid(int(g), position[self.geom_id[g]], rotation[self.geom_id[g]])
+                for g in np.flatnonzero(self.geom_body == body)
+            ]
+            if solids and body > 0:
+                self.volume[body], centre = displaced.united(solids, self.slab)
+                self.centroid[body] = body_rotation[body].T @ (centre - body_position[body])
+
+    def _solid(self, geom: int, position: Array, rotation: Array) -> displaced.Solid:
+        """The geometry at rest, in the world's frame; a slab's geometry is checked on the way."""
+        g, kind, size = int(self.geom_id[geom]), self.geom_type[geom], self.geom_size[geom]
+        mesh = mjcf.mesh_of(self.mj, g)
+        if self.slab:
+            cut = mjcf.slab_section(self.mj, g, position, rotation)
+            volume, centre = cut.area, cut.centroid
+        else:
+            volume, centre = displaced.volume(kind, size, mesh), displaced.centroid(mesh)
+        middle = position + rotation @ self.mj.geom_aabb[g, :3]
+        half = np.abs(rotation) @ self.mj.geom_aabb[g, 3:]
+        centroid = position + rotation @ centre
+        return displaced.Solid(
+            kind, size, position, rotation, middle - half, middle + half, mesh, volume, centroid
+        )
+
+
+def _names(mj: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ...]:
+    return tuple(mjcf.element_name(mj, kind, i) for i in range(count))
+
+
+def _index(names: tuple[str, ...], name: str, what: str) -> int:
+    if name not in names:
+        raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(names)}.")
+    return names.index(name)
+
+
+def _rotations(quaternions: Array) -> Array:
+    rotations = np.empty((len(quaternions), 9))
+    for row, quaternion in zip(rotations, quaternions, strict=True):
+        mujoco.mju_quat2Mat(row, quaternion)
+    return rotations.reshape(-1, 3, 3)
+
+
+def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Dofs whose motion carries a whole tree rigidly along a symmetry of its kinetic energy.
+
+    They are, on bodies hung on the world: free joints, a first ball or hinge, slides that follow
+    slides alone, and a ball or hinge after slides that span every direction it turns. Along them
+    the equation of motion says that momentum changes by the outer impulse.
+    """
+    conserved = np.zeros(mj.nv, bool)
+    for body in range(1, mj.nbody):
+        if mj.body_weldid[mj.body_parentid[body]] != 0:
+            continue
+        slides: list[Array] = []
+        for joint in range(mj.body_jntadr[body], mj.body_jntadr[body] + mj.body_jntnum[body]):
+            kind, first = int(mj.jnt_type[joint]), int(mj.jnt_dofadr[joint])
+            axis = np.array(mj.jnt_axis[joint])
+            spanned = np.linalg.matrix_rank(np.array(slides), tol=1e-9) if slides else 0
+            if kind == HINGE and slides:
+                across = np.array(slides) - np.outer(np.array(slides) @ axis, axis)
+                turned = bool(np.linalg.matrix_rank(across, tol=1e-9) == 2)
+                turned &= spanned == 3 or bool(np.abs(np.array(slides) @ axis).max() < 1e-9)
+            else:
+                turned = not slides or spanned == 3
+            if kind == SLIDE:
+                slides.append(axis)
+                conserved[first] = True
+                continue
+            conserved[first : first + len(SUFFIXES[kind])] = turned
+            break
+    return conserved
+
+
+def _locked(mj: mujoco.MjModel, names: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Dofs whose motion leaves the plane z = 0. Raises ValueError when one leaves it partly.
+
+    A hinge must be along z and a slide across z to be free. A ball or free joint turns about its
+    body's axes, one of which has to be along z.
+    """
+    data = mujoco.MjData(mj)
+    mujoco.mj_kinematics(mj, data)
+    mujoco.mj_comPos(mj, data)
+    locked = np.zeros(mj.nv, bool)
+    for dof in range(mj.nv):
+        kind = int(mj.jnt_type[mj.dof_jntid[dof]])
+        within = dof - int(mj.jnt_dofadr[mj.dof_jntid[dof]])
+        turn, slide = data.cdof[dof, :3], data.cdof[dof, 3:]
+        if kind == SLIDE or (kind == FREE and within < 3):
+            locked[dof] = abs(slide[2]) > 1e-9
+        else:
+            tilt = float(np.hypot(turn[0], turn[1]))
+            locked[dof] = tilt > 1e-6
+            if kind in (BALL, FREE) and 1e-6 < tilt < 1.0 - 1e-6:
+                raise ValueError(
+                    f"dof '{names[dof]}' turns about an axis that is neither along z nor across "
+                    "it. In a slab the body of a ball or free joint has a local axis along z."
+                )
+    return locked

@@ -1,0 +1,126 @@
+"""Prescribed dofs: the velocity they end the step with is given, the force they need is read off.
+
+Partial inverse dynamics: with P the prescribed dofs and F the free ones,
+
+    v+_P = hold        v+_F = A_FF^-1 (r_F + impulse_F - A_FP hold)
+    tau dt = A v+ - r - impulse      on P
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
+
+from flowborne.solids.dynamics import SolidSystem
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+OVER = 1e-9
+"""A drive may exceed its torque limit by this share before it is released."""
+
+
+@dataclass(frozen=True)
+class PrescribedSystem:
+    """The solid's answer to an impulse when some dofs are prescribed.
+
+    system      the system it was made from
+    prescribed  (nv,) dofs that end the step with velocity `hold`
+    hold        (nv,) rad/s or m/s; free dofs' entries are not used
+    inverse     (nv, nv) A_FF^-1, zero in rows and columns of prescribed dofs; symmetric
+    velocity    (nv,) v*, velocity after the step when there is no impulse
+    limited     (nv,) dofs whose drive reached its limit; they are free and pushed by `push`
+    push        (nv,) generalised force of limited drives, already in `system`
+    """
+
+    system: SolidSystem
+    prescribed: Mask
+    hold: Array
+    inverse: Array
+    velocity: Array
+    limited: Mask
+    push: Array = field(repr=False)
+
+    def after(self, impulse: Array) -> Array:
+        """(nv,) velocity after the step with a generalised impulse (nv,), the fluid's for one."""
+        return np.asarray(self.velocity + self.inverse @ impulse)
+
+    def actuator(self, v_plus: Array, impulse: Array) -> Array:
+        """(nv,) generalised force that the drives supplied; zero on dofs without a drive."""
+        s = self.system
+        needed = (s.A @ v_plus - s.impulse - impulse) / s.dt
+        return np.where(self.prescribed, needed, self.push)
+
+    def updated(self, v_plus: Array) -> PrescribedSystem | None:
+        """With the contacts and limits that `v_plus` implies; None when it has them already."""
+        system = self.system.updated(v_plus)
+        if system is None:
+            return None
+        return _solved(system, self.prescribed, self.hold, self.limited, self.push)
+
+
+def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedSystem:
+    """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly.
+
+    raises  ValueError when the free dofs' matrix is not positive definite
+    """
+    none = np.zeros(len(hold), bool)
+    return _solved(system, prescribed, hold, none, np.zeros(len(hold)))
+
+
+def release(driven: PrescribedSystem, limit: Array, actuator: Array) -> PrescribedSystem | None:
+    """Free the dofs whose drive is over its limit and push them with the limit instead.
+
+    limit     (nv,) largest |generalised force| of each drive, inf for none
+    actuator  (nv,) force that the drives need, as `driven.actuator` gives it
+    returns   the system to solve again, or None when no drive is over its limit
+    """
+    over = driven.prescribed & (np.abs(actuator) > limit * (1.0 + OVER))
+    if not over.any():
+        return None
+    more = np.zeros(len(limit))
+    more[over] = np.sign(actuator[over]) * limit[over]
+    return _solved(
+        driven.system.pushed(more),
+        driven.prescribed & ~over,
+        driven.hold,
+        driven.limited | over,
+        driven.push + more,
+    )
+
+
+def _solved(
+    system: SolidSystem, prescribed: Mask, hold: Array, limited: Mask, push: Array
+) -> PrescribedSystem:
+    free = np.flatnonzero(~prescribed)
+    velocity = np.where(prescribed, hold, 0.0)
+    inverse = np.zeros_like(system.A)
+    if free.size:
+        across = np.ix_(free, free)
+        block = symmetric_inverse(system.A[across])
+        inverse[across] = block
+        velocity[free] = block @ (system.impulse[free] - system.A[free] @ velocity)
+    return PrescribedSystem(
+        system, prescribed.copy(), hold.copy(), inverse, velocity, limited, push
+    )
+
+
+def symmetric_inverse(matrix: Array) -> Array:
+    """Inverse of a symmetric positive definite matrix by Cholesky, exactly symmetric.
+
+    raises  ValueError when it is not positive definite
+    """
+    factor, fault = dpotrf(matrix, lower=1)
+    if fault == 0:
+        lower, fault = dpotri(factor, lower=1)
+    if fault:
+        raise ValueError(
+            f"the solid's matrix is not positive definite at free dof {fault - 1}. "
+            "Give the body there mass and inertia, or its joint some armature."
+        )
+    inverse = lower + lower.T  # dpotrf has cleared the upper triangle
+    inverse.flat[:: len(inverse) + 1] *= 0.5
+    return np.asarray(inverse)

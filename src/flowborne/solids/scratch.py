@@ -1,0 +1,85 @@
+"""MuJoCo's working memory: one per thread and model, never part of the state.
+
+Nothing in it carries over: every use sets positions, velocities and applied forces anew, and
+warm starts are off, so results depend on arguments only.
+"""
+
+from __future__ import annotations
+
+import copy
+import threading
+import weakref
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from flowborne.solids.model import SolidModel
+
+Array = NDArray[np.float64]
+
+
+class Scratch:
+    """MjData and a private MjModel, whose time step may be set without other threads seeing it.
+
+    mj, data    MuJoCo's model and data
+    mass        (nv, nv) room for the mass matrix
+    q, v, ...   lasting views into `data`
+    """
+
+    def __init__(self, model: SolidModel) -> None:
+        self.mj = copy.copy(model.mj)
+        self.data = data = mujoco.MjData(self.mj)
+        self.dt = float(self.mj.opt.timestep)
+        self.mass = np.zeros((model.nv, model.nv))
+        self.q, self.v = data.qpos, data.qvel
+        self.applied = data.qfrc_applied
+        self.smooth, self.bias = data.qfrc_smooth, data.qfrc_bias
+        self.cdof = data.cdof
+        self.subtree_com = data.subtree_com
+        self.subtree_linvel, self.subtree_angmom = data.subtree_linvel, data.subtree_angmom
+        self.xpos, self.xmat = data.xpos, data.xmat
+        self.geom_xpos, self.geom_xmat = data.geom_xpos, data.geom_xmat
+
+    def set_time_step(self, dt: float) -> None:
+        """Time step that implicit terms and constraint references are made for, s."""
+        if dt != self.dt:
+            self.mj.opt.timestep = self.dt = dt
+
+    def place(self, q: Array, v: Array | None = None) -> None:
+        """Poses of everything at `q`, and velocities of everything when `v` is given."""
+        self.q[:] = q
+        mujoco.mj_kinematics(self.mj, self.data)
+        mujoco.mj_comPos(self.mj, self.data)
+        if v is not None:
+            self.v[:] = v
+            mujoco.mj_comVel(self.mj, self.data)
+
+    def forward(self, q: Array, v: Array, applied: Array) -> None:
+        """Everything up to the acceleration, with constraints."""
+        self.q[:] = q
+        self.v[:] = v
+        self.applied[:] = applied
+        mujoco.mj_forward(self.mj, self.data)
+
+    def mass_matrix(self) -> Array:
+        """(nv, nv) mass matrix at the present pose; overwritten by the next call."""
+        if self.mass.size:
+            mujoco.mj_fullM(self.mj, self.data, self.mass)
+        return self.mass
+
+
+_local = threading.local()
+
+
+def scratch(model: SolidModel) -> Scratch:
+    """This thread's working memory for `model`."""
+    known: weakref.WeakKeyDictionary[SolidModel, Scratch] | None = getattr(_local, "known", None)
+    if known is None:
+        known = _local.known = weakref.WeakKeyDictionary()
+    found = known.get(model)
+    if found is None:
+        found = known[model] = Scratch(model)
+    return found

@@ -1,0 +1,98 @@
+"""Simple winds: forces on the bodies without a simulated fluid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.solids.dynamics import Kinematics, cross
+from flowborne.solids.model import SolidModel
+from flowborne.solids.surfaces import surfaces
+
+Array = NDArray[np.float64]
+
+
+class Wind(Protocol):
+    """What pushes the bodies from outside."""
+
+    def wrench(self, model: SolidModel, kinematics: Kinematics, v: Array, time: float) -> Array:
+        """(nbody, 6) force (N) and torque about the world origin (N m) on each body.
+
+        v     (nv,) generalised velocity
+        time  s
+        """
+        ...
+
+
+class WindField(Protocol):
+    """A wind that differs from place to place; picklable."""
+
+    def __call__(self, x: Array, time: float) -> Array:
+        """(n, 3) velocity in m/s at the places x (n, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class WindFaces:
+    """The simple wind force on every face, eq. (2): F = sign(u.n) A rho (u.n)^2 n.
+
+    u is the wind relative to the face, n its outward normal. Every face counts, windward and
+    leeward, as in the paper: a thin plate across the wind feels 2 rho U^2 per area. Nothing
+    shelters anything.
+
+    velocity  (3,) m/s, or a field of place and time
+    density   rho, kg/m^3 (per unit depth in a slab)
+    bodies    names of the bodies that it blows on; all when None
+    source    Lentine et al. 2011, eq. (2)
+    """
+
+    velocity: tuple[float, float, float] | WindField
+    density: float
+    bodies: tuple[str, ...] | None = None
+
+    def wrench(self, model: SolidModel, kinematics: Kinematics, v: Array, time: float) -> Array:
+        """(nbody, 6) force and torque about the world origin on each body."""
+        patches = surfaces(model)
+        body, area = patches.body, patches.area
+        rotation = kinematics.body_rotation[body]
+        normal = np.matmul(rotation, patches.normal[:, :, None])[:, :, 0]
+        x = kinematics.body_position[body]
+        x = x + np.matmul(rotation, patches.centre[:, :, None])[:, :, 0]
+        twist = (kinematics.twist_jacobian @ v)[body]
+        wind = self.velocity(x, time) if callable(self.velocity) else np.array(self.velocity)
+        inflow = ((wind - twist[:, :3] - cross(twist[:, 3:], x)) * normal).sum(axis=1)
+        force = (self.density * area * inflow * np.abs(inflow))[:, None] * normal
+        wrench = np.zeros((model.nbody, 6))
+        np.add.at(wrench, body, np.concatenate([force, cross(x, force)], axis=1))
+        return _only(model, wrench, self.bodies)
+
+
+@dataclass(frozen=True)
+class WindForce:
+    """The same force on each body, at its centre of mass: the wind of Fig. 4.
+
+    force   (3,) N (N/m in a slab)
+    bodies  names of the bodies that it pushes; all when None
+    """
+
+    force: tuple[float, float, float]
+    bodies: tuple[str, ...] | None = None
+
+    def wrench(self, model: SolidModel, kinematics: Kinematics, v: Array, time: float) -> Array:
+        """(nbody, 6) force and torque about the world origin on each body."""
+        force = np.tile(np.asarray(self.force, dtype=np.float64), (model.nbody, 1))
+        wrench = np.concatenate([force, cross(kinematics.mass_centre, force)], axis=1)
+        wrench[0] = 0.0
+        return _only(model, wrench, self.bodies)
+
+
+def _only(model: SolidModel, wrench: Array, bodies: tuple[str, ...] | None) -> Array:
+    """The wrenches of the named bodies. Raises ValueError for a name that is not in the model."""
+    if bodies is None:
+        return wrench
+    chosen = np.zeros(model.nbody, bool)
+    chosen[[model.body(name) for name in bodies]] = True
+    return np.where(chosen[:, None], wrench, 0.0)

@@ -1,0 +1,115 @@
+"""Prescribed dofs: exact velocities, torques read off, torque limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flowborne.solids.dynamics import assemble
+from flowborne.solids.model import SolidModel
+from flowborne.solids.prescribed import PrescribedSystem, prescribe, release
+from flowborne.solids.state import SolidState
+
+CREATURE = SolidModel.from_string("""<mujoco><worldbody><geom type="plane" size="5 5 .1"/>
+<body pos="0 0 .15"><freejoint name="root"/><geom type="box" size=".3 .2 .1" mass="2"/>
+<body pos=".3 0 0"><joint name="j1" axis="0 1 0" range="-20 20"/>
+<geom type="capsule" fromto="0 0 0 .4 0 0" size=".08" mass="1"/>
+<body pos=".4 0 0"><joint name="j2" axis="0 1 0" damping=".1"/>
+<geom type="capsule" fromto="0 0 0 .4 0 0" size=".08" mass="1"/></body></body></body></worldbody>
+</mujoco>""")
+
+
+def settled(driven: PrescribedSystem, impulse: np.ndarray) -> tuple[PrescribedSystem, np.ndarray]:
+    for _ in range(30):
+        v_plus = driven.after(impulse)
+        changed = driven.updated(v_plus)
+        if changed is None:
+            return driven, v_plus
+        driven = changed
+    raise AssertionError("the active set did not settle")
+
+
+@given(seed=st.integers(0, 10_000), which=st.lists(st.booleans(), min_size=8, max_size=8))
+@settings(max_examples=60, deadline=None)
+def test_targets_are_met_and_the_drives_balance(seed: int, which: list[bool]) -> None:
+    """Exact targets under gravity, contact, limits and any impulse; A v+ = r + impulse + drives."""
+    model, dt, rng = CREATURE, 0.01, np.random.default_rng(seed)
+    rest = model.rest()
+    q = model.integrate(rest.q, 0.2 * rng.normal(size=model.nv), 1.0)
+    state = SolidState(q, rng.normal(size=model.nv))
+    prescribed, hold = np.array(which), rng.normal(size=model.nv)
+    impulse = rng.normal(size=model.nv)
+    driven = prescribe(assemble(model, state, np.zeros(model.nv), dt), prescribed, hold)
+    driven, v_plus = settled(driven, impulse)
+    np.testing.assert_array_equal(v_plus[prescribed], hold[prescribed])
+    actuator = driven.actuator(v_plus, impulse)
+    assert np.all(actuator[~prescribed] == 0.0)
+    system = driven.system
+    scale = 1.0 + np.abs(system.A).max() * (1.0 + np.abs(v_plus).max())
+    np.testing.assert_allclose(
+        system.A @ v_plus, system.impulse + impulse + dt * actuator, atol=1e-12 * scale
+    )
+    np.testing.assert_array_equal(driven.inverse, driven.inverse.T)
+    assert np.all(driven.inverse[prescribed] == 0.0)
+
+
+def test_nothing_prescribed_is_the_free_solution() -> None:
+    model = CREATURE
+    state = model.rest()
+    system = assemble(model, state, np.zeros(model.nv), 0.01)
+    driven = prescribe(system, np.zeros(model.nv, bool), np.zeros(model.nv))
+    np.testing.assert_allclose(
+        driven.velocity, np.linalg.solve(system.A, system.impulse), atol=1e-12
+    )
+
+
+def test_everything_prescribed_has_no_answer_to_the_fluid() -> None:
+    model = CREATURE
+    system = assemble(model, model.rest(), np.zeros(model.nv), 0.01)
+    driven = prescribe(system, np.ones(model.nv, bool), np.full(model.nv, 0.1))
+    assert np.all(driven.inverse == 0.0)
+    np.testing.assert_array_equal(driven.after(np.ones(model.nv)), np.full(model.nv, 0.1))
+
+
+def test_release_pushes_with_the_limit() -> None:
+    """Of two driven joints one is too weak: it gives way and uses exactly its limit."""
+    model, dt = CREATURE, 0.01
+    state, none = model.rest(), np.zeros(model.nv)
+    state.q[2] = 3.0
+    prescribed = np.array([False] * 6 + [True, True])
+    hold = np.array([0.0] * 6 + [0.3, -4.0])
+    limit = np.array([np.inf] * 6 + [np.inf, 0.5])
+    driven = prescribe(assemble(model, state, none, dt), prescribed, hold)
+    driven, v_plus = settled(driven, none)
+    weak = release(driven, limit, driven.actuator(v_plus, none))
+    assert weak is not None
+    weak, v_plus = settled(weak, none)
+    actuator = weak.actuator(v_plus, none)
+    np.testing.assert_array_equal(weak.limited, [False] * 7 + [True])
+    assert actuator[7] == -0.5
+    assert v_plus[6] == 0.3
+    assert -4.0 < v_plus[7] < 0.0
+    applied = assemble(model, state, np.array([0.0] * 7 + [-0.5]), dt)
+    alone = prescribe(applied, weak.prescribed, hold)
+    np.testing.assert_allclose(settled(alone, none)[1], v_plus, atol=1e-12)
+    assert release(weak, limit, actuator) is None
+
+
+def test_release_leaves_drives_below_their_limits() -> None:
+    model = CREATURE
+    prescribed = np.array([False] * 6 + [True, True])
+    system = assemble(model, model.rest(), np.zeros(model.nv), 0.01)
+    driven = prescribe(system, prescribed, np.zeros(model.nv))
+    actuator = np.array([9.0] * 6 + [0.9, -0.9])
+    assert release(driven, np.ones(model.nv), actuator) is None
+
+
+def test_singular_matrix_is_refused() -> None:
+    system = assemble(CREATURE, CREATURE.rest(), np.zeros(8), 0.01)
+    flat = system.A.copy()
+    flat[3] = flat[:, 3] = 0.0
+    broken = type(system)(flat, system.impulse, 0.01, system.v, system.smooth, None, system.zones)
+    with pytest.raises(ValueError, match="not positive definite at free dof 3"):
+        prescribe(broken, np.zeros(8, bool), np.zeros(8))
