@@ -1,0 +1,215 @@
+"""The controller: decides targets for the controlled joints and drives the joints there.
+
+Paper: sections 2.1 (algorithm), 4.3 (Navier-Stokes: fewer decisions, frozen flow).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import partial
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.control import creature
+from flowborne.control.executors import Mapper, Threads
+from flowborne.control.gradients import Gradient, GradientCentral
+from flowborne.control.measurement import Measurement
+from flowborne.control.objectives import ObjectiveSum
+from flowborne.control.rules import FixedStep, Rule
+from flowborne.control.servo import Servo, ServoExact
+from flowborne.control.trial import Hypothesis, Step, Trials
+from flowborne.coupling.motion import Drive
+from flowborne.coupling.report import StepReport
+
+if TYPE_CHECKING:
+    from flowborne.coupling.world import World
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What the controller decided at the start of a frame.
+
+    decided       False in frames between decisions; the numbers are then those of the last one
+    objective     in the present pose, as the gradient's trials estimate it; 0 when no term is on
+    gradient      (n,) in the present pose, per rad or m
+    displacement  (n,) from the pose at the decision to the target, rad or m
+    target        (nq,) pose whose controlled entries are the target
+    evaluations   number of trials run
+    seconds       wall-clock time of the decision
+    """
+
+    decided: bool
+    objective: float
+    gradient: Array
+    displacement: Array
+    target: Array
+    evaluations: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """Gradient descent on an objective over the controlled joints, within the creature's strength.
+
+    Its own state is in the world's memory: "target" (nq,), "displacement" (n,), "gradient" (n,),
+    "objective" (1,), and "schedule" (2,): frames left after this one until the next decision, and
+    the frame time in s.
+
+    dofs        (n,) controlled dofs, indices into v
+    objective   what to minimise
+    hypothesis  how a pose is tried
+    strength    rad/s or m/s, the fastest that a dof moves; one for all dofs or one each
+    gradient    finite difference
+    rule        how far to go down the gradient
+    every       a decision every so many frames; its step is as long as strength allows in all of
+                them together and is spread evenly over them
+    iterations  descent steps per decision, each from the pose found so far in the flow as it is
+                now; more than one is the paper's infinite strength, and the target may be as many
+                steps away
+    servo       how the drives approach the target
+    executor    where the trials run
+    raises      ValueError for controlled dofs that are none, negative or repeated, a strength that
+                is not positive and finite or not one per dof, every < 1 or iterations < 1
+    """
+
+    dofs: Integers
+    objective: ObjectiveSum
+    hypothesis: Hypothesis
+    strength: float | tuple[float, ...]
+    gradient: Gradient = field(default_factory=partial(GradientCentral, math.radians(10.0)))
+    rule: Rule = field(default_factory=FixedStep)
+    every: int = 1
+    iterations: int = 1
+    servo: Servo = field(default_factory=ServoExact)
+    executor: Mapper = field(default_factory=Threads)
+
+    def __post_init__(self) -> None:
+        dofs = np.asarray(self.dofs)
+        if dofs.ndim != 1 or dofs.size == 0 or dofs.min() < 0 or np.unique(dofs).size < dofs.size:
+            raise ValueError(f"controlled dofs are {dofs.tolist()}: give at least one, each once")
+        object.__setattr__(self, "dofs", dofs.astype(np.int64))
+        for name in ("strength", "servo.torque_limit"):
+            values = np.asarray(
+                self.strength if name == "strength" else self.servo.torque_limit, dtype=np.float64
+            )
+            if values.ndim and values.shape != dofs.shape:
+                raise ValueError(
+                    f"{name} has {values.size} values for {dofs.size} controlled dofs: "
+                    "give one for all or one each"
+                )
+        strength = np.asarray(self.strength, dtype=np.float64)
+        if not (np.all(strength > 0.0) and np.all(np.isfinite(strength))):
+            raise ValueError(
+                f"strength is {self.strength}: give positive finite numbers in rad/s or m/s"
+            )
+        if self.every < 1 or self.iterations < 1:
+            raise ValueError(
+                f"every is {self.every} frames and iterations {self.iterations}: "
+                "both must be at least 1"
+            )
+
+    def decide(self, world: World, frame_time: float, step: Step) -> Decision:
+        """Choose the target for the coming frames; call at the start of every frame.
+
+        Nothing of the world changes but its memory.
+
+        frame_time  s
+        raises      TrialError when a hypothetical step blows up
+        """
+        started = perf_counter()
+        memory = world.memory
+        if "schedule" in memory and memory["schedule"][0] >= 1.0:
+            memory["schedule"] = np.array([memory["schedule"][0] - 1.0, frame_time])
+            return self._decision(world, False, 0, started)
+        pose, value, gradient, evaluations = self._descend(world, frame_time, step)
+        model, state = creature.parts(world)
+        memory["target"] = pose
+        memory["displacement"] = creature.difference(model, state.q, pose)[self.dofs]
+        memory["gradient"] = gradient
+        memory["objective"] = np.array([value])
+        memory["schedule"] = np.array([self.every - 1.0, frame_time])
+        return self._decision(world, True, evaluations, started)
+
+    def drive(self, world: World, frame_end_time: float, dt: float) -> Drive:
+        """Drive of the controlled dofs for the next step; without a decision yet, to hold still.
+
+        frame_end_time  s, end of the frame that the step is in
+        dt              s, length of the step
+        """
+        model, state = creature.parts(world)
+        drive = Drive.none(model.nv)
+        move: Array | float = 0.0
+        hold: Array | float = 0.0
+        if "target" in world.memory:
+            left, frame_time = world.memory["schedule"]
+            remaining = max(frame_end_time + left * frame_time - world.time, dt)
+            gap = creature.difference(model, state.q, world.memory["target"])[self.dofs]
+            move, hold = self.servo.velocity(gap, state.v[self.dofs], float(remaining), dt)
+        drive.set(self.dofs, move, hold, np.asarray(self.servo.torque_limit, dtype=np.float64))
+        return drive
+
+    def measure(self, world: World, report: StepReport) -> dict[str, float]:
+        """After a real step: the weighted sum as "objective", then every term's own value."""
+        measurement = Measurement(world, report)
+        return {"objective": self.objective.value(measurement)} | self.objective.values(measurement)
+
+    def trials(self, world: World, step: Step, pose: Array | None = None) -> Trials:
+        """The objective as a function of displacements from `pose` (nq,); None: the present."""
+        _, state = creature.parts(world)
+        start = (state.q if pose is None else pose).copy()
+        return Trials(world, step, self.objective, self.hypothesis, self.dofs, start, self.executor)
+
+    def positions(self, world: World) -> Array:
+        """(n,) present positions of controlled scalar joints, rad or m; NaN for ball dofs."""
+        return creature.positions(world, self.dofs)
+
+    def targets(self, world: World) -> Array:
+        """(n,) targets of controlled scalar joints; before the first decision where they are."""
+        model, state = creature.parts(world)
+        return creature.positions_in(model, world.memory.get("target", state.q), self.dofs)
+
+    def close(self) -> None:
+        """Let the workers go."""
+        self.executor.close()
+
+    def _descend(
+        self, world: World, frame_time: float, step: Step
+    ) -> tuple[Array, float, Array, int]:
+        """Pose to go to; objective and gradient in the present pose; number of trials run."""
+        n = self.dofs.size
+        trials = self.trials(world, step)
+        if not self.objective.active(world.time):
+            return trials.pose, 0.0, np.zeros(n), 0
+        limit = np.broadcast_to(np.asarray(self.strength), (n,)) * (self.every * frame_time)
+        first = estimate = self.gradient.estimate(trials)
+        evaluations = 0
+        for iteration in range(self.iterations):
+            if iteration:
+                estimate = self.gradient.estimate(trials)
+            wanted = self.rule.step(trials, estimate.gradient, limit)
+            displacement = trials.within_range(wanted)
+            evaluations += trials.evaluations
+            pose = trials.moved(displacement) if displacement.any() else trials.pose
+            trials = self.trials(world, step, pose)
+            if not displacement.any():
+                break
+        return trials.pose, first.value, first.gradient, evaluations
+
+    def _decision(self, world: World, decided: bool, evaluations: int, started: float) -> Decision:
+        memory = world.memory
+        return Decision(
+            decided,
+            float(memory["objective"][0]),
+            memory["gradient"].copy(),
+            memory["displacement"].copy(),
+            memory["target"].copy(),
+            evaluations,
+            perf_counter() - started,
+        )

@@ -1,0 +1,225 @@
+"""Where the evaluations of a decision run: here, in threads, in processes, or anywhere else.
+
+Each evaluation depends on nothing but its own task and the answers come back in the order of the
+tasks, so that a decision is the same, bit for bit, whatever runs it. flowborne has no scheduler of
+its own: all there is are the interfaces of `concurrent.futures`.
+"""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import os
+import pickle
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from typing import Any, Protocol, TypeVar
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+
+class Mapper(Protocol):
+    """Applies a function to every task."""
+
+    def map(
+        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
+    ) -> list[Answer]:
+        """Answers in the order of the tasks; an exception in one is raised here.
+
+        shared  an object that tasks refer to and that stays the same from call to call
+        """
+        ...
+
+    def close(self) -> None:
+        """Let the workers go; a later `map` starts new ones."""
+        ...
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def worker_count(workers: int | None) -> int:
+    """Number of workers; None is one per core. Raises ValueError for less than one."""
+    count = cores() if workers is None else workers
+    if count < 1:
+        raise ValueError(f"number of workers is {workers}: give at least 1")
+    return count
+
+
+def collect(futures: list[Any]) -> list[Any]:
+    """Results of futures in their order; when one fails, those not yet begun are cancelled."""
+    try:
+        return [future.result() for future in futures]
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+
+
+class Serial:
+    """One evaluation after the other, in the calling thread."""
+
+    def map(
+        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
+    ) -> list[Answer]:
+        return [function(task) for task in tasks]
+
+    def close(self) -> None:
+        """Nothing to let go."""
+
+
+class Pool:
+    """Workers of `concurrent.futures` that start at the first use and are not pickled.
+
+    workers  how many; None is one per core
+    raises   ValueError for less than one
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        self.workers = worker_count(workers)
+        self._executor: Executor | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"workers": self.workers}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["workers"])  # type: ignore[misc]
+
+    def close(self) -> None:
+        """Let the workers go; a later `map` starts new ones."""
+        if self._executor is not None:
+            self._executor.shutdown()
+            self._executor = None
+
+
+class Threads(Pool):
+    """Threads of this process: a physics step lets go of the interpreter lock."""
+
+    def map(
+        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
+    ) -> list[Answer]:
+        if self.workers == 1 or len(tasks) == 1:
+            return [function(task) for task in tasks]
+        if self._executor is None:
+            self._executor = ThreadPoolExecutor(self.workers, thread_name_prefix="evaluation")
+        return collect([self._executor.submit(function, task) for task in tasks])
+
+
+class Processes(Pool):
+    """Other processes of this machine, started anew: a fork would not carry the threads over.
+
+    The shared object goes to each worker once, when the workers start; tasks that refer to it
+    carry a mark in its place. The main script must guard its start by `__name__ == "__main__"`.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        super().__init__(workers)
+        self._shared: object = None
+
+    def map(
+        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
+    ) -> list[Answer]:
+        if self._executor is not None and shared is not self._shared:
+            self.close()
+        if self._executor is None:
+            self._shared = shared
+            self._executor = ProcessPoolExecutor(
+                self.workers,
+                mp_context=multiprocessing.get_context("spawn"),
+                initializer=receive_shared,
+                initargs=(pickle.dumps(shared),),
+            )
+        packed = [pack((function, task), shared) for task in tasks]
+        return collect([self._executor.submit(run_packed, each) for each in packed])
+
+
+class Foreign:
+    """Any object with `submit` (giving futures with `result`) or else an ordered `map`.
+
+    For example an executor of `concurrent.futures` or mpi4py, or a client of `dask.distributed`;
+    whoever made it lets it go.
+
+    raises  TypeError when the object has neither
+    """
+
+    def __init__(self, executor: Any) -> None:
+        if not (hasattr(executor, "submit") or hasattr(executor, "map")):
+            raise TypeError(
+                f"executor {executor!r} has neither submit nor map: give 'serial', 'threads', "
+                "'processes' or an object like concurrent.futures.Executor"
+            )
+        self.executor = executor
+
+    def map(
+        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
+    ) -> list[Answer]:
+        if hasattr(self.executor, "submit"):
+            return collect([self.executor.submit(function, task) for task in tasks])
+        return list(self.executor.map(function, tasks))
+
+    def close(self) -> None:
+        """The executor belongs to whoever made it."""
+
+
+def mapper(executor: str | object = "threads", workers: int | None = None) -> Mapper:
+    """The mapper of that name, or one around any executor.
+
+    executor  "serial", "threads", "processes", or an object with `submit` or `map`
+    workers   for threads and processes; None is one per core
+    raises    ValueError for another name, TypeError for another object
+    """
+    if not isinstance(executor, str):
+        return Foreign(executor)
+    if executor == "serial":
+        return Serial()
+    if executor == "threads":
+        return Threads(workers)
+    if executor == "processes":
+        return Processes(workers)
+    raise ValueError(
+        f"executor is {executor!r}: give 'serial', 'threads', 'processes' or an executor object"
+    )
+
+
+class _Packer(pickle.Pickler):
+    """Pickler that writes a mark in place of the shared object."""
+
+    def __init__(self, file: io.BytesIO, shared: object) -> None:
+        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
+        self._shared = shared
+
+    def persistent_id(self, obj: object) -> str | None:
+        return "shared" if self._shared is not None and obj is self._shared else None
+
+
+class _Unpacker(pickle.Unpickler):
+    """Unpickler that puts this process's shared object in the place of the mark."""
+
+    def persistent_load(self, pid: str) -> object:
+        return _received[pid]
+
+
+_received: dict[str, object] = {}
+
+
+def pack(item: object, shared: object) -> bytes:
+    """The item pickled, with a mark wherever it refers to `shared`."""
+    file = io.BytesIO()
+    _Packer(file, shared).dump(item)
+    return file.getvalue()
+
+
+def receive_shared(pickled: bytes) -> None:
+    """First thing that a worker process does: keep the shared object."""
+    _received["shared"] = pickle.loads(pickled)
+
+
+def run_packed(packed: bytes) -> Any:
+    """Apply the packed function to the packed task in a worker process."""
+    function, task = _Unpacker(io.BytesIO(packed)).load()
+    return function(task)

@@ -1,0 +1,126 @@
+"""Finite differences of the objective over the controlled dofs. Paper: sections 2.1 and 4.3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Poses(Protocol):
+    """The objective as a function of the pose, which is all that differences and searches see.
+
+    count  n, number of controlled dofs
+    """
+
+    @property
+    def count(self) -> int: ...
+
+    def within_range(self, displacement: Array) -> Array:
+        """(n,) the part of a displacement that the joints' ranges allow."""
+        ...
+
+    def values(self, displacements: Array) -> Array:
+        """(m,) objective in poses displaced by the rows of (m, n), each row on its own."""
+        ...
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Objective and its gradient in a pose.
+
+    value     objective in the pose (central differences: mean of the trials)
+    gradient  (n,) per rad or m
+    """
+
+    value: float
+    gradient: Array
+
+
+class Gradient(Protocol):
+    """Estimates the gradient of the objective."""
+
+    def estimate(self, poses: Poses) -> Estimate:
+        """Objective and gradient in the present pose."""
+        ...
+
+
+@dataclass(frozen=True)
+class FiniteDifference:
+    """What both differences have in common.
+
+    displacement  d in rad or m, one for all dofs or one each. A dof closer than that to the end
+                  of its range is tried at the end
+    resolution    a difference smaller than this part of the objective's size is no gradient, so
+                  that the rounding of a symmetric pose moves nothing
+    raises        ValueError when a displacement is not positive and finite or resolution negative
+    """
+
+    displacement: float | tuple[float, ...]
+    resolution: float = 1e-10
+
+    def __post_init__(self) -> None:
+        d = np.atleast_1d(np.asarray(self.displacement, dtype=np.float64))
+        if not (np.all(np.isfinite(d)) and np.all(d > 0.0)):
+            raise ValueError(
+                f"displacement of the difference is {self.displacement}: "
+                "give positive numbers in rad or m"
+            )
+        if not 0.0 <= self.resolution < 1.0:
+            raise ValueError(f"resolution is {self.resolution}: give a number from 0 to below 1")
+
+    def displacements(self, count: int) -> Array:
+        """(n,) d of each dof. Raises ValueError when there are not as many as dofs."""
+        d = np.asarray(self.displacement, dtype=np.float64)
+        if d.ndim and d.shape != (count,):
+            raise ValueError(f"{d.size} displacements for {count} controlled dofs: give one each")
+        return np.broadcast_to(d, (count,))
+
+    def slope(self, rise: Array, run: Array, size: float) -> Array:
+        """(n,) rise over run; zero where the rise is below resolution or there is no run."""
+        real = (np.abs(rise) > self.resolution * size) & (run > 0.0)
+        return np.divide(rise, run, out=np.zeros_like(rise), where=real)
+
+
+@dataclass(frozen=True)
+class GradientCentral(FiniteDifference):
+    """(f(+d) - f(-d)) / 2d for every dof: 2n evaluations, error O(d^2).
+
+    source  Lentine et al. 2011, section 2.1
+    """
+
+    def estimate(self, poses: Poses) -> Estimate:
+        n = poses.count
+        d = np.diag(self.displacements(n))
+        tried = np.array([poses.within_range(row) for row in np.concatenate([d, -d])])
+        values = poses.values(tried)
+        forward, backward = values[:n], values[n:]
+        run = np.diagonal(tried[:n]) - np.diagonal(tried[n:])
+        size = float(np.max(np.abs(values)))
+        return Estimate(float(np.mean(values)), self.slope(forward - backward, run, size))
+
+
+@dataclass(frozen=True)
+class GradientOneSided(FiniteDifference):
+    """(f(+d) - f(0)) / d for every dof with one f(0) for all: n + 1 evaluations, error O(d).
+
+    A dof that its range keeps from going forward is tried backward.
+
+    source  Lentine et al. 2011, section 4.3
+    """
+
+    def estimate(self, poses: Poses) -> Estimate:
+        n = poses.count
+        tried = np.zeros((n + 1, n))
+        for row, wanted in zip(tried[1:], np.diag(self.displacements(n)), strict=True):
+            forward, backward = poses.within_range(wanted), poses.within_range(-wanted)
+            row[:] = forward if np.abs(forward).sum() >= np.abs(backward).sum() else backward
+        values = poses.values(tried)
+        travel = np.diagonal(tried[1:])
+        size = float(np.max(np.abs(values)))
+        rise = (values[1:] - values[0]) * np.sign(travel)
+        return Estimate(float(values[0]), self.slope(rise, np.abs(travel), size))

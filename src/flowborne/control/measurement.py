@@ -1,0 +1,54 @@
+"""What an objective may look at: a world after a step, and the step's report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.control import creature
+from flowborne.coupling.report import StepReport
+
+if TYPE_CHECKING:
+    from flowborne.coupling.world import World
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A world after a step, real or hypothetical.
+
+    world   the state after the step
+    report  what the step said
+    now     s, the time at which phases are looked up: that of the decision. None: the world's
+    """
+
+    world: World
+    report: StepReport
+    now: float | None = None
+
+    @property
+    def dt(self) -> float:
+        """Length of the measured step, s."""
+        return self.report.dt
+
+    @property
+    def phase_time(self) -> float:
+        """Time at which phases are looked up, s."""
+        return self.world.time if self.now is None else self.now
+
+    def joint_positions(self, dofs: Integers) -> Array:
+        """(k,) positions of scalar joints, rad or m; NaN for dofs of ball and free joints."""
+        return creature.positions(self.world, dofs)
+
+    def body_rotation(self, body: int) -> Array:
+        """(3, 3) columns are the body's axes in the world."""
+        return creature.body_rotation(self.world, body)
+
+    def body_velocity(self, body: int) -> Array:
+        """(3,) velocity of the origin of the body's frame, m/s."""
+        return creature.body_velocity(self.world, body)

@@ -1,0 +1,213 @@
+"""What the creature wants: objectives with a name and a scope that add, by weight and phase.
+
+Every objective is minimised; to maximise one, give it a negative weight. Paper: eq. (1) effort,
+eqs. (2)-(4) simple wind drag, eq. (10) pressure drag and lift.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.control.measurement import Measurement
+from flowborne.control.phases import PhaseAlways, Phases
+from flowborne.coupling.motion import Motion
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Vector = tuple[float, float, float]
+
+
+class Objective(Protocol):
+    """A number that the creature wants small.
+
+    name  heading under which it is written to the history
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    def value(self, measurement: Measurement) -> float:
+        """The number in the measured state."""
+        ...
+
+
+def unit(direction: Vector) -> Array:
+    """(3,) the direction with length one. Raises ValueError when it has no direction."""
+    vector = np.asarray(direction, dtype=np.float64)
+    length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
+    if not 0.0 < length < np.inf:
+        raise ValueError(f"direction is {direction}: give three finite numbers, not all zero")
+    return vector / length
+
+
+def force(wrench: Array, bodies: Integers) -> Array:
+    """(3,) total force on `bodies` of the wrenches (nbody, 6), N."""
+    return wrench[bodies, :3].sum(axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveEffort:
+    """Impulse with which the drives of `dofs` hold their velocities, eq. (1), N s or N m s.
+
+    The norm over the scope of actuator force times step. In a hypothetical step whose drives hold
+    a velocity that the joints already have it is the effort of section 2.3; in a real step it is
+    what the muscles did, the change of velocity included.
+
+    source  Lentine et al. 2011, section 2.3
+    """
+
+    dofs: Integers
+    name: str = "effort"
+
+    def value(self, measurement: Measurement) -> float:
+        return float(np.linalg.norm(measurement.report.actuator[self.dofs])) * measurement.dt
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveWindDrag:
+    """Force of the simple winds on `bodies` along `direction`, eqs. (2)-(4), N.
+
+    raises  ValueError for a direction of no length
+    source  Lentine et al. 2011, sections 3.1 and 3.2
+    """
+
+    bodies: Integers
+    direction: Vector
+    name: str = "wind-drag"
+
+    def __post_init__(self) -> None:
+        unit(self.direction)
+
+    def value(self, measurement: Measurement) -> float:
+        return float(force(measurement.report.wind_wrench, self.bodies) @ unit(self.direction))
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectivePressureDrag:
+    """Force of the fluid's pressure on `bodies` along `direction`, eq. (10), N.
+
+    With a direction across the stream it is lift.
+
+    frame   body on which the direction rides (it is then given in that body's axes), or None
+    raises  ValueError for a direction of no length
+    source  Lentine et al. 2011, section 4.3
+    """
+
+    bodies: Integers
+    direction: Vector
+    frame: int | None = None
+    name: str = "pressure-drag"
+
+    def __post_init__(self) -> None:
+        unit(self.direction)
+
+    def value(self, measurement: Measurement) -> float:
+        along = unit(self.direction)
+        if self.frame is not None:
+            along = measurement.body_rotation(self.frame) @ along
+        return float(force(measurement.report.pressure_wrench, self.bodies) @ along)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveInputMotion:
+    """Sum of squared distances of scalar joints from a given motion, rad^2 or m^2.
+
+    dofs       (k,) hinge and slide dofs
+    reference  motion whose position has one entry for each of them
+    """
+
+    dofs: Integers
+    reference: Motion
+    name: str = "input-motion"
+
+    def value(self, measurement: Measurement) -> float:
+        wanted = self.reference.position(measurement.world.time)
+        return float(np.sum((measurement.joint_positions(self.dofs) - wanted) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveVelocity:
+    """Squared distance of a body's velocity (at the origin of its frame) from a target, m^2/s^2."""
+
+    body: int
+    target: Vector
+    name: str = "velocity"
+
+    def value(self, measurement: Measurement) -> float:
+        missing = measurement.body_velocity(self.body) - np.asarray(self.target)
+        return float(missing @ missing)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveCallable:
+    """Any function of the measurement (a picklable one, if the evaluations run in processes)."""
+
+    function: Callable[[Measurement], float]
+    name: str = "callable"
+
+    def value(self, measurement: Measurement) -> float:
+        return float(self.function(measurement))
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedObjective:
+    """An objective in a sum: its weight (negative to maximise) and when it counts."""
+
+    objective: Objective
+    weight: float = 1.0
+    phases: Phases = field(default_factory=PhaseAlways)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveSum:
+    """Weighted sum of the terms that are on at the time of the decision.
+
+    raises  ValueError when there is no term, or when a weight is not finite
+    """
+
+    terms: tuple[WeightedObjective, ...]
+
+    def __post_init__(self) -> None:
+        if not self.terms:
+            raise ValueError("the objective has no term: give at least one")
+        for term in self.terms:
+            if not np.isfinite(term.weight):
+                raise ValueError(
+                    f"weight of objective {term.objective.name!r} is {term.weight}: "
+                    "give a finite number"
+                )
+
+    @classmethod
+    def of(cls, objective: Objective, weight: float = 1.0) -> ObjectiveSum:
+        """Sum of a single objective that always counts."""
+        return cls((WeightedObjective(objective, weight),))
+
+    def active(self, time: float) -> bool:
+        """Whether any term counts at `time`."""
+        return any(term.phases.active(time) for term in self.terms)
+
+    def value(self, measurement: Measurement) -> float:
+        """Sum of weight times value over the terms that are on."""
+        now = measurement.phase_time
+        return float(
+            sum(
+                term.weight * term.objective.value(measurement)
+                for term in self.terms
+                if term.phases.active(now)
+            )
+        )
+
+    def values(self, measurement: Measurement) -> dict[str, float]:
+        """Value of every term without its weight, on or off, under distinct names."""
+        named: dict[str, float] = {}
+        for term in self.terms:
+            name, again = term.objective.name, 2
+            while name in named:
+                name, again = f"{term.objective.name}-{again}", again + 1
+            named[name] = term.objective.value(measurement)
+        return named

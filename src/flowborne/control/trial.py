@@ -1,0 +1,232 @@
+"""One hypothetical evaluation: copy the world, move the controlled joints, step, measure.
+
+Paper: sections 2.1 and 2.2 (positional change), 2.3 and 3.2 (which velocities are there when the
+objective is read), 3.3 (what is outboard is rigid), 4.3 (settling).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.control import creature
+from flowborne.control.executors import Mapper
+from flowborne.control.measurement import Measurement
+from flowborne.control.objectives import ObjectiveSum
+from flowborne.coupling.motion import Drive
+from flowborne.coupling.report import Outcome, StepReport
+
+if TYPE_CHECKING:
+    from flowborne.coupling.world import World
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Velocities = Literal["removed", "present", "probe"]
+Step = Callable[["World", float, Drive | None], StepReport]
+"""step(world, dt, drive): advances `world` in place and says what it did."""
+
+
+class TrialError(ArithmeticError):
+    """A hypothetical step, or the objective after it, is not a finite number."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """How a pose is tried.
+
+    dt          s, length of a hypothetical step
+    steps       number of steps over which the displacement is spread
+    settle      number of steps in the new pose after that, for the flow to adapt. They also keep
+                what the displacement itself does to the inertia of a turning creature out of the
+                drives' force; take one for the effort of a floating one
+    velocities  what the controlled dofs' velocities are while the objective is read, which is in
+                the last step:
+                "removed"  none: relative velocities are taken out first, momentum kept, and the
+                           fluid sees the pose, not the motion into it (steady state, section 3.1)
+                "present"  those that the dofs have now: the drives' force is what holds them
+                           (effort, eq. 1). In the last steps, at least one, the dofs move on with
+                           them, having started so far behind that they end in the pose tried
+                "probe"    that of the displacement itself, from the start and over all steps; the
+                           other controlled dofs have none (section 3.2). In a fluid the first step
+                           holds the impulse that starts the flow: take two steps or settle
+    raises      ValueError when dt is not positive, steps < 1, settle < 0 or velocities is unknown
+    """
+
+    dt: float
+    steps: int = 1
+    settle: int = 0
+    velocities: Velocities = "removed"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.dt < np.inf:
+            raise ValueError(f"hypothetical step is {self.dt} s: give a positive number of seconds")
+        if self.steps < 1 or self.settle < 0:
+            raise ValueError(
+                f"hypothetical steps are {self.steps} with {self.settle} to settle: "
+                "give at least 1 and at least 0"
+            )
+        if self.velocities not in ("removed", "present", "probe"):
+            raise ValueError(
+                f"velocities is {self.velocities!r}: give 'removed', 'present' or 'probe'"
+            )
+
+    @property
+    def last_steps(self) -> int:
+        """Number of steps after those of the displacement."""
+        return max(self.settle, 1) if self.velocities == "present" else self.settle
+
+    @property
+    def duration(self) -> float:
+        """Time over which the displacement is spread, s."""
+        return self.steps * self.dt
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One evaluation, complete in itself: it may run in any thread or process.
+
+    world         as it is now; only its copy is stepped
+    step          the physics
+    objective     what is measured
+    hypothesis    how the pose is tried
+    dofs          (n,) the controlled dofs
+    pose          (nq,) from which the displacement starts, in the flow of `world`
+    displacement  (n,) rad or m
+    """
+
+    world: World
+    step: Step
+    objective: ObjectiveSum
+    hypothesis: Hypothesis
+    dofs: Integers
+    pose: Array
+    displacement: Array
+
+    def run(self) -> float:
+        """Objective after the hypothetical steps. Raises TrialError when it is not finite."""
+        world = self.world.copy()
+        _, state = creature.parts(world)
+        state.q[:] = self.pose
+        hypothesis = self.hypothesis
+        drive = self._prepare(world)
+        for _ in range(hypothesis.steps):
+            report = self._advance(world, drive)
+        drive.move[self.dofs] = self._pace(drive)
+        for _ in range(hypothesis.last_steps):
+            report = self._advance(world, drive)
+        value = self.objective.value(Measurement(world, report, self.world.time))
+        if not np.isfinite(value):
+            raise TrialError(self._complaint(f"the objective is {value}"))
+        return value
+
+    def _prepare(self, world: World) -> Drive:
+        """Make rigid what is outboard, and give the drive that moves the controlled dofs.
+
+        All that is outboard of any controlled dof is rigid in every trial, so that trials of
+        different dofs, and the one with no displacement, differ in nothing but the displacement.
+        """
+        _, state = creature.parts(world)
+        rigid = creature.outboard(world, self.dofs)
+        hypothesis = self.hypothesis
+        move = self.displacement / hypothesis.duration
+        if hypothesis.velocities == "present":
+            hold = state.v[self.dofs].copy()
+            creature.give_velocity(world, rigid, np.zeros(rigid.size), self.dofs)
+        else:
+            hold = move if hypothesis.velocities == "probe" else np.zeros_like(move)
+            held = np.concatenate([self.dofs, rigid])
+            velocity = np.concatenate([hold, np.zeros(rigid.size)])
+            creature.give_velocity(world, held, velocity, np.zeros(0, np.int64))
+        drive = Drive.none(state.v.size)
+        drive.set(rigid, 0.0, 0.0)
+        drive.set(self.dofs, move, hold)
+        ahead = hypothesis.last_steps * hypothesis.dt * self._pace(drive)
+        drive.move[self.dofs] -= ahead / hypothesis.duration
+        return drive
+
+    def _pace(self, drive: Drive) -> Array:
+        """(n,) velocity of the controlled dofs' positions in the last steps."""
+        hold = drive.hold[self.dofs]
+        return hold if self.hypothesis.velocities == "present" else np.zeros_like(hold)
+
+    def _advance(self, world: World, drive: Drive) -> StepReport:
+        report = self.step(world, self.hypothesis.dt, drive)
+        if report.outcome is Outcome.NOT_FINITE:
+            raise TrialError(self._complaint(report.outcome.value))
+        return report
+
+    def _complaint(self, what: str) -> str:
+        model, _ = creature.parts(self.world)
+        tried = ", ".join(
+            f"{model.dof_names[dof]} by {by:.4g}"
+            for dof, by in zip(self.dofs, self.displacement, strict=True)
+        )
+        return (
+            f"in a hypothetical step of {self.hypothesis.dt:.4g} s that moves {tried} at time "
+            f"{self.world.time:.6g} s, {what}; try a smaller displacement or a shorter step"
+        )
+
+
+def run(trial: Trial) -> float:
+    """Run a trial; a function at module level, so that any executor can take it."""
+    return trial.run()
+
+
+@dataclass(eq=False)
+class Trials:
+    """The objective as a function of the pose, in the flow and time of `world`.
+
+    world, step, objective, hypothesis, dofs, pose  as in `Trial`
+    mapper  runs the trials
+    evaluations  number of trials run so far
+    """
+
+    world: World
+    step: Step
+    objective: ObjectiveSum
+    hypothesis: Hypothesis
+    dofs: Integers
+    pose: Array
+    mapper: Mapper
+    evaluations: int = 0
+
+    @property
+    def count(self) -> int:
+        """n, number of controlled dofs."""
+        return int(self.dofs.size)
+
+    def within_range(self, displacement: Array) -> Array:
+        """(n,) the part of a displacement (n,) that the joints' ranges allow."""
+        model, _ = creature.parts(self.world)
+        return creature.within_range(model, self.pose, self._full(displacement))[self.dofs]
+
+    def moved(self, displacement: Array) -> Array:
+        """(nq,) the pose displaced by (n,)."""
+        model, _ = creature.parts(self.world)
+        return creature.moved(model, self.pose, self._full(displacement))
+
+    def values(self, displacements: Array) -> Array:
+        """(m,) objective in poses displaced by the rows of (m, n). Raises TrialError."""
+        trials = [
+            Trial(
+                self.world,
+                self.step,
+                self.objective,
+                self.hypothesis,
+                self.dofs,
+                self.pose,
+                displacement,
+            )
+            for displacement in displacements
+        ]
+        self.evaluations += len(trials)
+        return np.array(self.mapper.map(run, trials, self.world.setup))
+
+    def _full(self, displacement: Array) -> Array:
+        full = np.zeros(creature.parts(self.world)[0].nv)
+        full[self.dofs] = displacement
+        return full

@@ -1,0 +1,76 @@
+"""Worlds whose objective is known in closed form: real joints, and a step that only moves them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.motion import Drive
+from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.world import Setup, World
+from flowborne.solids.model import SolidModel
+
+ARM = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" type="hinge" axis="0 0 1" range="-1.2 1.2" limited="{limited}"/>
+      <geom name="upper" type="box" size=".5 .1 .1" pos=".5 0 0"/>
+      <body name="lower" pos="1 0 0">
+        <joint name="elbow" type="hinge" axis="0 0 1"/>
+        <geom name="lower" type="box" size=".5 .1 .1" pos=".5 0 0"/>
+        <body name="hand" pos="1 0 0">
+          <joint name="wrist" type="hinge" axis="0 0 1"/>
+          <geom name="hand" type="box" size=".2 .1 .1" pos=".2 0 0"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+BALL = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="arm">
+      <joint name="ball" type="ball" range="0 0.7" limited="{limited}"/>
+      <geom type="box" size=".5 .1 .1" pos=".5 0 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def move_only(world: World, dt: float, drive: Drive | None = None) -> StepReport:
+    """A step in which driven dofs do as told and nothing else happens."""
+    model, state = world.setup.solid, world.solid
+    assert model is not None
+    assert state is not None
+    drive = Drive.none(model.nv) if drive is None else drive
+    state.q[:] = model.integrate(state.q, np.where(drive.prescribed, drive.move, state.v), dt)
+    state.v[:] = np.where(drive.prescribed, drive.hold, state.v)
+    world.time += dt
+    world.steps += 1
+    none = np.zeros((model.nbody, 6))
+    return StepReport(dt, Outcome.DONE, np.zeros(model.nv), none, none, none, none)
+
+
+@pytest.fixture
+def step() -> Callable[[World, float, Drive | None], StepReport]:
+    """The step in which driven dofs do as told and nothing else happens."""
+    return move_only
+
+
+@pytest.fixture
+def make_world() -> Callable[..., World]:
+    """Makes a world of an arm with three hinges, or of one with a ball joint, at rest."""
+
+    def make(*, ball: bool = False, limited: bool = False, **setup: object) -> World:
+        xml = (BALL if ball else ARM).format(limited=str(limited).lower())
+        model = SolidModel.from_string(xml)
+        return World(Setup(model, **setup), solid=model.rest())  # type: ignore[arg-type]
+
+    return make

@@ -1,0 +1,86 @@
+"""Steps down a known slope."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flowborne.control.rules import FixedStep, GoldenSection, descent
+
+
+@dataclass
+class Line:
+    """Poses of a function of n numbers around zero."""
+
+    function: Callable[[np.ndarray], float]
+    count: int = 1
+    evaluations: int = 0
+
+    def within_range(self, displacement: np.ndarray) -> np.ndarray:
+        return displacement
+
+    def values(self, displacements: np.ndarray) -> np.ndarray:
+        self.evaluations += len(displacements)
+        return np.array([self.function(d) for d in displacements])
+
+
+@given(
+    st.lists(st.floats(-1e6, 1e6).filter(lambda g: abs(g) > 1e-9), min_size=1, max_size=5),
+    st.data(),
+)
+def test_longest_descent_that_strength_allows(gradient: list[float], data: st.DataObject) -> None:
+    g = np.array(gradient)
+    limit = np.array(data.draw(st.lists(st.floats(1e-3, 10), min_size=g.size, max_size=g.size)))
+    move = descent(g, limit)
+    assert np.max(np.abs(move) / limit) == pytest.approx(1.0)
+    assert np.all(np.abs(move) <= limit)
+    assert move @ g / (np.linalg.norm(move) * np.linalg.norm(g)) == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("gradient", [1e-300, 1e-8, 3.0, 1e12])
+def test_step_of_one_dof_is_its_strength_however_small_the_gradient(gradient: float) -> None:
+    for sign in (-1.0, 1.0):
+        step = FixedStep().step(Line(lambda d: 0.0), np.array([sign * gradient]), np.array([0.03]))
+        assert step == [-sign * 0.03]
+
+
+@pytest.mark.parametrize("rule", [FixedStep(), GoldenSection()])
+def test_no_gradient_no_step(rule: FixedStep | GoldenSection) -> None:
+    line = Line(lambda d: 0.0, 2)
+    assert not rule.step(line, np.zeros(2), np.ones(2)).any()
+    assert line.evaluations == 0
+
+
+@pytest.mark.parametrize("least", [0.0, 0.013, 0.1234, 0.31, 0.4999, 0.5, 0.9])
+def test_golden_section_brackets_the_least(least: float) -> None:
+    line = Line(lambda d: abs(d[0] + least) ** 1.5)
+    step = GoldenSection(tolerance=0.01).step(line, np.array([1.0]), np.array([0.5]))
+    assert abs(step[0] + min(least, 0.5)) <= 0.01 * 0.5
+    assert line.evaluations <= 4 + np.ceil(np.log(0.01) / np.log(0.618)) + 1
+
+
+def test_golden_section_reaches_farther_than_strength_but_steps_within_it() -> None:
+    line = Line(lambda d: float((d[0] - 0.8) ** 2), 2)
+    gradient, limit = np.array([-1.6, 0.4]), np.array([0.1, 0.1])
+    near = GoldenSection(reach=2.0, tolerance=1e-3).step(line, gradient, limit)
+    assert near == pytest.approx([0.1, -0.025])
+    far = GoldenSection(reach=2.0, tolerance=1e-3).step(line, gradient, 100.0 * limit)
+    assert far == pytest.approx([0.8, -0.2], abs=2e-3)
+
+
+def test_golden_section_never_goes_uphill() -> None:
+    line = Line(lambda d: float(np.cos(40.0 * d[0]) + 3.0 * abs(d[0])))
+    step = GoldenSection().step(line, np.array([1.0]), np.array([0.5]))
+    assert line.function(step) <= line.function(np.zeros(1))
+
+
+def test_bad_searches_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"reach .* is 0"):
+        GoldenSection(reach=0.0)
+    with pytest.raises(ValueError, match=r"tolerance .* is 1"):
+        GoldenSection(tolerance=1.0)

@@ -1,0 +1,171 @@
+"""One hypothetical evaluation: what moves, what holds, what is measured, what is left alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from flowborne.control.executors import Serial
+from flowborne.control.measurement import Measurement
+from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum
+from flowborne.control.phases import PhaseIntervals
+from flowborne.control.trial import Hypothesis, Trial, TrialError, Trials
+from flowborne.coupling.motion import Drive
+from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.world import World
+
+MakeWorld = Callable[..., World]
+Step = Callable[[World, float, Drive | None], StepReport]
+SHOULDER = np.array([0])
+
+
+@dataclass
+class Recorder:
+    """A step that keeps what it was asked and what it left."""
+
+    step: Step
+    drives: list[Drive] = field(default_factory=list)
+    before: list[np.ndarray] = field(default_factory=list)
+    worlds: list[World] = field(default_factory=list)
+
+    def __call__(self, world: World, dt: float, drive: Drive | None = None) -> StepReport:
+        self.drives.append(
+            Drive(drive.prescribed.copy(), drive.move.copy(), drive.hold.copy(), drive.torque_limit)
+        )
+        self.before.append(world.solid.v.copy())
+        report = self.step(world, dt, drive)
+        self.worlds.append(world.copy())
+        return report
+
+
+def angle(measurement: Measurement) -> float:
+    return float(measurement.world.solid.q[0])
+
+
+def trial_of(
+    world: World, step: Step, hypothesis: Hypothesis, dofs: np.ndarray, displacement: list[float]
+) -> Trial:
+    objective = ObjectiveSum.of(ObjectiveCallable(angle))
+    pose = world.solid.q.copy()
+    return Trial(world, step, objective, hypothesis, dofs, pose, np.array(displacement))
+
+
+def test_K7_displacement_is_exact_over_any_number_of_steps(
+    make_world: MakeWorld, step: Step
+) -> None:
+    world = make_world()
+    world.solid.q[:] = [0.3, -0.2, 0.1]
+    for steps, settle in ((1, 0), (3, 0), (4, 5)):
+        recorder = Recorder(step)
+        hypothesis = Hypothesis(0.02, steps, settle)
+        value = trial_of(world, recorder, hypothesis, SHOULDER, [0.17]).run()
+        assert value == pytest.approx(0.47, abs=1e-14)
+        assert len(recorder.worlds) == steps + settle
+        assert recorder.worlds[-1].solid.q == pytest.approx([0.47, -0.2, 0.1], abs=1e-14)
+        assert recorder.worlds[-1].time == pytest.approx(0.02 * (steps + settle))
+
+
+def test_outboard_joints_are_rigid_and_others_free(make_world: MakeWorld, step: Step) -> None:
+    world = make_world()
+    world.solid.v[:] = [0.5, 0.6, 0.7]
+    recorder = Recorder(step)
+    trial_of(world, recorder, Hypothesis(0.1), np.array([1]), [0.2]).run()
+    drive = recorder.drives[0]
+    assert drive.prescribed.tolist() == [False, True, True]
+    assert drive.move == pytest.approx([0.0, 2.0, 0.0])
+    assert np.all(np.isinf(drive.torque_limit))
+
+
+@pytest.mark.parametrize(
+    ("velocities", "shoulder", "elbow"),
+    [("removed", 0.0, 0.0), ("present", 0.5, 0.6), ("probe", 4.0, 0.0)],
+)
+def test_velocities_that_are_held_are_there_from_the_first_step(
+    make_world: MakeWorld, step: Step, velocities: str, shoulder: float, elbow: float
+) -> None:
+    """So no drive's force holds an acceleration of the probe's own."""
+    world = make_world()
+    world.solid.v[:] = [0.5, 0.6, 0.7]
+    recorder = Recorder(step)
+    hypothesis = Hypothesis(0.05, 2, 3, velocities)  # type: ignore[arg-type]
+    trial_of(world, recorder, hypothesis, np.array([0, 1]), [0.4, 0.0]).run()
+    expected = [shoulder, elbow, 0.0]
+    for before, drive in zip(recorder.before, recorder.drives, strict=True):
+        assert drive.hold == pytest.approx(expected, abs=1e-12)
+        assert before == pytest.approx(expected, abs=1e-12)
+    moves = np.array([drive.move[:2] for drive in recorder.drives])
+    last = np.array([shoulder, elbow]) * (velocities == "present")
+    assert moves[2:] == pytest.approx(np.tile(last, (3, 1)), abs=1e-12)
+    assert moves[:2] == pytest.approx(np.tile([4.0, 0.0] - 1.5 * last, (2, 1)), abs=1e-12)
+    assert recorder.worlds[-1].solid.q == pytest.approx([0.4, 0.0, 0.0], abs=1e-12)
+
+
+def test_trial_starts_from_its_pose_and_leaves_the_world_alone(
+    make_world: MakeWorld, step: Step
+) -> None:
+    world = make_world()
+    world.solid.v[:] = 1.0 / 3.0
+    world.memory["target"] = np.array([1.0, 2.0, 3.0])
+    before = {name: values.tobytes() for name, values in world.arrays().items()}
+    trials = Trials(
+        world,
+        step,
+        ObjectiveSum.of(ObjectiveCallable(angle)),
+        Hypothesis(0.1),
+        SHOULDER,
+        np.array([0.5, 0.0, 0.0]),
+        Serial(),
+    )
+    values = trials.values(np.array([[0.1], [-0.2]]))
+    assert values == pytest.approx([0.6, 0.3], abs=1e-14)
+    assert trials.evaluations == 2
+    assert {name: values.tobytes() for name, values in world.arrays().items()} == before
+
+
+def test_phases_are_those_of_the_decision(make_world: MakeWorld, step: Step) -> None:
+    """Not of the hypothetical future, which may already be another phase."""
+    world = make_world()
+    trial = trial_of(world, step, Hypothesis(0.5), SHOULDER, [0.2])
+    early = PhaseIntervals(((0.0, 0.3),))
+    term = ObjectiveSum.of(ObjectiveCallable(angle)).terms[0]
+    phased = ObjectiveSum((type(term)(term.objective, 2.0, early),))
+    value = Trial(
+        world, step, phased, trial.hypothesis, trial.dofs, trial.pose, trial.displacement
+    ).run()
+    assert value == pytest.approx(0.4)
+
+
+def test_blown_up_trial_says_what_was_tried(make_world: MakeWorld, step: Step) -> None:
+    def blow_up(world: World, dt: float, drive: Drive | None = None) -> StepReport:
+        report = step(world, dt, drive)
+        report.outcome = Outcome.NOT_FINITE
+        return report
+
+    trial = trial_of(make_world(), blow_up, Hypothesis(0.1), SHOULDER, [0.25])
+    with pytest.raises(
+        TrialError, match=r"shoulder by 0\.25 at time 0 s, a velocity or a pressure"
+    ):
+        trial.run()
+    nothing = ObjectiveSum.of(ObjectiveCallable(lambda m: np.nan))
+    trial = Trial(
+        make_world(), step, nothing, Hypothesis(0.1), SHOULDER, trial.pose, trial.displacement
+    )
+    with pytest.raises(TrialError, match="the objective is nan"):
+        trial.run()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0.0,), "step is 0.0 s"),
+        ((0.1, 0), "steps are 0"),
+        ((0.1, 1, -1), "-1 to settle"),
+        ((0.1, 1, 0, "kept"), "'kept'"),
+    ],
+)
+def test_bad_hypotheses_are_refused(arguments: tuple, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Hypothesis(*arguments)
