@@ -1,1 +1,1 @@
-"""Scene files: schema, loading, building a world from them, prescribed motions, the built-in scenes."""
+"""Scene files: schema, loading, building a world, prescribed motions, the built-in scenes."""

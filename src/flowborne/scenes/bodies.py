@@ -1,0 +1,97 @@
+"""The bodies of a scene: their model, and the state in which they start."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.motion import Motion
+from flowborne.errors import SceneError
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_solids import MotionConstantTable, MotionSinusoidTable, MotionTable
+from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes, MotionSinusoid
+from flowborne.solids.model import SolidModel
+from flowborne.solids.state import SolidState
+
+Array = NDArray[np.float64]
+
+HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+BALL = int(mujoco.mjtJoint.mjJNT_BALL)
+FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free joint"}
+
+
+def load_model(scene: Scene) -> SolidModel:
+    """The model of a scene. Raises SceneError when its file is missing or MuJoCo refuses it."""
+    path = scene.model_path
+    assert path is not None
+    assert scene.solids is not None
+    if not path.is_file():
+        raise SceneError(f"there is no model file {path}. Correct solids.model.")
+    x, y, z = scene.gravity
+    try:
+        return SolidModel.from_file(
+            path,
+            slab=scene.is_slab,
+            gravity=(x, y, z),
+            density=scene.solids.density,
+            densities=scene.solids.densities,
+        )
+    except ValueError as error:
+        raise SceneError(_sentence(str(error))) from None
+
+
+def _sentence(text: str) -> str:
+    text = " ".join(text.split())
+    return text if text.endswith(".") else f"{text}."
+
+
+def joint_kind(model: SolidModel, joint: str) -> int:
+    """MuJoCo's number of the joint's kind."""
+    return int(model.mj.jnt_type[model.joint(joint)])
+
+
+def joint_unit(model: SolidModel, joint: str) -> float:
+    """What one unit of a scene's number is for a scalar joint: a degree in rad, or 1 m."""
+    return 1.0 if joint_kind(model, joint) == SLIDE else math.pi / 180.0
+
+
+def motion_of(table: MotionTable, model: SolidModel) -> Motion:
+    """A prescribed motion of the scene in radians or metres."""
+    unit = joint_unit(model, table.joint)
+    dofs = model.dofs_of(table.joint)
+    if isinstance(table, MotionConstantTable):
+        return MotionConstant(dofs, unit * table.position, unit * table.rate)
+    if isinstance(table, MotionSinusoidTable):
+        return MotionSinusoid(
+            dofs, unit * table.amplitude, table.period, unit * table.mean, math.radians(table.phase)
+        )
+    return MotionKeyframes(dofs, Curve(table.times, tuple(unit * v for v in table.values)))
+
+
+def initial_state(scene: Scene, model: SolidModel) -> SolidState:
+    """Where the bodies start: the model's own pose, `initial`, and the prescribed motions."""
+    state = model.rest()
+    for joint, values in scene.initial.positions.items():
+        places = model.positions_of(joint)
+        kind = joint_kind(model, joint)
+        if kind in (HINGE, SLIDE):
+            state.q[places] = joint_unit(model, joint) * values[0]
+            continue
+        numbers = np.array(values)
+        numbers[-4:] /= np.linalg.norm(numbers[-4:])
+        state.q[places] = numbers
+    for joint, values in scene.initial.velocities.items():
+        units = np.full(len(values), joint_unit(model, joint))
+        if joint_kind(model, joint) == FREE:
+            units[:3] = 1.0
+        state.v[model.dofs_of(joint)] = units * values
+    for table in scene.motion:
+        motion = motion_of(table, model)
+        state.q[model.positions_of(table.joint)] = motion.position(0.0)
+        state.v[model.dofs_of(table.joint)] = motion.velocity(0.0)
+    return state

@@ -1,0 +1,82 @@
+"""From a scene to the world that it describes and the controller that moves it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.control.controller import Controller
+from flowborne.control.executors import Mapper, Serial
+from flowborne.coupling.world import Setup, World
+from flowborne.fluid.state import FluidState
+from flowborne.scenes.bodies import initial_state, load_model, motion_of
+from flowborne.scenes.build_control import controller_of
+from flowborne.scenes.build_fluid import fluid_of
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_solids import WindFacesTable, WindTable
+from flowborne.solids.model import SolidModel
+from flowborne.solids.wind import Wind, WindFaces, WindForce
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Built:
+    """What a scene describes, ready to be stepped.
+
+    scene            the scene
+    world            its initial state
+    controller       None when no joint is controlled
+    frame_time       s between frames
+    steps_per_frame  physics steps in a frame
+    frames           number of frames
+    """
+
+    scene: Scene
+    world: World
+    controller: Controller | None
+    frame_time: float
+    steps_per_frame: int
+    frames: int
+
+
+def build(scene: Scene, executor: Mapper | None = None) -> Built:
+    """The world and the controller of a scene that `load_scene` gave.
+
+    executor  runs the controller's trials; one after the other when None
+    raises    SceneError when the model file cannot be read
+    """
+    model = SolidModel.empty() if scene.solids is None else load_model(scene)
+    motions = tuple(motion_of(table, model) for table in scene.motion)
+    fluid = fluid_of(scene)
+    setup = Setup(model, fluid, motions, tuple(_wind(table) for table in scene.wind))
+    world = World.at_rest(setup)
+    world.solid = initial_state(scene, model)
+    if world.fluid is not None:
+        _set_velocity(world.fluid, scene)
+    controller = None
+    if scene.control:
+        controller = controller_of(scene, model, motions, executor or Serial())
+    time = scene.time
+    return Built(scene, world, controller, scene.frame_time, time.steps_per_frame, time.frames)
+
+
+def _set_velocity(state: FluidState, scene: Scene) -> None:
+    """The initial velocity on every face, as the velocity and as what carries it."""
+    assert scene.fluid is not None
+    for faces in (state.velocity, state.carrier):
+        for values, component in zip(faces, scene.fluid.velocity, strict=True):
+            values.fill(component)
+
+
+def _wind(table: WindTable) -> Wind:
+    if isinstance(table, WindFacesTable):
+        return WindFaces(_triple(table.velocity), table.density, table.bodies)
+    return WindForce(_triple(table.force), table.bodies)
+
+
+def _triple(vector: tuple[float, ...]) -> tuple[float, float, float]:
+    x, y, z = vector
+    return x, y, z

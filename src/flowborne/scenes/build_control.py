@@ -1,0 +1,169 @@
+"""The controller of a scene: dofs, objectives, gradient, rule, servo."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.control.controller import Controller
+from flowborne.control.executors import Mapper
+from flowborne.control.gradients import Gradient, GradientCentral, GradientOneSided
+from flowborne.control.objectives import (
+    Objective,
+    ObjectiveCallable,
+    ObjectiveEffort,
+    ObjectiveInputMotion,
+    ObjectivePressureDrag,
+    ObjectiveSum,
+    ObjectiveVelocity,
+    ObjectiveWindDrag,
+    WeightedObjective,
+)
+from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseTrack
+from flowborne.control.rules import FixedStep, GoldenSection, Rule
+from flowborne.control.servo import Servo, ServoExact, ServoPD
+from flowborne.control.trial import Hypothesis
+from flowborne.coupling.motion import Motion
+from flowborne.scenes import schema_control as tables
+from flowborne.scenes.bodies import joint_unit
+from flowborne.scenes.python_function import find_function
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes
+from flowborne.solids.model import SolidModel
+
+Integers = NDArray[np.int64]
+
+
+def controller_of(
+    scene: Scene, model: SolidModel, motions: tuple[Motion, ...], executor: Mapper
+) -> Controller:
+    """The controller that the scene's tables describe.
+
+    motions   the scene's prescribed motions, in its order
+    executor  runs the trials
+    """
+    dofs: list[int] = []
+    strength: list[float] = []
+    probe: list[float] = []
+    limit: list[float] = []
+    for table in scene.control:
+        for joint in table.joints:
+            unit = joint_unit(model, joint)
+            for dof in _free_dofs(model, joint):
+                dofs.append(dof)
+                strength.append(unit * table.strength)
+                probe.append(unit * table.probe)
+                limit.append(math.inf if table.torque_limit is None else table.torque_limit)
+    how = scene.controller
+    return Controller(
+        np.array(dofs, dtype=np.int64),
+        ObjectiveSum(tuple(_weighted(o, scene, model, motions) for o in scene.objectives)),
+        Hypothesis(
+            scene.frame_time if how.hypothetical_time is None else how.hypothetical_time,
+            how.hypothetical_steps,
+            how.settle_steps,
+            how.velocities,
+        ),
+        tuple(strength),
+        gradient=_gradient(how.gradient, tuple(probe)),
+        rule=_rule(how.rule, scene, model),
+        every=how.every,
+        iterations=how.iterations,
+        servo=_servo(how.servo, tuple(limit)),
+        executor=executor,
+    )
+
+
+def _free_dofs(model: SolidModel, joint: str) -> list[int]:
+    """Dofs of a joint that a slab does not lock."""
+    return [int(dof) for dof in model.dofs_of(joint) if not model.locked[dof]]
+
+
+def _dofs_of(model: SolidModel, joints: tuple[str, ...]) -> Integers:
+    return np.array([dof for joint in joints for dof in _free_dofs(model, joint)], dtype=np.int64)
+
+
+def _gradient(kind: str, probe: tuple[float, ...]) -> Gradient:
+    return GradientCentral(probe) if kind == "central" else GradientOneSided(probe)
+
+
+def _rule(
+    table: tables.RuleFixed | tables.RuleGoldenSection, scene: Scene, model: SolidModel
+) -> Rule:
+    if isinstance(table, tables.RuleFixed):
+        return FixedStep()
+    unit = joint_unit(model, scene.controlled_joints()[0])
+    reach = None if table.reach is None else unit * table.reach
+    return GoldenSection(reach, table.tolerance)
+
+
+def _servo(table: tables.ServoExact | tables.ServoPD, limit: tuple[float, ...]) -> Servo:
+    if isinstance(table, tables.ServoExact):
+        return ServoExact(limit)
+    return ServoPD(2.0 * math.pi * table.frequency, limit)
+
+
+def _weighted(
+    table: tables.AnyObjective, scene: Scene, model: SolidModel, motions: tuple[Motion, ...]
+) -> WeightedObjective:
+    sign = 1.0 if table.goal == "least" else -1.0
+    return WeightedObjective(
+        _objective(table, scene, model),
+        sign * table.weight,
+        _phases(table.phases, scene, model, motions),
+    )
+
+
+def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> Objective:
+    if isinstance(table, tables.ObjectiveEffortTable):
+        joints = table.joints if table.joints is not None else scene.controlled_joints()
+        return ObjectiveEffort(_dofs_of(model, joints))
+    if isinstance(table, tables.ObjectiveWindDragTable):
+        return ObjectiveWindDrag(_bodies(model, table.bodies), _triple(table.direction))
+    if isinstance(table, tables.ObjectivePressureTable):
+        frame = None if table.frame is None else model.body(table.frame)
+        bodies = _bodies(model, table.bodies)
+        return ObjectivePressureDrag(bodies, _triple(table.direction), frame, table.kind)
+    if isinstance(table, tables.ObjectiveInputMotionTable):
+        return ObjectiveInputMotion(_dofs_of(model, (table.joint,)), _reference(table, model))
+    if isinstance(table, tables.ObjectiveVelocityTable):
+        return ObjectiveVelocity(model.body(table.body), _triple(table.target))
+    return ObjectiveCallable(find_function(table.function), table.function)
+
+
+def _reference(table: tables.ObjectiveInputMotionTable, model: SolidModel) -> Motion:
+    unit, dofs = joint_unit(model, table.joint), model.dofs_of(table.joint)
+    values = tuple(unit * value for value in table.values)
+    if len(values) == 1:
+        return MotionConstant(dofs, values[0])
+    return MotionKeyframes(dofs, Curve(table.times, values))
+
+
+def _bodies(model: SolidModel, names: tuple[str, ...] | None) -> Integers:
+    """Numbers of the named bodies, or of all that can move."""
+    if names is None:
+        return np.flatnonzero(model.moves.any(axis=1)).astype(np.int64)
+    return np.array([model.body(name) for name in names], dtype=np.int64)
+
+
+def _phases(
+    table: tables.PhaseIntervalsTable | tables.PhaseMotionTable | None,
+    scene: Scene,
+    model: SolidModel,
+    motions: tuple[Motion, ...],
+) -> Phases:
+    if table is None:
+        return PhaseAlways()
+    if isinstance(table, tables.PhaseIntervalsTable):
+        return PhaseIntervals(table.intervals, table.period)
+    index = [motion.joint for motion in scene.motion].index(table.joint)
+    sign = 1 if table.side == "above" else -1
+    threshold = joint_unit(model, table.joint) * table.threshold
+    return PhaseTrack(motions[index], table.quantity, sign, threshold)
+
+
+def _triple(vector: tuple[float, ...]) -> tuple[float, float, float]:
+    x, y, z = vector
+    return x, y, z

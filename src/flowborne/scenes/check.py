@@ -1,0 +1,22 @@
+"""All checks that hold the tables of a scene against each other and against its model."""
+
+from __future__ import annotations
+
+from flowborne.errors import SceneError
+from flowborne.scenes.bodies import load_model
+from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
+from flowborne.scenes.check_control import check_control
+from flowborne.scenes.check_fluid import check_dimensions, check_fluid
+from flowborne.scenes.draft import Draft
+
+
+def cross_check(draft: Draft) -> list[str]:
+    """Everything that is wrong with a scene that the schema accepts."""
+    problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
+    if draft.scene.solids is None or not draft.sound("dimensions", "gravity"):
+        return problems
+    try:
+        model = load_model(draft.scene)
+    except SceneError as error:
+        return problems + [f"{draft.at('solids')}: {problem}" for problem in error.problems]
+    return [*problems, *check_bodies(draft, model), *check_control(draft, model)]

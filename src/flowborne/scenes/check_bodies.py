@@ -1,0 +1,176 @@
+"""Contradictions between a scene and its model: names, initial state, motions, winds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from flowborne.scenes.bodies import (
+    BALL,
+    FREE,
+    HINGE,
+    JOINT_KINDS,
+    SLIDE,
+    initial_state,
+    joint_kind,
+    joint_unit,
+)
+from flowborne.scenes.draft import Draft
+from flowborne.scenes.wording import Key, suggestion
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.model import SolidModel
+
+NEEDS_BODIES = ("initial", "motion", "wind", "control", "objectives", "controller")
+
+
+def check_without_bodies(draft: Draft) -> Iterator[str]:
+    """Tables that speak of bodies need bodies."""
+    if draft.scene.solids is not None or not draft.sound("solids"):
+        return
+    for table in NEEDS_BODIES:
+        if draft.gives(table):
+            yield (
+                f"{draft.at(table)}: there are no bodies. "
+                "Add [solids] with a model, or drop this table."
+            )
+
+
+def unknown_joint(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> list[str]:
+    """The problem when `joint` is not in the model."""
+    return _unknown(draft, joint, model.joint_names, "joint", "Its joints are", keys)
+
+
+def unknown_body(draft: Draft, model: SolidModel, body: str, *keys: Key) -> list[str]:
+    """The problem when `body` is not in the model."""
+    return _unknown(draft, body, model.body_names, "body", "Its bodies are", keys)
+
+
+def _unknown(
+    draft: Draft, name: str, known: Iterable[str], what: str, listed: str, keys: tuple[Key, ...]
+) -> list[str]:
+    if name in known:
+        return []
+    assert draft.scene.model_path is not None
+    end = suggestion(name, known, listed)
+    file = draft.scene.model_path.name
+    return [f"{draft.at(*keys)}: {what} '{name}' is not in model {file}{end}"]
+
+
+def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
+    """Names, initial state, motions and winds against the model."""
+    scene = draft.scene
+    assert scene.solids is not None
+    named = []
+    for body in scene.solids.densities:
+        named += unknown_body(draft, model, body, "solids", "densities")
+    for index, wind in enumerate(scene.wind):
+        for body in wind.bodies or ():
+            named += unknown_body(draft, model, body, "wind", index)
+    yield from named
+    state = [*_check_initial(draft, model), *_check_motions(draft, model)]
+    yield from state
+    if not state and draft.sound("initial", "motion"):
+        yield from _check_ranges(draft, model)
+        yield from _check_places(draft, model)
+
+
+def _check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
+    initial = draft.scene.initial
+    moved = {table.joint for table in draft.scene.motion}
+    for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
+        for joint, numbers in values.items():
+            where = draft.at("initial", key)
+            unknown = unknown_joint(draft, model, joint, "initial", key)
+            yield from unknown
+            if unknown:
+                continue
+            kind = joint_kind(model, joint)
+            places = model.positions_of(joint) if key == "positions" else model.dofs_of(joint)
+            if len(numbers) != len(places):
+                yield (
+                    f"{where}: joint '{joint}' is a {JOINT_KINDS[kind]} and has {len(numbers)} "
+                    f"numbers. Give {len(places)}."
+                )
+            elif joint in moved:
+                yield (
+                    f"{where}: joint '{joint}' has a [[motion]], which says where it starts. "
+                    "Drop one of them."
+                )
+            elif key == "positions" and kind in (BALL, FREE) and not any(numbers[-4:]):
+                yield f"{where}: the quaternion of joint '{joint}' is 0. Give (1, 0, 0, 0) or so."
+
+
+def _check_motions(draft: Draft, model: SolidModel) -> Iterator[str]:
+    seen: set[str] = set()
+    for index, table in enumerate(draft.scene.motion):
+        unknown = unknown_joint(draft, model, table.joint, "motion", index)
+        yield from unknown
+        where = draft.at("motion", index)
+        if table.joint in seen:
+            yield f"{where}: joint '{table.joint}' has another [[motion]] above. Keep one of them."
+        seen.add(table.joint)
+        if unknown:
+            continue
+        kind = joint_kind(model, table.joint)
+        if kind not in (HINGE, SLIDE):
+            yield (
+                f"{where}: joint '{table.joint}' is a {JOINT_KINDS[kind]}, and only hinges and "
+                "slides follow a motion. Replace it by hinges in the model."
+            )
+        yield from out_of_plane(draft, model, table.joint, "motion", index)
+
+
+def out_of_plane(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> Iterator[str]:
+    """The problem when a joint of a slab has no motion within the plane."""
+    if model.locked[model.dofs_of(joint)].all():
+        yield (
+            f"{draft.at(*keys)}: joint '{joint}' moves out of the plane of a scene of 2 "
+            "dimensions. Turn its axis, or choose another joint."
+        )
+
+
+def _check_ranges(draft: Draft, model: SolidModel) -> Iterator[str]:
+    state = initial_state(draft.scene, model)
+    for joint in model.joint_names:
+        kind = joint_kind(model, joint)
+        if kind not in (HINGE, SLIDE):
+            continue
+        dof = model.dofs_of(joint)[0]
+        low, high = model.dof_range[dof]
+        here = state.q[model.dof_position[dof]]
+        if not low - 1e-9 <= here <= high + 1e-9:
+            unit, mark = joint_unit(model, joint), " degrees" if kind == HINGE else " m"
+            yield (
+                f"{draft.at('initial')}: joint '{joint}' starts at {here / unit:g}{mark}, outside "
+                f"its range from {low / unit:g} to {high / unit:g}{mark}. Start it within."
+            )
+
+
+def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
+    """No body may start outside the domain; a fixed one may reach out of it."""
+    domain = draft.scene.domain
+    if domain is None or not draft.sound("domain", "solids"):
+        return
+    pose = kinematics(model, initial_state(draft.scene, model).q)
+    axes = min(len(domain.lower), draft.scene.dimensions)
+    reach = model.mj.geom_aabb[model.geom_id]
+    outside: set[int] = set()
+    for geom in range(model.ngeom):
+        rotation = pose.geom_rotation[geom]
+        centre = pose.geom_position[geom] + rotation @ reach[geom, :3]
+        half = np.abs(rotation) @ reach[geom, 3:]
+        body = int(model.geom_body[geom])
+        fixed = model.moves[body].any() == np.False_
+        for axis in range(axes):
+            low, high = centre[axis] - half[axis], centre[axis] + half[axis]
+            first, last = domain.lower[axis], domain.upper[axis]
+            gone = (high <= first or low >= last) if fixed else (low < first or high > last)
+            if gone and body not in outside and math.isfinite(low):
+                outside.add(body)
+                yield (
+                    f"{draft.at('domain')}: body '{model.body_names[body]}' reaches from {low:g} "
+                    f"to {high:g} m in {'xyz'[axis]} at the start, outside the domain from "
+                    f"{first:g} to {last:g} m. Move the body or enlarge the domain."
+                )

@@ -1,0 +1,121 @@
+"""Contradictions between the controller's tables, the model and the rest of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from flowborne.errors import SceneError
+from flowborne.scenes.bodies import FREE, HINGE, JOINT_KINDS, SLIDE, joint_kind
+from flowborne.scenes.check_bodies import out_of_plane, unknown_body, unknown_joint
+from flowborne.scenes.draft import Draft
+from flowborne.scenes.python_function import find_function
+from flowborne.scenes.schema_control import (
+    ObjectiveEffortTable,
+    ObjectiveInputMotionTable,
+    ObjectivePressureTable,
+    ObjectivePythonTable,
+    ObjectiveVelocityTable,
+    ObjectiveWindDragTable,
+    PhaseMotionTable,
+)
+from flowborne.solids.model import SolidModel
+
+
+def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
+    """Controlled joints and objectives against the model."""
+    scene = draft.scene
+    yield from _check_joints(draft, model)
+    if scene.control and not scene.objectives and draft.sound("objectives"):
+        yield (
+            f"{draft.at('control', 0)}: joints are controlled, but nothing is wanted of them. "
+            "Add [[objectives]], or drop [[control]]."
+        )
+    if scene.objectives and not scene.control and draft.sound("control"):
+        yield (
+            f"{draft.at('objectives', 0)}: something is wanted, but no joint is controlled. "
+            "Add [[control]], or drop [[objectives]]."
+        )
+    for index in range(len(scene.objectives)):
+        yield from _check_objective(draft, model, index)
+
+
+def _check_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
+    scene = draft.scene
+    moved = {table.joint for table in scene.motion}
+    seen: set[str] = set()
+    for index, table in enumerate(scene.control):
+        where = draft.at("control", index)
+        for joint in table.joints:
+            unknown = unknown_joint(draft, model, joint, "control", index)
+            yield from unknown
+            if joint in seen:
+                yield f"{where}: joint '{joint}' is controlled twice. Name it once."
+            seen.add(joint)
+            if joint in moved:
+                yield (
+                    f"{where}: joint '{joint}' has a [[motion]] as well. "
+                    "Take it out of one of the two."
+                )
+            if unknown:
+                continue
+            if joint_kind(model, joint) == FREE:
+                yield (
+                    f"{where}: joint '{joint}' is a free joint, and only hinges, slides and ball "
+                    "joints have strength. Choose another joint."
+                )
+            else:
+                yield from out_of_plane(draft, model, joint, "control", index)
+
+
+def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[str]:
+    scene, table = draft.scene, draft.scene.objectives[index]
+    where = draft.at("objectives", index)
+    driven = {*scene.controlled_joints(), *(motion.joint for motion in scene.motion)}
+    whole = draft.sound("control", "motion")
+    if isinstance(table, ObjectiveEffortTable):
+        for joint in table.joints or ():
+            unknown = unknown_joint(draft, model, joint, "objectives", index)
+            yield from unknown
+            if not unknown and joint not in driven and whole:
+                yield (
+                    f"{where}: joint '{joint}' makes no effort, being free. "
+                    "Name joints of [[control]] or [[motion]]."
+                )
+    if isinstance(table, ObjectiveWindDragTable | ObjectivePressureTable):
+        for body in table.bodies or ():
+            yield from unknown_body(draft, model, body, "objectives", index)
+        if not any(table.direction):
+            yield f"{where}: direction is 0. Give a direction such as [1.0, 0.0, 0.0]."
+    if isinstance(table, ObjectiveWindDragTable) and not scene.wind and draft.sound("wind"):
+        yield f"{where}: there is no wind to drag. Add a [[wind]], or use 'pressure-drag'."
+    if isinstance(table, ObjectivePressureTable):
+        if scene.domain is None and draft.sound("domain"):
+            yield f"{where}: there is no fluid to press. Add a [domain], or use 'wind-drag'."
+        if table.frame is not None:
+            yield from unknown_body(draft, model, table.frame, "objectives", index, "frame")
+    if isinstance(table, ObjectiveInputMotionTable):
+        unknown = unknown_joint(draft, model, table.joint, "objectives", index)
+        yield from unknown
+        if not unknown and joint_kind(model, table.joint) not in (HINGE, SLIDE):
+            kind = JOINT_KINDS[joint_kind(model, table.joint)]
+            yield f"{where}: joint '{table.joint}' is a {kind}. Name a hinge or a slide."
+        if not unknown and table.joint not in scene.controlled_joints() and whole:
+            yield (
+                f"{where}: joint '{table.joint}' is not controlled. "
+                "Add it to [[control]], or drop the objective."
+            )
+    if isinstance(table, ObjectiveVelocityTable):
+        yield from unknown_body(draft, model, table.body, "objectives", index)
+    if isinstance(table, ObjectivePythonTable):
+        try:
+            find_function(table.function)
+        except SceneError as error:
+            yield f"{where}: {error}"
+    phases = table.phases
+    if isinstance(phases, PhaseMotionTable) and draft.sound("motion"):
+        followed = {motion.joint for motion in scene.motion}
+        if phases.joint not in followed:
+            yield (
+                f"{where}, phases: joint '{phases.joint}' has no [[motion]] to follow. "
+                "Add one, or give phases as intervals."
+            )

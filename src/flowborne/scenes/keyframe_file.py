@@ -1,0 +1,77 @@
+"""Keyframes that a scene takes from a CSV file.
+
+The first row names the columns; one is `time` (s), the others are joint positions in degrees or m.
+A motion takes the column with its joint's name, or the one that `column` names. Reading puts the
+numbers into the scene, so that a written scene needs the CSV file no more.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from flowborne.errors import SceneError
+from flowborne.scenes.wording import place, suggestion
+
+
+def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
+    """Replace `file` and `column` of every [[motion]] of `raw` by times and values.
+
+    A motion whose file cannot be read gets a table that is beyond reproach, so that the rest of
+    the scene can be checked. returns the problems
+    """
+    problems = []
+    motions = raw.get("motion")
+    for index, motion in enumerate(motions if isinstance(motions, list) else []):
+        if (
+            not isinstance(motion, dict)
+            or "file" not in motion
+            or motion.get("kind") != "keyframes"
+        ):
+            continue
+        where = place(file, ("motion", index))
+        path, column = motion.pop("file"), motion.pop("column", motion.get("joint"))
+        try:
+            if {"times", "values"} & motion.keys():
+                raise SceneError(f"{where} has both a file and a table. Keep one of them.")
+            if not (isinstance(path, str) and isinstance(column, str)):
+                raise SceneError(f"{where}: file and column are names. Put them in quotes.")
+            motion["times"], motion["values"] = read_columns(folder / path, column, where)
+        except SceneError as error:
+            problems += error.problems
+            motion["times"], motion["values"] = [0.0, 1.0], [0.0, 0.0]
+    return problems
+
+
+def read_columns(path: Path, column: str, where: str) -> tuple[list[float], list[float]]:
+    """Columns `time` and `column` of a CSV file. Raises SceneError with the file's line."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(stream)]
+    except FileNotFoundError:
+        raise SceneError(f"{where}: there is no file {path}. Correct the name.") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise SceneError(f"{where}: {path} cannot be read ({error}). Give a CSV file.") from None
+    header = rows[0] if rows else []
+    places = []
+    for name in ("time", column):
+        if name not in header:
+            end = suggestion(name, [h for h in header if h != "time"], "Its first row has")
+            raise SceneError(f"{where}: {path.name} has no column '{name}'{end}")
+        places.append(header.index(name))
+    times: list[float] = []
+    values: list[float] = []
+    for line, row in enumerate(rows[1:], start=2):
+        if not any(row):
+            continue
+        for target, index in zip((times, values), places, strict=True):
+            cell = row[index] if index < len(row) else ""
+            try:
+                target.append(float(cell))
+            except ValueError:
+                raise SceneError(
+                    f"{where}: {path.name}, line {line}, column '{header[index]}': "
+                    f"'{cell}' is not a number. Give a number."
+                ) from None
+    return times, values

@@ -1,0 +1,211 @@
+"""From a name or a path to a checked scene."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from flowborne.errors import SceneError
+from flowborne.scenes.check import cross_check
+from flowborne.scenes.draft import Draft
+from flowborne.scenes.keyframe_file import inline_keyframes
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.wording import explain, keys_of, suggestion
+
+BUILT_IN = (
+    "block-effort-wind",
+    "block-effort-weak-wind",
+    "block-drag-min",
+    "block-drag-max",
+    "block-drag-min-moving",
+    "block-drag-max-moving",
+    "ns-block-effort",
+    "ns-block-drag-min",
+    "ns-block-drag-max",
+    "ns-chain-1",
+    "ns-chain-2",
+    "ns-chain-3",
+    "ns-chain-4",
+)
+
+
+def library() -> Path:
+    """The folder of the built-in scenes."""
+    return Path(str(resources.files("flowborne.scenes") / "library"))
+
+
+def scene_names() -> tuple[str, ...]:
+    """Names of the built-in scenes, in the order of the paper's figures."""
+    return BUILT_IN
+
+
+def load_scene(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> Scene:
+    """The scene of a built-in name or of a TOML file, checked whole.
+
+    overrides  dotted key -> TOML text of its new value; list entries count from 0:
+               {"domain.resolution": "64", "control.0.strength": "30"}
+    raises     SceneError with every problem there is
+    """
+    scene, problems = _examine(name_or_path, overrides)
+    if scene is None or problems:
+        raise SceneError(problems)
+    return scene
+
+
+def check_scene(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> list[str]:
+    """Everything that is wrong with a scene; an empty list when it is fine."""
+    return _examine(name_or_path, overrides)[1]
+
+
+def _examine(
+    name_or_path: str | Path, overrides: Mapping[str, str] | None
+) -> tuple[Scene | None, list[str]]:
+    try:
+        path = find(name_or_path)
+        raw = _read(path)
+        for key, text in (overrides or {}).items():
+            override(raw, key, text)
+    except SceneError as error:
+        return None, error.problems
+    raw.setdefault("name", path.stem)
+    problems = inline_keyframes(raw, path.parent, path.name)
+    draft, more = _validate(raw, path)
+    problems += more
+    if draft is None:
+        return None, problems
+    return draft.scene, problems + cross_check(draft)
+
+
+def find(name_or_path: str | Path) -> Path:
+    """The file of a built-in name or a path. Raises SceneError when there is none."""
+    text = str(name_or_path)
+    if text in BUILT_IN:
+        return library() / f"{text}.toml"
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise SceneError(f"scene {text} is a folder. Give the TOML file in it.")
+    if path.suffix == ".toml" or path.parent != Path():
+        raise SceneError(f"there is no scene file {text}. Correct the path.")
+    end = suggestion(text, BUILT_IN, "Give a TOML file or one of")
+    raise SceneError(f"there is no scene '{text}'{end}")
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise SceneError(f"scene {path} cannot be read: {error.strerror}. Mend that.") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"scene {path.name}: byte {error.start + 1} is not UTF-8 text. Save it as UTF-8."
+        ) from None
+    except tomllib.TOMLDecodeError as error:
+        text = str(error)
+        found = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", text)
+        what, line, column = found.groups() if found else (text, None, None)
+        where = f", line {line}, column {column}" if line else ", at its end" if found else ""
+        raise SceneError(
+            f"scene {path.name}{where}: this is not TOML ({what[:1].lower() + what[1:]}). "
+            "Correct it there."
+        ) from None
+
+
+def override(raw: dict[str, Any], key: str, text: str) -> None:
+    """Set one value of a scene file as read; text that is no TOML value is taken as text.
+
+    A table that is missing on the way is made; the schema finds keys that are unknown.
+    raises  SceneError when the way leads nowhere
+    """
+    steps = key.split(".")
+    if not all(steps):
+        raise SceneError(f"--set {key}={text}: '{key}' is no key. Write it as table.key=value.")
+    value: Any = raw
+    for depth, step in enumerate(steps):
+        so_far = ".".join(steps[:depth])
+        last = depth == len(steps) - 1
+        if isinstance(value, list):
+            if not step.isdecimal() or int(step) >= len(value):
+                raise SceneError(
+                    f"--set {key}={text}: '{step}' is not an entry of {so_far}, which has "
+                    f"{len(value)}. Count its entries from 0."
+                )
+            index: Any = int(step)
+        elif isinstance(value, dict):
+            index = step
+        else:
+            raise SceneError(
+                f"--set {key}={text}: {so_far} is {value!r} and has no keys. Shorten the key."
+            )
+        if last:
+            value[index] = _value_of(text)
+            return
+        if isinstance(value, dict):
+            value.setdefault(index, {})
+        if isinstance(value[index], str):
+            value[index] = {"kind": value[index]}
+        value = value[index]
+
+
+def _value_of(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _validate(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str]]:
+    """The scene as far as it can be understood, and what cannot.
+
+    What is wrong is taken out of a copy of `raw`, so that the rest is checked as well.
+    """
+    sound = copy.deepcopy(raw)
+    numbers = {
+        key: list(range(1, len(value) + 1)) for key, value in raw.items() if isinstance(value, list)
+    }
+    try:
+        scene = Scene.model_validate(sound)
+        return Draft(scene.in_folder(path.parent), path.name, frozenset(), numbers), []
+    except ValidationError as error:
+        errors = error.errors()
+    problems = list(dict.fromkeys(explain(one, raw, path.name) for one in errors))
+    broken: set[str] = set()
+    doomed: set[tuple[str, int]] = set()
+    for one in errors:
+        keys = keys_of(one["loc"], raw)
+        top = str(keys[0])
+        if one["type"] == "extra_forbidden":
+            _remove(sound, keys)
+        elif len(keys) > 1 and isinstance(keys[1], int) and top in numbers:
+            broken.add(top)
+            doomed.add((top, keys[1]))
+        else:
+            broken.add(top)
+            sound.pop(top, None)
+    for top, index in sorted(doomed, reverse=True):
+        if isinstance(sound.get(top), list):
+            del sound[top][index], numbers[top][index]
+    sound.setdefault("name", path.stem)
+    try:
+        scene = Scene.model_validate(sound)
+    except ValidationError:
+        return None, problems
+    return Draft(scene.in_folder(path.parent), path.name, frozenset(broken), numbers), problems
+
+
+def _remove(raw: Any, keys: tuple[str | int, ...]) -> None:
+    """Take a key out of nested tables, unless the table around it is gone already."""
+    for key in keys[:-1]:
+        if isinstance(raw, dict) and key not in raw:
+            return
+        raw = raw[key]
+    if isinstance(raw, dict):
+        raw.pop(keys[-1], None)

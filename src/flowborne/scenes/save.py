@@ -1,0 +1,115 @@
+"""Writing a scene so that it stands on its own: TOML, model, and what the model needs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from flowborne.errors import SceneError
+from flowborne.scenes.schema import Scene
+
+SCENE_FILE = "scene.toml"
+ASSETS = "assets"
+FOLDER_KEYS = {
+    "mesh": ("meshdir", "assetdir"),
+    "hfield": ("assetdir",),
+    "skin": ("assetdir",),
+    "texture": ("texturedir", "assetdir"),
+}
+"""Element that names a file -> compiler attributes that say where its folder is, first wins."""
+
+
+def save_scene(scene: Scene, folder: Path) -> Path:
+    """Write `scene_files` into `folder`, which is made when it is missing.
+
+    returns  the scene file; `load_scene` makes an identical scene of it
+    """
+    for name, content in scene_files(scene).items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return folder / SCENE_FILE
+
+
+def scene_files(scene: Scene) -> dict[str, bytes]:
+    """Everything that the scene is made of: name in its new folder -> content.
+
+    The model keeps its file name; included models and meshes go to a folder `assets`.
+    raises  SceneError when a file of the model is missing
+    """
+    files: dict[str, bytes] = {}
+    model = scene.model_path
+    if model is not None:
+        assert scene.solids is not None
+        files = _model_files(model)
+        solids = scene.solids.model_copy(update={"model": model.name})
+        scene = scene.model_copy(update={"solids": solids})
+    return {SCENE_FILE: scene.to_toml().encode()} | files
+
+
+def _model_files(model: Path) -> dict[str, bytes]:
+    """The model and what it names. A model that names no file is copied as it is."""
+    folders = _folders(model, model.parent)
+    taken: dict[Path, str] = {}
+    files: dict[str, bytes] = {}
+    _add_mjcf(model, model.name, model.parent, folders, taken, files)
+    return files
+
+
+def _add_mjcf(
+    path: Path,
+    name: str,
+    main_folder: Path,
+    folders: dict[str, str],
+    taken: dict[Path, str],
+    files: dict[str, bytes],
+) -> None:
+    """Add an MJCF file under `name`, with its references turned to the copies."""
+    text = _read(path)
+    root = ElementTree.fromstring(text)
+    changed = False
+    for element in root.iter():
+        if element.tag == "compiler":
+            for key in ("meshdir", "texturedir", "assetdir"):
+                changed |= element.attrib.pop(key, None) is not None
+        for key in [k for k in element.attrib if k.startswith("file") and element.attrib[k]]:
+            given = element.attrib[key]
+            if element.tag == "include":
+                source = main_folder / given
+            else:
+                source = main_folder / folders.get(element.tag, "") / given
+            source = source.resolve()
+            if source not in taken:
+                taken[source] = f"{ASSETS}/{len(taken)}-{source.name}"
+                if element.tag == "include":
+                    _add_mjcf(source, taken[source], main_folder, folders, taken, files)
+                else:
+                    files[taken[source]] = _read(source)
+            element.attrib[key] = taken[source]
+            changed = True
+    files[name] = ElementTree.tostring(root, encoding="utf-8") if changed else text
+
+
+def _folders(path: Path, main_folder: Path) -> dict[str, str]:
+    """Element -> folder in which its files are, as the compiler elements of a model say."""
+    given: dict[str, str] = {}
+    pending = [path]
+    while pending:
+        for element in ElementTree.fromstring(_read(pending.pop())).iter():
+            if element.tag == "compiler":
+                given |= element.attrib
+            elif element.tag == "include" and "file" in element.attrib:
+                pending.append(main_folder / element.attrib["file"])
+    return {
+        tag: next((given[key] for key in keys if key in given), "")
+        for tag, keys in FOLDER_KEYS.items()
+    }
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SceneError(
+            f"model file {path} cannot be read: {error.strerror}. Put it there."
+        ) from None

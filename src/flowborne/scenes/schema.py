@@ -1,0 +1,140 @@
+"""A scene: everything that a run needs to know, as its TOML file says it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import tomli_w
+from pydantic import PrivateAttr, model_validator
+
+from flowborne.scenes.fields import Count, Positive, Table, Text, Vector, filled
+from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
+from flowborne.scenes.schema_fluid import (
+    BoundariesTable,
+    Domain,
+    DyeTable,
+    FluidTable,
+    InflowSide,
+    SourceTable,
+)
+from flowborne.scenes.schema_solids import (
+    InitialTable,
+    MotionTable,
+    SolidsTable,
+    WindFacesTable,
+    WindForceTable,
+    WindTable,
+)
+
+
+class TimeTable(Table):
+    """[time]: frames, and physics steps within each."""
+
+    frames_per_second: Positive = 24.0
+    frames: Count = 120
+    steps_per_frame: Count = 1
+
+
+class OutputTable(Table):
+    """[output]: what a run leaves behind.
+
+    checkpoint_every  frames between checkpoints
+    picture           what the fluid shows in pictures and films
+    """
+
+    checkpoint_every: Count = 24
+    picture: Literal["dye", "vorticity", "none"] = "vorticity"
+
+
+class Scene(Table):
+    """A scene, checked and with every default filled in.
+
+    name         as in the file, or the file's own name
+    description  one line that says what is seen
+    figure       the paper's figure or section that it shows
+    dimensions   2: a slab one cell thick, everything per unit depth; 3
+    gravity      m/s^2
+    """
+
+    name: Text
+    description: str = ""
+    figure: str = ""
+    dimensions: Literal[2, 3] = 3
+    gravity: Vector = (0.0, 0.0, 0.0)
+    time: TimeTable = TimeTable()
+    domain: Domain | None = None
+    fluid: FluidTable | None = None
+    boundaries: BoundariesTable | None = None
+    sources: tuple[SourceTable, ...] = ()
+    dye: tuple[DyeTable, ...] = ()
+    solids: SolidsTable | None = None
+    initial: InitialTable = InitialTable()
+    motion: tuple[MotionTable, ...] = ()
+    wind: tuple[WindTable, ...] = ()
+    control: tuple[ControlTable, ...] = ()
+    objectives: tuple[AnyObjective, ...] = ()
+    controller: ControllerTable = ControllerTable()
+    output: OutputTable = OutputTable()
+
+    _folder: Path = PrivateAttr(default=Path())
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_what_depends(cls, data: Any) -> Any:
+        """A domain brings a fluid and boundaries with it."""
+        if isinstance(data, dict) and "domain" in data:
+            return filled(data, {"fluid": {}, "boundaries": {}})
+        return data
+
+    @property
+    def is_slab(self) -> bool:
+        return self.dimensions == 2
+
+    @property
+    def folder(self) -> Path:
+        """The folder from which the scene's files are found."""
+        return self._folder
+
+    @property
+    def model_path(self) -> Path | None:
+        """The MJCF file, or None in a scene without bodies."""
+        return None if self.solids is None else self._folder / self.solids.model
+
+    @property
+    def frame_time(self) -> float:
+        """s between frames."""
+        return 1.0 / self.time.frames_per_second
+
+    def in_folder(self, folder: Path) -> Scene:
+        """The same scene with its files found from `folder`."""
+        scene = self.model_copy()
+        scene._folder = Path(folder)
+        return scene
+
+    def controlled_joints(self) -> tuple[str, ...]:
+        """Names of the controlled joints in the order of the controller."""
+        return tuple(joint for table in self.control for joint in table.joints)
+
+    def scalars(self) -> tuple[str, ...]:
+        """Names of the dyes, each once, in the order of the file."""
+        names = [table.name for table in self.dye]
+        names += [name for source in self.sources for name in source.dye]
+        return tuple(dict.fromkeys(names))
+
+    def stream(self) -> tuple[float, ...] | None:
+        """Velocity of the stream far from the bodies in m/s, or a uniform wind force in N.
+
+        That of the first inflow side, else of the first wind, else the fluid's initial velocity;
+        None when all of it is at rest.
+        """
+        sides = [] if self.boundaries is None else [side for _, side in self.boundaries]
+        found = [side.velocity for side in sides if isinstance(side, InflowSide)]
+        found += [wind.velocity for wind in self.wind if isinstance(wind, WindFacesTable)]
+        found += [wind.force for wind in self.wind if isinstance(wind, WindForceTable)]
+        found += [] if self.fluid is None else [self.fluid.velocity]
+        return next((vector for vector in found if any(vector)), None)
+
+    def to_toml(self) -> str:
+        """The scene as a file, every default written out; what is absent has no value at all."""
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))

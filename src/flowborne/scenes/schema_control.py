@@ -1,0 +1,229 @@
+"""Tables of a scene that describe the controller: joints, objectives, how it decides.
+
+Angles are degrees, lengths metres, as everywhere in a scene.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from flowborne.scenes.fields import (
+    ByKind,
+    Count,
+    Number,
+    Positive,
+    Table,
+    Text,
+    Vector,
+    WholeNumber,
+)
+
+
+class ControlTable(Table):
+    """[[control]]: joints that the controller moves.
+
+    joints        their names
+    strength      fastest rate: degrees/s (hinge, ball) or m/s (slide)
+    probe         displacement d of a hypothetical motion: degrees or m
+    torque_limit  largest torque (N m) or force (N) of the drive; unlimited unless given
+    """
+
+    joints: Annotated[tuple[Text, ...], Field(min_length=1)]
+    strength: Positive
+    probe: Positive = 5.0
+    torque_limit: Positive | None = None
+
+
+class PhaseIntervalsTable(Table):
+    """On during the intervals [start, stop) in s, which repeat with `period` when it is given."""
+
+    kind: Literal["intervals"]
+    intervals: Annotated[tuple[tuple[Number, Number], ...], Field(min_length=1)]
+    period: Positive | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for start, stop in self.intervals:
+            if stop <= start:
+                raise ValueError(
+                    f"has the interval [{start:g}, {stop:g}] s. Put the smaller time first"
+                )
+            if self.period is not None and stop - start > self.period:
+                raise ValueError(
+                    f"has the interval [{start:g}, {stop:g}] s, longer than its period of "
+                    f"{self.period:g} s. Shorten it"
+                )
+        return self
+
+
+class PhaseMotionTable(Table):
+    """On while a prescribed motion moves, or is, on one side of a threshold.
+
+    joint      whose [[motion]] it follows
+    quantity   "velocity" (degrees/s or m/s) or "position" (degrees or m)
+    side       "above" (threshold included) or "below"
+    threshold  in the unit of the quantity
+    """
+
+    kind: Literal["motion"]
+    joint: Text
+    quantity: Literal["velocity", "position"] = "velocity"
+    side: Literal["above", "below"] = "above"
+    threshold: Number = 0.0
+
+
+PhaseTable = Annotated[PhaseIntervalsTable | PhaseMotionTable, *ByKind]
+
+
+class ObjectiveTable(Table):
+    """What every objective has.
+
+    goal    "least" or "most" of it
+    weight  its share in the sum
+    phases  when it counts; always unless given
+    """
+
+    goal: Literal["least", "most"] = "least"
+    weight: Positive = 1.0
+    phases: PhaseTable | None = None
+
+
+class ObjectiveEffortTable(ObjectiveTable):
+    """Effort of joints (eq. 1); of every controlled joint unless `joints` are given."""
+
+    kind: Literal["effort"]
+    joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+
+
+class ObjectiveWindDragTable(ObjectiveTable):
+    """Simple wind force (eqs. 2-4) on bodies along `direction`; on every body unless given."""
+
+    kind: Literal["wind-drag"]
+    direction: Vector
+    bodies: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+
+
+class ObjectivePressureTable(ObjectiveTable):
+    """Pressure force (eq. 10) on bodies along `direction`; drag and lift differ by the name alone.
+
+    bodies  every moving body unless given
+    frame   body on which the direction rides; fixed in the world unless given
+    """
+
+    kind: Literal["pressure-drag", "pressure-lift"]
+    direction: Vector
+    bodies: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+    frame: Text | None = None
+
+
+class ObjectiveInputMotionTable(ObjectiveTable):
+    """Squared distance of a controlled joint from a motion that it would have on its own.
+
+    joint          the joint
+    times, values  keyframes of the motion, s and degrees or m; one of each is a fixed pose
+    """
+
+    kind: Literal["input-motion"]
+    joint: Text
+    times: Annotated[tuple[Number, ...], Field(min_length=1)] = (0.0,)
+    values: Annotated[tuple[Number, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if len(self.times) != len(self.values):
+            raise ValueError(
+                f"has {len(self.times)} times and {len(self.values)} values. Give as many of both"
+            )
+        for before, after in zip(self.times, self.times[1:], strict=False):
+            if after <= before:
+                raise ValueError(
+                    f"has times that do not increase: {after:g} s after {before:g} s. "
+                    "Put them in order, each once"
+                )
+        return self
+
+
+class ObjectiveVelocityTable(ObjectiveTable):
+    """Squared distance of a body's velocity from `target`, m/s."""
+
+    kind: Literal["velocity"]
+    body: Text
+    target: Vector
+
+
+class ObjectivePythonTable(ObjectiveTable):
+    """Python function "module:name" that takes a Measurement and gives a number."""
+
+    kind: Literal["python"]
+    function: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
+
+
+AnyObjective = Annotated[
+    ObjectiveEffortTable
+    | ObjectiveWindDragTable
+    | ObjectivePressureTable
+    | ObjectiveInputMotionTable
+    | ObjectiveVelocityTable
+    | ObjectivePythonTable,
+    *ByKind,
+]
+
+
+class RuleFixed(Table):
+    """The largest step down the gradient that strength allows."""
+
+    kind: Literal["fixed"]
+
+
+class RuleGoldenSection(Table):
+    """Golden-section search along the gradient.
+
+    reach      degrees or m that the joint that moves most may travel in the search; what strength
+               allows unless given
+    tolerance  part of the bracket at which the search ends
+    """
+
+    kind: Literal["golden-section"]
+    reach: Positive | None = None
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.02
+
+
+class ServoExact(Table):
+    """The drive reaches every target exactly when it is due."""
+
+    kind: Literal["exact"]
+
+
+class ServoPD(Table):
+    """Critically damped drive of natural frequency `frequency`, Hz."""
+
+    kind: Literal["pd"]
+    frequency: Positive
+
+
+class ControllerTable(Table):
+    """[controller]: how the controlled joints decide.
+
+    gradient           "central" (2 trials a dof) or "one-sided" (1 a dof and 1)
+    velocities         during a trial's measurement: "removed" (steady state), "present" (as now),
+                       or "probe" (those of the trial's own motion)
+    hypothetical_steps steps over which a trial makes its displacement
+    hypothetical_time  s of one such step; the time of a frame unless given
+    settle_steps       further steps of a trial in the fixed pose
+    rule               "fixed", or "golden-section" with its options
+    every              frames between decisions
+    iterations         descent steps per decision, in the flow as it is then
+    servo              "exact", or "pd" with its frequency
+    """
+
+    gradient: Literal["central", "one-sided"] = "central"
+    velocities: Literal["removed", "present", "probe"] = "removed"
+    hypothetical_steps: Count = 1
+    hypothetical_time: Positive | None = None
+    settle_steps: WholeNumber = 0
+    rule: Annotated[RuleFixed | RuleGoldenSection, *ByKind] = RuleFixed(kind="fixed")
+    every: Count = 1
+    iterations: Count = 1
+    servo: Annotated[ServoExact | ServoPD, *ByKind] = ServoExact(kind="exact")

@@ -1,0 +1,108 @@
+"""Tables of a scene that describe the bodies: model, initial state, prescribed motions, winds.
+
+Angles are degrees and angular velocities degrees per second, as in MJCF; lengths are metres. What
+a number means for a joint follows from the joint: degrees for a hinge, metres for a slide.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from flowborne.scenes.fields import ByKind, JointValues, Number, Positive, Table, Text, Vector
+from flowborne.scenes.schema_fluid import check_table
+
+
+class SolidsTable(Table):
+    """[solids]: the bodies.
+
+    model      MJCF file, found from the folder of the scene file
+    density    kg/m^3 of every body, in place of the model's densities
+    densities  body -> kg/m^3 of that body, in place of the model's density and of `density`
+    """
+
+    model: Text
+    density: Positive | None = None
+    densities: dict[str, Positive] = Field(default_factory=dict)
+
+
+class InitialTable(Table):
+    """[initial]: where the joints start. What is not named starts as in the model, at rest.
+
+    positions   joint -> degrees (hinge) or m (slide); a ball joint takes a quaternion (w, x, y, z),
+                a free joint (x, y, z) in m and a quaternion
+    velocities  joint -> degrees/s or m/s; a ball joint takes (x, y, z) in degrees/s, a free joint
+                (x, y, z) in m/s and (x, y, z) in degrees/s, as MuJoCo's qvel does
+    """
+
+    positions: dict[str, JointValues] = Field(default_factory=dict)
+    velocities: dict[str, JointValues] = Field(default_factory=dict)
+
+
+class MotionConstantTable(Table):
+    """Joint that keeps its place or its rate: position + rate * time."""
+
+    kind: Literal["constant"]
+    joint: Text
+    position: Number = 0.0
+    rate: Number = 0.0
+
+
+class MotionSinusoidTable(Table):
+    """mean + amplitude * sin(360 degrees * time / period + phase), phase in degrees."""
+
+    kind: Literal["sinusoid"]
+    joint: Text
+    amplitude: Number
+    period: Positive
+    mean: Number = 0.0
+    phase: Number = 0.0
+
+
+class MotionKeyframesTable(Table):
+    """Smooth curve through keyframes, still before the first and after the last.
+
+    times   s, increasing
+    values  degrees or m
+
+    In a file, `file = "walk.csv"` (and `column`) may stand for times and values; see keyframe_file.
+    """
+
+    kind: Literal["keyframes"]
+    joint: Text
+    times: tuple[Number, ...]
+    values: tuple[Number, ...]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_table(self.times, self.values, "times", "values")
+        return self
+
+
+MotionTable = Annotated[MotionConstantTable | MotionSinusoidTable | MotionKeyframesTable, *ByKind]
+
+
+class WindFacesTable(Table):
+    """Simple wind of the paper's eq. (2): every face is pushed by its own exposure.
+
+    velocity  of the wind, m/s
+    density   kg/m^3
+    bodies    that it blows on; every body unless given
+    """
+
+    kind: Literal["faces"]
+    velocity: Vector
+    density: Positive = 1.2
+    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
+
+
+class WindForceTable(Table):
+    """The same force (N; N per unit depth in two dimensions) at each body's centre of mass."""
+
+    kind: Literal["force"]
+    force: Vector
+    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
+
+
+WindTable = Annotated[WindFacesTable | WindForceTable, *ByKind]

@@ -1,0 +1,271 @@
+"""From tables to a world: units, initial state, what enters, what is wanted."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from flowborne.control.gradients import GradientCentral, GradientOneSided
+from flowborne.control.measurement import Measurement
+from flowborne.control.objectives import ObjectiveCallable, ObjectivePressureDrag
+from flowborne.control.phases import PhaseIntervals, PhaseTrack
+from flowborne.control.rules import GoldenSection
+from flowborne.control.servo import ServoPD
+from flowborne.fluid.boundary import BoundaryInflow, BoundaryNoSlip
+from flowborne.scenes.build import Built, build
+from flowborne.scenes.load import load_scene
+from flowborne.solids.wind import WindFaces, WindForce
+
+Write = Callable[..., Path]
+
+
+def cost(measurement: Measurement) -> float:
+    """A user's own objective."""
+    return 3.0 * measurement.dt
+
+
+def built(write: Write, append: str = "", **replaced: str) -> Built:
+    return build(load_scene(write(append=append), replaced))
+
+
+def test_degrees_become_radians_and_metres_stay(write: Write) -> None:
+    scene = """
+[initial]
+positions = { wrist = 90.0, rail = 0.25, drift = [-0.5, 0.4, 0.0, 2.0, 0.0, 0.0, 0.0] }
+velocities = { wrist = -180.0, rail = 0.5, drift = [1.0, 2.0, 0.0, 0.0, 0.0, 90.0] }
+"""
+    made = built(write, scene)
+    model, state = made.world.setup.solid, made.world.solid
+    q = {joint: state.q[model.positions_of(joint)] for joint in model.joint_names}
+    v = {joint: state.v[model.dofs_of(joint)] for joint in model.joint_names}
+    assert_allclose(q["wrist"], math.pi / 2)
+    assert_allclose(q["rail"], 0.25)
+    assert_allclose(q["drift"], [-0.5, 0.4, 0.0, 1.0, 0.0, 0.0, 0.0])
+    assert_allclose(v["wrist"], -math.pi)
+    assert_allclose(v["rail"], 0.5)
+    assert_allclose(v["drift"], [1.0, 2.0, 0.0, 0.0, 0.0, math.pi / 2])
+
+
+def test_a_joint_with_a_motion_starts_in_it(write: Write) -> None:
+    made = build(load_scene(write(), {"motion.0.mean": "10.0", "motion.0.phase": "90.0"}))
+    model, state = made.world.setup.solid, made.world.solid
+    assert_allclose(state.q[model.positions_of("shoulder")], math.radians(40.0))
+    assert_allclose(state.v[model.dofs_of("shoulder")], 0.0, atol=1e-15)
+    motion = made.world.setup.motions[0]
+    assert_allclose(motion.dofs, model.dofs_of("shoulder"))
+    assert_allclose(motion.velocity(0.5), -math.radians(30.0) * math.pi)
+
+
+def test_the_fluid_starts_with_the_scenes_velocity_everywhere(write: Write) -> None:
+    made = build(load_scene(write(), {"fluid.velocity": "[1.5, -0.5]"}))
+    fluid = made.world.fluid
+    assert fluid is not None
+    for faces in (fluid.velocity, fluid.carrier):
+        for values, expected in zip(faces, (1.5, -0.5, 0.0), strict=True):
+            assert_allclose(values, expected)
+    for values in fluid.acceleration:
+        assert_allclose(values, 0.0)
+
+
+def test_the_sides_are_those_of_the_scene(write: Write) -> None:
+    made = build(
+        load_scene(
+            write(append='[[dye]]\nkind = "bands"\nside = "x_min"\ncount = 2\nwidth = 0.5'),
+            {
+                "boundaries.x_min.ramp": "2.0",
+                "boundaries.y_max": '{ kind = "no-slip", velocity = [3.0, 0.0] }',
+            },
+        )
+    )
+    fluid = made.world.setup.fluid
+    assert fluid is not None
+    fluid.boundaries.check(fluid.grid)
+    assert fluid.grid.shape == (16, 16, 1)
+    assert_allclose(fluid.grid.upper[:2], (1.0, 1.0))
+    inflow = fluid.boundaries.x_min
+    assert isinstance(inflow, BoundaryInflow)
+    y = np.array([-0.9, -0.5, 0.0, 0.5])
+    u, _, _ = inflow.profile(np.full(4, -1.0), y, np.zeros(4), 1.0)
+    assert_allclose(u, 0.5)
+    assert_allclose(inflow.scalars["dye"](np.full(4, -1.0), y, np.zeros(4), 1.0), [0, 1, 0, 1])
+    assert fluid.scalars == ("dye",)
+    assert fluid.boundaries.y_max == BoundaryNoSlip((3.0, 0.0, 0.0))
+
+
+def test_a_parabolic_inflow_spans_its_side(write: Write) -> None:
+    made = build(load_scene(write(), {"boundaries.x_min.profile": "parabolic"}))
+    assert made.world.setup.fluid is not None
+    inflow = made.world.setup.fluid.boundaries.x_min
+    assert isinstance(inflow, BoundaryInflow)
+    u, _, _ = inflow.profile(np.full(3, -1.0), np.array([-1.0, 0.0, 1.0]), np.zeros(3), 0.0)
+    assert_allclose(u, [0.0, 1.5, 0.0], atol=1e-15)
+
+
+def test_sources_and_boxes_of_dye(write: Write) -> None:
+    made = built(
+        write,
+        """
+[[sources]]
+lower = [0.2, -0.9]
+upper = [0.4, -0.8]
+volume_rate = 0.1
+stop = 2.0
+[[dye]]
+kind = "box"
+name = "smoke"
+lower = [0.0, 0.0]
+upper = [0.1, 0.1]
+value = 0.5
+""",
+    )
+    assert made.world.setup.fluid is not None
+    jet, smoke = made.world.setup.fluid.sources
+    assert (jet.volume_rate, jet.velocity, jet.times) == (0.1, None, (0.0, 2.0))
+    assert (smoke.volume_rate, smoke.scalars) == (None, {"smoke": 0.5})
+    assert smoke.active(1e9)
+
+
+def test_winds(write: Write) -> None:
+    made = built(
+        write,
+        """
+[[wind]]
+kind = "faces"
+velocity = [5.0, 0.0]
+[[wind]]
+kind = "force"
+force = [2.0, 0.0]
+bodies = ["hand"]
+""",
+    )
+    faces, force = made.world.setup.winds
+    assert isinstance(faces, WindFaces)
+    assert (faces.velocity, faces.density, faces.bodies) == ((5.0, 0.0, 0.0), 1.2, None)
+    assert isinstance(force, WindForce)
+    assert (force.force, force.bodies) == ((2.0, 0.0, 0.0), ("hand",))
+
+
+def test_densities_of_the_scene_replace_those_of_the_model(write: Write) -> None:
+    area = {"arm": 0.1 * 0.4, "hand": math.pi * 0.01, "float": math.pi * 0.01}
+    densities = {
+        (): {"arm": 1200.0, "hand": 1200.0, "float": 500.0},
+        (("solids.density", "100.0"),): {"arm": 100.0, "hand": 100.0, "float": 100.0},
+        (("solids.density", "100.0"), ("solids.densities.hand", "7.0")): {
+            "arm": 100.0,
+            "hand": 7.0,
+            "float": 100.0,
+        },
+    }
+    for overrides, expected in densities.items():
+        model = build(load_scene(write(), dict(overrides))).world.setup.solid
+        for body, density in expected.items():
+            mass = model.body_mass[model.body(body)]
+            assert_allclose(mass, density * area[body], rtol=1e-9)
+
+
+def test_the_controller_is_that_of_the_scene(write: Write) -> None:
+    made = build(
+        load_scene(
+            write(),
+            {
+                "control.0.joints": '["wrist", "rail"]',
+                "control.0.torque_limit": "4.0",
+                "controller.gradient": "one-sided",
+                "controller.rule": '{ kind = "golden-section", reach = 30.0 }',
+                "controller.servo": '{ kind = "pd", frequency = 2.0 }',
+                "controller.every": "3",
+                "controller.settle_steps": "2",
+                "controller.velocities": "present",
+            },
+        )
+    )
+    controller, model = made.controller, made.world.setup.solid
+    assert controller is not None
+    assert_allclose(controller.dofs, [*model.dofs_of("wrist"), *model.dofs_of("rail")])
+    assert_allclose(controller.strength, [math.radians(20.0), 20.0])
+    assert isinstance(controller.gradient, GradientOneSided)
+    assert_allclose(controller.gradient.displacement, [math.radians(5.0), 5.0])
+    assert isinstance(controller.rule, GoldenSection)
+    assert controller.rule.reach == pytest.approx(math.radians(30.0))
+    assert isinstance(controller.servo, ServoPD)
+    assert controller.servo.frequency == pytest.approx(4.0 * math.pi)
+    assert controller.servo.torque_limit == (4.0, 4.0)
+    assert (controller.every, controller.hypothesis.settle) == (3, 2)
+    assert controller.hypothesis.dt == pytest.approx(1.0 / 24.0)
+    assert controller.hypothesis.velocities == "present"
+    pickle.loads(pickle.dumps((made.world, controller)))
+
+
+def test_objectives_have_sign_weight_scope_and_phases(write: Write) -> None:
+    made = built(
+        write,
+        f"""
+[[objectives]]
+kind = "pressure-lift"
+goal = "most"
+weight = 2.5
+direction = [0.0, 1.0]
+bodies = ["hand"]
+frame = "arm"
+phases = {{ kind = "motion", joint = "shoulder", side = "below", threshold = 10.0 }}
+
+[[objectives]]
+kind = "input-motion"
+joint = "wrist"
+values = [45.0]
+phases = {{ kind = "intervals", intervals = [[0.0, 1.0]], period = 2.0 }}
+
+[[objectives]]
+kind = "velocity"
+body = "arm"
+target = [1.0, 0.0]
+
+[[objectives]]
+kind = "python"
+function = "{__name__}:cost"
+""",
+    )
+    assert made.controller is not None
+    assert isinstance(made.controller.gradient, GradientCentral)
+    model = made.world.setup.solid
+    effort, lift, pose, _, own = made.controller.objective.terms
+    assert effort.weight == 1.0
+    assert isinstance(lift.objective, ObjectivePressureDrag)
+    assert lift.weight == -2.5
+    assert lift.objective.name == "pressure-lift"
+    assert lift.objective.bodies.tolist() == [model.body("hand")]
+    assert lift.objective.frame == model.body("arm")
+    assert isinstance(lift.phases, PhaseTrack)
+    assert (lift.phases.sign, lift.phases.threshold) == (-1, pytest.approx(math.radians(10.0)))
+    assert isinstance(pose.phases, PhaseIntervals)
+    assert pose.phases.active(2.5)
+    assert not pose.phases.active(1.5)
+    assert isinstance(own.objective, ObjectiveCallable)
+
+
+def test_a_scene_without_bodies(tmp_path: Path) -> None:
+    path = tmp_path / "cavity.toml"
+    path.write_text(
+        "dimensions = 2\n[domain]\nsize = [1.0, 1.0]\nresolution = 8\n[fluid]\nviscosity = 0.01\n"
+        '[boundaries]\ny_max = { kind = "no-slip", velocity = [1.0, 0.0] }'
+    )
+    made = build(load_scene(path))
+    assert made.controller is None
+    assert made.world.setup.solid.nv == 0
+    assert made.world.solid.q.size == 0
+
+
+def test_a_scene_without_fluid_in_three_dimensions(tmp_path: Path, write: Write) -> None:
+    write()
+    path = tmp_path / "air.toml"
+    path.write_text('gravity = [0.0, 0.0, -9.81]\n[solids]\nmodel = "squid.xml"')
+    made = build(load_scene(path))
+    assert made.world.fluid is None
+    assert not made.world.setup.solid.slab
+    assert_allclose(made.world.setup.solid.gravity, [0.0, 0.0, -9.81])

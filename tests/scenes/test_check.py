@@ -1,0 +1,314 @@
+"""Everything that can be wrong with a scene is said at once, in sentences, with its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from flowborne.errors import SceneError
+from flowborne.scenes.load import check_scene, load_scene
+
+Write = Callable[..., Path]
+
+ONE_FAULT = {
+    "a key that is unknown": (
+        {"density = 1000.0": "densty = 1000.0"},
+        "scene swim.toml, [fluid]: unknown key 'densty'; did you mean 'density'?",
+    ),
+    "a table that is unknown": (
+        {"[fluid]": "[fluit]"},
+        "scene swim.toml: unknown key 'fluit'; did you mean 'fluid'?",
+    ),
+    "a negative density": (
+        {"density = 1000.0": "density = -1.5"},
+        "scene swim.toml, [fluid] density: -1.5 is not greater than 0. Give a larger number.",
+    ),
+    "a joint that is not in the model": (
+        {'joints = ["wrist"]': 'joints = ["wirst"]'},
+        "scene swim.toml, [[control]] 1: joint 'wirst' is not in model squid.xml; "
+        "did you mean 'wrist'?",
+    ),
+    "a joint that is like no other": (
+        {'joints = ["wrist"]': 'joints = ["xyz"]'},
+        "scene swim.toml, [[control]] 1: joint 'xyz' is not in model squid.xml. "
+        "Its joints are: shoulder, wrist, rail, drift.",
+    ),
+    "no resolution at all": (
+        {"resolution = 16": "resolution = 0"},
+        "scene swim.toml, [domain] resolution: 0 is less than 1. Give a larger number.",
+    ),
+    "a coarse resolution": (
+        {"resolution = 16": "resolution = 2"},
+        "scene swim.toml, [domain] is too coarse with 2 x 2 cells. "
+        "Refine it until every side has at least 4 cells.",
+    ),
+    "cells that are no cubes": (
+        {"resolution = 16": "cells = [16, 8]"},
+        "scene swim.toml, [domain] has cells of 0.125 x 0.25 m, but cells are cubes. "
+        "Change cells or the corners, or give resolution alone.",
+    ),
+    "a domain inside out": (
+        {"upper = [1.0, 1.0]": "upper = [1.0, -2.0]"},
+        "scene swim.toml, [domain] reaches from -1 to -2 m in y. "
+        "Make every number of upper larger than that of lower.",
+    ),
+    "a body outside the domain": (
+        {"lower = [-1.0, -1.0]": "lower = [-1.0, -0.5]", "resolution = 16": "cells = [16, 12]"},
+        "scene swim.toml, [domain]: body 'hand' reaches from -0.6 to -0.4 m in y at the start, "
+        "outside the domain from -0.5 to 1 m. Move the body or enlarge the domain.",
+    ),
+    "an infinite velocity": (
+        {"velocity = [1.0, 0.0]": "velocity = [inf, 0.0]"},
+        "scene swim.toml, [boundaries] x_min.velocity, entry 1: inf is not a finite number. "
+        "Give a finite number.",
+    ),
+    "a number that is text": (
+        {"strength = 20.0": 'strength = "20"'},
+        "scene swim.toml, [[control]] 1, strength: '20' is not a number. "
+        "Give a number without quotes.",
+    ),
+    "a boundary that does not exist": (
+        {'x_max = "open"': 'x_max = "opn"'},
+        "scene swim.toml, [boundaries] x_max: 'opn' is not known; did you mean 'open'?",
+    ),
+    "an inflow without outlet": (
+        {'x_max = "open"': 'x_max = "closed"'},
+        "scene swim.toml, [boundaries]: +2 m^2/s enters through inflow sides and sources, and no "
+        "side is open for as much to leave. Make a side open.",
+    ),
+    "one periodic side": (
+        {'x_max = "open"': 'x_max = "open"\ny_min = "periodic"'},
+        "scene swim.toml, [boundaries]: y_min is periodic and y_max is closed. "
+        "Make both of them periodic or neither.",
+    ),
+    "a side in z of a plane": (
+        {'x_max = "open"': 'x_max = "open"\nz_min = "open"'},
+        "scene swim.toml, [boundaries] z_min is open, but a scene of 2 dimensions has no sides "
+        "in z. Drop it.",
+    ),
+    "gravity out of the plane": (
+        {"gravity = [0.0, -9.81]": "gravity = [0.0, 0.0, -9.81]"},
+        "scene swim.toml, gravity: [0.0, 0.0, -9.81] leaves the plane of a scene of 2 dimensions. "
+        "Make its z component 0.",
+    ),
+    "a model that is missing": (
+        {"squid.xml": "octopus.xml"},
+        "octopus.xml. Correct solids.model.",
+    ),
+    "motion and control on one joint": (
+        {'joints = ["wrist"]': 'joints = ["wrist", "shoulder"]'},
+        "scene swim.toml, [[control]] 1: joint 'shoulder' has a [[motion]] as well. "
+        "Take it out of one of the two.",
+    ),
+    "a joint that is controlled twice": (
+        {'joints = ["wrist"]': 'joints = ["wrist", "wrist"]'},
+        "scene swim.toml, [[control]] 1: joint 'wrist' is controlled twice. Name it once.",
+    ),
+    "a free joint that is controlled": (
+        {'joints = ["wrist"]': 'joints = ["wrist", "drift"]'},
+        "joint 'drift' is a free joint, and only hinges, slides and ball joints have strength.",
+    ),
+    "a motion of a free joint": (
+        {'joint = "shoulder"': 'joint = "drift"'},
+        "scene swim.toml, [[motion]] 1: joint 'drift' is a free joint, and only hinges and slides "
+        "follow a motion.",
+    ),
+    "a start beyond the joint's range": (
+        {"amplitude = 30.0": "amplitude = 150.0\nphase = 90.0"},
+        "scene swim.toml, [initial]: joint 'shoulder' starts at 150 degrees, outside its range "
+        "from -120 to 120 degrees. Start it within.",
+    ),
+    "an objective without its kind": (
+        {'kind = "effort"': 'goal = "least"'},
+        "scene swim.toml, [[objectives]] 1: key 'kind' is missing. Give one of: effort, wind-drag, "
+        "pressure-drag, pressure-lift, input-motion, velocity, python.",
+    ),
+    "a wind objective without wind": (
+        {'kind = "effort"': 'kind = "wind-drag"\ndirection = [1.0, 0.0]'},
+        "scene swim.toml, [[objectives]] 1: there is no wind to drag. "
+        "Add a [[wind]], or use 'pressure-drag'.",
+    ),
+    "a frame that is no body": (
+        {'kind = "effort"': 'kind = "pressure-lift"\ndirection = [0.0, 1.0]\nframe = "hnad"'},
+        "scene swim.toml, [[objectives]] 1, frame: body 'hnad' is not in model squid.xml; "
+        "did you mean 'hand'?",
+    ),
+    "a phase that ends before it starts": (
+        {
+            'kind = "effort"': 'kind = "effort"\n'
+            'phases = { kind = "intervals", intervals = [[2.0, 1.0]] }'
+        },
+        "scene swim.toml, [[objectives]] 1, phases has the interval [2, 1] s. "
+        "Put the smaller time first.",
+    ),
+    "a phase that follows nothing": (
+        {'kind = "effort"': 'kind = "effort"\nphases = { kind = "motion", joint = "rail" }'},
+        "scene swim.toml, [[objectives]] 1, phases: joint 'rail' has no [[motion]] to follow.",
+    ),
+    "a function that Python does not find": (
+        {'kind = "effort"': 'kind = "python"\nfunction = "nowhere_at_all:cost"'},
+        "Python does not find module 'nowhere_at_all' of 'nowhere_at_all:cost'.",
+    ),
+    "one table where several may be": (
+        {"[[control]]": "[control]"},
+        "scene swim.toml: [control] may be there several times. Write [[control]].",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", ONE_FAULT)
+def test_one_fault_gives_one_clear_message(write: Write, fault: str) -> None:
+    replaced, message = ONE_FAULT[fault]
+    problems = check_scene(write(replaced))
+    assert len(problems) == 1
+    assert message in problems[0]
+
+
+APPENDED_FAULT = {
+    "keyframes that go back in time": (
+        '[[motion]]\nkind = "keyframes"\njoint = "rail"\ntimes = [0, 2, 1]\nvalues = [0, 1, 2]',
+        "scene swim.toml, [[motion]] 2 has times that do not increase: entry 3 is 1 s after 2 s. "
+        "Put them in order, each once.",
+    ),
+    "NaN in keyframes": (
+        '[[motion]]\nkind = "keyframes"\njoint = "rail"\ntimes = [0, 1]\nvalues = [0, nan]',
+        "scene swim.toml, [[motion]] 2, values, entry 2: nan is not a finite number. "
+        "Give a finite number.",
+    ),
+    "tables of unequal length": (
+        '[[motion]]\nkind = "keyframes"\njoint = "rail"\ntimes = [0, 1, 2]\nvalues = [0, 1]',
+        "scene swim.toml, [[motion]] 2 has 3 times and 2 values. Give as many of both.",
+    ),
+    "two motions of one joint": (
+        '[[motion]]\nkind = "constant"\njoint = "shoulder"',
+        "scene swim.toml, [[motion]] 2: joint 'shoulder' has another [[motion]] above.",
+    ),
+    "a start and a motion of one joint": (
+        "[initial]\npositions = { shoulder = 3.0 }",
+        "scene swim.toml, [initial] positions: joint 'shoulder' has a [[motion]], which says where "
+        "it starts. Drop one of them.",
+    ),
+    "too many numbers for a joint": (
+        "[initial]\nvelocities = { rail = [1.0, 2.0] }",
+        "scene swim.toml, [initial] velocities: joint 'rail' is a slide and has 2 numbers. Give 1.",
+    ),
+    "dye at a closed side": (
+        '[[dye]]\nkind = "bands"\nside = "y_min"\ncount = 3\nwidth = 0.1',
+        "scene swim.toml, [[dye]] 1: side y_min is closed, and dye enters with an inflow. "
+        "Choose an inflow side, or use a dye of kind 'box'.",
+    ),
+    "a source outside the domain": (
+        "[[sources]]\nlower = [2.0, 0.0]\nupper = [3.0, 0.1]\nvolume_rate = 1.0",
+        "scene swim.toml, [[sources]] 1: the box reaches from 2 to 3 m in x, outside the domain "
+        "from -1 to 1 m. Move it.",
+    ),
+    "a wind on no body": (
+        '[[wind]]\nkind = "force"\nforce = [1.0, 0.0]\nbodies = ["arms"]',
+        "scene swim.toml, [[wind]] 1: body 'arms' is not in model squid.xml; did you mean 'arm'?",
+    ),
+    "a short vector": (
+        '[[wind]]\nkind = "faces"\nvelocity = [1.0]',
+        "scene swim.toml, [[wind]] 1, velocity [1.0] is neither (x, y) nor (x, y, z). "
+        "Give 2 or 3 numbers.",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", APPENDED_FAULT)
+def test_one_more_table_gives_one_clear_message(write: Write, fault: str) -> None:
+    text, message = APPENDED_FAULT[fault]
+    problems = check_scene(write(append="\n" + text))
+    assert len(problems) == 1
+    assert message in problems[0]
+
+
+def test_a_sound_scene_has_no_problems(write: Write) -> None:
+    assert check_scene(write()) == []
+
+
+def test_all_problems_come_at_once(write: Write) -> None:
+    problems = check_scene(
+        write(
+            {
+                "frames = 3": "frames = 0",
+                "density = 1000.0": "density = -1.0\nviscosty = 1.0",
+                'x_max = "open"': 'x_max = "open"\ny_min = "periodic"',
+                'joint = "shoulder"': 'joint = "sholder"',
+                'kind = "effort"': 'kind = "efort"',
+            },
+            '\n[[objectives]]\nkind = "velocity"\nbody = "palm"\ntarget = [1.0, 0.0]',
+        )
+    )
+    wanted = ["frames", "density", "viscosty", "y_min", "sholder", "efort", "[[objectives]] 2"]
+    assert len(problems) == len(wanted)
+    for word in wanted:
+        assert any(word in problem for problem in problems), word
+
+
+def test_syntax_is_told_with_its_line(write: Write) -> None:
+    problems = check_scene(write({"frames = 3": "frames = = 3"}))
+    assert len(problems) == 1
+    assert problems[0].startswith("scene swim.toml, line 6, column 10: this is not TOML (")
+
+
+def test_a_file_that_ends_early_is_told(write: Write) -> None:
+    problems = check_scene(write(append="\nfoo = [1, 2"))
+    assert problems == [
+        "scene swim.toml, at its end: this is not TOML (unclosed array). Correct it there."
+    ]
+
+
+def test_mujoco_refuses_the_model(write: Write) -> None:
+    problems = check_scene(write(model="<mujoco><worldbody><body><geom/></body></worldbody>"))
+    assert len(problems) == 1
+    assert problems[0].startswith("scene swim.toml, [solids]: model ")
+    assert "squid.xml cannot be read" in problems[0]
+
+
+def test_a_hinge_across_the_plane_cannot_be_driven(write: Write) -> None:
+    tilted = """
+    <mujoco><worldbody><body name="arm">
+      <joint name="shoulder" type="hinge" axis="0 0 1"/>
+      <geom type="box" size="0.05 0.2 0.5"/>
+      <body name="hand" pos="0 -0.4 0">
+        <joint name="wrist" type="hinge" axis="1 0 0"/>
+        <geom type="box" size="0.05 0.05 0.5"/>
+      </body></body></worldbody></mujoco>"""
+    problems = check_scene(write(model=tilted))
+    assert problems == [
+        "scene swim.toml, [[control]] 1: joint 'wrist' moves out of the plane of a scene of 2 "
+        "dimensions. Turn its axis, or choose another joint."
+    ]
+
+
+def test_tables_without_their_domain_or_bodies(write: Write, tmp_path: Path) -> None:
+    path = tmp_path / "empty.toml"
+    path.write_text("dimensions = 2\n[fluid]\ndensity = 1.0\n[[control]]\njoints=['a']\nstrength=1")
+    problems = check_scene(path)
+    assert problems == [
+        "scene empty.toml, [fluid]: there is no [domain] to fill. "
+        "Add [domain], or drop this table.",
+        "scene empty.toml has neither [domain] nor [solids]: there is nothing to simulate. "
+        "Add one of them.",
+        "scene empty.toml, [control]: there are no bodies. "
+        "Add [solids] with a model, or drop this table.",
+    ]
+
+
+def test_a_scene_that_is_not_there() -> None:
+    assert check_scene("ns-blok-drag-max") == [
+        "there is no scene 'ns-blok-drag-max'; did you mean 'ns-block-drag-max'?"
+    ]
+    assert check_scene("nowhere/swim.toml") == [
+        "there is no scene file nowhere/swim.toml. Correct the path."
+    ]
+
+
+def test_load_raises_what_check_lists(write: Write) -> None:
+    path = write({"density = 1000.0": "density = -1.0", "frames = 3": "frames = -3"})
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    assert caught.value.problems == check_scene(path)
+    assert len(caught.value.problems) == 2

@@ -1,0 +1,71 @@
+"""Every built-in scene keeps what scenes promise."""
+
+from __future__ import annotations
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from flowborne.scenes.build import build
+from flowborne.scenes.load import check_scene, library, load_scene, scene_names
+
+NAMES = scene_names()
+
+
+def test_the_list_of_scenes_is_what_lies_in_the_library() -> None:
+    assert sorted(NAMES) == sorted(path.stem for path in library().glob("*.toml"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
+    assert check_scene(name) == []
+    scene = load_scene(name)
+    assert scene.name == name
+    assert scene.figure
+    assert scene.description
+    assert "\n" not in scene.description
+    assert scene.controlled_joints()
+    assert scene.stream() is not None
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_everything_in_the_model_has_a_name(name: str) -> None:
+    model = build(load_scene(name)).world.setup.solid.mj
+    elements = [model.body(i) for i in range(model.nbody)]
+    elements += [model.joint(i) for i in range(model.njnt)]
+    elements += [model.geom(i) for i in range(model.ngeom)]
+    assert all(element.name for element in elements)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_two_worlds_of_a_scene_are_equal_and_share_nothing(name: str) -> None:
+    first, second = (build(load_scene(name)).world.arrays() for _ in range(2))
+    assert first.keys() == second.keys()
+    for key, values in first.items():
+        assert_array_equal(values, second[key])
+        assert not np.shares_memory(values, second[key])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_a_worker_needs_survives_pickling(name: str) -> None:
+    made = build(load_scene(name))
+    world, controller = pickle.loads(pickle.dumps((made.world, made.controller)))
+    for key, values in made.world.arrays().items():
+        assert_array_equal(world.arrays()[key], values)
+    assert controller.strength == made.controller.strength
+
+
+def test_effort_scenes_come_to_rest_within_their_frames() -> None:
+    """K1: at rest tan(psi) = wind / weight; the film lasts longer than the way there."""
+    for name in ("block-effort-wind", "block-effort-weak-wind"):
+        scene = load_scene(name)
+        made = build(scene)
+        model = made.world.setup.solid
+        weight = model.body_mass[model.body("block")] * 9.81
+        wind = scene.wind[0].model_dump()["force"][0]
+        angle = math.degrees(math.atan2(wind, weight))
+        assert angle == pytest.approx({"block-effort-wind": 42.4}.get(name, 18.1), abs=0.1)
+        assert angle / scene.control[0].strength < 0.75 * made.frames * made.frame_time
