@@ -1,0 +1,62 @@
+"""Files that are there whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+
+def partial_name(name: str) -> str:
+    """Name under which a file called `name` is written until it is whole."""
+    return f".{name}.partial"
+
+
+def write_atomically(
+    path: Path, write: Callable[[BinaryIO], object], *, durable: bool = True
+) -> None:
+    """Write a file that other processes see either whole or not at all.
+
+    path     where it belongs; what was there is replaced in one go
+    write    gets the open binary file
+    durable  wait until the file is on the disc, so that it outlives a loss of power too; without
+             it only the death of the process is provided for
+    raises   whatever `write` raises and OSError; the half-written file is then gone and `path` is
+             as it was
+    """
+    partial = path.with_name(partial_name(path.name))
+    try:
+        with open(partial, "wb") as file:
+            write(file)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+    if durable:
+        sync_folder(path.parent)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` in UTF-8, whole or not at all."""
+    write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write `value` as JSON, whole or not at all; raises ValueError when it holds a NaN."""
+    write_text(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def sync_folder(path: Path) -> None:
+    """Wait until the names in a folder are on the disc (where the system can do that)."""
+    if os.name != "posix":
+        return
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

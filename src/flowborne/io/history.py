@@ -1,0 +1,108 @@
+"""history.csv: a row of numbers per frame, in the file and not in memory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from flowborne.io.atomic import write_text
+
+
+class History:
+    """The history of a run, open for appending.
+
+    Numbers are written with as many digits as it takes to read the same number back. A row is
+    there whole, or is dropped when the history is next opened.
+
+    columns  names, in the order of the file
+    rows     number of rows written
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str], rows: int) -> None:
+        self.path = path
+        self.columns = tuple(columns)
+        self.rows = rows
+        self._file = open(path, "ab", buffering=0)  # noqa: SIM115 (open as long as the run)
+        self._length = os.fstat(self._file.fileno()).st_size
+
+    @classmethod
+    def create(cls, path: Path, columns: Sequence[str]) -> History:
+        """New history with a header and no rows, in place of what was there."""
+        write_text(path, ",".join(columns) + "\n")
+        return cls(path, columns, 0)
+
+    @classmethod
+    def reopen(cls, path: Path, columns: Sequence[str], rows: int) -> History:
+        """History cut to its first `rows` rows.
+
+        raises  ValueError when its columns are others, or when it has fewer rows
+        """
+        with open(path, "r+b") as file:
+            if file.readline().decode().rstrip("\n") != ",".join(columns):
+                raise ValueError(f"{path} has other columns than this version writes")
+            for row in range(rows):
+                if not file.readline().endswith(b"\n"):
+                    raise ValueError(f"{path} has {row} rows where the checkpoint has {rows}")
+            file.truncate(file.tell())
+        return cls(path, columns, rows)
+
+    def append(self, values: Mapping[str, float]) -> None:
+        """Write a row; `values` has a number for every column.
+
+        raises  KeyError when a column is missing; OSError when the row cannot be written (no row
+                is then added)
+        """
+        line = memoryview((",".join(_text(values[name]) for name in self.columns) + "\n").encode())
+        written = 0
+        try:
+            while written < len(line):
+                written += self._file.write(line[written:]) or 0
+        except OSError:
+            self._file.truncate(self._length)
+            raise
+        self._length += written
+        self.rows += 1
+
+    def drop_last(self, length: int) -> None:
+        """Take back the last row; `length` is what `length` was before it was written."""
+        self._file.truncate(length)
+        self._length = length
+        self.rows -= 1
+
+    @property
+    def length(self) -> int:
+        """Bytes of the file up to the end of its last row."""
+        return self._length
+
+    def sync(self) -> None:
+        """Wait until every row is on the disc."""
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def history_columns(path: Path) -> tuple[str, ...]:
+    """Names of the columns of a history."""
+    with open(path, encoding="utf-8") as file:
+        return tuple(file.readline().rstrip("\n").split(","))
+
+
+def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ...]]:
+    """The numbers of the named columns, row after row, without holding the whole file.
+
+    raises  ValueError when there is no such column
+    """
+    with open(path, encoding="utf-8") as file:
+        names = file.readline().rstrip("\n").split(",")
+        places = [names.index(column) for column in columns]
+        for line in file:
+            if line.endswith("\n"):
+                cells = line.rstrip("\n").split(",")
+                yield tuple(float(cells[place]) for place in places)
+
+
+def _text(value: float) -> str:
+    """Shortest text that reads back as the same number."""
+    return str(value) if isinstance(value, int) else repr(float(value))

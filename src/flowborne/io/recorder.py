@@ -1,0 +1,153 @@
+"""What is kept of each frame, so that any frame can be drawn without the solver."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.report import StepReport
+from flowborne.coupling.world import Setup, World
+from flowborne.io.atomic import write_atomically, write_json
+from flowborne.io.run_folder import RunFolder
+from flowborne.solids.dynamics import Kinematics, kinematics
+from flowborne.solids.model import SolidModel
+
+Array = NDArray[np.float64]
+
+BYTES_PER_MEMBER = 300
+"""What an array costs in an npz file besides its numbers: two headers and a name, twice."""
+
+
+class Recorder:
+    """Writes states/NNNNNN.npz of a run.
+
+    Each file holds, in single precision but for the time,
+
+      time                                       s
+      q (nq,), v (nv,)                           generalised coordinates
+      geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
+      fluid_force (nb, 3)                        N, what the fluid and the winds do to each body
+      fluid_centre (nb, 3)                       m, where to draw it: the body's centroid
+      velocity_x, velocity_y, velocity_z         m/s on the faces (no z in a slab)
+      pressure                                   Pa in the cells
+      scalar_<name>                              in the cells
+      open                                       part of each cell that no body takes up
+
+    A file is there whole or not at all when the process is killed. Files are not forced to the
+    disc one by one, which would cost more than writing them.
+    """
+
+    def __init__(self, folder: RunFolder) -> None:
+        self.folder = folder
+
+    def write(self, frame: int, world: World, report: StepReport | None) -> None:
+        """Write the state after `frame` frames; `report` is of the last step, None at the start.
+
+        raises  OSError when the disc refuses; nothing is then left of the file
+        """
+        arrays = self.arrays(world, report)
+        path = self.folder.state(frame)
+        write_atomically(path, lambda file: np.savez(file, **arrays), durable=False)  # type: ignore[arg-type]
+
+    def bytes_per_frame(self, world: World) -> int:
+        """About the size of a state file."""
+        solid = world.setup.solid
+        numbers, members = 24 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
+        if world.fluid is not None and world.setup.fluid is not None:
+            moving = [world.fluid.velocity[axis] for axis in world.setup.fluid.grid.axes]
+            kept = [*moving, *world.fluid.scalars.values()]
+            numbers += sum(values.size for values in kept) + 2 * world.fluid.pressure.size
+            members += len(kept) + 2
+        return 4 * numbers + BYTES_PER_MEMBER * members
+
+    def arrays(self, world: World, report: StepReport | None) -> dict[str, NDArray[Any]]:
+        """What is kept of `world`."""
+        pose = kinematics(world.setup.solid, world.solid.q)
+        kept: dict[str, Array] = {
+            "q": world.solid.q,
+            "v": world.solid.v,
+            "geom_position": pose.geom_position,
+            "geom_rotation": pose.geom_rotation,
+            "body_position": pose.body_position,
+            "body_rotation": pose.body_rotation,
+            "fluid_centre": pose.centroid,
+            "fluid_force": np.zeros_like(pose.centroid),
+        }
+        if report is not None:
+            kept["fluid_force"] = report.fluid_wrench()[:, :3]
+        if world.fluid is not None and world.setup.fluid is not None:
+            named = world.fluid.arrays()
+            axes = [f"velocity_{'xyz'[axis]}" for axis in world.setup.fluid.grid.axes]
+            scalars = [name for name in named if name.startswith("scalar_")]
+            kept |= {name: named[name] for name in ("pressure", *axes, *scalars)}
+            kept["open"] = open_cells(world, pose)
+        single: dict[str, NDArray[Any]] = {k: v.astype(np.float32) for k, v in kept.items()}
+        return {"time": np.array(world.time)} | single
+
+
+def open_cells(world: World, pose: Kinematics) -> Array:
+    """(nx, ny, nz) open fraction of each cell, from the bodies' distance to its centre."""
+    from flowborne.coupling.step import cut_by_bodies
+
+    assert world.setup.fluid is not None
+    distance = cut_by_bodies(world, pose).distance
+    for _ in range(3):
+        # mean of neighbours along the first axis, which then becomes the last: all three in turn
+        distance = np.moveaxis(0.5 * (distance[1:] + distance[:-1]), 0, -1)
+    return np.clip(0.5 + distance / world.setup.fluid.grid.spacing, 0.0, 1.0)
+
+
+def write_model(
+    folder: RunFolder,
+    setup: Setup,
+    *,
+    controlled: list[str],
+    frames_per_second: float,
+    wind: list[list[float]],
+) -> None:
+    """Write model.json: what does not move, but is needed to draw the run.
+
+    controlled  names of the controlled joints
+    wind        directions and speeds of the streams, m/s, to draw as arrows
+    """
+    solid, fluid = setup.solid, setup.fluid
+    grid = None
+    if fluid is not None:
+        grid = {
+            "shape": list(fluid.grid.shape),
+            "spacing": fluid.grid.spacing,
+            "origin": list(fluid.grid.origin),
+        }
+    write_json(
+        folder.model,
+        {
+            "slab": solid.slab,
+            "bodies": list(solid.body_names),
+            "joints": list(solid.joint_names),
+            "joint_bodies": solid.mj.jnt_bodyid.tolist(),
+            "controlled": controlled,
+            "grid": grid,
+            "geoms": _geoms(solid),
+            "frames_per_second": frames_per_second,
+            "wind": wind,
+        },
+    )
+
+
+def _geoms(solid: SolidModel) -> list[dict[str, Any]]:
+    """The geometries in the order of geom_position."""
+    listed = []
+    for geom, kind in enumerate(solid.geom_type):
+        entry: dict[str, Any] = {
+            "type": kind,
+            "size": solid.geom_size[geom].tolist(),
+            "body": int(solid.geom_body[geom]),
+            "rgba": solid.geom_rgba[geom].tolist(),
+        }
+        if kind == "mesh":
+            vertices, faces = solid.mesh_of(geom)
+            entry |= {"vertices": vertices.tolist(), "faces": faces.tolist()}
+        listed.append(entry)
+    return listed

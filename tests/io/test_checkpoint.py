@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.fluid.grid import Grid
+from flowborne.fluid.state import FluidState
+from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
+from flowborne.solids.model import SolidModel
+
+MODEL = """
+<mujoco>
+  <worldbody>
+    <body name="block">
+      <joint name="hinge" axis="0 0 1"/>
+      <geom name="block" type="box" size="1 0.2 1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def world():
+    grid = Grid.slab(6, 4, 0.5, (0.0, 0.0))
+    state = FluidState.at_rest(grid, ("smoke",))
+    numbers = np.random.default_rng(1)
+    for values in state.arrays().values():
+        values[...] = numbers.normal(size=values.shape)
+    memory = {"target": np.array([0.1, np.nextafter(0.2, 1.0)])}
+    model = SolidModel.from_string(MODEL, slab=True)
+    setup = Setup(model, Fluid(grid, 1.0, scalars=("smoke",)))
+    return World(setup, model.rest(), state, time=1 / 3, steps=7, memory=memory)
+
+
+def test_a_world_is_read_back_bit_for_bit(tmp_path, world):
+    path = tmp_path / "checkpoint.npz"
+    save_checkpoint(path, world, 5)
+    again, frame = load_checkpoint(path, world.setup)
+    assert (frame, again.steps, again.time) == (5, 7, world.time)
+    saved, read = world.arrays(), again.arrays()
+    assert list(saved) == list(read)
+    for name, values in saved.items():
+        assert np.array_equal(values, read[name])
+        assert not np.shares_memory(values, read[name])
+
+
+def test_equal_worlds_give_equal_files(tmp_path, world):
+    save_checkpoint(tmp_path / "a.npz", world, 5)
+    save_checkpoint(tmp_path / "b.npz", world.copy(), 5)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+@pytest.mark.parametrize("contents", [b"", b"PK\x03\x04 torn"])
+def test_what_is_no_checkpoint_is_refused(tmp_path, world, contents):
+    path = tmp_path / "checkpoint.npz"
+    path.write_bytes(contents)
+    with pytest.raises(ValueError, match="is not a checkpoint of this scene"):
+        load_checkpoint(path, world.setup)
+
+
+def test_state_bytes_counts_every_array_once(world):
+    cells = 6 * 4
+    faces = 7 * 4 + 6 * 5 + 2 * cells
+    assert state_bytes(world) == 8 * (2 * cells + 3 * faces + 2 + 2 + 2)

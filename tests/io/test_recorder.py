@@ -1,0 +1,80 @@
+import json
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.fluid.grid import Grid
+from flowborne.fluid.state import FluidState
+from flowborne.io.recorder import Recorder, open_cells, write_model
+from flowborne.io.run_folder import RunFolder
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.model import SolidModel
+
+DISC = """
+<mujoco>
+  <worldbody>
+    <body name="disc" pos="0.13 -0.07 0">
+      <joint name="hinge" axis="0 0 1"/>
+      <geom name="disc" type="cylinder" size="0.5 1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+TETRAHEDRON = """
+<mujoco>
+  <asset><mesh name="fin" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset>
+  <worldbody>
+    <body name="fin"><freejoint name="root"/><geom name="fin" type="mesh" mesh="fin"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def disc_world(cells):
+    model = SolidModel.from_string(DISC, slab=True)
+    grid = Grid.slab(cells, cells, 2.0 / cells, (-1.0, -1.0))
+    state = FluidState.at_rest(grid, ("smoke",))
+    return World(Setup(model, Fluid(grid, 1.0, scalars=("smoke",))), model.rest(), state)
+
+
+@pytest.mark.parametrize(("cells", "error"), [(32, 4e-3), (64, 1e-3)])
+def test_open_cells_leave_out_the_area_of_a_disc(cells, error):
+    world = disc_world(cells)
+    part = open_cells(world, kinematics(world.setup.solid, world.solid.q))
+    assert part.shape == (cells, cells, 1)
+    assert part.min() == 0.0
+    closed = (1.0 - part).sum() * world.setup.fluid.grid.cell_volume
+    assert closed == pytest.approx(np.pi * 0.25, rel=error)
+
+
+def test_a_state_holds_what_a_picture_needs_in_single_precision(tmp_path):
+    world = disc_world(16)
+    world.fluid.pressure[:] = np.arange(256.0).reshape(16, 16, 1) / 3
+    recorder = Recorder(RunFolder.create(tmp_path / "run"))
+    recorder.write(0, world, None)
+    path = recorder.folder.state(0)
+    state = np.load(path)
+    assert state["velocity_x"].shape == (17, 16, 1)
+    assert "velocity_z" not in state
+    assert state["pressure"].dtype == np.float32
+    np.testing.assert_array_equal(state["pressure"], world.fluid.pressure.astype(np.float32))
+    assert state["scalar_smoke"].shape == state["open"].shape == (16, 16, 1)
+    np.testing.assert_allclose(state["fluid_centre"][1], [0.13, -0.07, 0.0], atol=1e-7)
+    assert path.stat().st_size == pytest.approx(recorder.bytes_per_frame(world), rel=0.1)
+
+
+def test_model_json_describes_a_mesh_and_the_grid(tmp_path):
+    model = SolidModel.from_string(TETRAHEDRON)
+    setup = Setup(model, Fluid(Grid((8, 8, 8), 0.5), 1000.0))
+    folder = RunFolder.create(tmp_path / "run")
+    write_model(folder, setup, controlled=[], frames_per_second=60.0, wind=[])
+    written = json.loads(folder.model.read_text())
+    assert (written["slab"], written["bodies"]) == (False, ["world", "fin"])
+    assert written["grid"] == {"shape": [8, 8, 8], "spacing": 0.5, "origin": [0.0, 0.0, 0.0]}
+    (geom,) = written["geoms"]
+    assert (geom["type"], geom["body"]) == ("mesh", 1)
+    corners = np.array(geom["vertices"])[np.array(geom["faces"])]
+    volume = np.linalg.det(corners).sum() / 6
+    assert volume == pytest.approx(1 / 6, rel=1e-5)
