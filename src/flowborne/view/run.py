@@ -1,0 +1,218 @@
+"""A run folder as the pictures need it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.fluid.grid import Grid
+from flowborne.io.history import history_columns, history_rows
+from flowborne.io.run_folder import STATE_NAME, RunFolder
+from flowborne.solids.slab import Section, section
+
+Array = NDArray[np.float64]
+State = dict[str, NDArray[Any]]
+"""Arrays of one file of states/, by name."""
+
+ARC = 72
+"""Corners of a full circle in a drawn outline."""
+
+PLOTTED = ("objective", "angle_", "position_")
+"""Beginnings of the columns of the history that are read besides frame and time."""
+
+
+@dataclass(frozen=True)
+class Geom:
+    """One drawn geometry of a body; sizes as MuJoCo has them.
+
+    mesh  vertices (k, 3) in the geometry's frame and faces (m, 3), or None
+    """
+
+    kind: str
+    size: Array
+    body: int
+    mesh: tuple[Array, NDArray[np.int64]] | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run folder says that holds for all frames; `state` reads one frame.
+
+    name               of the scene
+    bodies             their names, the world's first
+    accented           numbers of the bodies that controlled joints carry
+    controlled         names of the controlled joints
+    grid               of the fluid; None without fluid
+    outlines           (k, 3) closed cross-section of each geometry, in the geometry's own frame
+    outline_body       body of each geometry
+    frames_per_second  of the film
+    wind               (n, 3) streams to draw where there is no fluid
+    picture            what the scene wants to see of the fluid
+    history            column -> values, a number per frame of the run from the first on
+    states             files of states/, in order
+    """
+
+    name: str
+    bodies: tuple[str, ...]
+    accented: frozenset[int]
+    controlled: tuple[str, ...]
+    grid: Grid | None
+    outlines: tuple[Array, ...]
+    outline_body: tuple[int, ...]
+    frames_per_second: float
+    wind: Array
+    picture: Literal["dye", "vorticity", "none"]
+    history: dict[str, Array]
+    states: tuple[Path, ...]
+
+    @classmethod
+    def read(cls, path: Path) -> Run:
+        """The run in folder `path`.
+
+        raises  ValueError when it has no frame, or is not two-dimensional; OSError when a file is
+                not there
+        """
+        folder = RunFolder(path)
+        states = _states(folder.states)
+        if not states:
+            raise ValueError(f"{path} has no frame to draw; let the run go on with --resume")
+        scene = tomllib.loads(folder.scene.read_text(encoding="utf-8"))
+        model = json.loads(folder.model.read_text(encoding="utf-8"))
+        if not model["slab"]:
+            raise ValueError(
+                f"{path} is a run in three dimensions, and previews are drawn of slabs; "
+                "read its states/ with another viewer"
+            )
+        geoms = [_geom(entry) for entry in model["geoms"]]
+        carriers = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
+        return cls(
+            name=scene.get("name", path.name),
+            bodies=tuple(model["bodies"]),
+            accented=frozenset(carriers[j] for j in model["controlled"] if j in carriers),
+            controlled=tuple(model["controlled"]),
+            grid=_grid(model["grid"]),
+            outlines=_outlines(geoms, read_state(states[0])),
+            outline_body=tuple(geom.body for geom in geoms),
+            frames_per_second=float(model["frames_per_second"]),
+            wind=np.asarray(model["wind"], float).reshape(-1, 3),
+            picture=scene.get("output", {}).get("picture", "vorticity"),
+            history=_history(folder.history),
+            states=states,
+        )
+
+    def __len__(self) -> int:
+        """Number of frames that can be drawn, the initial state included."""
+        return len(self.states)
+
+    def state(self, number: int) -> State:
+        """Arrays of the `number`-th state; negative numbers count from the end."""
+        return read_state(self.states[number])
+
+    def sampled(self, most: int) -> list[State]:
+        """At most `most` states, evenly spread, the last one among them."""
+        picks = np.unique(np.linspace(len(self) - 1, 0, min(most, len(self))).round().astype(int))
+        return [self.state(int(pick)) for pick in picks]
+
+    def every(self, name: str) -> Array:
+        """(n, ...) a small array of all states, such as "fluid_force"."""
+        values = []
+        for path in self.states:
+            with np.load(path) as file:
+                values.append(file[name])
+        return np.asarray(values, float)
+
+    def row(self, number: int) -> int | None:
+        """Row of the history that goes with the `number`-th state; None for the initial one."""
+        frame = int(self.states[number].stem)
+        rows = np.flatnonzero(self.history["frame"] == frame)
+        return int(rows[0]) if rows.size else None
+
+    def placed(self, state: State) -> list[Array]:
+        """(k, 2) outline of each geometry in the x-y plane, m."""
+        if not self.outlines:
+            return []
+        centres, turns = state["geom_position"], state["geom_rotation"]
+        return [
+            (centre + outline @ turn.T)[:, :2]
+            for outline, centre, turn in zip(self.outlines, centres, turns, strict=True)
+        ]
+
+
+def read_state(path: Path) -> State:
+    """Arrays of a file of states/."""
+    with np.load(path) as file:
+        return {name: file[name] for name in file.files}
+
+
+def _states(folder: Path) -> tuple[Path, ...]:
+    if not folder.is_dir():
+        return ()
+    return tuple(sorted(p for p in folder.iterdir() if STATE_NAME.fullmatch(p.name)))
+
+
+def _grid(entry: dict[str, Any] | None) -> Grid | None:
+    if entry is None:
+        return None
+    nx, ny, nz = entry["shape"]
+    x, y, z = entry["origin"]
+    return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
+
+
+def _geom(entry: dict[str, Any]) -> Geom:
+    mesh = None
+    if entry["type"] == "mesh":
+        mesh = (np.asarray(entry["vertices"], float), np.asarray(entry["faces"], np.int64))
+    return Geom(entry["type"], np.asarray(entry["size"], float), int(entry["body"]), mesh)
+
+
+def _outlines(geoms: list[Geom], state: State) -> tuple[Array, ...]:
+    """Closed outline of the cross-section of each geometry, in the geometry's frame."""
+    return tuple(
+        _loop(
+            section(
+                geom.kind,
+                geom.size,
+                state["geom_rotation"][n].astype(float),
+                float(state["geom_position"][n, 2]),
+                geom.mesh,
+            )
+        )
+        for n, geom in enumerate(geoms)
+    )
+
+
+def _loop(cut: Section) -> Array:
+    """(k, 3) corners of a cross-section one after the other; of several loops the longest."""
+    segments = cut.outline(ARC)
+    if cut.family != "segments":
+        return np.asarray(segments[:, 0])
+    reach = np.ptp(segments.reshape(-1, 3), axis=0).max()
+    keys = [tuple(key) for key in np.rint(segments[:, 0] / (1e-6 * reach)).astype(int).tolist()]
+    ends = [tuple(key) for key in np.rint(segments[:, 1] / (1e-6 * reach)).astype(int).tolist()]
+    following = {key: n for n, key in enumerate(keys)}
+    longest: list[int] = []
+    left = set(range(len(segments)))
+    while left:
+        loop = [left.pop()]
+        while (n := following.get(ends[loop[-1]])) in left:
+            left.remove(n)
+            loop.append(n)
+        longest = max(longest, loop, key=len)
+    return np.asarray(segments[longest, 0])
+
+
+def _history(path: Path) -> dict[str, Array]:
+    """The columns that are drawn; those that a run does not have are left out."""
+    columns = [
+        name
+        for name in history_columns(path)
+        if name in ("frame", "time_s") or name.startswith(PLOTTED)
+    ]
+    rows = np.array(list(history_rows(path, columns)), float).reshape(-1, len(columns))
+    return dict(zip(columns, rows.T, strict=True))

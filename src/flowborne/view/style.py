@@ -1,0 +1,33 @@
+"""Colours of all pictures, films and plots: light on dark water."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+PAPER = "#0a121c"
+WATER = "#0e1b2b"
+TEXT = "#e9eff6"
+MUTED = "#8ba0b5"
+LINE = "#26384c"
+
+BODY = "#e3eaf2"
+FIXED = "#748394"
+ACCENT = "#ffb81f"
+WIND = "#2f4a66"
+EDGE = "#05090f"
+FORCE = "#6dffb0"
+
+DYES = ("#2fd3ee", "#ff72b6", "#b9f24d", "#a992ff")
+CURVES = ("#ffb81f", "#5cc8ff", "#ff72b6", "#b9f24d", "#a992ff", "#ff8a5c")
+
+SPIN_LEFT = ("#ffe3d8", "#ff5648", "#7e2231")
+"""Colours of strong, middling and weak vorticity that turns counter-clockwise."""
+
+SPIN_RIGHT = ("#d9f0ff", "#2f9dff", "#15457f")
+"""The same for clockwise."""
+
+
+def rgb(colour: str) -> NDArray[np.float64]:
+    """(3,) red, green and blue from 0 to 1 of "#rrggbb"."""
+    return np.array([int(colour[n : n + 2], 16) / 255.0 for n in (1, 3, 5)])
