@@ -1,0 +1,78 @@
+"""Comparison with analytic and published cases: the reference list, run on this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+from flowborne.validation.case import Case, GridSeries, Result
+
+__all__ = ["Case", "GridSeries", "Result", "case", "case_ids", "run_cases"]
+
+MODULES = {
+    "F1": "fluid_cases",
+    "F2": "cavity",
+    "F4": "scalar_cases",
+    "F5": "hydrostatics",
+    "F6": "fluid_cases",
+    "F7": "fluid_cases",
+    "B1": "fixed_bodies",
+    "B2": "fixed_bodies",
+    "B5": "fixed_bodies",
+    "I1": "added_mass",
+    "I2": "added_mass",
+    "I4": "inviscid",
+    "I6": "inviscid",
+    "I7": "inviscid",
+    "I8": "inviscid",
+    "V8": "viscous",
+    "A1": "articulated",
+    "A2": "articulated",
+    "A3": "articulated",
+    "A4": "articulated",
+    "K1": "controller",
+    "K2": "controller",
+    "K3": "controller",
+    "K4": "controller",
+    "K5": "controller_in_flow",
+    "K6": "controller_in_flow",
+    "K7": "gradients",
+    "S5": "swimmers",
+}
+"""Case -> module that holds it, in the order of the list; a module is imported when it is run."""
+
+
+def case_ids() -> Sequence[str]:
+    """Every case, in the order of the list."""
+    return tuple(MODULES)
+
+
+def case(name: str) -> Case:
+    """The case with this id. Raises KeyError when there is none."""
+    module = import_module(f"flowborne.validation.{MODULES[name]}")
+    found: dict[str, Case] = {c.id: c for c in module.CASES}
+    return found[name]
+
+
+def run_cases(
+    ids: Sequence[str] | None,
+    quick: bool,
+    on_result: Callable[[Result], None] | None = None,
+) -> list[Result]:
+    """Run cases one after the other, each on all of the machine's cores.
+
+    ids        which; every one when None
+    quick      coarser grids and shorter runs
+    on_result  called with every result as its case ends
+    """
+    from flowborne.fluid.jit import parallel_kernels
+
+    results = []
+    for name in case_ids() if ids is None else ids:
+        with parallel_kernels():
+            found = case(name).run(quick)
+        for result in found:
+            if on_result is not None:
+                on_result(result)
+        results += found
+    return results

@@ -1,0 +1,395 @@
+"""Bodies let go in ideal fluid: I1 in an unbounded one, I2 in closed containers.
+
+One step from rest is enough, because the first acceleration is what the cases are about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from flowborne.coupling.motion import Drive
+from flowborne.fluid.grid import Grid
+from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
+from flowborne.validation.reference import reference, table
+from flowborne.validation.worlds import Vector, advance, mjcf, world_of
+
+DT = 1e-3
+"""s, the one step; nothing depends on it."""
+
+LIGHT = 0.01
+"""Density of most bodies here over the fluid's."""
+
+UP: Vector = (0.0, 1.0, 0.0)
+SIDEWAYS: Vector = (1.0, 0.0, 0.0)
+
+Grids = Sequence[int]
+"""Cells across the body, from coarse to fine."""
+
+
+def box(cells: int, solid: bool = False, long: int = 1) -> Grid:
+    """A closed box of width 1 m about the origin, `cells` across; 2D, `long` m high, or a cube."""
+    if solid:
+        return Grid((cells, cells, cells), 1.0 / cells, (-0.5, -0.5, -0.5))
+    return Grid.slab(cells, long * cells, 1.0 / cells, (-0.5, -0.5 * long))
+
+
+def round_body(diameter: float) -> str:
+    """A sphere, which in a slab is a cylinder."""
+    return f'<geom type="sphere" size="{0.5 * diameter}"/>'
+
+
+def ellipse(a: float, b: float) -> str:
+    """Ellipse with semi-axes a along x and b along y."""
+    return f'<geom type="ellipsoid" size="{a} {b} 1"/>'
+
+
+def rise(grid: Grid, geom: str, ratio: float, direction: Vector = UP, walls: str = "") -> float:
+    """Acceleration of a body against gravity, over gravity.
+
+    geom       at the origin
+    ratio      density over the fluid's
+    direction  against gravity
+    walls      fixed geoms
+    """
+    body = f'<body name="body"><freejoint name="root"/>{geom}</body>'
+    gravity = (-direction[0], -direction[1], -direction[2])
+    world = world_of(grid, mjcf(walls, body), gravity=gravity, solid_density=ratio, tolerance=1e-11)
+    advance(world, DT)
+    return float(world.solid.v[:3] @ np.array(direction)) / DT
+
+
+def coefficient(grid: Grid, geom: str, direction: Vector = UP, walls: str = "") -> float:
+    """Ca of a body in its container, from how it rises."""
+    return (1.0 - LIGHT) / rise(grid, geom, LIGHT, direction, walls) - LIGHT
+
+
+def turned(grid: Grid, geom: str) -> float:
+    """Added moment of inertia about the origin over the fluid's density, m^4: from the torque of
+    the pressure while a drive starts the body turning."""
+    body = f'<body name="body"><joint name="turn" axis="0 0 1"/>{geom}</body>'
+    world = world_of(grid, mjcf(body), solid_density=1.0, tolerance=1e-11)
+    drive = Drive.none(1)
+    drive.set(np.array([0]), 0.0, DT)
+    return -float(advance(world, DT, drive=drive).pressure_wrench[1, 5])
+
+
+def series_of(label: str, grids: Grids, values: Sequence[float], exact: float) -> GridSeries:
+    """The values and their relative errors."""
+    return GridSeries(label, grids, values, [abs(v / exact - 1.0) for v in values])
+
+
+ACROSS = "cells across D"
+
+
+def squares(quick: bool) -> list[Finding]:
+    """Cylinder in a square."""
+    grids = (8, 16, 32) if quick else (8, 16, 32, 64)
+    findings = []
+    for ratio, exact in table("I2", "cylinder in closed square, Ca vs D/L").items():
+        if quick and ratio < 0.2:
+            continue
+        width = 1.0 / round(1.0 / ratio)
+        values = [coefficient(box(round(n / width)), round_body(width)) for n in grids]
+        said = f"Ca of a cylinder in a square, D/L = {ratio:g}"
+        series = series_of(ACROSS, grids, values, exact)
+        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+    return findings
+
+
+def oblongs(quick: bool) -> list[Finding]:
+    """Cylinder in a box twice as long as wide."""
+    grids = (8, 16, 32) if quick else (8, 16, 32, 64)
+    name = "cylinder in 1x2 box (width 1): [moving across, moving along the long side]"
+    findings = []
+    for key, pair in reference("I2", name).items():
+        width = float(key.removeprefix("D/L="))
+        if quick and width < 0.5:
+            continue
+        for said, direction, exact in zip(("across", "along"), (SIDEWAYS, UP), pair, strict=True):
+            values = [
+                coefficient(box(round(n / width), long=2), round_body(width), direction)
+                for n in grids
+            ]
+            series = series_of(ACROSS, grids, values, exact)
+            title = f"Ca of a cylinder {said} a 1 x 2 box, D/L = {width:g}"
+            findings.append(near(title, values[-1], exact, relative=0.01, series=series))
+    return findings
+
+
+LONG, SHORT = 0.1, 0.05
+"""Semi-axes of the list's ellipse, m."""
+
+
+def ellipse_in_box(quick: bool) -> list[Finding]:
+    """Ellipse along both axes and turning."""
+    grids = (16, 32, 64) if quick else (16, 32, 64, 128)
+    along, across, turning = reference("I2", "ellipse 2:1 (a=0.1,b=0.05) in unit box")
+    unbounded = np.pi / 8.0 * (LONG**2 - SHORT**2) ** 2
+    spaces = [box(round(n / (2.0 * LONG))) for n in grids]
+    geom = ellipse(LONG, SHORT)
+    rows = (
+        ("Ca along its long axis", along, [coefficient(g, geom, SIDEWAYS) for g in spaces]),
+        ("Ca across", across, [coefficient(g, geom, UP) for g in spaces]),
+        ("I_a over the unbounded one", turning, [turned(g, geom) / unbounded for g in spaces]),
+    )
+    findings = []
+    for said, exact, values in rows:
+        series = series_of("cells along the long axis", grids, values, exact)
+        title = f"ellipse in a box, {said}"
+        findings.append(near(title, values[-1], exact, relative=0.01, series=series))
+    return findings
+
+
+def cubes(quick: bool) -> list[Finding]:
+    """Sphere in a cube; the finest grid of the smallest sphere has 160^3 cells."""
+    findings = []
+    for ratio, exact in table("I2", "sphere in closed cube, Ca vs D/L").items():
+        grids: Grids = (8, 16) if quick or ratio < 0.15 else (8, 16, 32)
+        if quick and ratio < 0.3:
+            continue
+        width = 1.0 / round(1.0 / ratio)
+        values = [coefficient(box(round(n / width), solid=True), round_body(width)) for n in grids]
+        series = series_of(ACROSS, grids, values, exact)
+        said = f"Ca of a sphere in a cube, D/L = {ratio:g}"
+        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+    return findings
+
+
+def ring_of_boxes(radius: float, sides: int = 128) -> str:
+    """Fixed boxes around the origin whose inner edges enclose the area of a circle."""
+    turn = np.pi / sides
+    inner = radius * float(np.sqrt(turn / np.tan(turn)))
+    half = 0.05 * radius
+    size = f"{half} {(inner + 2.0 * half) * np.tan(turn)} 1"
+    geoms = []
+    for angle in 2.0 * turn * np.arange(sides):
+        x, y = (inner + half) * np.cos(angle), (inner + half) * np.sin(angle)
+        geoms.append(f'<geom type="box" size="{size}" pos="{x} {y} 0" euler="0 0 {angle}"/>')
+    return "".join(geoms)
+
+
+def ball_of_boxes(radius: float) -> str:
+    """Fixed boxes around the origin whose inner faces enclose the volume of a ball."""
+    normals = trimesh.creation.icosphere(subdivisions=3, radius=1.0).vertices
+    planes = np.column_stack([normals, -np.ones(len(normals))])
+    hollow = ConvexHull(HalfspaceIntersection(planes, np.zeros(3)).intersections)
+    inner = radius * (4.0 / 3.0 * np.pi / hollow.volume) ** (1.0 / 3.0)
+    half = 0.08 * radius
+    geoms = []
+    for normal in normals:
+        place = " ".join(str(x) for x in (inner + half) * normal)
+        along = " ".join(str(x) for x in normal)
+        size = f"{0.15 * radius} {0.15 * radius} {half}"
+        geoms.append(f'<geom type="box" size="{size}" pos="{place}" zaxis="{along}"/>')
+    return "".join(geoms)
+
+
+def shells(quick: bool) -> list[Finding]:
+    """Cylinder and sphere in the middle of a shell that stands still."""
+    findings = []
+    outer = 0.4
+    for ratio in (2.0,) if quick else (2.0, 3.0, 4.0):
+        grids = (8, 16, 32) if quick else (8, 16, 32, 64)
+        width = 2.0 * outer / ratio
+        exact = (ratio**2 + 1.0) / (ratio**2 - 1.0)
+        walls = ring_of_boxes(outer)
+        values = [coefficient(box(round(n / width)), round_body(width), walls=walls) for n in grids]
+        said = f"Ca of a cylinder in a concentric shell, b/a = {ratio:g}"
+        series = series_of(ACROSS, grids, values, exact)
+        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+    if not quick:
+        grids = (8, 16, 32)
+        exact = (2.0**3 + 2.0) / (2.0 * (2.0**3 - 1.0))
+        walls = ball_of_boxes(outer)
+        values = [
+            coefficient(box(round(n / outer), solid=True), round_body(outer), walls=walls)
+            for n in grids
+        ]
+        series = series_of(ACROSS, grids, values, exact)
+        said = "Ca of a sphere in a concentric shell, b/a = 2"
+        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+    return findings
+
+
+def containers(quick: bool) -> list[Finding]:
+    """I2: bodies in closed boxes and shells."""
+    return squares(quick) + oblongs(quick) + ellipse_in_box(quick) + cubes(quick) + shells(quick)
+
+
+FLAT_IMAGES = 3.438 / (2.0 * np.pi)
+"""Flow that the images of a dipole in a square of 1 m make at its place, per area of the dipole:
+I2's fit Ca + 1 = 2/(1 - 3.438 (D/2L)^2), of which it is the general form."""
+
+SOLID_IMAGES = 4.84372 / (2.0 * np.pi)
+"""The same for a cube of 1 m, per volume: I2's q = 4.84372 (D/2L)^3."""
+
+
+def unbounded(added: float, displaced: float, solid: bool = False) -> float:
+    """Added mass over the fluid's density without the box of 1 m, from that in its middle.
+
+    The body's dipole S is its displaced volume and its added one together; in the box it is
+    S / (1 - images S).
+    """
+    dipole = added + displaced
+    return dipole / (1.0 + (SOLID_IMAGES if solid else FLAT_IMAGES) * dipole) - displaced
+
+
+def free_rise(measured: float, ratio: float, displaced: float, solid: bool) -> float:
+    """Rise over g without the box, from that in the box."""
+    boxed = (1.0 - ratio) / measured - ratio
+    free = unbounded(boxed * displaced, displaced, solid) / displaced
+    return (1.0 - ratio) / (ratio + free)
+
+
+def density_ratios(quick: bool) -> list[Finding]:
+    """The list's tables of accelerations, downward positive, and their limits."""
+    findings = []
+    for name, solid, limit in (("cylinder", False, -1.0), ("sphere", True, -2.0)):
+        if quick and solid:
+            continue
+        width = 1.0 / 3.0 if solid else 0.25
+        grid = box(round(32 / width), solid)
+        displaced = np.pi * width**3 / 6.0 if solid else np.pi * width**2 / 4.0
+        rows = table("I1", f"table a/g {'(down +) ' if not solid else ''}{name}")
+        for ratio, exact in (rows | {1e-6: limit, 1e6: 1.0}).items():
+            measured = rise(grid, round_body(width), ratio)
+            if ratio == 1.0:
+                findings.append(at_most(f"a/g of a neutral {name}", measured, 1e-10))
+                continue
+            found = -free_rise(measured, ratio, displaced, solid)
+            said = f"a/g of a {name}, rho_s/rho_f = {ratio:g}, 32 cells across D"
+            findings.append(near(said, found, exact, relative=0.01))
+    return findings
+
+
+def ellipses(quick: bool) -> list[Finding]:
+    """How an ellipse rises along both axes, and its added moment of inertia."""
+    grids = (16, 32) if quick else (32, 64, 128)
+    area = np.pi * LONG * SHORT
+    rows = reference("I1", "rise a/g for rho_s/rho_f=0.01")
+    findings = []
+    for said, direction in (("a=2b along long axis", SIDEWAYS), ("across", UP)):
+        exact = rows[f"ellipse {said}"]
+        values = []
+        for n in grids:
+            space = box(round(n / (2.0 * LONG)))
+            values.append(
+                free_rise(rise(space, ellipse(LONG, SHORT), LIGHT, direction), LIGHT, area, False)
+            )
+        series = series_of("cells along the long axis", grids, values, exact)
+        title = f"rise over g of an ellipse {said}"
+        findings.append(near(title, values[-1], exact, relative=0.01, series=series))
+    inertia = turning(LONG, SHORT)
+    values = [
+        free_turning(turned(box(round(n / (2.0 * LONG))), ellipse(LONG, SHORT)), LONG, SHORT)
+        / inertia
+        for n in grids
+    ]
+    series = series_of("cells along the long axis", grids, values, 1.0)
+    title = "I_a of an ellipse over rho pi/8 (a^2-b^2)^2"
+    return [*findings, near(title, values[-1], 1.0, relative=0.01, series=series)]
+
+
+def turning(a: float, b: float) -> float:
+    """Added moment of inertia of an ellipse over the fluid's density, unbounded, m^4."""
+    return float(np.pi / 8.0 * (a**2 - b**2) ** 2)
+
+
+def free_turning(boxed: float, a: float, b: float) -> float:
+    """Added moment of inertia without the box of 1 m, from that in its middle.
+
+    The images of the body's quadrupole, (a^2 - b^2)(a + b)^2/16, add its square times a number
+    that I2's ellipse tells.
+    """
+
+    def square(a: float, b: float) -> float:
+        return ((a**2 - b**2) * (a + b) ** 2 / 16.0) ** 2
+
+    excess = reference("I2", "ellipse 2:1 (a=0.1,b=0.05) in unit box")[2] - 1.0
+    images = excess * turning(LONG, SHORT) / square(LONG, SHORT)
+    return boxed / (1.0 + images * square(a, b) / turning(a, b))
+
+
+def spheroid(quick: bool) -> list[Finding]:
+    """A prolate spheroid twice as long as wide, along its axis."""
+    grids = (16, 32) if quick else (16, 32, 64)
+    length, width = 0.4, 0.2
+    e = np.sqrt(1.0 - (width / length) ** 2)
+    a0 = 2.0 * (1.0 - e**2) / e**3 * (np.arctanh(e) - e)
+    exact = float(a0 / (2.0 - a0))
+    volume = np.pi / 6.0 * length * width**2
+    geom = f'<geom type="ellipsoid" size="{0.5 * width} {0.5 * length} {0.5 * width}"/>'
+    values = []
+    for n in grids:
+        boxed = coefficient(box(round(n / length), solid=True), geom)
+        values.append(unbounded(boxed * volume, volume, solid=True) / volume)
+    series = series_of("cells along the axis", grids, values, exact)
+    said = "Ca of a prolate spheroid 2:1 along its axis"
+    return [near(said, values[-1], exact, relative=0.01, series=series)]
+
+
+THIN = 1e-4
+"""Half thickness of plate and disc, m."""
+
+
+def plates(quick: bool) -> list[Finding]:
+    """A plate across, along and turning; the fluid sees it 1.4 cells thick, so the order is 1."""
+    half = 0.2
+    grids = (16, 32, 64) if quick else (64, 128, 256, 512, 1024)
+    geom = f'<geom type="box" size="{half} {THIN} 1"/>'
+    displaced, circle = 4.0 * half * THIN, np.pi * half**2
+    across, along, rounds = [], [], []
+    for n in grids:
+        space = box(round(n / (2.0 * half)))
+        across.append(unbounded(pushed(space, geom, UP), displaced) / circle)
+        along.append(unbounded(pushed(space, geom, SIDEWAYS), displaced) / circle)
+        rounds.append(free_turning(turned(space, geom), half, 0.0) / turning(half, 0.0))
+    label = "cells across the plate"
+    lengthwise = GridSeries(label, grids, along, [abs(v) for v in along])
+    findings = [
+        near(said, values[-1], 1.0, relative=0.01, series=series_of(label, grids, values, 1.0))
+        for said, values in (
+            ("m_a of a plate across over rho pi a^2", across),
+            ("I_a of a plate over rho pi a^4/8", rounds),
+        )
+    ]
+    title = "m_a of a plate along over rho pi a^2"
+    return [*findings, at_most(title, along[-1], 0.01, series=lengthwise)]
+
+
+def disc(quick: bool) -> list[Finding]:
+    """A disc broadside; the fluid sees it 1.75 cells thick."""
+    half = 0.2
+    grids = (8, 16, 32) if quick else (8, 16, 32, 64)
+    geom = f'<geom type="cylinder" size="{half} {THIN}" zaxis="0 1 0"/>'
+    displaced, exact = 2.0 * THIN * np.pi * half**2, 8.0 / 3.0 * half**3
+    values = []
+    for n in grids:
+        added = pushed(box(round(n / (2.0 * half)), solid=True), geom, UP)
+        values.append(unbounded(added, displaced, solid=True) / exact)
+    series = series_of("cells across the disc", grids, values, 1.0)
+    title = "m_a of a disc broadside over 8/3 rho a^3"
+    return [near(title, values[-1], 1.0, relative=0.01, series=series)]
+
+
+def unbounded_bodies(quick: bool) -> list[Finding]:
+    """I1: what is left without the container's part."""
+    return density_ratios(quick) + ellipses(quick) + spheroid(quick) + plates(quick) + disc(quick)
+
+
+def pushed(grid: Grid, geom: str, direction: Vector) -> float:
+    """Added mass over the fluid's density, from the pressure while a drive starts the body."""
+    axis = " ".join(str(x) for x in direction)
+    body = f'<body name="body"><joint name="slide" type="slide" axis="{axis}"/>{geom}</body>'
+    world = world_of(grid, mjcf(body), solid_density=1.0, tolerance=1e-11)
+    drive = Drive.none(1)
+    drive.set(np.array([0]), 0.0, DT)
+    force = advance(world, DT, drive=drive).pressure_wrench[1, :3]
+    return -float(force @ np.array(direction))
+
+
+CASES = (Case("I1", unbounded_bodies), Case("I2", containers))

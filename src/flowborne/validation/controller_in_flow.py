@@ -1,0 +1,217 @@
+"""The block in a stream, and how fast controllers arrive: K5 and K6."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from flowborne.coupling.motion import Drive
+from flowborne.fluid.grid import Array
+from flowborne.scenes.build import build
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import BlowUpError, Simulation
+from flowborne.validation.case import Case, Finding, GridSeries, near
+from flowborne.validation.reference import reference
+from flowborne.validation.worlds import advance
+
+FRAMES_PER_SECOND = 24.0
+STRENGTH = 20.0
+"""degrees/s, of the block scenes."""
+
+AREA = 1.0
+STREAM_PRESSURE = 0.5 * 1000.0
+"""rho U^2 / 2 of the NS scenes, Pa."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """How the block's angle went.
+
+    angles    (frames + 1,) degrees
+    step      degrees in a frame that the strength allows
+    final     mean of the last tenth, at least ten frames, degrees
+    frames    the first after which the angle stays within a step of the final one; the number of
+              frames when it never does
+    chatter   largest departure from the final angle in those last frames, in steps
+    """
+
+    angles: Array
+    step: float
+    final: float
+    frames: int
+    chatter: float
+
+    @property
+    def arrived(self) -> bool:
+        """Whether it stays within a step of the final angle to the end."""
+        return self.chatter <= 1.0 + 1e-9
+
+
+def course(
+    scene: str, frames: int | None = None, strength: float = STRENGTH, resolution: int | None = None
+) -> Course:
+    """Run a built-in block scene with one worker.
+
+    frames      how many; as many as the scene asks for when None
+    strength    degrees/s
+    resolution  of the domain, in place of the scene's
+    raises      ArithmeticError when the run blows up
+    """
+    settings = {"control.0.strength": str(strength)}
+    if resolution is not None:
+        settings["domain.resolution"] = str(resolution)
+    with Simulation(load_scene(scene, settings), workers=1) as simulation:
+        angles = [float(simulation.world.solid.q[0])]
+        try:
+            for _ in range(simulation.frames if frames is None else frames):
+                simulation.advance_frame()
+                angles.append(float(simulation.world.solid.q[0]))
+        except BlowUpError as error:
+            raise ArithmeticError(f"{scene}: {error}") from error
+    return judged(np.degrees(angles), strength / FRAMES_PER_SECOND)
+
+
+def judged(angles: Array, step: float) -> Course:
+    """Final angle and convergence, as the summary of a run has them."""
+    run = angles[1:]
+    last = min(len(run), max(10, round(0.1 * len(run))))
+    final = float(run[-last:].mean())
+    away = np.abs(run - final)
+    outside = np.flatnonzero(away > step * (1.0 + 1e-9))
+    frames = int(outside[-1]) + 2 if outside.size else 1
+    return Course(angles, step, final, min(frames, len(run)), float(away[-last:].max()) / step)
+
+
+def held_drag(degrees: float, resolution: int, seconds: float) -> float:
+    """Mean pressure drag of the block held at an angle, N, over the last half of `seconds`.
+
+    A step takes the stream of 1 m/s a quarter of a cell.
+    """
+    settings = {"domain.resolution": str(resolution), "initial.positions.hinge": str(degrees)}
+    world = build(load_scene("ns-block-drag-max", settings)).world
+    drive = Drive.none(1)
+    drive.set(np.array([0]), 0.0, 0.0)
+    dt = 0.25 * world.flow()[0].grid.spacing
+    count = round(seconds / dt)
+    drags = [float(advance(world, dt, drive=drive).pressure_wrench[1, 0]) for _ in range(count)]
+    return float(np.mean(drags[count // 2 :]))
+
+
+def from_wind(angle: float) -> float:
+    """Angle between the block and the stream, 0 to 90 degrees; an angle of 0 hangs across it."""
+    return abs((angle % 180.0) - 90.0)
+
+
+def block_in_stream(quick: bool) -> list[Finding]:
+    """K5: where most and least drag lead, and the drag of held blocks on a grid of 5 degrees."""
+    grids = (48,) if quick else (64, 128)
+    findings: list[Finding] = []
+    goals = {"ns-block-drag-max": 90.0, "ns-block-drag-min": 0.0}
+    finals = {}
+    for scene, goal in goals.items():
+        runs = [course(scene, resolution=n) for n in grids]
+        values = [from_wind(run.final) for run in runs]
+        series = GridSeries("cells a side", grids, values, [abs(v - goal) for v in values])
+        finals[scene] = runs[-1].final
+        said = f"{scene}: final angle to the stream, degrees"
+        findings.append(near(said, values[-1], goal, absolute=15.0, series=series))
+    angles = np.arange(-90.0, 91.0, 15.0 if quick else 5.0)
+    resolution, seconds = (32, 3.0) if quick else (64, 6.0)
+    drags = np.array([held_drag(a, resolution, seconds) for a in angles])
+    unit = STREAM_PRESSURE * AREA
+    lines = [f"{a:>6g} degrees: {d / unit:.4g}" for a, d in zip(angles, drags, strict=True)]
+    middle = len(angles) // 2
+    rise = float(drags[middle] - 0.5 * (drags[0] + drags[-1])) / unit
+    said = "drag across the stream less that along it, over rho U^2 L/2"
+    findings.append(Finding(said, rise, "> 0", "sign", rise > 0.0, lines=tuple(lines)))
+    for scene, best in (
+        ("ns-block-drag-max", angles[drags.argmax()]),
+        ("ns-block-drag-min", angles[drags.argmin()]),
+    ):
+        apart = abs((finals[scene] - best + 90.0) % 180.0 - 90.0)
+        said = f"{scene}: final angle from that of held blocks, degrees"
+        findings.append(near(said, apart, 0.0, absolute=float(angles[1] - angles[0])))
+    return findings
+
+
+SCENES = {
+    "NS max drag": "ns-block-drag-max",
+    "NS min drag": "ns-block-drag-min",
+    "NS min effort": "ns-block-effort",
+    "simple max drag": "block-drag-max",
+    "simple min drag": "block-drag-min",
+    "simple min effort": "block-effort-wind",
+}
+"""Rows of Fig. 2 and our scene of each."""
+
+PROBE = 5.0
+"""Displacement of the scenes' central differences, degrees."""
+
+
+def balanced_corner() -> float:
+    """Angle at which the drag of the block (K3's law, w/L = 0.2) is the same a probe to either
+    side, degrees: the least drag as central differences see it, 0.9 degrees from where it is."""
+
+    def drag(degrees: float) -> float:
+        phi = np.radians(degrees + 90.0)
+        return float(np.abs(np.sin(phi)) ** 3 + 0.2 * np.abs(np.cos(phi)) ** 3)
+
+    return float(brentq(lambda a: drag(a + PROBE) - drag(a - PROBE), 70.0, 85.0))
+
+
+OPTIMA = {
+    "block-drag-max": 0.0,
+    "block-drag-min": balanced_corner(),
+    "block-effort-wind": float(np.degrees(np.arctan(224.0 / (25.0 * 9.81)))),
+}
+"""Degrees: across the wind; the block's corner into it; along the net force."""
+
+
+def frames_and_strength(quick: bool) -> list[Finding]:
+    """K6: the law of the frames in simple winds, and the frames of Fig. 2."""
+    findings = []
+    strengths = (20.0, 40.0) if quick else (5.0, 10.0, 20.0, 40.0)
+    for scene, best in OPTIMA.items():
+        start = float(np.degrees(build(load_scene(scene)).world.solid.q[0]))
+        runs = [
+            course(scene, round(1.2 * abs(start - best) * FRAMES_PER_SECOND / s) + 30, s)
+            for s in strengths
+        ]
+        lines = []
+        off = 0.0
+        for s, run in zip(strengths, runs, strict=True):
+            law = int(np.ceil(abs(start - best) / run.step))
+            off = max(off, abs(run.frames - law))
+            lines.append(
+                f"{s:g} degrees/s: {run.frames} frames, law {law}, final {run.final:.3f} degrees, "
+                f"chatter {run.chatter:.2f} steps"
+            )
+        said = f"{scene}: frames less ceil(|phi0 - phi*| / (strength dt)), largest"
+        findings.append(near(said, off, 0.0, absolute=1.0, lines=lines))
+        products = [run.frames * s for s, run in zip(strengths, runs, strict=True)]
+        rounds = [
+            abs(p - products[0]) / max(s, strengths[0])
+            for s, p in zip(strengths, products, strict=True)
+        ]
+        said = f"{scene}: N x strength, largest difference in frames"
+        findings.append(near(said, max(rounds), 0.0, absolute=1.0))
+        apart = max(abs(run.final - best) / run.step for run in runs)
+        said = f"{scene}: final angle from the optimum, in steps"
+        findings.append(near(said, apart, 0.0, absolute=1.0))
+        chatter = max(run.chatter for run in runs)
+        findings.append(near(f"{scene}: chatter, in steps", chatter, 0.0, absolute=1.0))
+    if quick:
+        return findings
+    paper = reference("K6", "paper frames")
+    found = {row: course(scene).frames for row, scene in SCENES.items()}
+    lines = [f"{row}: {found[row]} frames, paper {paper[row]}" for row in SCENES]
+    flow, simple = (
+        found[f"{kind} max drag"] + found[f"{kind} min drag"] for kind in ("NS", "simple")
+    )
+    said = "frames of most and least drag together, NS over simple wind"
+    return [*findings, near(said, flow / simple, 1.0, relative=0.1, lines=lines)]
+
+
+CASES = (Case("K5", block_in_stream), Case("K6", frames_and_strength))

@@ -1,0 +1,123 @@
+"""The paper's Fig. 2 and Fig. 10 with our numbers: tables and a plot."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from flowborne.control.executors import cores
+from flowborne.fluid.jit import parallel_kernels
+from flowborne.io.atomic import write_atomically
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import Simulation
+from flowborne.validation.controller_in_flow import SCENES, Course, course
+from flowborne.validation.reference import reference
+from flowborne.view.plots import ChainCost, plot_chain_cost
+
+PAPER_SERIAL = {1: 14.0, 2: 29.0, 3: 43.0, 4: 58.0}
+PAPER_PARALLEL = (14.0, 15.0)
+"""s per frame in Fig. 10 on the authors' machines; parallel: least and most."""
+
+CHAIN_FRAMES = 20
+"""Frames of each chain whose median time is taken, after the first."""
+
+
+def make_figures(out: Path, console: Console | None = None) -> None:
+    """Run the scenes of Fig. 2 and Fig. 10 and write what they gave.
+
+    Writes figure-2.csv, figure-10.csv and figure-10.png, and prints both tables.
+
+    out      folder; made when it is not there
+    console  where the tables are printed
+    raises   ArithmeticError when a run blows up, OSError when a file cannot be written
+    """
+    shown = console or Console()
+    out.mkdir(parents=True, exist_ok=True)
+    convergence_figure(out, shown)
+    chain_figure(out, shown)
+
+
+def convergence_figure(out: Path, console: Console) -> None:
+    """Fig. 2: the frame in which the block arrives, for each wind and objective."""
+    paper = reference("K6", "paper frames")
+    columns = ("run", "scene", "frames", "frames in the paper", "final angle", "chatter in steps")
+    rows = []
+    for row, scene in SCENES.items():
+        found = course(scene)
+        rows.append(
+            (row, scene, arrival(found), paper[row], f"{found.final:.1f}", f"{found.chatter:.2f}")
+        )
+    finish(
+        "Fig. 2: frames until the block stays within a step of its final angle",
+        columns,
+        rows,
+        out / "figure-2.csv",
+        console,
+    )
+
+
+def arrival(found: Course) -> str:
+    """The converged frame, or that there is none."""
+    return str(found.frames) if found.arrived else "none"
+
+
+def chain_figure(out: Path, console: Console) -> None:
+    """Fig. 10: seconds per frame of chains with 1 to 4 joints."""
+    costs = [ChainCost(n, frame_seconds(n, 1), frame_seconds(n, cores())) for n in PAPER_SERIAL]
+    columns = (
+        "joints",
+        "serial s",
+        "parallel s",
+        "workers",
+        "serial s in the paper",
+        "parallel s in the paper",
+    )
+    rows = [
+        (
+            c.joints,
+            f"{c.serial:.4f}",
+            f"{c.parallel:.4f}",
+            cores(),
+            PAPER_SERIAL[c.joints],
+            "{:g} to {:g}".format(*PAPER_PARALLEL),
+        )
+        for c in costs
+    ]
+    finish("Fig. 10: seconds per frame", columns, rows, out / "figure-10.csv", console)
+    plot_chain_cost(costs, out / "figure-10.png")
+
+
+def frame_seconds(joints: int, workers: int, frames: int = CHAIN_FRAMES) -> float:
+    """Median time of a frame of ns-chain-`joints`, s."""
+    with (
+        parallel_kernels(False),
+        Simulation(load_scene(f"ns-chain-{joints}"), workers=workers) as simulation,
+    ):
+        simulation.advance_frame()
+        times = [simulation.advance_frame().seconds["total"] for _ in range(frames)]
+    return float(np.median(times))
+
+
+def finish(
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    path: Path,
+    console: Console,
+) -> None:
+    """Print a table and write it as CSV."""
+    table = Table(*columns, title=title)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for row in rows:
+        table.add_row(*(str(value) for value in row))
+        writer.writerow(row)
+    write_atomically(path, lambda file: file.write(text.getvalue().encode("utf-8")))
+    console.print(table)

@@ -1,0 +1,209 @@
+"""Finite differences of the objective, and what they cost: K7."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from time import perf_counter, process_time
+
+import numpy as np
+
+from flowborne.control.controller import Controller
+from flowborne.control.executors import Serial, cores
+from flowborne.control.gradients import GradientCentral, GradientOneSided
+from flowborne.control.measurement import Measurement
+from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, ObjectiveWindDrag
+from flowborne.control.trial import Hypothesis
+from flowborne.coupling.step import step
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Grid
+from flowborne.fluid.jit import parallel_kernels
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import Simulation
+from flowborne.solids.wind import WindFaces, WindForce
+from flowborne.validation.case import Case, Finding, GridSeries, at_most, near, order_of
+from flowborne.validation.controller import AIR, HINGE, LENGTH, SPEED, WIDTH, block
+from flowborne.validation.worlds import Vector, mjcf, world_of
+
+FRAME = 1.0 / 24.0
+
+LEANING = 35.0
+"""degrees of the block where the gradient is taken; its incidence is 90 more."""
+
+
+def drag_slope(degrees: float) -> float:
+    """dD/dphi of K3's law, N per rad, of the block at an angle."""
+    phi = float(np.radians(degrees + 90.0))
+    s, c = np.sin(phi), np.cos(phi)
+    rise = LENGTH * 3.0 * s * abs(s) * c - WIDTH * 3.0 * c * abs(c) * s
+    return float(2.0 * AIR * SPEED**2 * rise)
+
+
+def slopes(
+    gradient: type[GradientCentral] | type[GradientOneSided], sizes: list[float], degrees: float
+) -> list[float]:
+    """Estimates with displacements `sizes` (degrees), N per rad."""
+    drag = ObjectiveSum.of(ObjectiveWindDrag(np.array([1]), (1.0, 0.0, 0.0)))
+    found = []
+    for size in sizes:
+        controller = Controller(
+            HINGE,
+            drag,
+            Hypothesis(FRAME),
+            1.0,
+            gradient(float(np.radians(size))),
+            executor=Serial(),
+        )
+        world = block(degrees, 0.0, WindFaces((SPEED, 0.0, 0.0), AIR, ("block",)))
+        estimate = controller.gradient.estimate(controller.trials(world, step))
+        found.append(float(estimate.gradient[0]))
+    return found
+
+
+def difference_error(quick: bool) -> list[Finding]:
+    """Order of both differences, and the bias of the one-sided at an optimum."""
+    sizes = [4.0, 2.0, 1.0, 0.5] if quick else [4.0, 2.0, 1.0, 0.5, 0.25]
+    exact = drag_slope(LEANING)
+    findings = []
+    for said, kind, order in (
+        ("central", GradientCentral, 2.0),
+        ("one-sided", GradientOneSided, 1.0),
+    ):
+        found = slopes(kind, sizes, LEANING)
+        errors = [abs(f / exact - 1.0) for f in found]
+        series = GridSeries("h^-1 in 1/degree", [1.0 / s for s in sizes], found, errors)
+        findings.append(order_of(f"order of {said} differences", series, expected=order))
+    scale = 2.0 * AIR * SPEED**2 * LENGTH
+    level = slopes(GradientCentral, [5.0], 0.0)[0] / scale
+    biased = slopes(GradientOneSided, [5.0], 0.0)[0] / scale
+    findings.append(at_most("central gradient at the most drag over 2 rho U^2 L", level, 1e-10))
+    found_bias = Finding(
+        "one-sided gradient there", biased, "< 0", "biased by O(h)", biased < -1e-3
+    )
+    return [*findings, found_bias]
+
+
+@dataclass(frozen=True)
+class Angle:
+    """Objective that tells a joint's position, as the trial leaves it."""
+
+    dof: int
+
+    def __call__(self, measurement: Measurement) -> float:
+        return float(measurement.joint_positions(np.array([self.dof]))[0])
+
+
+def pushed_arm(force: Vector) -> World:
+    """Two blocks in a fluid under gravity and a force."""
+    lower = (
+        '<body name="lower" pos="0 -.5 0"><joint name="elbow" axis="0 0 1"/>'
+        '<geom type="box" size=".08 .25 1" pos="0 -.25 0"/></body>'
+    )
+    model = mjcf(
+        '<body name="upper"><joint name="shoulder" axis="0 0 1"/>'
+        f'<geom type="box" size=".1 .25 1" pos="0 -.25 0"/>{lower}</body>'
+    )
+    grid = Grid.slab(32, 32, 3.0 / 32, (-1.5, -1.5))
+    return world_of(
+        grid,
+        model,
+        gravity=(0.0, -9.81, 0.0),
+        solid_density=3.0,
+        density=1.0,
+        winds=(WindForce(force),),
+    )
+
+
+def exact_position(quick: bool) -> list[Finding]:
+    """Displacement of the trials over the one asked for, and where a frame's drive ends."""
+    rng = np.random.default_rng(3)
+    wrong, off = 0.0, 0.0
+    for _ in range(2 if quick else 10):
+        fx, fy = rng.uniform(-50.0, 50.0, 2)
+        world = pushed_arm((float(fx), float(fy), 0.0))
+        world.solid.q[:] = rng.uniform(-1.0, 1.0, 2)
+        world.solid.v[:] = rng.uniform(-1.0, 1.0, 2)
+        start, asked = world.solid.q.copy(), rng.uniform(-0.3, 0.3, 2)
+        for dof in (0, 1):
+            controller = Controller(
+                np.array([0, 1]),
+                ObjectiveSum.of(ObjectiveCallable(Angle(dof))),
+                Hypothesis(FRAME, steps=2),
+                1.0,
+                executor=Serial(),
+            )
+            reached = controller.trials(world, step).values(asked[None, :])[0]
+            wrong = max(wrong, abs(float(reached - start[dof] - asked[dof])))
+        controller.decide(world, FRAME, step)
+        target = world.memory["target"].copy()
+        for _ in range(3):
+            drive = controller.drive(world, FRAME, FRAME / 3.0)
+            step(world, FRAME / 3.0, drive)
+        off = max(off, float(np.abs(world.solid.q - target).max()))
+    return [
+        at_most("displacement of a trial minus the one asked for, rad", wrong, 1e-6),
+        at_most("joints minus their targets at the end of a frame, rad", off, 1e-6),
+    ]
+
+
+CHAINS = (1, 2, 3, 4)
+"""Joints of the chains of Fig. 10."""
+
+
+def decision_seconds(
+    count: int, resolution: int, workers: int, clock: Callable[[], float]
+) -> list[float]:
+    """Least time of `count` decisions of each chain by `clock`, s.
+
+    The chains take turns, so that what else the machine does meets all of them.
+    """
+    least = [float("inf")] * len(CHAINS)
+    settings = {"domain.resolution": str(resolution)}
+    with parallel_kernels(False), ExitStack() as stack:
+        simulations = [
+            stack.enter_context(Simulation(load_scene(f"ns-chain-{n}", settings), workers))
+            for n in CHAINS
+        ]
+        for simulation in simulations:
+            simulation.advance_frame()
+        for _ in range(count):
+            for k, simulation in enumerate(simulations):
+                controller, world = simulation.controller, simulation.world.copy()
+                assert controller is not None
+                started = clock()
+                controller.decide(world, simulation.frame_time, step)
+                least[k] = min(least[k], clock() - started)
+    return least
+
+
+def chain_cost(quick: bool) -> list[Finding]:
+    """Time of a decision against the number of joints.
+
+    The serial time is the processor's, so that it does not depend on what else the machine does.
+    """
+    count, resolution = (3, 48) if quick else (15, 128)
+    serial = decision_seconds(count, resolution, 1, process_time)
+    side = decision_seconds(count, resolution, cores(), perf_counter)
+    lines = [
+        f"{n} joints: {s:.4g} s serial, {p:.4g} s with {cores()} workers"
+        for n, s, p in zip(CHAINS, serial, side, strict=True)
+    ]
+    return [
+        near(
+            f"serial time of a decision for {n} joints over that for one",
+            seconds / serial[0],
+            float(n),
+            relative=0.1,
+            lines=lines if n == CHAINS[-1] else (),
+        )
+        for n, seconds in zip(CHAINS[1:], serial[1:], strict=True)
+    ]
+
+
+def gradient_case(quick: bool) -> list[Finding]:
+    """K7."""
+    return difference_error(quick) + exact_position(quick) + chain_cost(quick)
+
+
+CASES = (Case("K7", gradient_case),)

@@ -1,0 +1,305 @@
+"""Bodies and an ideal fluid that answer each other: I4, I6, I7, I8."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flowborne.coupling.world import World
+from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.fluid.grid import Array, Grid
+from flowborne.solids.wind import WindForce
+from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
+from flowborne.validation.fluid_cases import Uniform, all_inflow
+from flowborne.validation.pendulums import passages
+from flowborne.validation.reference import table
+from flowborne.validation.worlds import (
+    PERIODIC,
+    RING,
+    Vector,
+    advance,
+    mjcf,
+    set_velocity,
+    start_at_once,
+    world_of,
+)
+
+G = 9.81
+
+FLAT_BODIES = (
+    ((-0.5, -0.5, 0.0), '<geom type="sphere" size=".2"/>'),
+    ((0.5, -0.47, 0.0), '<geom type="ellipsoid" size=".3 .15 1" euler="0 0 .4"/>'),
+    ((-0.49, 0.5, 0.0), '<geom type="box" size=".25 .12 1" euler="0 0 -.7"/>'),
+    ((0.5, 0.5, 0.0), '<geom type="capsule" size=".1 .2" zaxis="1 1 0"/>'),
+)
+SOLID_BODIES = (
+    ((-0.5, -0.5, -0.5), '<geom type="sphere" size=".3"/>'),
+    ((0.4, 0.4, 0.3), '<geom type="box" size=".3 .2 .25" euler=".3 .5 .7"/>'),
+    ((0.4, -0.4, -0.3), '<geom type="ellipsoid" size=".3 .2 .25" euler=".3 .5 .7"/>'),
+    ((-0.4, 0.45, 0.4), '<geom type="cylinder" size=".2 .25" euler=".3 .5 .7"/>'),
+)
+"""Place and shape of the free bodies of I4, in boxes of 2 m about the origin."""
+
+
+def neutral(
+    grid: Grid,
+    bodies: Sequence[tuple[Vector, str]],
+    dt: float,
+    steps: int,
+    stream: Vector | None = None,
+) -> tuple[float, float]:
+    """Largest displacement (m, and of quaternions' entries) and change of velocity (m/s, rad/s) of
+    bodies as heavy as the fluid, under gravity.
+
+    stream  that carries fluid and bodies through a periodic box; None: at rest in a closed one
+    """
+    elements = (
+        f'<body pos="{at[0]} {at[1]} {at[2]}"><freejoint/>{geom}</body>' for at, geom in bodies
+    )
+    world = world_of(
+        grid,
+        mjcf(*elements),
+        gravity=(0.0, -G, 0.0),
+        solid_density=1.0,
+        boundaries=None if stream is None else RING,
+    )
+    state = world.solid
+    start = state.q.copy()
+    if stream is not None:
+        set_velocity(world, Uniform(stream))
+        state.v.reshape(-1, 6)[:, :3] = stream
+    first = state.v.copy()
+    advance(world, dt, steps)
+    places = start.reshape(-1, 7)
+    places[:, :3] += steps * dt * first.reshape(-1, 6)[:, :3]
+    moved = world.solid.q - start
+    return float(np.abs(moved).max()), float(np.abs(world.solid.v - first).max())
+
+
+def neutrally_buoyant(quick: bool) -> list[Finding]:
+    """I4: bodies of many shapes stay where they are, or go with the stream."""
+    steps = 100 if quick else 1000
+    flat = Grid.slab(32, 32, 2.0 / 32, (-1.0, -1.0))
+    solid = Grid((16, 16, 16), 2.0 / 16, (-1.0, -1.0, -1.0))
+    findings = []
+    for said, grid, bodies in (("2D", flat, FLAT_BODIES), ("3D", solid, SOLID_BODIES)):
+        if quick and grid is solid:
+            continue
+        moved, fast = neutral(grid, bodies, 0.02, steps)
+        findings.append(at_most(f"displacement over {steps} steps at rest, {said}, m", moved, 1e-8))
+        findings.append(at_most(f"velocity after {steps} steps at rest, {said}, m/s", fast, 1e-8))
+    stream = (0.4, 0.23, 0.0)
+    moved, slip = neutral(flat, FLAT_BODIES, 5e-4, steps, stream)
+    findings.append(at_most("displacement from the stream's, m", moved, 1e-8))
+    findings.append(at_most("slip in a uniform stream of 0.46 m/s, m/s", slip, 1e-8))
+    return findings
+
+
+LONG, SHORT = 0.5, 0.25
+"""Semi-axes of I6's ellipse, m."""
+
+
+@dataclass(frozen=True)
+class PotentialFlow:
+    """Flow of 1 m/s round the ellipse without circulation, as a profile.
+
+    incidence  angle of the stream above the long axis, which is x, rad
+    """
+
+    incidence: float
+
+    def __call__(
+        self, x: Array, y: Array, z: Array, time: float = 0.0
+    ) -> tuple[Array, Array, Array]:
+        place = x + 1j * y + 0.0 * z
+        focus, radius = np.sqrt(LONG**2 - SHORT**2), 0.5 * (LONG + SHORT)
+        circle = 0.5 * (place + np.sqrt(place - focus) * np.sqrt(place + focus))
+        onward, back = np.exp(-1j * self.incidence), np.exp(1j * self.incidence)
+        velocity = onward - back * (radius / circle) ** 2
+        velocity /= 1.0 - (0.5 * focus / circle) ** 2
+        return velocity.real, -velocity.imag, 0.0 * velocity.real
+
+
+def held_ellipse(cells: int, incidence: float) -> tuple[float, float]:
+    """Moment (nose-up) over pi (a^2 - b^2)/2 and force over its chord, both over rho U^2.
+
+    The first projection makes the potential flow; the pressure is Bernoulli's a few steps later.
+
+    cells  across the long axis, in a box of 3 m whose sides have the unbounded flow's velocity
+    """
+    side = 3.0
+    count = round(cells * side)
+    grid = Grid.slab(count, count, side / count, (-0.5 * side, -0.5 * side))
+    model = mjcf(f'<geom type="ellipsoid" size="{LONG} {SHORT} 1"/>')
+    world = world_of(grid, model, boundaries=all_inflow(PotentialFlow(incidence)))
+    dt = 0.25 * grid.spacing
+    start_at_once(world, dt)
+    wrench = advance(world, dt, 4).pressure_wrench[0]
+    moment = -wrench[5] / (0.5 * np.pi * (LONG**2 - SHORT**2))
+    return float(moment), float(np.hypot(wrench[0], wrench[1]) / (2.0 * LONG))
+
+
+def munk_moment(quick: bool) -> list[Finding]:
+    """I6: moment and force on the ellipse at three incidences."""
+    grids = (16, 32, 64) if quick else (16, 32, 64, 128, 256)
+    label = "cells along the long axis"
+    findings = []
+    for degrees in (45.0,) if quick else (10.0, 30.0, 45.0):
+        exact = float(np.sin(2.0 * np.radians(degrees)))
+        runs = [held_ellipse(n, np.radians(degrees)) for n in grids]
+        moments, forces = [run[0] for run in runs], [run[1] for run in runs]
+        errors = [abs(m / exact - 1.0) for m in moments]
+        series = GridSeries(label, grids, moments, errors)
+        said = f"M over rho U^2 pi (a^2-b^2)/2 at {degrees:g} degrees"
+        findings.append(near(said, moments[-1], exact, relative=0.02, falling=series))
+        series = GridSeries(label, grids, forces, forces)
+        said = f"force over rho U^2 2a at {degrees:g} degrees"
+        findings.append(at_most(said, forces[-1], 0.02, series=series))
+    return findings
+
+
+RADIUS, ROD, BOX = 0.1, 0.5, 2.0
+"""Bob, rod and box of I7, m."""
+
+IN_BOX = 0.1
+"""D/L of the bob in its box, the key of I2's table."""
+
+
+WIDE_GRIDS = (64, 128, 192)
+"""Cells across the box for the wider swings; beyond 90 degrees the bob would leave the box."""
+
+
+def small_period(ratio: float, added: float) -> float:
+    """I7's formula: s, for a density over the fluid's and a Ca."""
+    inertia = (ratio + added) * ROD**2 + 0.5 * ratio * RADIUS**2
+    return float(2.0 * np.pi * np.sqrt(inertia / (abs(ratio - 1.0) * G * ROD)))
+
+
+def start_midway(world: World, dt: float) -> None:
+    """Give bodies and fluid the velocity of the middle of the first step from rest."""
+    ahead = world.copy()
+    advance(ahead, dt)
+    world.solid.v[:] = 0.5 * ahead.solid.v
+    _, state = world.flow()
+    _, later = ahead.flow()
+    for axis in range(3):
+        state.velocity[axis][:] = 0.5 * later.velocity[axis]
+        state.carrier[axis][:] = 0.5 * later.carrier[axis]
+        state.acceleration[axis][:] = later.acceleration[axis]
+
+
+def swing(cells: int, ratio: float, degrees: float, period: float) -> float:
+    """Period in s of the bob, let go at an angle from where it rests, which is the box's middle.
+
+    cells   across the box
+    ratio   density over the fluid's: the rod stands on its pivot below 1, and hangs above
+    period  expected, s; a hundredth of it is the step, more when the bob is fast
+    """
+    grid = Grid.slab(cells, cells, BOX / cells, (-0.5 * BOX, -0.5 * BOX))
+    up = ROD if ratio > 1.0 else -ROD
+    bob = f'<geom type="sphere" size="{RADIUS}" pos="0 {-up} 0" density="{ratio}"/>'
+    body = f'<body pos="0 {up} 0"><joint name="pivot" axis="0 0 1"/>{bob}</body>'
+    world = world_of(grid, mjcf(body), gravity=(0.0, -G, 0.0))
+    world.solid.q[0] = np.radians(degrees)
+    fastest = 2.0 * np.pi / period * ROD * np.radians(degrees)
+    dt = min(0.01 * period, 0.5 * grid.spacing / fastest)
+    start_midway(world, dt)
+    angles = [float(world.solid.q[0])]
+    for _ in range(int(1.35 * period / dt)):
+        advance(world, dt)
+        angles.append(float(world.solid.q[0]))
+    times = passages(np.array(angles), dt)
+    if times.size < 3:
+        raise ArithmeticError(f"the pendulum let go at {degrees:g} degrees has no full swing")
+    return float(times[2] - times[0])
+
+
+def pendulum(quick: bool) -> list[Finding]:
+    """I7: period of a heavy bob and of light ones, which stand up, and of wider swings."""
+    grids = (32, 64) if quick else (64, 128, 256)
+    added = float(table("I2", "cylinder in closed square, Ca vs D/L")[IN_BOX])
+    findings = []
+    for ratio in (2.0, 0.5) if quick else (2.0, 0.5, 0.01):
+        exact = small_period(ratio, added)
+        found = [swing(n, ratio, 5.0, exact) for n in grids]
+        errors = [abs(f / exact - 1.0) for f in found]
+        series = GridSeries("cells a side", grids, found, errors)
+        said = f"period at rho_s/rho_f = {ratio:g} let go at 5 degrees, s"
+        findings.append(near(said, found[-1], exact, relative=0.02, series=series))
+    if quick:
+        return findings
+    exact = small_period(2.0, added)
+    for degrees, factor in table("I7", "amplitude factor").items():
+        if degrees == 5.0 or degrees > 90.0:
+            continue
+        values = [swing(n, 2.0, degrees, factor * exact) / exact for n in WIDE_GRIDS]
+        errors = [abs(v - factor) for v in values]
+        series = GridSeries("cells a side", WIDE_GRIDS, values, errors)
+        said = f"T/T0 at rho_s/rho_f = 2 let go at {degrees:g} degrees"
+        findings.append(near(said, values[-1], factor, relative=0.02, series=series))
+    return findings
+
+
+LENGTH = 4.0
+"""Of the channel of I8, whose width is 1 m, m."""
+
+
+def slug(cells: int, plug: float, mass: float, sides: Boundaries, steps: int, solid: bool) -> float:
+    """Mean acceleration of a plug that fills the channel, under 1 N, times all mass in it.
+
+    cells  across the channel
+    plug   its length, m
+    mass   its mass, kg
+    """
+    h = 1.0 / cells
+    corner = (-0.5 * LENGTH, -0.5, -0.5)
+    grid = (
+        Grid((round(LENGTH) * cells, cells, cells), h, corner)
+        if solid
+        else Grid.slab(round(LENGTH) * cells, cells, h, corner[:2])
+    )
+    geom = f'<geom type="box" size="{0.5 * plug} .6 .6" mass="{mass}"/>'
+    body = f'<body name="plug" pos=".0123 0 0"><joint type="slide" axis="1 0 0"/>{geom}</body>'
+    force = WindForce((1.0, 0.0, 0.0))
+    world = world_of(grid, mjcf(body), boundaries=sides, tolerance=1e-12, winds=(force,))
+    dt = 0.01
+    advance(world, dt, steps)
+    return float(world.solid.v[0]) / (steps * dt) * (mass + LENGTH - plug)
+
+
+def piston(quick: bool) -> list[Finding]:
+    """I8: a plug between open ends and in a ring, in the first step and over many."""
+    grids: Sequence[int] = (8, 16) if quick else (8, 16, 32, 64)
+    steps = 10 if quick else 100
+    ends = BoundaryOpen()
+    findings = []
+    for said, sides in (
+        ("open channel", Boundaries(ends, ends)),
+        ("ring", Boundaries(PERIODIC, PERIODIC)),
+    ):
+        wrong = 0.0
+        for mass in (0.01, 1.0, 100.0):
+            for count in (1, steps):
+                for n in grids:
+                    wrong = max(wrong, abs(slug(n, 0.5, mass, sides, count, False) - 1.0))
+                wrong = max(wrong, abs(slug(8, 0.5, mass, sides, min(count, 10), True) - 1.0))
+        between = [slug(n, 0.53, 1.0, sides, 1, False) for n in grids]
+        errors = [abs(b - 1.0) for b in between]
+        series = GridSeries("cells across", grids, between, errors)
+        lines = [
+            "a plug 0.53 m long, no whole number of cells, displaces whole faces:",
+            *series.lines(),
+        ]
+        title = f"largest error of (m + M_f) a / F, {said}, plug of whole cells"
+        findings.append(at_most(title, wrong, 1e-6, lines=lines))
+    return findings
+
+
+CASES = (
+    Case("I4", neutrally_buoyant),
+    Case("I6", munk_moment),
+    Case("I7", pendulum),
+    Case("I8", piston),
+)

@@ -1,0 +1,29 @@
+"""A flow on one grid as the start of the same flow on a finer one."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Array
+
+
+def start_from(coarse: World, fine: World) -> None:
+    """Give `fine` the flow of `coarse`, interpolated; both are slabs."""
+    (fluid, to), (rough, of) = fine.flow(), coarse.flow()
+    for axis in fluid.grid.axes:
+        for kept, found in ((to.velocity, of.velocity), (to.carrier, of.carrier)):
+            known, wanted = (g.face_coordinates(axis) for g in (rough.grid, fluid.grid))
+            kept[axis][:] = interpolated(found[axis], known, wanted)
+    known, wanted = rough.grid.cell_coordinates(), fluid.grid.cell_coordinates()
+    to.pressure[:] = interpolated(of.pressure, known, wanted)
+
+
+def interpolated(
+    values: Array, known: tuple[Array, Array, Array], wanted: tuple[Array, Array, Array]
+) -> Array:
+    """Values of a slab (nx, ny, 1) between the coordinates where they are known, bilinear."""
+    table = RegularGridInterpolator(known[:2], values[:, :, 0], bounds_error=False, fill_value=None)
+    x, y = np.meshgrid(wanted[0], wanted[1], indexing="ij")
+    return np.asarray(table((x, y)))[:, :, None]

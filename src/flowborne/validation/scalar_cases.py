@@ -1,0 +1,206 @@
+"""Scalars carried by a given velocity: F4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flowborne.coupling.distance import BAND
+from flowborne.fluid.advection import CENTRE, carry, cells_per_step
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import pad_cells
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.scalars import carry_scalars
+from flowborne.validation.case import Case, Finding, GridSeries, order_of
+from flowborne.validation.worlds import whole_steps
+
+Flow = Callable[[Array, Array, float], tuple[Array, Array]]
+"""velocity(x, y, time) -> (u, v) in m/s."""
+
+Shape = Callable[[Array, Array], Array]
+"""Value of a scalar at (x, y)."""
+
+WALLS = Boundaries()
+
+TURN_GRIDS = {True: (32, 64, 128), False: (64, 128, 256, 512)}
+SMEARED_GRIDS = {True: (64, 128, 256), False: (64, 128, 256, 512)}
+SWIRL_GRIDS = {True: (64, 128), False: (128, 256, 512)}
+DISC_GRIDS = {True: (50, 100), False: (50, 100, 200, 400)}
+"""Cells a side, by quick: the blob in a turn, the same with the semi-Lagrangian scheme, the blob in
+the swirl, the disc."""
+
+SWIRL_PERIOD = {True: 2.0, False: 8.0}
+"""s, by quick."""
+
+SHORT_PERIOD = 2.0
+"""s, of the swirl with the semi-Lagrangian scheme: in 8 s it would smear LeVeque's thread away on
+every grid that can be run, and an order does not show."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Rigid rotation about (centre, centre), one turn in `period` s."""
+
+    centre: float
+    period: float
+
+    def __call__(self, x: Array, y: Array, time: float) -> tuple[Array, Array]:
+        rate = 2.0 * np.pi / self.period
+        return -rate * (y - self.centre), rate * (x - self.centre)
+
+
+@dataclass(frozen=True)
+class Swirl:
+    """LeVeque's vortex in the unit box, which turns back half-way through `period` s."""
+
+    period: float
+
+    def __call__(self, x: Array, y: Array, time: float) -> tuple[Array, Array]:
+        strength = np.cos(np.pi * time / self.period)
+        u = strength * np.sin(np.pi * x) ** 2 * np.sin(2.0 * np.pi * y)
+        return u, -strength * np.sin(2.0 * np.pi * x) * np.sin(np.pi * y) ** 2
+
+
+@dataclass(frozen=True)
+class Blob:
+    """Gaussian of height 1 about (0.5, height)."""
+
+    height: float
+    width: float
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        away = (x - 0.5) ** 2 + (y - self.height) ** 2
+        return np.asarray(np.exp(-away / self.width**2))
+
+
+def slotted_disc(x: Array, y: Array) -> Array:
+    """Zalesak's disc: 1 inside."""
+    inside = (x - 50.0) ** 2 + (y - 75.0) ** 2 <= 15.0**2
+    slot = (np.abs(x - 50.0) < 2.5) & (y < 85.0)
+    return np.where(inside & ~slot, 1.0, 0.0)
+
+
+def carrier_of(flow: Flow, grid: Grid, time: float, dt: float) -> Faces:
+    """Padded Faces, cells per step: the velocity with which a particle on each face crosses the
+    step that begins at `time`, which is what the engine makes of velocity and acceleration."""
+    h, (x0, y0, _) = grid.spacing, grid.origin
+    wide = Grid.slab(grid.shape[0] + 2, grid.shape[1] + 2, h, (x0 - h, y0 - h))
+    faces = wide.zeros_faces()
+    for axis in grid.axes:
+        x, y, _ = np.meshgrid(*wide.face_coordinates(axis), indexing="ij", sparse=True)
+        u, v = flow(x, y, time)
+        faces[axis][:] = flow(x + 0.5 * dt * u, y + 0.5 * dt * v, time + 0.5 * dt)[axis]
+    return cells_per_step(faces, dt, h)
+
+
+def carried_back(
+    flow: Flow, shape: Shape, period: float, grid: Grid, courant: float, maccormack: bool
+) -> tuple[Array, Array]:
+    """The scalar before and after a period, after which it is exactly where it was.
+
+    courant  cells that the fastest particle of the box crosses in a step
+    """
+    x, y, _ = np.meshgrid(*grid.cell_coordinates(), indexing="ij")
+    before = shape(x, y)
+    fastest = max(float(np.abs(u).max()) for u in flow(x, y, 0.0))
+    count, dt = whole_steps(period, courant * grid.spacing / fastest)
+    after = before
+    clear = np.full((grid.shape[0] + 1, grid.shape[1] + 1, 2), BAND * grid.spacing)
+    for step in range(count):
+        carrier = carrier_of(flow, grid, step * dt, dt)
+        if maccormack:
+            scalars = {"dye": after}
+            after = carry_scalars(scalars, carrier, clear, clear, grid, WALLS, (), 0.0)["dye"]
+        else:
+            after = carry_once(after, carrier, grid)
+    return before, after
+
+
+def carry_once(values: Array, carrier: Faces, grid: Grid) -> Array:
+    """One semi-Lagrangian step."""
+    out = np.empty_like(values)
+    field = pad_cells(values, grid, WALLS)
+    everywhere = np.ones(field.shape, np.uint8)
+    closed = np.zeros(3, np.uint8)
+    carry(out, field, everywhere, *carrier, CENTRE, np.array(grid.shape), closed)
+    return out
+
+
+def lost(before: Array, after: Array) -> float:
+    """Sum of the absolute differences over the sum of what there was."""
+    return float(np.abs(after - before).sum() / before.sum())
+
+
+def unit_box(cells: int) -> Grid:
+    return Grid.slab(cells, cells, 1.0 / cells, (0.0, 0.0))
+
+
+def blob_in_turn(grids: Sequence[int], maccormack: bool) -> tuple[GridSeries, GridSeries]:
+    """Error and peak of the blob after one rigid turn."""
+    errors, peaks = [], []
+    for n in grids:
+        courant = 2.0 if maccormack else 4.0
+        blob, turn = Blob(0.7, 0.1), Turn(0.5, 1.0)
+        before, after = carried_back(turn, blob, 1.0, unit_box(n), courant, maccormack)
+        errors.append(lost(before, after))
+        peaks.append(float(after.max() / before.max()))
+    return (
+        GridSeries("cells a side", grids, errors, errors),
+        GridSeries("cells a side", grids, peaks, [abs(1.0 - peak) for peak in peaks]),
+    )
+
+
+def blob_in_swirl(grids: Sequence[int], period: float, maccormack: bool) -> GridSeries:
+    """Error of the blob after the swirl has turned back."""
+    errors = [
+        lost(*carried_back(Swirl(period), Blob(0.75, 0.2), period, unit_box(n), 4.0, maccormack))
+        for n in grids
+    ]
+    return GridSeries("cells a side", grids, errors, errors)
+
+
+def disc_in_turn(grids: Sequence[int]) -> tuple[GridSeries, Array]:
+    """Error of Zalesak's disc after one turn, and the disc on the finest grid."""
+    errors = []
+    for n in grids:
+        grid = Grid.slab(n, n, 100.0 / n, (0.0, 0.0))
+        before, after = carried_back(Turn(50.0, 628.0), slotted_disc, 628.0, grid, 2.0, True)
+        errors.append(lost(before, after))
+    return GridSeries("cells a side", grids, errors, errors), after
+
+
+def scalars_carried(quick: bool) -> list[Finding]:
+    """F4: orders of both schemes, the peak after a turn, and Zalesak's disc.
+
+    In the swirl the way back undoes the dispersion of the way out, which is the leading error of
+    the MacCormack scheme; its order there is above 2.
+    """
+    turn, peak = blob_in_turn(TURN_GRIDS[quick], True)
+    smeared, _ = blob_in_turn(SMEARED_GRIDS[quick], False)
+    period = SWIRL_PERIOD[quick]
+    swirl = blob_in_swirl(SWIRL_GRIDS[quick], period, True)
+    short = blob_in_swirl(SWIRL_GRIDS[quick], SHORT_PERIOD, False)
+    disc, after = disc_in_turn(DISC_GRIDS[quick])
+    falls = "falling from grid to grid"
+    extremes = f"after the turn the disc's values lie in [{after.min():.3f}, {after.max():.3f}]"
+    return [
+        order_of("order of MacCormack, blob after a turn", turn, expected=2.0),
+        order_of("order of MacCormack, blob in the swirl", swirl, least=1.9),
+        order_of("order of semi-Lagrangian, blob after a turn", smeared, expected=1.0),
+        order_of("order of semi-Lagrangian, blob in the swirl", short, expected=1.0),
+        Finding("peak of the blob after a turn", peak.values[-1], 1.0, falls, peak.falls, peak),
+        Finding(
+            "error of Zalesak's disc / its area",
+            disc.values[-1],
+            0.0,
+            falls,
+            disc.falls,
+            disc,
+            (extremes,),
+        ),
+    ]
+
+
+CASES = (Case("F4", scalars_carried),)

@@ -1,0 +1,112 @@
+"""Viscous flow between coaxial cylinders: V8."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.coupling.motion import Motion
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Grid
+from flowborne.scenes.tracks import MotionConstant
+from flowborne.validation.case import Case, Finding, GridSeries, near
+from flowborne.validation.worlds import advance, mjcf, world_of
+
+INNER, OUTER = 0.5, 1.0
+"""Radii a and b, m."""
+
+SPIN = 1.0
+"""Omega, rad/s."""
+
+GRIDS = {True: (12, 24), False: (16, 32, 64, 128)}
+"""Cells across the outer radius, by quick."""
+
+SIDES = 48
+"""Boxes that make the outer cylinder."""
+
+SHELL = 0.1
+"""Half the thickness of the outer cylinder, m; the grids reach into it and not through."""
+
+VISCOSITY = 1.0
+"""Pa s; the fluid's density is 1 kg/m^3."""
+
+SETTLING = 1.0
+"""s after which the steady flow stands: 40 times (b - a)^2 / (pi^2 nu)."""
+
+HEAVY = 1000.0
+"""kg/m^3, of the inner cylinder: the flow that it drives stays quasi-steady as it slows down."""
+
+PART = 0.2
+"""How much of the time constant of the spin-down is run."""
+
+
+TORQUE = 4.0 * np.pi * VISCOSITY * INNER**2 * OUTER**2 / (OUTER**2 - INNER**2)
+"""N m per m on the inner cylinder at 1 rad/s."""
+
+RATE = TORQUE / (0.5 * HEAVY * np.pi * INNER**4)
+"""1/s, of the spin-down."""
+
+
+def annulus(cells: int, free: bool) -> World:
+    """The inner cylinder, told to turn with SPIN or free to, in the outer one.
+
+    The outer cylinder is a ring of boxes whose inner sides make a regular polygon; its mean radius
+    is that of the cylinder.
+    """
+    h = OUTER / cells
+    side = cells + 2
+    grid = Grid.slab(2 * side, 2 * side, h, (-side * h, -side * h))
+    angle = 2.0 * np.pi / SIDES
+    # the mean of apothem / cos(t) over half a side is the radius
+    half = 0.5 * angle
+    apothem = OUTER * half / np.log(1.0 / np.cos(half) + np.tan(half))
+    reach = apothem + SHELL
+    ring = "".join(
+        f'<geom type="box" size="{SHELL} {1.05 * half * (reach + SHELL)} 1" '
+        f'pos="{reach * np.cos(t)} {reach * np.sin(t)} 0" euler="0 0 {t}"/>'
+        for t in angle * np.arange(SIDES)
+    )
+    shaft = (
+        '<body name="shaft"><joint name="turn" type="hinge" axis="0 0 1"/>'
+        f'<geom type="cylinder" size="{INNER} 1" density="{HEAVY}"/></body>'
+    )
+    motions: tuple[Motion, ...] = ()
+    if not free:
+        motions = (MotionConstant(np.array([0]), 0.0, SPIN),)
+    return world_of(grid, mjcf(ring, shaft), viscosity=VISCOSITY, motions=motions)
+
+
+def measured(cells: int) -> tuple[float, float]:
+    """Torque on the inner cylinder in the steady flow, and the rate at which it slows down from
+    there when let go, both over the exact ones."""
+    dt = OUTER / cells / (SPIN * INNER)
+    driven = annulus(cells, free=False)
+    report = advance(driven, dt, int(SETTLING / dt))
+    wrench = report.viscous_wrench + report.pressure_wrench
+    freed = annulus(cells, free=True)
+    freed.fluid = driven.fluid
+    freed.solid.v[0] = SPIN
+    steps = int(PART / RATE / dt)
+    advance(freed, dt, steps)
+    rate = np.log(SPIN / freed.solid.v[0]) / (steps * dt)
+    return float(-wrench[-1, 5] / (SPIN * TORQUE)), float(rate / RATE)
+
+
+def between_cylinders(quick: bool) -> list[Finding]:
+    """V8: torque of the steady flow, and the free inner cylinder's slowing down.
+
+    The list's unbounded cylinder is the same formula with b without end.
+    """
+    grids = GRIDS[quick]
+    torques, rates = zip(*(measured(n) for n in grids), strict=True)
+    findings = []
+    for quantity, values, tolerance in (
+        ("torque / exact, steady", torques, 0.01),
+        ("rate of the spin-down / exact", rates, 0.02),
+    ):
+        errors = [abs(value - 1.0) for value in values]
+        series = GridSeries("cells across b", grids, values, errors)
+        findings.append(near(quantity, values[-1], 1.0, relative=tolerance, series=series))
+    return findings
+
+
+CASES = (Case("V8", between_cylinders),)

@@ -1,0 +1,65 @@
+"""Cases I1 and I2, on coarse grids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.validation import added_mass as case
+from flowborne.validation.reference import table
+
+
+@pytest.mark.parametrize("ratio", [0.25, 0.5])
+def test_I2_cylinder_in_a_square(ratio: float) -> None:
+    exact = table("I2", "cylinder in closed square, Ca vs D/L")[ratio]
+    errors = [
+        case.coefficient(case.box(round(n / ratio)), case.round_body(ratio)) / exact - 1.0
+        for n in (16, 32)
+    ]
+    assert abs(errors[1]) < 0.01
+    assert abs(errors[1]) < 0.5 * abs(errors[0])
+
+
+def test_I2_sphere_in_a_cube() -> None:
+    exact = table("I2", "sphere in closed cube, Ca vs D/L")[0.3333]
+    errors = [
+        case.coefficient(case.box(3 * n, solid=True), case.round_body(1.0 / 3.0)) / exact - 1.0
+        for n in (8, 16)
+    ]
+    assert abs(errors[1]) < 0.01
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_I2_concentric_shell() -> None:
+    for finding in case.shells(True):
+        assert finding.passed, f"{finding.quantity}: {finding.value}"
+
+
+def test_I1_acceleration_at_every_density_ratio() -> None:
+    for finding in case.density_ratios(True):
+        assert finding.passed, f"{finding.quantity}: {finding.value}"
+
+
+def test_I1_ellipse_along_both_axes_and_turning() -> None:
+    for finding in case.ellipses(True):
+        assert finding.passed, f"{finding.quantity}: {finding.value}"
+
+
+def test_I1_added_mass_of_plates_falls_towards_the_exact_one() -> None:
+    across, _, along = case.plates(True)
+    assert across.series is not None
+    assert along.series is not None
+    assert across.series.falls
+    assert 0.0 < float(across.value) - 1.0 < 0.05
+    assert along.series.falls
+    assert float(along.value) < 0.002
+
+
+def test_box_correction_undoes_the_box() -> None:
+    """I2's own numbers, corrected, are the unbounded ones, for round and for long bodies."""
+    for ratio, boxed in table("I2", "cylinder in closed square, Ca vs D/L").items():
+        area = np.pi * (1.0 / round(1.0 / ratio)) ** 2 / 4.0
+        assert case.unbounded(boxed * area, area) / area == pytest.approx(1.0, abs=5e-4)
+    area = np.pi * case.LONG * case.SHORT
+    assert case.unbounded(0.51952 * area, area) / area == pytest.approx(0.5, abs=5e-4)
+    assert case.unbounded(2.07972 * area, area) / area == pytest.approx(2.0, abs=5e-4)

@@ -1,0 +1,52 @@
+"""F2: the lid-driven cavity at Re 100, on coarse grids."""
+
+import numpy as np
+import pytest
+
+from flowborne.validation import case
+from flowborne.validation.cavity import cavity, primary_vortex, profiles, stream_function
+from flowborne.validation.worlds import advance, set_velocity
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {result.quantity: result for result in case("F2").run(quick=True)}
+
+
+def test_F2_errors_fall(found):
+    for result in found.values():
+        assert result.series.falls, (result.quantity, result.lines)
+
+
+def test_F2_profiles_are_those_of_the_tables(found):
+    for name in ("u", "v"):
+        result = found[f"max|{name} - table|, Re 100"]
+        assert result.verdict == "pass", result.lines
+        assert result.series.order > 1.8, result.lines
+
+
+def test_F2_vortex(found):
+    assert found["x of the vortex, Re 100"].verdict == "pass"
+    assert found["y of the vortex, Re 100"].verdict == "pass"
+    psi = found["psi of the vortex, Re 100"]
+    assert psi.series.order > 1.8, psi.lines
+    assert psi.series.errors[-1] < 0.02 * abs(psi.reference), psi.lines
+
+
+def turning(x, y, z):
+    """Velocity of psi = -sin^2(pi x) sin^2(pi y), whose vortex is in the middle."""
+    u = -(np.sin(np.pi * x) ** 2) * np.pi * np.sin(2.0 * np.pi * y)
+    v = np.sin(np.pi * y) ** 2 * np.pi * np.sin(2.0 * np.pi * x)
+    return u + 0.0 * z, v + 0.0 * z, 0.0 * (x + y + z)
+
+
+def test_F2_figures_of_a_known_flow():
+    world = cavity(32, 100)
+    set_velocity(world, turning)
+    x, y, psi = primary_vortex(world)
+    np.testing.assert_allclose((x, y, psi), (0.5, 0.5, -1.0), atol=5e-3)
+    assert np.abs(stream_function(world)[:, -1]).max() < 1e-12
+    u, v = profiles(world)
+    assert float(u(0.25)) == pytest.approx(-np.pi, rel=1e-3)
+    assert float(v(0.25)) == pytest.approx(np.pi, rel=1e-3)
+    advance(world, 0.01)

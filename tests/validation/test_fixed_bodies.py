@@ -1,0 +1,49 @@
+"""B1 and B2: flow past a cylinder, on a coarse grid."""
+
+import numpy as np
+import pytest
+
+from flowborne.validation import case
+from flowborne.validation.fixed_bodies import (
+    CENTRE,
+    DIAMETER,
+    Parabola,
+    channel,
+    pressure_drop,
+    recirculation,
+)
+from flowborne.validation.refine import start_from
+from flowborne.validation.worlds import set_velocity
+
+
+def test_B1_on_ten_cells_across_D():
+    """Ten cells give the drag to a tenth, and the two lengths that depend on the whole flow."""
+    drag, _, drop, length = case("B1").run(quick=True)
+    assert drag.value == pytest.approx(drag.reference, rel=0.10)
+    assert drop.value == pytest.approx(drop.reference, rel=0.03)
+    assert length.value == pytest.approx(length.reference, rel=0.15)
+
+
+def test_B1_figures_of_a_known_flow():
+    """A linear pressure and a velocity that changes its sign at a known place."""
+    world = channel(10, 0.3)
+    fluid, state = world.flow()
+    x, _, _ = fluid.grid.cell_coordinates()
+    state.pressure[:] = (1.0 - 3.0 * x)[:, None, None]
+    x, _, _ = fluid.grid.face_coordinates(0)
+    state.velocity[0][:] = (x - 0.333)[:, None, None]
+    assert pressure_drop(world) == pytest.approx(3.0 * DIAMETER, rel=1e-12)
+    assert recirculation(world) == pytest.approx(0.333 - CENTRE - 0.5 * DIAMETER, rel=1e-12)
+
+
+def test_refined_flow_is_the_coarse_one():
+    coarse, fine = channel(10, 0.3), channel(20, 0.3)
+    set_velocity(coarse, Parabola(0.3))
+    coarse.flow()[1].pressure[:] = np.arange(220.0)[:, None, None]
+    start_from(coarse, fine)
+    fluid, state = fine.flow()
+    x, y, z = np.meshgrid(*fluid.grid.face_coordinates(0), indexing="ij")
+    exact = Parabola(0.3)(x, y, z)[0]
+    assert np.abs(state.velocity[0] - exact).max() < 0.01 * 0.3
+    assert not state.velocity[1].any()
+    np.testing.assert_allclose(np.diff(state.pressure[:, 0, 0]), 0.5)

@@ -1,0 +1,41 @@
+"""F1, F6, F7: flows without obstacles, on coarse grids."""
+
+import pytest
+
+from flowborne.validation import case
+from flowborne.validation.fluid_cases import carried_body
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {name: case(name).run(quick=True) for name in ("F1", "F7")}
+
+
+@pytest.mark.parametrize("name", ["F1", "F7"])
+def test_order_is_two(found, name):
+    for result in found[name]:
+        assert result.verdict == "pass", (result.quantity, result.lines)
+        assert result.series.falls, (result.quantity, result.lines)
+
+
+def test_F1_decays_and_never_gains(found):
+    """Without viscosity every change of the energy is a numerical loss."""
+    for result in found["F1"]:
+        assert max(result.series.values) <= 1.0, result.lines
+        assert result.series.errors[-1] < 2e-3, result.lines
+
+
+def test_F7_error_on_the_finest_grid(found):
+    assert found["F7"][0].series.errors[-1] < 2e-3
+
+
+def test_F6_a_body_that_goes_with_the_stream_leaves_no_trace():
+    for result in case("F6").run(quick=True):
+        assert result.verdict == "pass", (result.quantity, result.value)
+
+
+def test_F6_a_slower_body_leaves_one():
+    """The fluid sees the body, so the case can fail."""
+    wrong, slip = carried_body(True, 2, pace=0.9)
+    assert 1e-2 < wrong < 1.0
+    assert slip == pytest.approx(0.1)

@@ -1,0 +1,37 @@
+"""Cases I4, I6, I7 and I8, short and on coarse grids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.validation import inviscid as case
+from flowborne.validation.worlds import PERIODIC
+
+
+def test_I4_neutrally_buoyant_bodies_stay() -> None:
+    for finding in case.neutrally_buoyant(True):
+        assert finding.passed, f"{finding.quantity}: {finding.value}"
+
+
+def test_I6_moment_converges_to_munk_and_force_to_none() -> None:
+    runs = [case.held_ellipse(n, np.radians(30.0)) for n in (16, 32, 64)]
+    errors = [abs(moment / np.sin(np.radians(60.0)) - 1.0) for moment, _ in runs]
+    order = -np.polyfit(np.log([16, 32, 64]), np.log(errors), 1)[0]
+    assert order > 0.75, f"order {order:.2f}, errors {errors}"
+    assert errors[-1] < 0.04
+    assert runs[-1][1] < 0.02
+
+
+@pytest.mark.parametrize("ratio", [2.0, 0.5])
+def test_I7_period_hanging_and_standing(ratio: float) -> None:
+    exact = case.small_period(ratio, 1.017337)
+    assert case.swing(48, ratio, 5.0, exact) == pytest.approx(exact, rel=0.02)
+
+
+@pytest.mark.parametrize("solid", [False, True])
+def test_I8_plug_moves_all_the_fluid(solid: bool) -> None:
+    ends = BoundaryOpen()
+    for sides in (Boundaries(ends, ends), Boundaries(PERIODIC, PERIODIC)):
+        assert case.slug(8, 0.5, 0.1, sides, 5, solid) == pytest.approx(1.0, abs=1e-9)
