@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from flowborne.coupling.motion import Motion
+from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.state import FluidState
@@ -45,51 +47,72 @@ class Fluid:
 class Setup:
     """What never changes during a run, shared by all copies of a world.
 
-    solid    the articulated bodies, or None
+    solid    the articulated bodies; a world without any has `SolidModel.empty()`
     fluid    the fluid, or None (simple wind and gravity only)
     motions  prescribed motions of some dofs
     winds    simple winds (paper eq. 2, or a uniform force)
     """
 
-    solid: SolidModel | None
+    solid: SolidModel
     fluid: Fluid | None = None
     motions: tuple[Motion, ...] = ()
     winds: tuple[Wind, ...] = ()
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """The bodies' geometries as the fluid's grid sees them."""
+        assert self.fluid is not None
+        return shapes(self.solid, self.fluid.grid)
 
 
 @dataclass
 class World:
     """All the state there is. Copies are cheap and share nothing but `setup`.
 
+    solid   positions and velocities of the bodies
+    fluid   None when the setup has no fluid
     time    s
     steps   number of steps taken
-    fluid   None when the setup has no fluid
-    solid   None when the setup has no bodies
     memory  the controller's own arrays, by name
     """
 
     setup: Setup
+    solid: SolidState
+    fluid: FluidState | None = None
     time: float = 0.0
     steps: int = 0
-    fluid: FluidState | None = None
-    solid: SolidState | None = None
     memory: dict[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def at_rest(cls, setup: Setup) -> World:
+        """World of `setup` in its model's rest pose, in still fluid."""
+        fluid = setup.fluid
+        return cls(
+            setup,
+            setup.solid.rest(),
+            None if fluid is None else FluidState.at_rest(fluid.grid, fluid.scalars),
+        )
+
+    def flow(self) -> tuple[Fluid, FluidState]:
+        """The fluid and its state. Raises ValueError when the world has none."""
+        if self.setup.fluid is None or self.fluid is None:
+            raise ValueError("this world has no fluid; give its setup one")
+        return self.setup.fluid, self.fluid
 
     def copy(self) -> World:
         return World(
             self.setup,
+            self.solid.copy(),
+            None if self.fluid is None else self.fluid.copy(),
             self.time,
             self.steps,
-            None if self.fluid is None else self.fluid.copy(),
-            None if self.solid is None else self.solid.copy(),
             {name: values.copy() for name, values in self.memory.items()},
         )
 
     def arrays(self) -> dict[str, Array]:
         """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""
         named: dict[str, Array] = {"clock": np.array([self.time, float(self.steps)])}
-        if self.solid is not None:
-            named |= {"solid/q": self.solid.q, "solid/v": self.solid.v}
+        named |= {"solid/q": self.solid.q, "solid/v": self.solid.v}
         if self.fluid is not None:
             named |= {f"fluid/{k}": v for k, v in self.fluid.arrays().items()}
         return named | {f"memory/{k}": v for k, v in self.memory.items()}
@@ -108,9 +131,9 @@ class World:
         time, steps = arrays["clock"]
         return cls(
             setup,
+            SolidState(arrays["solid/q"], arrays["solid/v"]),
+            None if setup.fluid is None else FluidState.from_arrays(part("fluid/")),
             float(time),
             int(steps),
-            None if setup.fluid is None else FluidState.from_arrays(part("fluid/")),
-            None if setup.solid is None else SolidState(arrays["solid/q"], arrays["solid/v"]),
             part("memory/"),
         )

@@ -1,0 +1,97 @@
+"""Distance to the bodies at the nodes of the grid, in the box around each body."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flowborne.coupling.shapes import signed_distance
+from flowborne.fluid.grid import Array
+
+Integers = NDArray[np.int64]
+
+BAND = 4.0
+"""Distances are known up to this many cells from a body; beyond, they are this large."""
+
+
+@njit(nogil=True, cache=True)
+def node_box(
+    geoms: Integers,
+    position: Array,
+    rotation: Array,
+    reach: Array,
+    origin: Array,
+    h: float,
+    shape: Integers,
+) -> Integers:
+    """Node ranges (low, high per axis) around the given geometries, with the band; may be empty."""
+    box = np.empty((3, 2), np.int64)
+    for axis in range(3):
+        low, high = 1e300, -1e300
+        for g in geoms:
+            extent = 0.0
+            for m in range(3):
+                extent += abs(rotation[g, axis, m]) * reach[g, m]
+            low = min(low, position[g, axis] - extent)
+            high = max(high, position[g, axis] + extent)
+        first = np.floor((low - origin[axis]) / h - BAND)
+        last = np.ceil((high - origin[axis]) / h + BAND) + 1.0
+        box[axis, 0] = int(min(max(first, 0.0), shape[axis] + 1.0))
+        box[axis, 1] = int(min(max(last, 0.0), shape[axis] + 1.0))
+    return box
+
+
+@njit(nogil=True, cache=True)
+def sample_body(
+    phi: Array,
+    box: Integers,
+    geoms: Integers,
+    kind: Integers,
+    size: Array,
+    position: Array,
+    rotation: Array,
+    tables: Array,
+    table: Integers,
+    corner: Array,
+    pitch: Array,
+    origin: Array,
+    h: float,
+    flat: bool,
+) -> None:
+    """Distance to one body at the nodes of its box; a slab's nodes lie at z = 0."""
+    for i in range(box[0, 0], box[0, 1]):
+        for j in range(box[1, 0], box[1, 1]):
+            for k in range(box[2, 0], box[2, 1]):
+                if flat and k > box[2, 0]:
+                    phi[i - box[0, 0], j - box[1, 0], k - box[2, 0]] = phi[
+                        i - box[0, 0], j - box[1, 0], 0
+                    ]
+                    continue
+                x, y = origin[0] + h * i, origin[1] + h * j
+                z = 0.0 if flat else origin[2] + h * k
+                value = BAND * h
+                for g in geoms:
+                    dx, dy, dz = x - position[g, 0], y - position[g, 1], z - position[g, 2]
+                    lx = rotation[g, 0, 0] * dx + rotation[g, 1, 0] * dy + rotation[g, 2, 0] * dz
+                    ly = rotation[g, 0, 1] * dx + rotation[g, 1, 1] * dy + rotation[g, 2, 1] * dz
+                    lz = rotation[g, 0, 2] * dx + rotation[g, 1, 2] * dy + rotation[g, 2, 2] * dz
+                    value = min(
+                        value,
+                        signed_distance(
+                            kind[g], size[g], lx, ly, lz, tables, table[g], corner[g], pitch[g]
+                        ),
+                    )
+                phi[i - box[0, 0], j - box[1, 0], k - box[2, 0]] = value
+
+
+@njit(nogil=True, cache=True)
+def merge(distance: Array, nearest: Integers, phi: Array, box: Integers, body: int) -> None:
+    """Lower the union's distance to that of one body inside its box."""
+    for i in range(box[0, 0], box[0, 1]):
+        for j in range(box[1, 0], box[1, 1]):
+            for k in range(box[2, 0], box[2, 1]):
+                value = phi[i - box[0, 0], j - box[1, 0], k - box[2, 0]]
+                if value < distance[i, j, k]:
+                    distance[i, j, k] = value
+                    nearest[i, j, k] = body

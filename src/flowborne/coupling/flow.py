@@ -1,0 +1,159 @@
+"""The fluid's half of a step: what happens to it between two coupled solves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.operators import carried_in, face_mass, fluid_momentum
+from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.advection import OFFSETS, carry, cells_per_step, correct
+from flowborne.fluid.continuation import LAYERS, continue_into
+from flowborne.fluid.ghosts import impose_sides, pad, pad_faces
+from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.scalars import carry_scalars, cells_in
+
+
+@dataclass
+class Carried:
+    """What advection and forces gave.
+
+    velocity  Faces u*, m/s
+    scalars   name -> (nx, ny, nz)
+    lost      (3,) momentum that advection made or lost, N s
+    """
+
+    velocity: Faces
+    scalars: dict[str, Array]
+    lost: Array
+
+
+def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> Carried:
+    """Advect velocity and scalars by the leak-proof field (section 6, items 2 and 3).
+
+    With the acceleration A = (u - u*)/dt of the last step, c = u + dt/2 A is the velocity of a
+    particle half-way; c is what is carried, along the paths of c, and dt/2 A is taken off where
+    the particle arrives. The pressure solve then adds dt A for the new A, so a steady flow stays
+    as it is and the step is second order in time. The semi-Lagrangian scheme of the paper carries
+    u itself.
+    """
+    fluid, state = world.flow()
+    grid, sides, time = fluid.grid, fluid.boundaries, world.time
+    second_order = fluid.advection == "maccormack"
+    half = 0.5 * dt if second_order else 0.0
+    halfway = faces_of(
+        [u + half * a for u, a in zip(state.velocity, state.acceleration, strict=True)]
+    )
+    paths = faces_of(
+        [
+            c + half * a * o
+            for c, a, o in zip(state.carrier, state.acceleration, before.open, strict=True)
+        ]
+    )
+    field = pad_faces(halfway, grid, sides, time)
+    carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
+    counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
+    sticky = fluid.viscosity > 0.0
+    valid = [
+        pad(np.ones(o.shape, np.uint8) if sticky else (o > 0.0).view(np.uint8), grid.axes)
+        for o in before.open
+    ]
+    arrived = grid.zeros_faces()
+    for axis in grid.axes:
+        carry(arrived[axis], field[axis], valid[axis], *carrier, OFFSETS[axis], counts, periodic)
+    if second_order:
+        impose_sides(arrived, grid, sides, time + dt)
+        there = pad_faces(arrived, grid, sides, time + dt)
+        for axis in grid.axes:
+            correct(
+                arrived[axis],
+                there[axis],
+                field[axis],
+                valid[axis],
+                *carrier,
+                OFFSETS[axis],
+                counts,
+                periodic,
+            )
+            arrived[axis][:] -= half * state.acceleration[axis]
+    scalars = carry_scalars(
+        state.scalars,
+        carrier,
+        before.distance,
+        after.distance,
+        grid,
+        sides,
+        fluid.sources,
+        time + dt,
+    )
+    was = fluid_momentum(state.velocity, face_mass(before.open, grid, sides, fluid.density), grid)
+    now = fluid_momentum(arrived, face_mass(after.open, grid, sides, fluid.density), grid)
+    entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
+    return Carried(arrived, scalars, now - was - entered)
+
+
+def faces_of(values: list[Array]) -> Faces:
+    """Three arrays as Faces."""
+    return values[0], values[1], values[2]
+
+
+def forced(carried: Faces, fluid: Fluid, time: float, dt: float) -> Faces:
+    """Velocity with the body force, driven regions and prescribed sides (item 4).
+
+    time  s at the end of the step
+    """
+    grid = fluid.grid
+    velocity = faces_of([u + dt * f for u, f in zip(carried, fluid.body_force, strict=True)])
+    for axis in grid.axes:
+        for source in fluid.sources:
+            if source.velocity is not None and source.active(time):
+                box = list(cells_in(source, grid))
+                box[axis] = slice(box[axis].start, box[axis].stop + 1)
+                velocity[axis][tuple(box)] = source.velocity[axis]
+    impose_sides(velocity, grid, fluid.boundaries, time)
+    return velocity
+
+
+def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
+    """(nx, ny, nz) volume that appears in each cell, m^3/s; none in cells wholly inside a body."""
+    grid = fluid.grid
+    rate = np.zeros(grid.shape)
+    for source in fluid.sources:
+        if source.volume_rate is None or not source.active(time):
+            continue
+        box = cells_in(source, grid)
+        clear = np.zeros(grid.shape, bool)
+        clear[box] = True
+        for axis in grid.axes:
+            lower = np.delete(opened[axis], -1, axis) > 0.0
+            clear &= lower | (np.delete(opened[axis], 0, axis) > 0.0)
+        if clear.any():
+            rate[clear] += source.volume_rate / np.count_nonzero(clear)
+    return rate
+
+
+def settle_state(
+    world: World, after: Geometry, velocity: Faces, start: Faces, leak_free: Faces, dt: float
+) -> None:
+    """Put the new velocity into the state, continued a few layers into the bodies (item 7).
+
+    velocity   Faces u after the solve
+    start      Faces u* after advection
+    leak_free  Faces, the leak-proof field of `velocity`
+    """
+    fluid, state = world.flow()
+    sticky = fluid.viscosity > 0.0
+    for axis in fluid.grid.axes:
+        opened = after.open[axis] > 0.0
+        u, a = velocity[axis], (velocity[axis] - start[axis]) / dt
+        a[~opened] = 0.0
+        if not opened.all():
+            u[~opened] = leak_free[axis][~opened]
+            if not sticky:
+                continue_into(u, opened.view(np.uint8), LAYERS)
+            continue_into(a, opened.view(np.uint8), LAYERS)
+        state.velocity[axis][:] = u
+        state.acceleration[axis][:] = a
+        state.carrier[axis][:] = leak_free[axis]

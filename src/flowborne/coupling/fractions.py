@@ -1,0 +1,350 @@
+"""Where bodies close the faces of the grid, and what pressure in each cell does to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from flowborne.coupling.closed import add_closed, list_closed, share_closed
+from flowborne.coupling.distance import BAND, Integers, merge, node_box, sample_body
+from flowborne.coupling.shapes import Shapes
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.grid import Array, Faces, Grid
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The bodies on the grid at one instant.
+
+    distance   (nx+1, ny+1, nz+1) to the nearest body at the nodes, m, at most BAND cells
+    nearest    (nx+1, ny+1, nz+1) that body
+    open       open fraction of each face
+    axis       (n,) closed parts of faces, one entry per face and body: axis of the face,
+    face       (n,) its flat index among the faces across that axis,
+    body       (n,) the body,
+    closed     (n,) the fraction that this body closes
+    cells      (m,) flat index of cells beside closed parts, one row per cell and body
+    row_start  (m+1,) where the row's entries begin
+    columns    (6m,) 6 body + component
+    values     (6m,) wrench about the origin that unit pressure in the cell exerts on the body, m^2
+    """
+
+    distance: Array
+    nearest: Integers
+    open: Faces
+    axis: Integers
+    face: Integers
+    body: Integers
+    closed: Array
+    cells: Integers
+    row_start: Integers
+    columns: Integers
+    values: Array
+
+
+@njit(nogil=True, cache=True)
+def cell_wrench(
+    wrench: Array,
+    i: int,
+    j: int,
+    k: int,
+    sx: Array,
+    sy: Array,
+    sz: Array,
+    ox: Array,
+    oy: Array,
+    oz: Array,
+    box: Integers,
+    origin: Array,
+    h: float,
+    area: float,
+    flat: bool,
+) -> int:
+    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given.
+
+    Gives 0 when the cell is wholly closed or touches no closed part, else 1.
+    """
+    a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
+    x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
+    z = 0.0 if flat else origin[2] + h * (k + 0.5)
+    touched = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
+    clear = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
+    if not flat:
+        touched += sz[a, b, c] + sz[a, b, c + 1]
+        clear += oz[i, j, k] + oz[i, j, k + 1]
+    if touched == 0.0 or clear == 0.0:
+        return 0
+    wrench[:] = 0.0
+    for side in range(2):
+        sign = 2.0 * side - 1.0
+        f = sign * area * sx[a + side, b, c]
+        wrench[0] += f
+        wrench[4] += z * f
+        wrench[5] -= y * f
+        f = sign * area * sy[a, b + side, c]
+        wrench[1] += f
+        wrench[3] -= z * f
+        wrench[5] += x * f
+        if not flat:
+            f = sign * area * sz[a, b, c + side]
+            wrench[2] += f
+            wrench[3] += y * f
+            wrench[4] -= x * f
+    return 1
+
+
+@njit(nogil=True, cache=True)
+def list_cells(
+    sx: Array,
+    sy: Array,
+    sz: Array,
+    ox: Array,
+    oy: Array,
+    oz: Array,
+    box: Integers,
+    body: int,
+    origin: Array,
+    h: float,
+    area: float,
+    flat: bool,
+    at: int,
+    cells: Integers,
+    columns: Integers,
+    values: Array,
+) -> int:
+    """Write the coupling rows of one body from row `at` on; gives the next one.
+
+    With `cells` of length 0 it only counts.
+    """
+    wrench = np.empty(6)
+    n = ox.shape
+    for i in range(box[0, 0], box[0, 1] - 1):
+        for j in range(box[1, 0], box[1, 1] - 1):
+            for k in range(box[2, 0], box[2, 1] - 1):
+                if cell_wrench(wrench, i, j, k, sx, sy, sz, ox, oy, oz, box, origin, h, area, flat):
+                    if cells.size:
+                        cells[at] = (i * n[1] + j) * n[2] + k
+                        for m in range(6):
+                            columns[6 * at + m] = 6 * body + m
+                            values[6 * at + m] = wrench[m]
+                    at += 1
+    return at
+
+
+@njit(nogil=True, cache=True)
+def cut(
+    kind: Integers,
+    size: Array,
+    reach: Array,
+    body_of: Integers,
+    tables: Array,
+    table: Integers,
+    corner: Array,
+    pitch: Array,
+    position: Array,
+    rotation: Array,
+    origin: Array,
+    h: float,
+    area: float,
+    shape: Integers,
+    walls: Integers,
+) -> tuple[
+    Array,
+    Integers,
+    Array,
+    Array,
+    Array,
+    Integers,
+    Integers,
+    Integers,
+    Array,
+    Integers,
+    Integers,
+    Array,
+]:
+    """The whole geometry in one call; see `Geometry` for what comes back, in its order."""
+    nx, ny, nz = shape
+    flat = nz == 1
+    distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
+    nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
+    ox, oy, oz = np.ones((nx + 1, ny, nz)), np.ones((nx, ny + 1, nz)), np.ones((nx, ny, nz + 1))
+    tx, ty, tz = np.zeros(ox.shape), np.zeros(oy.shape), np.zeros(oz.shape)
+    bodies = np.unique(body_of)
+    boxes = np.empty((bodies.size, 3, 2), np.int64)
+    phis = []
+    shares_x = []
+    shares_y = []
+    shares_z = []
+    for n in range(bodies.size):
+        geoms = np.nonzero(body_of == bodies[n])[0]
+        box = node_box(geoms, position, rotation, reach, origin, h, shape)
+        if flat:
+            box[2, 0], box[2, 1] = 0, 2
+        if np.any(box[:, 1] - box[:, 0] < 2):
+            box[:, :] = 0
+        boxes[n] = box
+        d = box[:, 1] - box[:, 0]
+        phi = np.empty((d[0], d[1], d[2]))
+        sample_body(
+            phi,
+            box,
+            geoms,
+            kind,
+            size,
+            position,
+            rotation,
+            tables,
+            table,
+            corner,
+            pitch,
+            origin,
+            h,
+            flat,
+        )
+        merge(distance, nearest, phi, box, bodies[n])
+        phis.append(phi)
+        add_closed(tx, phi, box, 0)
+        add_closed(ty, phi, box, 1)
+        if not flat:
+            add_closed(tz, phi, box, 2)
+    parts, rows = 0, 0
+    none = np.empty(0, np.int64)
+    empty = np.empty(0)
+    for n in range(bodies.size):
+        box = boxes[n]
+        d = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
+        shares_x.append(np.zeros((d[0] + 1, d[1], d[2])))
+        shares_y.append(np.zeros((d[0], d[1] + 1, d[2])))
+        shares_z.append(np.zeros((d[0], d[1], d[2] + 1)))
+        parts += share_closed(shares_x[n], ox, tx, distance, phis[n], box, 0, walls[0])
+        parts += share_closed(shares_y[n], oy, ty, distance, phis[n], box, 1, walls[1])
+        if not flat:
+            parts += share_closed(shares_z[n], oz, tz, distance, phis[n], box, 2, walls[2])
+    for n in range(bodies.size):
+        rows = list_cells(
+            shares_x[n],
+            shares_y[n],
+            shares_z[n],
+            ox,
+            oy,
+            oz,
+            boxes[n],
+            bodies[n],
+            origin,
+            h,
+            area,
+            flat,
+            rows,
+            none,
+            none,
+            empty,
+        )
+    axis = np.empty(parts, np.int64)
+    face = np.empty(parts, np.int64)
+    body = np.empty(parts, np.int64)
+    closed = np.empty(parts)
+    cells = np.empty(rows, np.int64)
+    columns = np.empty(6 * rows, np.int64)
+    values = np.empty(6 * rows)
+    at, row = 0, 0
+    for n in range(bodies.size):
+        b = bodies[n]
+        at = list_closed(
+            shares_x[n], boxes[n], 0, b, np.array(ox.shape), at, axis, face, body, closed
+        )
+        at = list_closed(
+            shares_y[n], boxes[n], 1, b, np.array(oy.shape), at, axis, face, body, closed
+        )
+        if not flat:
+            at = list_closed(
+                shares_z[n], boxes[n], 2, b, np.array(oz.shape), at, axis, face, body, closed
+            )
+        if rows:
+            row = list_cells(
+                shares_x[n],
+                shares_y[n],
+                shares_z[n],
+                ox,
+                oy,
+                oz,
+                boxes[n],
+                b,
+                origin,
+                h,
+                area,
+                flat,
+                row,
+                cells,
+                columns,
+                values,
+            )
+    if flat:
+        oz[:] = 0.0
+    return distance, nearest, ox, oy, oz, axis, face, body, closed, cells, columns, values
+
+
+def geometry(
+    shapes: Shapes, position: Array, rotation: Array, grid: Grid, boundaries: Boundaries
+) -> Geometry:
+    """Cut the grid by bodies whose geometries stand at `position` (ng, 3) and `rotation`
+    (ng, 3, 3), in the order of `shapes`."""
+    solid = ("closed", "no-slip", "inflow")
+    walls = np.array(
+        [[int(side.kind in solid) for side in boundaries.pair(axis)] for axis in range(3)]
+    )
+    found = cut(
+        shapes.kind,
+        shapes.size,
+        shapes.reach,
+        shapes.body,
+        shapes.tables,
+        shapes.table,
+        shapes.corner,
+        shapes.pitch,
+        position,
+        rotation,
+        np.array(grid.origin),
+        grid.spacing,
+        grid.face_area,
+        np.array(grid.shape),
+        walls,
+    )
+    distance, nearest, ox, oy, oz, axis, face, body, closed, cells, columns, values = found
+    row_start = 6 * np.arange(cells.size + 1, dtype=np.int64)
+    return Geometry(
+        distance,
+        nearest,
+        (ox, oy, oz),
+        axis,
+        face,
+        body,
+        closed,
+        cells,
+        row_start,
+        columns,
+        values,
+    )
+
+
+def uncut(grid: Grid) -> Geometry:
+    """Geometry of a domain without bodies."""
+    nx, ny, nz = grid.shape
+    opened = [np.ones(grid.face_shape(axis)) for axis in range(3)]
+    if grid.is_slab:
+        opened[2][:] = 0.0
+    none = np.zeros(0, np.int64)
+    return Geometry(
+        np.full((nx + 1, ny + 1, nz + 1), BAND * grid.spacing),
+        np.zeros((nx + 1, ny + 1, nz + 1), np.int64),
+        (opened[0], opened[1], opened[2]),
+        none,
+        none,
+        none,
+        np.zeros(0),
+        none,
+        np.zeros(1, np.int64),
+        none,
+        np.zeros(0),
+    )

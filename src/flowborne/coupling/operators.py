@@ -1,0 +1,197 @@
+"""Between bodies and grid: the leak-proof field, fluxes, wrenches, momenta.
+
+A body's twist holds the velocity (3) of its point at the world origin and its angular velocity (3).
+J v of the paper, the flux that moving bodies push into a cell, is  values @ twist  over the rows of
+`Geometry`; J^T p is the transpose and a wrench. Twists and generalised velocities are related by
+the twist Jacobian of the kinematics.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flowborne.coupling.fractions import Geometry
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.solids.dynamics import Kinematics
+
+Integers = NDArray[np.int64]
+
+
+def twists(kinematics: Kinematics, v: Array) -> Array:
+    """(nbody, 6) twist of every body at generalised velocity v (nv,)."""
+    return kinematics.twist_jacobian @ v
+
+
+def generalised(kinematics: Kinematics, wrenches: Array) -> Array:
+    """(nv,) generalised force of wrenches (nbody, 6)."""
+    return np.einsum("bwv,bw->v", kinematics.twist_jacobian, wrenches)
+
+
+def response(kinematics: Kinematics, inverse: Array) -> Array:
+    """(6 nb, 6 nb) twists that unit wrench impulses give: M = T A^-1 T^T, eq. (9) eliminated.
+
+    inverse  (nv, nv) A^-1 with prescribed dofs projected out
+    """
+    bodies, components, dofs = kinematics.twist_jacobian.shape
+    jacobian = kinematics.twist_jacobian.reshape(bodies * components, dofs)
+    return np.ascontiguousarray(jacobian @ inverse @ jacobian.T)
+
+
+@njit(nogil=True, cache=True)
+def add_body_velocity(
+    out: Array,
+    axis: int,
+    axes: Integers,
+    faces: Integers,
+    bodies: Integers,
+    closed: Array,
+    twist: Array,
+    origin: Array,
+    h: float,
+    flat: bool,
+) -> None:
+    """Add closed fraction x body velocity on the faces across `axis`, at their centres."""
+    n1, n2 = out.shape[1], out.shape[2]
+    flat_out = out.reshape(-1)
+    for n in range(axes.size):
+        if axes[n] != axis:
+            continue
+        f = faces[n]
+        i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
+        x = origin[0] + h * (i + (0.0 if axis == 0 else 0.5))
+        y = origin[1] + h * (j + (0.0 if axis == 1 else 0.5))
+        z = 0.0 if flat else origin[2] + h * (k + (0.0 if axis == 2 else 0.5))
+        t = twist[bodies[n]]
+        if axis == 0:
+            velocity = t[0] + t[4] * z - t[5] * y
+        elif axis == 1:
+            velocity = t[1] + t[5] * x - t[3] * z
+        else:
+            velocity = t[2] + t[3] * y - t[4] * x
+        flat_out[f] += closed[n] * velocity
+
+
+def leak_proof(velocity: Faces, geometry: Geometry, twist: Array, grid: Grid) -> Faces:
+    """Field that crosses no body: open part fluid, closed part body (section 6, item 2).
+
+    twist  (nbody, 6)
+    """
+    carried = [opened * u for opened, u in zip(geometry.open, velocity, strict=True)]
+    origin = np.array(grid.origin)
+    for axis in grid.axes:
+        add_body_velocity(
+            carried[axis],
+            axis,
+            geometry.axis,
+            geometry.face,
+            geometry.body,
+            geometry.closed,
+            twist,
+            origin,
+            grid.spacing,
+            grid.is_slab,
+        )
+    return carried[0], carried[1], carried[2]
+
+
+@njit(nogil=True, cache=True)
+def add_flux(out: Array, cells: Integers, columns: Integers, values: Array, twist: Array) -> None:
+    """Add the volume rate that the bodies' motion takes from each cell, J v, m^3/s."""
+    flat_out, flat_twist = out.reshape(-1), twist.reshape(-1)
+    for n in range(cells.size):
+        flux = 0.0
+        for m in range(6 * n, 6 * n + 6):
+            flux += values[m] * flat_twist[columns[m]]
+        flat_out[cells[n]] += flux
+
+
+@njit(nogil=True, cache=True)
+def push_bodies(
+    cells: Integers, columns: Integers, values: Array, pressure: Array, nbody: int
+) -> Array:
+    """(nbody, 6) wrench of a pressure field, J^T p, N and N m (impulses for p^ = p dt)."""
+    wrench = np.zeros(6 * nbody)
+    flat = pressure.reshape(-1)
+    for n in range(cells.size):
+        p = flat[cells[n]]
+        for m in range(6 * n, 6 * n + 6):
+            wrench[columns[m]] += values[m] * p
+    return wrench.reshape(nbody, 6)
+
+
+def pressure_wrench(geometry: Geometry, pressure: Array, nbody: int) -> Array:
+    """(nbody, 6) wrench about the world origin of a pressure field (nx, ny, nz)."""
+    return push_bodies(
+        geometry.cells, geometry.columns, geometry.values, np.ascontiguousarray(pressure), nbody
+    )
+
+
+def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:
+    """(nbody, 6) Archimedes' force -rho g V at the centroid of each body's displaced volume."""
+    force = -density * volume[:, None] * gravity[None, :]
+    return np.concatenate([force, np.cross(centroid, force)], axis=1)
+
+
+def face_mass(opened: Faces, grid: Grid, boundaries: Boundaries, density: float) -> Faces:
+    """Fluid mass of every face: open fraction x density x volume, half of it on a side, kg.
+
+    The last face of a periodic axis is its first one and counts nothing.
+    """
+    masses = []
+    for axis in range(3):
+        mass = density * grid.cell_volume * opened[axis]
+        if axis in grid.axes:
+            ends = np.moveaxis(mass, axis, 0)
+            if boundaries.periodic()[axis]:
+                ends[-1] = 0.0
+            else:
+                ends[0] *= 0.5
+                ends[-1] *= 0.5
+        masses.append(mass)
+    return masses[0], masses[1], masses[2]
+
+
+def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid) -> Array:
+    """(3,) linear momentum of the fluid, N s."""
+    total = np.zeros(3)
+    for axis in grid.axes:
+        total[axis] = np.vdot(mass[axis], velocity[axis])
+    return total
+
+
+def side_push(pressure: Array, grid: Grid, boundaries: Boundaries) -> Array:
+    """(3,) force of the solid and inflow sides on the fluid for a pressure field, N."""
+    force = np.zeros(3)
+    for axis in grid.axes:
+        low, high = boundaries.pair(axis)
+        if low.kind not in ("open", "periodic"):
+            force[axis] += grid.face_area * float(pressure.take(0, axis).sum())
+        if high.kind not in ("open", "periodic"):
+            force[axis] -= grid.face_area * float(pressure.take(-1, axis).sum())
+    return force
+
+
+def carried_in(
+    velocity: Faces, opened: Faces, grid: Grid, boundaries: Boundaries, density: float
+) -> Array:
+    """(3,) momentum per time that the flow itself carries in through the sides, N."""
+    inward = np.zeros(3)
+    for axis in grid.axes:
+        for end, side in enumerate(boundaries.pair(axis)):
+            if side.kind not in ("open", "inflow"):
+                continue
+            layer, sign = (-1, -1.0) if end else (0, 1.0)
+            normal = velocity[axis].take(layer, axis) * opened[axis].take(layer, axis)
+            flux = sign * density * grid.face_area * normal
+            inward[axis] += float((flux * velocity[axis].take(layer, axis)).sum())
+            for other in grid.axes:
+                if other == axis:
+                    continue
+                tangential = velocity[other].take(layer, axis)
+                along = other - 1 if other > axis else other
+                mean = 0.5 * (np.delete(tangential, -1, along) + np.delete(tangential, 0, along))
+                inward[other] += float((flux * mean).sum())
+    return inward

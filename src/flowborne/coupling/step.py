@@ -1,0 +1,247 @@
+"""One time step of the coupled world (paper, section 6)."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from flowborne.coupling.flow import carry_fluid, forced, settle_state
+from flowborne.coupling.fractions import Geometry, geometry, uncut
+from flowborne.coupling.motion import Drive
+from flowborne.coupling.operators import (
+    buoyancy_wrench,
+    face_mass,
+    fluid_momentum,
+    generalised,
+    leak_proof,
+    side_push,
+    twists,
+)
+from flowborne.coupling.report import Momentum, Outcome, StepReport
+from flowborne.coupling.solve import Solved, solve_bodies, solve_together
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Array
+from flowborne.solids.dynamics import Kinematics, assemble, kinematics, momentum
+from flowborne.solids.prescribed import PrescribedSystem, prescribe
+from flowborne.solids.state import SolidState
+
+
+class Stopwatch:
+    """Seconds by part of a step."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = perf_counter()
+
+    def lap(self, part: str) -> None:
+        """Book the time since the last lap to `part`."""
+        now = perf_counter()
+        self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
+        self._last = now
+
+
+def step(world: World, dt: float, drive: Drive | None = None) -> StepReport:
+    """Advance `world` by dt, in place (section 6).
+
+    drive    what the controlled dofs do; the setup's prescribed motions are added to it
+    returns  the report; its outcome is not DONE when the numbers cannot be trusted
+    """
+    watch = Stopwatch()
+    orders = command(world, dt, drive)
+    if world.setup.fluid is None:
+        return step_bodies(world, dt, orders, watch)
+    return step_together(world, dt, orders, watch)
+
+
+def step_bodies(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
+    """A step without a fluid: simple winds, gravity, joints and contact."""
+    before, pose = move_bodies(world, orders, dt)
+    wind = winds_on(world, pose)
+    driven = equations(world, before, pose, wind, orders, dt)
+    solved = solve_bodies(driven, orders.torque_limit, len(pose.body_position))
+    if np.isfinite(solved.v).all() and not orders.prescribed.all():
+        halfway = 0.5 * (before.v + solved.v)
+        driven = equations(world, before, pose, wind, orders, dt, halfway)
+        solved = solve_bodies(driven, orders.torque_limit, len(pose.body_position))
+    world.solid.v[:] = solved.v
+    advance_clock(world, dt)
+    watch.lap("solids")
+    return report(world, solved, np.zeros_like(wind), wind, Momentum(), dt, watch)
+
+
+def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
+    """A step of bodies and fluid: the seven items of section 6."""
+    fluid, state = world.flow()
+    cut_before = cut_by_bodies(world)
+    watch.lap("geometry")
+    # 1. the bodies move with the velocity they have, driven joints as they are told
+    before, pose = move_bodies(world, orders, dt)
+    watch.lap("solids")
+    cut = cut_by_bodies(world, pose)
+    watch.lap("geometry")
+    # 2. and 3. velocity and scalars are carried by the leak-proof field
+    carried = carry_fluid(world, cut_before, cut, dt)
+    # 4. forces on the fluid
+    velocity = forced(carried.velocity, fluid, world.time + dt, dt)
+    watch.lap("advection")
+    # 5. forces on the bodies, and their own equations of motion
+    wind = winds_on(world, pose)
+    buoyancy = buoyancy_wrench(
+        pose.centroid, world.setup.solid.volume, world.setup.solid.gravity, fluid.density
+    )
+    driven = equations(world, before, pose, wind + buoyancy, orders, dt)
+    watch.lap("solids")
+    # 6. viscosity, pressure, bodies, joints and contact in one solve
+    solved = solve_together(world, velocity, driven, pose, cut, orders.torque_limit, dt)
+    watch.lap("projection")
+    # 7. the new state: it holds the promises of section 6 on the next step's leak-proof field
+    assert solved.projected is not None
+    world.solid.v[:] = solved.v
+    twist = twists(pose, solved.v)
+    leak_free = leak_proof(solved.projected.velocity, cut, twist, fluid.grid)
+    settle_state(world, cut, solved.projected.velocity, carried.velocity, leak_free, dt)
+    state.pressure[:] = solved.projected.pressure
+    state.scalars = carried.scalars
+    advance_clock(world, dt)
+    balance = momentum_balance(world, cut, solved)
+    balance.advection = carried.lost
+    watch.lap("advection")
+    return report(world, solved, buoyancy, wind, balance, dt, watch)
+
+
+def command(world: World, dt: float, drive: Drive | None) -> Drive:
+    """The drive with prescribed motions and a slab's locked dofs added."""
+    model = world.setup.solid
+    orders = Drive.none(model.nv)
+    if drive is not None:
+        at = np.flatnonzero(drive.prescribed)
+        orders.set(at, drive.move[at], drive.hold[at], drive.torque_limit[at])
+    for motion in world.setup.motions:
+        position = world.solid.q[model.dof_position[motion.dofs]]
+        later = world.time + dt
+        move = (motion.position(later) - position) / dt
+        orders.set(motion.dofs, move, motion.velocity(later))
+    orders.set(np.flatnonzero(model.locked), 0.0, 0.0)
+    return orders
+
+
+def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
+    """The grid cut by the bodies where they are."""
+    setup = world.setup
+    assert setup.fluid is not None
+    if setup.shapes.body.size == 0:
+        return uncut(setup.fluid.grid)
+    if pose is None:
+        pose = kinematics(setup.solid, world.solid.q)
+    return geometry(
+        setup.shapes,
+        pose.geom_position[setup.shapes.source],
+        pose.geom_rotation[setup.shapes.source],
+        setup.fluid.grid,
+        setup.fluid.boundaries,
+    )
+
+
+def move_bodies(world: World, orders: Drive, dt: float) -> tuple[SolidState, Kinematics]:
+    """Move the bodies to the end of the step, in place; gives the state before and the new pose.
+
+    A drive with a torque limit may give way, so its dof moves with the velocity it has.
+    """
+    before = world.solid.copy()
+    told = orders.prescribed & ~np.isfinite(orders.torque_limit)
+    velocity = np.where(told, orders.move, before.v)
+    world.solid.q[:] = world.setup.solid.integrate(before.q, velocity, dt)
+    return before, kinematics(world.setup.solid, world.solid.q)
+
+
+def winds_on(world: World, pose: Kinematics) -> Array:
+    """(nbody, 6) wrench of the simple winds."""
+    total = np.zeros((len(pose.body_position), 6))
+    for wind in world.setup.winds:
+        total += wind.wrench(world.setup.solid, pose, world.solid.v, world.time)
+    return total
+
+
+def equations(
+    world: World,
+    before: SolidState,
+    pose: Kinematics,
+    wrench: Array,
+    orders: Drive,
+    dt: float,
+    bias_velocity: Array | None = None,
+) -> PrescribedSystem:
+    """The bodies' own equations of motion under a wrench on each, with the drives in force."""
+    system = assemble(
+        world.setup.solid,
+        world.solid,
+        generalised(pose, wrench),
+        dt,
+        before=before,
+        bias_velocity=bias_velocity,
+    )
+    return prescribe(system, orders.prescribed, orders.hold)
+
+
+def advance_clock(world: World, dt: float) -> None:
+    world.time += dt
+    world.steps += 1
+
+
+def momentum_balance(world: World, cut: Geometry, solved: Solved) -> Momentum:
+    """What bodies, fluid and sides gave each other in the pressure solve."""
+    fluid, _ = world.flow()
+    projected, before = solved.projected, solved.before_pressure
+    assert projected is not None
+    assert before is not None
+    dt = solved.driven.system.dt
+    mass = face_mass(cut.open, fluid.grid, fluid.boundaries, fluid.density)
+    after = fluid_momentum(projected.velocity, mass, fluid.grid)
+    gained = after - fluid_momentum(before, mass, fluid.grid)
+    sides = dt * side_push(projected.pressure, fluid.grid, fluid.boundaries)
+    exchanged = projected.impulse[:, :3].sum(axis=0)
+    scale = float(np.abs(projected.impulse[:, :3]).sum() + np.abs(gained).sum())
+    missing = float(np.abs(exchanged + gained - sides).max())
+    return Momentum(
+        fluid=after,
+        exchanged=exchanged,
+        exchange_error=missing / scale if scale > 0.0 else 0.0,
+        boundary=sides,
+    )
+
+
+def report(
+    world: World,
+    solved: Solved,
+    buoyancy: Array,
+    wind: Array,
+    balance: Momentum,
+    dt: float,
+    watch: Stopwatch,
+) -> StepReport:
+    """What the step did."""
+    projected = solved.projected
+    balance.solid = momentum(world.setup.solid, world.solid)[0]
+    finite = bool(np.isfinite(solved.v).all())
+    if projected is not None:
+        finite = finite and bool(np.isfinite(projected.pressure).all())
+    outcome = Outcome.DONE if solved.converged else Outcome.NOT_CONVERGED
+    done = StepReport(
+        dt=dt,
+        outcome=outcome if finite else Outcome.NOT_FINITE,
+        actuator=solved.actuator,
+        pressure_wrench=np.zeros_like(wind),
+        viscous_wrench=solved.viscous_impulse / dt,
+        buoyancy_wrench=buoyancy,
+        wind_wrench=wind,
+        momentum=balance,
+        contacts=solved.driven.system.contacts,
+        limited=np.flatnonzero(solved.driven.limited),
+        seconds=watch.seconds,
+    )
+    if projected is not None:
+        done.pressure_wrench = projected.impulse / dt
+        done.iterations, done.residual = projected.iterations, projected.residual
+        done.divergence = projected.divergence
+    return done
