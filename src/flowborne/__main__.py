@@ -1,0 +1,5 @@
+"""`python -m flowborne` is the command `flowborne`."""
+
+from flowborne.cli import main
+
+main()

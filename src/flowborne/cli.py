@@ -1,0 +1,293 @@
+"""The command `flowborne`.
+
+Whatever is wrong with the input is one message on stderr and exit code 2; a run that blew up or
+could not be written ends with 1, and one that was interrupted with 130.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flowborne import __version__
+from flowborne.errors import SceneError
+from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write
+
+if TYPE_CHECKING:
+    from flowborne.running import RunResult
+
+FAILED, WRONG, INTERRUPTED = 1, 2, 130
+"""Exit codes besides 0."""
+
+BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Our solves are small: more threads in BLAS are slower, and their sums differ."""
+
+app = typer.Typer(
+    name="flowborne",
+    help="Creatures that answer the fluid around them.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+"""What typer raises when the command line itself is wrong."""
+
+
+class InputError(Exception):
+    """Something on the command line is wrong; the text says what and how to mend it."""
+
+
+SceneArgument = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print a list of objects and no more.")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def flowborne(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Creatures that answer the fluid around them."""
+
+
+@app.command()
+def scenes() -> None:
+    """List the built-in scenes."""
+    from flowborne.scenes.load import load_scene, scene_names
+
+    rows = [(s.name, s.figure, s.description) for s in map(load_scene, scene_names())]
+    widths = [max((len(row[n]) for row in rows), default=0) for n in range(2)]
+    for name, figure, description in rows:
+        print(f"{name:<{widths[0]}}  {figure:<{widths[1]}}  {description}".rstrip())
+
+
+@app.command()
+def run(
+    scene: SceneArgument,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write.", show_default="runs/<scene name>")
+    ] = None,
+    frames: Annotated[
+        int | None, typer.Option(help="How many frames.", show_default="what the scene says")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the scene."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Trials of the controller at once; changes no number.")
+    ] = None,
+    resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the folder.")] = False,
+    replace: Annotated[bool, typer.Option(help="Replace an earlier run in the folder.")] = False,
+    film: Annotated[bool, typer.Option(help="Draw preview.png and preview.mp4.")] = True,
+) -> None:
+    """Run a scene and leave numbers and a film in a folder."""
+    for name, count in (("--frames", frames), ("--workers", workers)):
+        if count is not None and count < 1:
+            raise InputError(f"{name} is {count}; give a whole number of 1 or more")
+    from flowborne.progress import ProgressDisplay
+    from flowborne.scenes.load import load_scene
+
+    loaded = load_scene(scene, _overrides(settings or []))
+    folder = Path("runs") / loaded.name if out is None else out
+    with ProgressDisplay() as progress:
+        from flowborne.running import RunInterrupted, RunOutcome
+        from flowborne.running import run as run_scene
+
+        try:
+            result = run_scene(
+                loaded,
+                folder,
+                frames=frames,
+                workers=workers,
+                resume=resume,
+                replace=replace,
+                film=film,
+                progress=progress,
+            )
+        except RunInterrupted as stopped:
+            progress.say(f"flowborne: {stopped}")
+            raise typer.Exit(INTERRUPTED) from stopped
+    if result.outcome is not RunOutcome.DONE:
+        _complain(result.message)
+        raise typer.Exit(FAILED)
+    print(_told(result))
+
+
+@app.command()
+def check(
+    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="Scene file to look through.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the scene."),
+    ] = None,
+) -> None:
+    """Say everything that is wrong with a scene."""
+    from flowborne.scenes.load import check_scene
+
+    problems = check_scene(scene, _overrides(settings or []))
+    if problems:
+        raise SceneError(problems)
+    print("nothing wrong")
+
+
+@app.command()
+def film(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")],
+) -> None:
+    """Draw the picture and the film of a run again."""
+    path = RunFolder.existing(folder).path
+    from flowborne.view.film import make_preview
+
+    try:
+        make_preview(path)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    print(f"drawn: {folder / 'preview.png'}, {folder / 'preview.mp4'}")
+
+
+@app.command()
+def validate(
+    case: Annotated[
+        list[str] | None, typer.Option(metavar="ID", help="Only this case; may be repeated.")
+    ] = None,
+    quick: Annotated[bool, typer.Option(help="Coarser grids, in minutes.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare with analytic and published cases."""
+    from flowborne.validation import case_ids, run_cases
+
+    ids = _known(case or [], case_ids(), "case", "--case")
+    show = None if as_json else _result_printer("id", "reference", "tolerance")
+    _report(run_cases(ids or None, quick, on_result=show), as_json)
+
+
+@app.command()
+def bench(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Only these benches.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure how fast it is."""
+    from flowborne.bench import bench_names, run_benches
+
+    chosen = _known(names or [], bench_names(), "bench", "NAME")
+    show = None if as_json else _result_printer("name", "target")
+    _report(run_benches(chosen or None, on_result=show), as_json)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line, then leave with its exit code."""
+    for name in BLAS_THREADS:
+        os.environ[name] = "1"
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)
+    except UsageError as error:
+        _complain(f"{_sentence(error)}; see flowborne --help")
+        code = WRONG
+    except SceneError as error:
+        for problem in error.problems:
+            _complain(problem)
+        code = WRONG
+    except (InputError, RunFolderError) as error:
+        _complain(str(error))
+        code = WRONG
+    except (KeyboardInterrupt, typer.Abort):
+        _complain("interrupted")
+        code = INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _overrides(settings: list[str]) -> dict[str, str]:
+    """What --set says. Raises InputError when one has no key or no '='."""
+    overrides = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals or not key.strip():
+            raise InputError(f"--set {setting} has no KEY=VALUE; write for example fluid.density=1")
+        overrides[key.strip()] = value.strip()
+    return overrides
+
+
+def _known(asked: list[str], known: Sequence[str], kind: str, option: str) -> list[str]:
+    """What was asked for. Raises InputError when one of them does not exist."""
+    for name in asked:
+        if name not in known:
+            near = get_close_matches(name, known, n=1, cutoff=0.4)
+            guess = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+            raise InputError(f"{option} {name}: there is no such {kind}; {guess}")
+    return asked
+
+
+def _result_printer(name: str, *columns: str) -> Callable[[Any], None]:
+    """Function that prints a result of a validation or a bench as it comes."""
+
+    def show(result: Any) -> None:
+        shown = "  ".join(f"{c} {_number(getattr(result, c))}" for c in ("value", *columns))
+        print(f"{result.verdict.upper():<4}  {getattr(result, name)}  {result.title}  {shown}")
+        for line in result.lines:
+            print(f"        {line}")
+        sys.stdout.flush()
+
+    return show
+
+
+def _number(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _report(results: Sequence[Any], as_json: bool) -> None:
+    """Print all results as JSON when asked to; leave with 1 when one has failed."""
+    if as_json:
+        print(json.dumps([result.as_dict() for result in results], indent=2))
+    if any(result.verdict == "fail" for result in results):
+        raise typer.Exit(FAILED)
+
+
+def _told(result: RunResult) -> str:
+    """A finished run in a few lines."""
+    summary = result.summary
+    lines = [result.message]
+    for column, value in summary["final_mean"].items():
+        lines.append(f"  {column}: {value:.4f} (mean of the last frames)")
+    if summary["converged_frame"] is not None:
+        lines.append(f"  converged at frame {summary['converged_frame']}")
+    pace = f"  {summary['seconds_per_frame']:.3g} s per frame"
+    if summary["bytes_per_cell"] is not None:
+        pace += f", {summary['bytes_per_cell']:.0f} bytes per cell"
+    if summary["peak_memory_bytes"] is not None:
+        pace += f", {summary['peak_memory_bytes'] / 1e6:.0f} MB at most"
+    return "\n".join([*lines, pace])
+
+
+def _sentence(error: Exception) -> str:
+    """What typer says, in one line without its full stop."""
+    text = error.format_message() if hasattr(error, "format_message") else str(error)
+    return " ".join(text.split()).rstrip(".")
+
+
+def _complain(message: str) -> None:
+    print(f"flowborne: {message}", file=sys.stderr)

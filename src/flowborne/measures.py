@@ -1,0 +1,174 @@
+"""The numbers that a run writes down of every frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.report import StepReport
+from flowborne.coupling.world import Setup, World
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.model import SolidModel
+
+if TYPE_CHECKING:
+    from flowborne.control.controller import Controller
+    from flowborne.simulation import FrameReport
+
+Array = NDArray[np.float64]
+
+SLIDE, HINGE = 2, 3
+"""Kinds of joints, by MuJoCo's numbers."""
+
+
+class Measures:
+    """Which numbers there are for a scene, and what they are now.
+
+    Columns carry their unit at the end of their name. Forces are of the last step of a frame, the
+    impulses of all its steps; convergence is that of its worst step.
+
+      frame, time_s
+      angle_<joint>_rad, position_<joint>_m     every hinge and slide joint
+      target_<joint>_rad, target_<joint>_m      the controlled ones among them
+      objective, objective_<term>               the controller's, weighted sum and unweighted terms
+      drag_N, lift_N                            force of fluid and winds on all bodies along and
+                                                across the stream (a quarter turn to its left)
+      effort                                    |drive force| dt over the controlled dofs, N m s
+      <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
+      momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
+      momentum_{exchanged,advection}_…_Ns       given to the bodies by the pressure; lost or gained
+                                                by the fluid in advection
+      momentum_exchange_error                   relative
+      divergence_1/s, solver_iterations, residual, contacts
+
+    columns     names, in the order in which they are written
+    controlled  those of the positions of the controlled joints
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        controller: Controller | None,
+        stream: tuple[float, ...] | None,
+    ) -> None:
+        self._model = setup.solid
+        self._controller = controller
+        self._along, self._across = _axes(stream)
+        self._joints = _scalar_joints(setup.solid)
+        places = (
+            {} if controller is None else {int(dof): n for n, dof in enumerate(controller.dofs)}
+        )
+        self._targets = [
+            (f"target_{column.split('_', 1)[1]}", places[dof])
+            for column, _, dof in self._joints
+            if dof in places
+        ]
+        self.controlled = [column for column, _, dof in self._joints if dof in places]
+        self._terms = [] if controller is None else _terms(controller)
+        self.columns = self._columns()
+
+    def values(self, world: World, frame: int, report: FrameReport | None) -> dict[str, float]:
+        """column -> number, in the order of `columns`; nan where only a step can tell."""
+        values: dict[str, float] = dict.fromkeys(self.columns, np.nan)
+        values |= {"frame": frame, "time_s": world.time}
+        values |= {column: float(world.solid.q[place]) for column, place, _ in self._joints}
+        values |= self._poses(world.solid.q)
+        if report is not None:
+            values |= self._of_frame(report)
+        return values
+
+    def strength_steps(self, frame_time: float) -> dict[str, float]:
+        """column of each controlled joint -> the farthest it moves by one decision, rad or m."""
+        controller = self._controller
+        if controller is None:
+            return {}
+        strength = np.broadcast_to(controller.strength, len(controller.dofs))
+        steps = strength * controller.every * frame_time
+        places = [place for _, place in self._targets]
+        return {c: float(steps[n]) for c, n in zip(self.controlled, places, strict=True)}
+
+    def _columns(self) -> tuple[str, ...]:
+        names = ["frame", "time_s", *(column for column, _, _ in self._joints)]
+        names += [column for column, _ in self._targets]
+        names += ["objective", *(f"objective_{term}" for term in self._terms)]
+        names += ["drag_N", "lift_N", "effort"]
+        for body in self._model.body_names[1:]:
+            names += [f"{body}_{axis}_m" for axis in "xyz"] + [f"{body}_q{axis}" for axis in "wxyz"]
+        for part in ("solid", "fluid", "exchanged", "advection"):
+            names += [f"momentum_{part}_{axis}_Ns" for axis in "xyz"]
+        names += ["momentum_exchange_error", "divergence_1/s"]
+        return (*names, "solver_iterations", "residual", "contacts")
+
+    def _of_frame(self, report: FrameReport) -> dict[str, float]:
+        steps, last = report.steps, report.step
+        values: dict[str, float] = {"objective": report.objective}
+        values |= {f"objective_{term}": report.terms[term] for term in self._terms}
+        values |= {column: float(report.targets[place]) for column, place in self._targets}
+        force = last.fluid_wrench()[1:, :3].sum(axis=0)
+        values |= {"drag_N": float(force @ self._along), "lift_N": float(force @ self._across)}
+        values["effort"] = self._effort(last)
+        for part, impulse in (
+            ("solid", last.momentum.solid),
+            ("fluid", last.momentum.fluid),
+            ("exchanged", sum(step.momentum.exchanged for step in steps)),
+            ("advection", sum(step.momentum.advection for step in steps)),
+        ):
+            for axis, component in zip("xyz", np.asarray(impulse), strict=True):
+                values[f"momentum_{part}_{axis}_Ns"] = float(component)
+        values["momentum_exchange_error"] = max(step.momentum.exchange_error for step in steps)
+        values["divergence_1/s"] = max(step.divergence for step in steps)
+        values["solver_iterations"] = max(step.iterations for step in steps)
+        values["residual"] = max(step.residual for step in steps)
+        values["contacts"] = max(step.contacts for step in steps)
+        return values
+
+    def _effort(self, last: StepReport) -> float:
+        if self._controller is None:
+            return 0.0
+        return float(np.linalg.norm(last.actuator[self._controller.dofs]) * last.dt)
+
+    def _poses(self, q: Array) -> dict[str, float]:
+        poses = kinematics(self._model, q)
+        values = {}
+        for body, name in list(enumerate(self._model.body_names))[1:]:
+            for axis, x in zip("xyz", poses.body_position[body], strict=True):
+                values[f"{name}_{axis}_m"] = float(x)
+            for axis, x in zip("wxyz", quaternion(poses.body_rotation[body]), strict=True):
+                values[f"{name}_q{axis}"] = float(x)
+        return values
+
+
+def quaternion(rotation: Array) -> Array:
+    """(w, x, y, z) of a rotation matrix (3, 3), with w >= 0."""
+    import mujoco
+
+    unit = np.zeros(4)
+    mujoco.mju_mat2Quat(unit, np.ascontiguousarray(rotation).ravel())
+    return unit if unit[0] >= 0.0 else -unit
+
+
+def _scalar_joints(model: SolidModel) -> list[tuple[str, int, int]]:
+    """(column, place in q, dof) of every hinge and slide joint."""
+    mj, joints = model.mj, []
+    for joint, name in enumerate(model.joint_names):
+        column = {HINGE: f"angle_{name}_rad", SLIDE: f"position_{name}_m"}.get(mj.jnt_type[joint])
+        if column:
+            joints.append((column, int(mj.jnt_qposadr[joint]), int(mj.jnt_dofadr[joint])))
+    return joints
+
+
+def _terms(controller: Controller) -> list[str]:
+    """Names of the terms of the objective, each once."""
+    return list(dict.fromkeys(term.objective.name for term in controller.objective.terms))
+
+
+def _axes(stream: tuple[float, ...] | None) -> tuple[Array, Array]:
+    """Unit vectors along the stream (x without one) and across it, z x along (x when along z)."""
+    if stream is None:
+        return np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    along = np.asarray(stream, float) / np.linalg.norm(stream)
+    across = np.cross([0.0, 0.0, 1.0], along)
+    if np.linalg.norm(across) < 1e-9:
+        return along, np.array([1.0, 0.0, 0.0])
+    return along, across / np.linalg.norm(across)

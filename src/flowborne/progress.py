@@ -1,0 +1,134 @@
+"""Telling a person how a run is getting on: a bar on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from time import monotonic
+from types import TracebackType
+from typing import Literal, TextIO
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+Stage = Literal["start", "compiling", "frame", "film"]
+
+COMPILING = "compiling kernels (first run only) …"
+
+LINE_SECONDS = 10.0
+"""How often a line is written where there is no terminal."""
+
+
+@dataclass(frozen=True)
+class RunProgress:
+    """News of a run.
+
+    stage      "start" (once), "compiling" (at every kernel), "frame" (after every frame), "film"
+    frame      frames done
+    frames     frames wanted
+    seconds    since the run began
+    kernels    number of kernels compiled so far
+    objective  after the frame; nan where there is none
+    joints     (column of the history, rad or m) of each controlled joint
+    """
+
+    stage: Stage
+    frame: int
+    frames: int
+    seconds: float
+    kernels: int = 0
+    objective: float = math.nan
+    joints: tuple[tuple[str, float], ...] = ()
+
+
+class ProgressDisplay:
+    """Shows `RunProgress` on `stream`; call it with each piece of news, inside a `with`."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._bar: Progress | None = None
+        self._started_at = 0
+        self._first: float | None = None
+        self._line_due = 0.0
+        self._said_compiling = False
+
+    def __enter__(self) -> ProgressDisplay:
+        if self._stream.isatty():
+            self._bar = Progress(
+                SpinnerColumn(),
+                TextColumn("{task.description}", markup=False),
+                BarColumn(bar_width=24),
+                TimeRemainingColumn(),
+                console=Console(file=self._stream),
+            )
+            self._task = self._bar.add_task("building the scene …", total=None)
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, news: RunProgress) -> None:
+        if news.stage == "start":
+            self._started_at = news.frame
+        if news.stage == "frame" and self._first is None:
+            self._first = news.seconds
+            self.say(f"first frame after {news.seconds:.1f} s")
+        if news.stage == "compiling" and not self._said_compiling:
+            self._said_compiling = True
+            self.say(COMPILING)
+        if self._bar is not None:
+            self._bar.update(
+                self._task,
+                description=self.line(news),
+                total=None if news.stage in ("start", "compiling") else news.frames,
+                completed=news.frame,
+            )
+        elif news.stage == "frame":
+            last = news.frame == news.frames
+            if monotonic() >= self._line_due or last:
+                self._line_due = monotonic() + LINE_SECONDS
+                self.say(self.line(news))
+        elif news.stage == "film":
+            self.say(self.line(news))
+
+    def line(self, news: RunProgress) -> str:
+        """The news in one line."""
+        if news.stage == "start":
+            return "starting …"
+        if news.stage == "compiling":
+            return f"{COMPILING} {news.kernels} kernels, {news.seconds:.0f} s"
+        if news.stage == "film":
+            return "drawing the film …"
+        words = [f"frame {news.frame}/{news.frames}"]
+        if not math.isnan(news.objective):
+            words.append(f"objective {news.objective:.4g}")
+        words += [_position(column, value) for column, value in news.joints[:3]]
+        done = news.frame - self._started_at - 1
+        if done > 0 and self._first is not None:
+            pace = (news.seconds - self._first) / done
+            words.append(f"{pace:.3g} s/frame")
+            if self._bar is None:
+                words.append(f"{pace * (news.frames - news.frame):.0f} s left")
+        return "  ".join(words)
+
+    def say(self, text: str) -> None:
+        """A line that stays."""
+        if self._bar is not None:
+            self._bar.console.print(text, markup=False, highlight=False)
+        else:
+            print(text, file=self._stream, flush=True)
+
+
+def _position(column: str, value: float) -> str:
+    """Where a joint is, with its name, in degrees or metres as its column says."""
+    kind, rest = column.split("_", 1)
+    name, _ = rest.rsplit("_", 1)
+    return f"{name} {math.degrees(value):.1f}°" if kind == "angle" else f"{name} {value:.4g} m"

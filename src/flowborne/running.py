@@ -1,0 +1,386 @@
+"""A run from its scene to its folder: begin or go on, record, stop well."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from enum import Enum
+from math import nan, prod
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from flowborne.compiling import compilation_watched
+from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
+from flowborne.io.history import History
+from flowborne.io.recorder import Recorder, write_model
+from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, check_space
+from flowborne.io.scene_copy import scene_to_resume, with_frames, write_scene
+from flowborne.io.summary import peak_memory, summarise, versions
+from flowborne.progress import RunProgress, Stage
+from flowborne.simulation import PARTS, BlowUpError, FrameReport, Simulation
+
+if TYPE_CHECKING:
+    from flowborne.scenes.schema import Scene
+
+FILM_BYTES = 20_000_000
+"""Room that is kept for the picture, the film and the history."""
+
+
+class RunOutcome(Enum):
+    """How a run ended, as a sentence."""
+
+    DONE = "the run is complete"
+    BLEW_UP = "the simulation blew up"
+    NOT_WRITTEN = "the run could not be written any further"
+    INTERRUPTED = "the run was interrupted"
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What came of a run.
+
+    folder   where it is
+    outcome  how it ended
+    message  what to tell a person about it
+    frames   frames done, those of earlier runs in the same folder included
+    summary  what summary.json says
+    """
+
+    folder: Path
+    outcome: RunOutcome
+    message: str
+    frames: int
+    summary: dict[str, Any]
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """The run was asked to stop; everything up to its last whole frame is saved.
+
+    result  what there is of the run
+    """
+
+    def __init__(self, result: RunResult) -> None:
+        super().__init__(result.message)
+        self.result = result
+
+
+def run(
+    scene: Scene | str | Path,
+    out: str | Path,
+    *,
+    frames: int | None = None,
+    workers: int | None = None,
+    resume: bool = False,
+    replace: bool = False,
+    film: bool = True,
+    progress: Callable[[RunProgress], None] | None = None,
+) -> RunResult:
+    """Run a scene and leave behind what is listed in `flowborne.io.run_folder`.
+
+    scene     a Scene, or the name of a built-in one, or the path of a scene file
+    out       folder to write
+    frames    how many; by default what the scene says
+    workers   trials of the controller at once; changes no number
+    resume    go on with the run in `out` from its checkpoint
+    replace   take the place of an earlier run in `out`
+    film      draw preview.png and preview.mp4 at the end
+    progress  called with news of the run
+    returns   the result; a run that blew up or filled the disc returns, too: see its outcome
+    raises    RunFolderError when `out` or the arguments are wrong, SceneError when the scene is;
+              nothing is then written. RunInterrupted (a KeyboardInterrupt) after Ctrl-C or
+              SIGTERM, when everything has been saved
+    """
+    from flowborne.scenes.load import load_scene
+    from flowborne.scenes.save import scene_files
+
+    if resume and replace:
+        raise RunFolderError("--resume and --replace exclude each other; give one of them")
+    for name, count in (("frames", frames), ("workers", workers)):
+        if count is not None and count < 1:
+            raise RunFolderError(f"{name} is {count}; give 1 or more")
+    wanted = load_scene(scene) if isinstance(scene, str | Path) else scene
+    folder = RunFolder.existing(Path(out)) if resume else RunFolder(Path(out))
+    if resume:
+        wanted = scene_to_resume(folder, wanted)
+    else:
+        folder.check_new(replace=replace)
+    wanted = with_frames(wanted, frames)
+    files = scene_files(wanted)
+    with Simulation(wanted, workers=workers) as simulation:
+        job = _Run(simulation, folder, files, progress)
+        with job.compilation_told():
+            if resume:
+                job.resume()
+            else:
+                job.begin(replace=replace)
+            return job.finish(*job.go_on(), film=film)
+
+
+class _Run:
+    """A simulation being written into a folder."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        folder: RunFolder,
+        files: dict[str, bytes],
+        progress: Callable[[RunProgress], None] | None,
+    ) -> None:
+        self.simulation = simulation
+        self.folder = folder
+        self.files = files
+        self.checkpoint_every = simulation.scene.output.checkpoint_every
+        self.frames = simulation.frames
+        self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
+        self.recorder = Recorder(folder)
+        self.history: History | None = None
+        self._progress = progress
+        self._started = perf_counter()
+
+    def begin(self, *, replace: bool) -> None:
+        """Make the folder ready for a new run. Raises RunFolderError; then nothing is written."""
+        self._check_space(freed=self.folder.bytes_used() if replace else 0)
+        RunFolder.create(self.folder.path, replace=replace)
+        try:
+            write_scene(self.folder, self.files)
+            self._write_start()
+        except OSError as error:
+            self.folder.remove()
+            raise cannot_write(self.folder.path, error) from error
+
+    def resume(self) -> None:
+        """Stand where the checkpoint is, and drop what was written after it."""
+        folder, simulation = self.folder, self.simulation
+        try:
+            if folder.checkpoint.exists():
+                simulation.restore(*load_checkpoint(folder.checkpoint, simulation.world.setup))
+            if simulation.frame > self.frames:
+                raise RunFolderError(
+                    f"{folder.path} has {simulation.frame} frames already; ask for more of them, "
+                    "or start again with --replace"
+                )
+            self._check_space(freed=0)
+            write_scene(folder, self.files)
+            if simulation.frame == 0:
+                self._write_start()
+                return
+            self.history = History.reopen(folder.history, self.columns, simulation.frame)
+            folder.drop_states_after(simulation.frame)
+        except (OSError, ValueError) as error:
+            raise RunFolderError(
+                f"{folder.path} cannot be gone on with: {error}; start again with --replace"
+            ) from error
+
+    def go_on(self) -> tuple[RunOutcome, str]:
+        """Advance and record to the last frame, or to what stops the run."""
+        simulation = self.simulation
+        self._tell("start")
+        with _Signals() as signals:
+            while simulation.frame < self.frames and not signals.asked:
+                try:
+                    with signals.interruptible():
+                        report = simulation.advance_frame()
+                except KeyboardInterrupt:
+                    if simulation.report is None or simulation.frame == self._rows():
+                        break
+                    report = simulation.report
+                except BlowUpError as error:
+                    return RunOutcome.BLEW_UP, self._blown_up(error)
+                try:
+                    values = self._record(report)
+                except OSError as error:
+                    return RunOutcome.NOT_WRITTEN, self._not_written(error)
+                self._tell("frame", report.objective, values)
+            try:
+                self._save()
+            except OSError as error:
+                return RunOutcome.NOT_WRITTEN, self._not_written(error)
+        if simulation.frame < self.frames:
+            return RunOutcome.INTERRUPTED, f"stopped after frame {simulation.frame}; {self._how()}"
+        return RunOutcome.DONE, f"{simulation.frame} frames are in {self.folder.path}"
+
+    def finish(self, outcome: RunOutcome, message: str, *, film: bool) -> RunResult:
+        """Write the summary and the film, and say what came of the run."""
+        assert self.history is not None
+        self.history.close()
+        folder = self.folder
+        summary = self._summary(outcome, message)
+        try:
+            folder.write_summary(summary)
+            if film and outcome in (RunOutcome.DONE, RunOutcome.BLEW_UP):
+                message += self._draw()
+        except OSError as error:
+            if outcome is RunOutcome.DONE:
+                outcome, message = RunOutcome.NOT_WRITTEN, self._not_written(error)
+        result = RunResult(folder.path, outcome, message, self.simulation.frame, summary)
+        if outcome is RunOutcome.INTERRUPTED:
+            raise RunInterrupted(result)
+        return result
+
+    def _draw(self) -> str:
+        """Draw the picture and the film; what to tell when there is nothing to draw."""
+        from flowborne.view.film import make_preview
+
+        self._tell("film")
+        try:
+            make_preview(self.folder.path)
+        except ValueError as error:
+            return f"; no film: {error}"
+        return ""
+
+    def compilation_told(self) -> AbstractContextManager[None]:
+        """Context in which news is given of every kernel that is compiled."""
+        if self.simulation.world.setup.fluid is None:
+            return nullcontext()
+        return compilation_watched(lambda kernels: self._tell("compiling", kernels=kernels))
+
+    def _write_start(self) -> None:
+        """Everything that a run has at frame 0; the checkpoint last."""
+        simulation, folder = self.simulation, self.folder
+        write_model(
+            folder,
+            simulation.world.setup,
+            controlled=list(simulation.scene.controlled_joints()),
+            frames_per_second=1.0 / simulation.frame_time,
+            wind=[list(stream)] if (stream := simulation.scene.stream()) else [],
+        )
+        folder.drop_states_after(-1)
+        self.history = History.create(folder.history, self.columns)
+        self.recorder.write(0, simulation.world, None)
+        self._save()
+
+    def _record(self, report: FrameReport) -> dict[str, float]:
+        """Write a frame: its row, its state, and a checkpoint when one is due."""
+        assert self.history is not None
+        simulation = self.simulation
+        values = simulation.measure()
+        seconds = {f"seconds_{part}": spent for part, spent in report.seconds.items()}
+        length = self.history.length
+        self.history.append(values | seconds)
+        try:
+            self.recorder.write(report.frame, simulation.world, report.step)
+        except BaseException:
+            self.history.drop_last(length)
+            raise
+        if report.frame % self.checkpoint_every == 0:
+            self._save()
+        return values
+
+    def _save(self) -> None:
+        """Write the checkpoint, after the rows that it speaks of are on the disc."""
+        assert self.history is not None
+        self.history.sync()
+        save_checkpoint(self.folder.checkpoint, self.simulation.world, self.simulation.frame)
+
+    def _check_space(self, freed: int) -> None:
+        """Raise RunFolderError when the frames still to come do not fit on the disc."""
+        simulation = self.simulation
+        states = (self.frames - simulation.frame) * self.recorder.bytes_per_frame(simulation.world)
+        needed = states + 2 * state_bytes(simulation.world) + FILM_BYTES
+        check_space(self.folder.path, needed - freed)
+
+    def _summary(self, outcome: RunOutcome, message: str) -> dict[str, Any]:
+        simulation = self.simulation
+        world = simulation.world
+        strength = simulation.measures.strength_steps(simulation.frame_time)
+        cells = None if world.setup.fluid is None else prod(world.setup.fluid.grid.shape)
+        return {
+            "scene": simulation.scene.name,
+            "outcome": outcome.name.lower(),
+            "message": message,
+            **summarise(self.folder.history, strength),
+            "cells": cells,
+            "state_bytes": state_bytes(world),
+            "bytes_per_cell": None if cells is None else state_bytes(world) / cells,
+            "peak_memory_bytes": peak_memory(),
+            "versions": versions(),
+            "model_files": self.folder.model_files(),
+        }
+
+    def _blown_up(self, error: BlowUpError) -> str:
+        """Save the last good frame; the message."""
+        kept = f"everything up to frame {self.simulation.frame} is kept"
+        try:
+            self._save()
+        except OSError as full:
+            kept += f", but its checkpoint could not be written ({full.strerror})"
+        return f"the simulation blew up in {error}; {kept}; try more steps per frame"
+
+    def _not_written(self, error: OSError) -> str:
+        return (
+            f"writing into {self.folder.path} failed after frame {self._rows()} "
+            f"({error.strerror or error}); what was written before is kept; make room, then "
+            f"{self._how()}"
+        )
+
+    def _rows(self) -> int:
+        """Frames that are in the history."""
+        return 0 if self.history is None else self.history.rows
+
+    def _how(self) -> str:
+        """How to go on."""
+        path = self.folder.path
+        return f"go on with: flowborne run {self.folder.scene} --out {path} --resume"
+
+    def _tell(
+        self,
+        stage: Stage,
+        objective: float = nan,
+        values: dict[str, float] | None = None,
+        kernels: int = 0,
+    ) -> None:
+        if self._progress is None:
+            return
+        joints = self.simulation.measures.controlled
+        self._progress(
+            RunProgress(
+                stage=stage,
+                frame=self.simulation.frame,
+                frames=self.frames,
+                seconds=perf_counter() - self._started,
+                kernels=kernels,
+                objective=objective,
+                joints=() if values is None else tuple((c, values[c]) for c in joints),
+            )
+        )
+
+
+class _Signals:
+    """Ctrl-C and SIGTERM while a run is going: noted, and raised only where that is safe.
+
+    asked  whether one has come
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._safe = False
+        self._earlier: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> _Signals:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._earlier[number] = signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        for number, handler in self._earlier.items():
+            signal.signal(number, handler)
+
+    def _note(self, number: int, frame: object) -> None:
+        self.asked = True
+        if self._safe:
+            self._safe = False
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def interruptible(self) -> Iterator[None]:
+        """Context that a signal ends at once, by KeyboardInterrupt."""
+        self._safe = True
+        try:
+            yield
+        finally:
+            self._safe = False

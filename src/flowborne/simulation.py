@@ -1,0 +1,283 @@
+"""A scene in motion, frame after frame."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
+
+from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.world import World
+from flowborne.measures import Measures
+
+if TYPE_CHECKING:
+    from flowborne.control.controller import Controller
+    from flowborne.coupling.motion import Drive
+    from flowborne.scenes.schema import Scene
+    from flowborne.solids.model import SolidModel
+
+Array = NDArray[np.float64]
+Step = Callable[[World, float, "Drive | None"], StepReport]
+
+PARTS = ("advection", "viscosity", "projection", "geometry", "solids", "control")
+"""Where the time of a frame goes."""
+
+
+class BlowUpError(Exception):
+    """The simulation cannot go on.
+
+    frame  the frame that could not be finished, counted from 1
+    step   the step in it, counted from 1
+    cause  what happened, a sentence without a full stop
+    """
+
+    def __init__(self, frame: int, step: int, cause: str) -> None:
+        super().__init__(f"frame {frame}, step {step}: {cause}")
+        self.frame, self.step, self.cause = frame, step, cause
+
+    def __reduce__(self) -> tuple[type[BlowUpError], tuple[int, int, str]]:
+        return BlowUpError, (self.frame, self.step, self.cause)
+
+
+@dataclass(frozen=True)
+class FrameReport:
+    """What a frame did.
+
+    frame      counted from 1
+    time       at its end, s
+    steps      reports of its steps, in order
+    objective  the controller's objective after it (weighted sum); nan without a controller
+    terms      name -> value of each term of the objective
+    gradient   (n,) of the last decision, objective per rad or m; empty without a controller
+    targets    (n,) where the controlled dofs are going, rad or m; nan for ball joints
+    decided    whether the controller decided anew in this frame
+    seconds    by part (`PARTS`) and "total"
+    """
+
+    frame: int
+    time: float
+    steps: tuple[StepReport, ...]
+    objective: float
+    terms: dict[str, float]
+    gradient: Array
+    targets: Array
+    decided: bool
+    seconds: dict[str, float]
+
+    @property
+    def step(self) -> StepReport:
+        """Report of the last step."""
+        return self.steps[-1]
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """The state after some frames, and the report of the last; they change together."""
+
+    world: World
+    frame: int
+    report: FrameReport | None
+
+
+class Simulation:
+    """A world, its controller and the clock that drives both.
+
+    scene     a Scene, or the name of a built-in one, or the path of a scene file
+    workers   how many trials of the controller run at once; by default as many as there are
+              trials and processors. Results do not depend on it
+    executor  "serial", "threads" (default), "processes", or an object with submit() or map()
+    raises    SceneError when the scene is wrong; ValueError for workers < 1
+
+    scene            the Scene
+    controller       the Controller, or None
+    frame_time       s of a frame
+    steps_per_frame  physics steps in a frame
+    frames           how many the scene asks for; `advance_frame` does not stop there
+    measures         what `measure` tells
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | Path,
+        workers: int | None = None,
+        executor: str | object | None = None,
+    ) -> None:
+        from flowborne.control.executors import mapper
+        from flowborne.coupling.step import step
+        from flowborne.scenes.build import build
+        from flowborne.scenes.load import load_scene
+
+        if workers is not None and workers < 1:
+            raise ValueError(f"workers is {workers}; give 1 or more")
+        self.scene: Scene = load_scene(scene) if isinstance(scene, str | Path) else scene
+        count = workers or default_workers(len(self.scene.controlled_joints()))
+        kind = ("serial" if count == 1 else "threads") if executor is None else executor
+        built = build(self.scene, mapper(kind, count))
+        self.controller: Controller | None = built.controller
+        self.frame_time = built.frame_time
+        self.steps_per_frame = built.steps_per_frame
+        self.frames = built.frames
+        self.measures = Measures(built.world.setup, self.controller, self.scene.stream())
+        self._moment = _Moment(built.world, 0, None)
+        self._step: Step = step
+
+    @property
+    def world(self) -> World:
+        """The state after `frame` frames; each frame puts a new World in its place."""
+        return self._moment.world
+
+    @property
+    def frame(self) -> int:
+        """Frames done."""
+        return self._moment.frame
+
+    @property
+    def time(self) -> float:
+        """s since the start."""
+        return self.world.time
+
+    @property
+    def report(self) -> FrameReport | None:
+        """Report of the last frame; None before the first, and after `restore`."""
+        return self._moment.report
+
+    def restore(self, world: World, frame: int) -> None:
+        """Go on from `world`, which is the state after `frame` frames of the same scene."""
+        self._moment = _Moment(world, frame, None)
+
+    def advance_frame(self) -> FrameReport:
+        """Decide, then take the steps of one frame.
+
+        raises  BlowUpError when a step fails. Whatever is raised, the frame has not begun
+        """
+        world = self.world.copy()
+        with _one_blas_thread():
+            report = self._advance(world, self.frame + 1)
+        self._moment = _Moment(world, report.frame, report)
+        return report
+
+    def measure(self) -> dict[str, float]:
+        """What the history says of the present state, by the history's column names.
+
+        Numbers that only a step can give are nan before the first frame.
+        """
+        return self.measures.values(self.world, self.frame, self.report)
+
+    def close(self) -> None:
+        """Shut the controller's workers down."""
+        if self.controller is not None:
+            self.controller.close()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.close()
+
+    def _advance(self, world: World, frame: int) -> FrameReport:
+        """Take `world` through a frame."""
+        started = perf_counter()
+        controller, dt = self.controller, self.frame_time / self.steps_per_frame
+        end = world.time + self.frame_time
+        seconds = dict.fromkeys(PARTS, 0.0)
+        nothing = np.zeros(0)
+        gradient, targets, terms, decided = nothing, nothing, {"objective": np.nan}, False
+        reports = []
+        number = 1
+        try:
+            if controller is not None:
+                decision = controller.decide(world, self.frame_time, self._step)
+                gradient, decided = decision.gradient, decision.decided
+                seconds["control"] = perf_counter() - started
+            for number in range(1, self.steps_per_frame + 1):
+                drive = None if controller is None else controller.drive(world, end, dt)
+                reports.append(self._step(world, dt, drive))
+                cause = trouble(world, reports[-1])
+                if cause:
+                    raise BlowUpError(frame, number, cause)
+            if controller is not None:
+                terms, targets = controller.measure(world, reports[-1]), controller.targets(world)
+        except (ArithmeticError, ValueError) as error:
+            raise BlowUpError(frame, number, str(error)) from error
+        for report in reports:
+            for part, spent in report.seconds.items():
+                seconds[part] = seconds.get(part, 0.0) + spent
+        seconds["total"] = perf_counter() - started
+        return FrameReport(
+            frame=frame,
+            time=world.time,
+            steps=tuple(reports),
+            objective=terms["objective"],
+            terms={name: value for name, value in terms.items() if name != "objective"},
+            gradient=gradient,
+            targets=targets,
+            decided=decided,
+            seconds=seconds,
+        )
+
+
+def trouble(world: World, report: StepReport) -> str | None:
+    """Why the world cannot be stepped on after the step of `report`, or None."""
+    if report.outcome is not Outcome.DONE:
+        detail = f" (relative residual {report.residual:.2g} after {report.iterations} iterations)"
+        return report.outcome.value + detail * (report.outcome is Outcome.NOT_CONVERGED)
+    solid, fluid, properties = world.solid, world.fluid, world.setup.fluid
+    if not (np.isfinite(solid.q).all() and np.isfinite(solid.v).all()):
+        return "a joint's position or velocity is not a finite number"
+    turn = np.abs(solid.v * report.dt) * turning_dofs(world.setup.solid)
+    if turn.size and turn.max() > np.pi:
+        name = world.setup.solid.dof_names[int(turn.argmax())]
+        return f"{name} turns by {turn.max():.3g} rad in one step, more than half a turn"
+    if fluid is None or properties is None:
+        return None
+    grid = properties.grid
+    fastest = max(float(np.abs(fluid.velocity[axis]).max()) for axis in grid.axes)
+    if not np.isfinite(fastest) or not np.isfinite(fluid.pressure).all():
+        return Outcome.NOT_FINITE.value
+    longest = max(grid.shape) * grid.spacing
+    if fastest * report.dt > longest:
+        return (
+            f"the fluid moves {fastest * report.dt:.3g} m in one step, farther than the domain is "
+            f"long ({longest:.3g} m)"
+        )
+    return None
+
+
+def turning_dofs(model: SolidModel) -> NDArray[np.bool_]:
+    """(nv,) which dofs are rotations: hinges, balls and the last three of free joints."""
+    kind, first = model.mj.jnt_type[model.mj.dof_jntid], model.mj.jnt_dofadr[model.mj.dof_jntid]
+    turning: NDArray[np.bool_] = np.where(kind == 0, np.arange(model.nv) - first >= 3, kind != 2)
+    return turning
+
+
+def default_workers(joints: int) -> int:
+    """As many workers as a controller of so many joints has trials, but no more than processors."""
+    return max(1, min(2 * joints, _processors()))
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@lru_cache(maxsize=1)
+def _blas() -> ThreadpoolController:
+    """The BLAS libraries that are loaded; all are, once a simulation has been built."""
+    return ThreadpoolController()
+
+
+def _one_blas_thread() -> AbstractContextManager[object]:
+    """Context in which BLAS uses one thread: small solves are faster, and sums always the same."""
+    limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
+    return limit

@@ -1,0 +1,257 @@
+import json
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass, field
+from types import ModuleType
+
+import pytest
+
+from flowborne import cli
+from flowborne.progress import ProgressDisplay, RunProgress
+
+
+@pytest.fixture
+def command(capsys, monkeypatch, tmp_path):
+    """Run the command line in an empty folder: (exit code, stdout, stderr)."""
+    monkeypatch.chdir(tmp_path)
+    for name in cli.BLAS_THREADS:
+        monkeypatch.setenv(name, "1")
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as left:
+            cli.main([str(argument) for argument in arguments])
+        said = capsys.readouterr()
+        return left.value.code, said.out, said.err
+
+    return run
+
+
+def test_a_run_tells_what_it_found(command, small_scene, tmp_path):
+    code, out, err = command("run", small_scene, "--no-film", "--frames", 5, "--workers", 1)
+    assert code == 0
+    assert (tmp_path / "runs" / "small" / "history.csv").exists()
+    assert "5 frames are in runs/small" in out
+    assert "angle_hinge_rad: 0." in out
+    assert "s per frame" in out
+    assert "frame 5/5  objective" in err
+    assert "hinge 47.5°" in err
+
+
+def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp_path):
+    settings = ("--set", "solids.density=50", "--set", "initial.positions.hinge = 30")
+    code, _, err = command("run", small_scene, "--no-film", "--frames", 1, *settings)
+    assert code == 0, err
+    written = (tmp_path / "runs" / "small" / "scene.toml").read_text()
+    assert "density = 50.0" in written
+    assert "hinge = 30.0" in written
+    assert "frames = 1\n" in written
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run"], "Missing argument 'SCENE'"),
+        (["run", "SMALL", "--frames", "0"], "--frames is 0; give a whole number of 1 or more"),
+        (["run", "SMALL", "--frames", "two"], "Invalid value for '--frames'"),
+        (["run", "SMALL", "--workers", "0"], "--workers is 0"),
+        (["run", "SMALL", "--set", "fluid.density"], "--set fluid.density has no KEY=VALUE"),
+        (["run", "SMALL", "--set", "=3"], "has no KEY=VALUE"),
+        (["run", "SMALL", "--set", "solids.density=-3"], "density"),
+        (["run", "SMALL", "--set", "solids.densty=3"], "densty"),
+        (["run", "SMALL", "--fames", "3"], "No such option"),
+        (["run", "SMALL", "--resume"], "there is no folder runs/small"),
+        (["run", "SMALL", "--resume", "--replace"], "exclude each other"),
+        (["run", "SMALL", "--out", "taken.txt"], "taken.txt is a file"),
+        (["run", "SMALL", "--out", "taken"], "taken is not empty and was not made by a run"),
+        (["run", "block-drag-mx"], "block-drag-max"),
+        (["run", "nowhere/scene.toml"], "nowhere/scene.toml"),
+        (["check", "nowhere.toml"], "nowhere.toml"),
+        (["film", "nowhere"], "there is no folder nowhere"),
+        (["film", "taken"], "taken is not the folder of a run"),
+        (["fly"], "No such command 'fly'"),
+    ],
+)
+def test_bad_input_is_one_message_and_writes_nothing(
+    command, small_scene, tmp_path, arguments, said
+):
+    (tmp_path / "taken.txt").write_text("mine")
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "notes.txt").write_text("mine")
+    before = sorted(tmp_path.rglob("*"))
+    given = [str(small_scene) if argument == "SMALL" else argument for argument in arguments]
+    code, out, err = command(*given)
+    assert code == 2
+    assert out == ""
+    assert said in err
+    assert err.startswith("flowborne: ")
+    assert err.count("\n") == 1, err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_check_tells_every_problem_at_once(command, small_scene):
+    assert command("check", small_scene) == (0, "nothing wrong\n", "")
+    text = small_scene.read_text().replace("density = 100.0", "density = -1.0")
+    small_scene.write_text(text.replace("frames = 12", "frames = 0"))
+    code, out, err = command("check", small_scene)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 2
+    assert "density" in err
+    assert "frames" in err
+
+
+def test_scenes_are_listed_with_their_figures(command):
+    code, out, _ = command("scenes")
+    assert code == 0
+    rows = out.splitlines()
+    assert rows[0].startswith("block-effort-wind")
+    assert "Fig. 4" in rows[0]
+
+
+def test_an_interrupted_command_says_how_to_go_on(command, small_scene, monkeypatch, tmp_path):
+    from flowborne.simulation import Simulation
+
+    advance = Simulation.advance_frame
+
+    def interrupted(simulation):
+        if simulation.frame == 3:
+            raise KeyboardInterrupt
+        return advance(simulation)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Simulation, "advance_frame", interrupted)
+        code, _, err = command("run", small_scene, "--out", "run", "--no-film")
+    assert code == 130
+    assert "stopped after frame 3; go on with: flowborne run run/scene.toml --out run" in err
+    code, out, _ = command("run", "run/scene.toml", "--out", "run", "--resume", "--no-film")
+    assert (code, out.splitlines()[0]) == (0, "12 frames are in run")
+
+
+def test_a_blow_up_ends_with_exit_code_1(command, small_scene, monkeypatch):
+    from flowborne.coupling import step as stepping
+
+    step = stepping.step
+
+    def blow_up(world, dt, drive=None):
+        report = step(world, dt, drive)
+        world.solid.v[:] = float("nan") if world.steps == 6 else world.solid.v
+        return report
+
+    monkeypatch.setattr(stepping, "step", blow_up)
+    code, out, err = command("run", small_scene, "--no-film", "--workers", 1)
+    assert (code, out) == (1, "")
+    assert "the simulation blew up in frame 3, step 2" in err
+    assert "Traceback" not in err
+
+
+@dataclass
+class Result:
+    """A result as the validation and the benches give it."""
+
+    id: str
+    verdict: str
+    name: str = ""
+    title: str = "a case"
+    value: float = 1.5
+    reference: float = 1.0
+    target: float = 1.0
+    tolerance: float = 0.1
+    lines: list[str] = field(default_factory=lambda: ["32: 1.4", "64: 1.5"])
+
+    def as_dict(self):
+        return asdict(self)
+
+
+@pytest.fixture
+def cases(monkeypatch):
+    """Stand-ins for the validation and the benches; what was asked of them."""
+    asked = []
+    results = {"K1": Result("K1", "pass", "K1"), "K2": Result("K2", "fail", "K2")}
+
+    def run_all(names, quick=None, on_result=None):
+        asked.append((names, quick))
+        chosen = [results[name] for name in names or results]
+        for result in chosen:
+            if on_result:
+                on_result(result)
+        return chosen
+
+    for module, ids, run in (
+        ("validation", "case_ids", "run_cases"),
+        ("bench", "bench_names", "run_benches"),
+    ):
+        stand_in = ModuleType(f"flowborne.{module}")
+        setattr(stand_in, ids, lambda: tuple(results))
+        setattr(stand_in, run, run_all)
+        monkeypatch.setitem(sys.modules, f"flowborne.{module}", stand_in)
+    return asked
+
+
+def test_validate_prints_rows_and_fails_when_a_case_does(command, cases):
+    code, out, _ = command("validate")
+    assert code == 1
+    assert out.splitlines()[0] == "PASS  K1  a case  value 1.5  reference 1  tolerance 0.1"
+    assert out.splitlines()[1] == "        32: 1.4"
+    code, _, _ = command("validate", "--case", "K1", "--quick")
+    assert code == 0
+    assert cases == [(None, False), (["K1"], True)]
+
+
+@pytest.mark.parametrize("arguments", [["validate", "--case", "K2"], ["bench", "K2"]])
+def test_json_is_all_that_is_printed(command, cases, arguments):
+    code, out, _ = command(*arguments, "--json")
+    assert code == 1
+    (result,) = json.loads(out)
+    assert (result["id"], result["verdict"]) == ("K2", "fail")
+
+
+@pytest.mark.parametrize("arguments", [["validate", "--case", "K3"], ["bench", "K3"]])
+def test_an_unknown_case_is_refused(command, cases, arguments):
+    code, out, err = command(*arguments)
+    assert (code, out, cases) == (2, "", [])
+    assert "K3: there is no such" in err
+    assert "did you mean K" in err
+
+
+def test_the_command_starts_quickly():
+    best = 10.0
+    for _ in range(3):
+        started = time.perf_counter()
+        subprocess.run(
+            [sys.executable, "-m", "flowborne", "--help"], check=True, capture_output=True
+        )
+        best = min(best, time.perf_counter() - started)
+    assert best < 0.5
+
+
+def test_import_is_light():
+    code = "import flowborne, sys; print('numpy' in sys.modules, flowborne.__version__)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.startswith("False")
+
+
+def test_public_names_are_found_and_others_are_not():
+    import flowborne
+
+    for name in flowborne.__all__:
+        assert getattr(flowborne, name) is not None
+        assert name in dir(flowborne)
+    with pytest.raises(AttributeError, match="no attribute 'fly'"):
+        _ = flowborne.fly
+
+
+def test_progress_says_that_it_compiles_and_how_long_the_first_frame_took(capsys):
+    with ProgressDisplay() as display:
+        display(RunProgress("start", 0, 3, 0.0))
+        for kernels in (1, 2):
+            display(RunProgress("compiling", 0, 3, float(kernels), kernels=kernels))
+        joints = (("angle_hinge_rad", 0.5), ("position_slide_m", 0.25))
+        for frame in (1, 2, 3):
+            news = RunProgress("frame", frame, 3, 9.0 + frame, objective=0.125, joints=joints)
+            display(news)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "compiling kernels (first run only) …"
+    assert lines[1] == "first frame after 10.0 s"
+    assert lines[2] == "frame 1/3  objective 0.125  hinge 28.6°  slide 0.25 m"
+    assert lines[3] == "frame 3/3  objective 0.125  hinge 28.6°  slide 0.25 m  1 s/frame  0 s left"
+    assert len(lines) == 4
