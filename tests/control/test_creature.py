@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from flowborne.control import creature
 from flowborne.coupling.world import Setup, World
-from flowborne.solids.dynamics import momentum
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import momentum
 
 MakeWorld = Callable[..., World]
 shared_fixture = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -23,7 +23,8 @@ class Outcome(Enum):
 class Momentum:
     """Linear momentum budget of a step, N s, each (3,); angular parts are about the origin.
 
-    solid            momentum of the bodies after the step
+    solid            momentum of the bodies half a step on, which keeps what it is given exactly
+                     (see solids.momentum.halfway_momentum)
     fluid            momentum of the fluid (open fraction x density x volume of each face)
     exchanged        impulse that the pressure solve gave to the bodies
     exchange_error   |impulse given to the bodies + impulse taken from the fluid and the walls|

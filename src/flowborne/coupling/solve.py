@@ -7,8 +7,10 @@ Eq. (9) of the paper with the bodies eliminated is symmetric positive definite i
     u+ = u* - (1/rho) G p^          v+ = v* + A^-1 J^T p^
 
 A^-1 has the prescribed dofs projected out; active contact rows and joint limits are part of A. When
-the solution opens a contact that was taken as pressed, or the other way round, or asks a drive for
-more than its torque limit, the system is solved again with that changed.
+the solution opens a contact that was taken as pressed, or the other way round, asks a drive for
+more than its torque limit, or moves the bodies otherwise than their Coriolis forces were made for,
+the system is solved again with that changed. Viscosity is solved again for new contacts only: what
+the others change is small in dt.
 """
 
 from __future__ import annotations
@@ -35,8 +37,8 @@ from flowborne.fluid.viscous_solve import ViscousSystem
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import PrescribedSystem, release
 
-PASSES = 20
-"""Most times that contacts and torque limits are corrected in one step."""
+PASSES = 50
+"""Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
 
 VISCOUS_TOLERANCE = 1e-10
 """Relative residual of the viscous solve."""
@@ -107,6 +109,17 @@ def solve_bodies(driven: PrescribedSystem, torque_limit: Array, nbody: int) -> S
     )
 
 
+def foreseen(driven: PrescribedSystem, impulse: Array) -> PrescribedSystem:
+    """The bodies' system with the contacts and Coriolis forces that it will have if the fluid
+    gives a generalised impulse (nv,): a good one to begin with."""
+    for _ in range(PASSES):
+        changed = driven.updated(driven.after(impulse))
+        if changed is None:
+            break
+        driven = changed
+    return driven
+
+
 def solve_together(
     world: World,
     velocity: Faces,
@@ -122,21 +135,26 @@ def solve_together(
     returns   velocity without divergence on the open parts of the faces, the bodies' velocity
               with driven dofs exactly at their targets, and what each gave to the other
     """
-    fluid, _ = world.flow()
+    fluid, state = world.flow()
     weights = face_weights(cut.open, fluid.grid, fluid.boundaries, fluid.density)
     matrix = PressureSystem(weights, fluid.boundaries.periodic())
+    pressure = dt * state.pressure
+    driven = foreseen(driven, generalised(pose, pressure_wrench(cut, pressure, len(pose.centroid))))
+    mobility = response(pose, driven.inverse)
+    smooth, viscous = diffuse(world, velocity, cut, pose, driven, mobility, dt)
     for _ in range(PASSES):
-        mobility = response(pose, driven.inverse)
-        smooth, viscous = diffuse(world, velocity, cut, pose, driven, mobility, dt)
         start = twists(pose, driven.after(generalised(pose, viscous)))
-        projected = project(world, matrix, smooth, cut, start, mobility, dt)
+        projected = project(world, matrix, smooth, cut, start, mobility, pressure, dt)
         impulse = generalised(pose, viscous + projected.impulse)
         v = driven.after(impulse)
         actuator = driven.actuator(v, impulse)
         changed = correct(driven, v, actuator, torque_limit)
         if changed is None:
             break
-        driven = changed
+        if not np.array_equal(changed.inverse, driven.inverse):
+            mobility = response(pose, changed.inverse)
+            smooth, viscous = diffuse(world, velocity, cut, pose, changed, mobility, dt)
+        driven, pressure = changed, dt * projected.pressure
     settled = projected.converged and changed is None
     return Solved(driven, v, actuator, viscous, smooth, projected, settled)
 
@@ -202,6 +220,7 @@ def project(
     cut: Geometry,
     twist: Array,
     mobility: Array,
+    pressure: Array,
     dt: float,
 ) -> Projected:
     """Make the flow free of divergence, with the bodies answering (eq. 9).
@@ -209,15 +228,16 @@ def project(
     matrix    K for this cut
     twist     (nbody, 6) of the bodies before the pressure acts
     mobility  (6 nb, 6 nb) twists that unit wrench impulses give
+    pressure  (nx, ny, nz) first guess of p^, Pa s
     """
-    fluid, state = world.flow()
+    fluid, _ = world.flow()
     grid = fluid.grid
     rate = source_rate(fluid, world.time + dt, cut.open)
     need = -excess(velocity, cut, twist, rate, fluid)
     fastest = max(float(np.abs(u).max()) for u in velocity)
     floor = ROUNDING * grid.face_area * fastest * np.sqrt(need.size)
     coupling = Coupling(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
-    solution = matrix.solve(need, dt * state.pressure, coupling, fluid.tolerance, floor)
+    solution = matrix.solve(need, pressure, coupling, fluid.tolerance, floor)
     after = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
     scale = 1.0 / (fluid.density * grid.spacing)
     push(after, cut.open, solution.pressure, grid, fluid.boundaries, scale)

@@ -22,7 +22,8 @@ from flowborne.coupling.report import Momentum, Outcome, StepReport
 from flowborne.coupling.solve import Solved, solve_bodies, solve_together
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
-from flowborne.solids.dynamics import Kinematics, assemble, kinematics, momentum
+from flowborne.solids.dynamics import Kinematics, assemble, kinematics
+from flowborne.solids.momentum import halfway_momentum
 from flowborne.solids.prescribed import PrescribedSystem, prescribe
 from flowborne.solids.state import SolidState
 
@@ -60,10 +61,6 @@ def step_bodies(world: World, dt: float, orders: Drive, watch: Stopwatch) -> Ste
     wind = winds_on(world, pose)
     driven = equations(world, before, pose, wind, orders, dt)
     solved = solve_bodies(driven, orders.torque_limit, len(pose.body_position))
-    if np.isfinite(solved.v).all() and not orders.prescribed.all():
-        halfway = 0.5 * (before.v + solved.v)
-        driven = equations(world, before, pose, wind, orders, dt, halfway)
-        solved = solve_bodies(driven, orders.torque_limit, len(pose.body_position))
     world.solid.v[:] = solved.v
     advance_clock(world, dt)
     watch.lap("solids")
@@ -170,17 +167,10 @@ def equations(
     wrench: Array,
     orders: Drive,
     dt: float,
-    bias_velocity: Array | None = None,
 ) -> PrescribedSystem:
     """The bodies' own equations of motion under a wrench on each, with the drives in force."""
-    system = assemble(
-        world.setup.solid,
-        world.solid,
-        generalised(pose, wrench),
-        dt,
-        before=before,
-        bias_velocity=bias_velocity,
-    )
+    force = generalised(pose, wrench)
+    system = assemble(world.setup.solid, world.solid, force, dt, before)
     return prescribe(system, orders.prescribed, orders.hold)
 
 
@@ -222,7 +212,7 @@ def report(
 ) -> StepReport:
     """What the step did."""
     projected = solved.projected
-    balance.solid = momentum(world.setup.solid, world.solid)[0]
+    balance.solid = halfway_momentum(world.setup.solid, world.solid, dt)[0]
     finite = bool(np.isfinite(solved.v).all())
     if projected is not None:
         finite = finite and bool(np.isfinite(projected.pressure).all())

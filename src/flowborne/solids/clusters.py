@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.dynamics import mass_matrix
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import mass_matrix
 from flowborne.solids.prescribed import symmetric_inverse
 from flowborne.solids.state import SolidState
 

@@ -8,7 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import dof_twists
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
 
@@ -27,6 +29,9 @@ FIRST_CONTACT = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 
 NEAR = 1e-11
 """A row within this share of its reference of a change of zone stays where it is."""
+
+SETTLED = 1e-12
+"""Forces of Coriolis are found to this share of the momentum."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +98,7 @@ class SolidSystem:
     v        (nv,) velocity before the step
     smooth   (A, r) without the constraint rows
     rows     constraint rows, and zones (k,), the state of each that A and impulse are made for
+    halfway  the forces half-way through the step, and own (nv,), the impulse that they give here
     """
 
     A: Array
@@ -102,6 +108,8 @@ class SolidSystem:
     smooth: tuple[Array, Array]
     rows: Rows | None
     zones: Zones
+    halfway: Halfway | None
+    own: Array
 
     @property
     def contacts(self) -> int:
@@ -112,17 +120,22 @@ class SolidSystem:
         return int(np.unique(pushing[pushing >= 0]).size)
 
     def updated(self, v_plus: Array) -> SolidSystem | None:
-        """System with the contacts and limits that `v_plus` (nv,) implies; None when it has them.
+        """System with the contacts, limits and Coriolis forces that `v_plus` (nv,) implies.
 
-        The repeated solve is Newton's method on a piecewise quadratic function. It ends after few
-        turns as a rule; the caller bounds their number.
+        None when it has them. The repeated solve is Newton's method on a piecewise quadratic
+        function, and a fixed point for the forces of Coriolis. It ends after few turns as a rule;
+        the caller bounds their number.
         """
-        if self.rows is None:
+        zones, own = self.zones, self.own
+        if self.rows is not None:
+            zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
+        if self.halfway is not None:
+            own = self.halfway.impulse(v_plus)
+        A, impulse = self.smooth
+        room = SETTLED * (np.abs(A) @ np.abs(v_plus))
+        if np.array_equal(zones, self.zones) and bool((np.abs(own - self.own) <= room).all()):
             return None
-        zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
-        if np.array_equal(zones, self.zones):
-            return None
-        return self._with(zones, *self.smooth)
+        return replace(self._with(zones, A, impulse + own - self.own), own=own)
 
     def pushed(self, force: Array) -> SolidSystem:
         """System with an additional generalised force (nv,)."""
@@ -148,23 +161,8 @@ def kinematics(model: SolidModel, q: Array) -> Kinematics:
         s.geom_xmat[model.geom_id].reshape(-1, 3, 3),
         centroid,
         s.data.xipos.copy(),
-        np.where(model.moves[:, None, :], _dof_twists(model, s).T, 0.0),
+        np.where(model.moves[:, None, :], dof_twists(model, s).T, 0.0),
     )
-
-
-def _dof_twists(model: SolidModel, s: Scratch) -> Array:
-    """(nv, 6) twist about the world origin that unit velocity of each dof gives what it moves."""
-    turn, at = s.cdof[:, :3], s.subtree_com[model.dof_root]
-    return np.concatenate([s.cdof[:, 3:] + cross(at, turn), turn], axis=1)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """(k, 3) vector products of rows; np.cross takes ten times as long for few rows."""
-    product = np.empty((len(b), 3))
-    product[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    product[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    product[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return product
 
 
 def assemble(
@@ -172,9 +170,7 @@ def assemble(
     state: SolidState,
     applied: Array,
     dt: float,
-    *,
     before: SolidState | None = None,
-    bias_velocity: Array | None = None,
 ) -> SolidSystem:
     """System of the bodies alone at `state`, with gravity, springs, limits and contact.
 
@@ -182,42 +178,27 @@ def assemble(
 
     E and the shift are the implicit part of springs and dampers of joints and tendons (MuJoCo's
     integrator "discrete"); Ja are the active rows, first those of MuJoCo's own solution under
-    `applied`. Without the optional arguments A a = b is solved by MuJoCo's acceleration.
+    `applied`.
 
-    applied        (nv,) generalised force, N or N m
-    dt             s
-    bias_velocity  (nv,) velocity of the Coriolis and centrifugal forces; v when None, and the step
-                   is first order. With (v + v+)/2, found by repeating the solve, it is second
-                   order and its energy does not creep
-    before         state before the positions moved. Used with bias_velocity: the rows of
-                   model.conserved then say that the momentum half a step on, see
-                   `halfway_momentum`, changes by dt (outer force) and nothing else
+    applied  (nv,) generalised force, N or N m
+    dt       s
+    before   state before the positions moved. With it, `updated` brings the forces of Coriolis to
+             the velocity half-way through the step; without, they are those at v, and A a = b is
+             solved by MuJoCo's acceleration
     """
     s = scratch(model)
     s.set_time_step(dt)
-    exchanged = np.zeros(0)
-    if before is not None and bias_velocity is not None:
-        guess = 2.0 * bias_velocity - state.v
-        exchanged = _halfway(model, s, before, dt) - _halfway(
-            model, s, SolidState(state.q, guess), dt
-        )
     s.forward(state.q, state.v, applied)
     A, force = _smooth(model, s, state.v)
     rows, zones = _rows(model, s)
-    outer = force + s.bias
-    if bias_velocity is not None:
-        s.v[:] = bias_velocity
-        mujoco.mj_comVel(s.mj, s.data)
-        bias = np.empty(model.nv)
-        mujoco.mj_rne(s.mj, s.data, 0, bias)
-        force = outer - bias
-    impulse = A @ state.v + dt * force
-    if exchanged.size:
-        kept = _along_dofs(model, s, exchanged + dt * _weight(model, s)) + dt * outer
-        kept += s.mass @ guess - model.armature * (guess - state.v) + (A - s.mass) @ state.v
-        impulse = np.where(model.conserved, kept, impulse)
+    centred, impulse = None, A @ state.v + dt * force
+    if before is not None:
+        centred = halfway(model, s, before, state, dt, A, force + s.bias)
+        impulse = centred.impulse(state.v)
     full = _with_rows(A, impulse, state.v, dt, rows, zones)
-    return SolidSystem(full[0], full[1], dt, state.v.copy(), (A, impulse), rows, zones)
+    return SolidSystem(
+        full[0], full[1], dt, state.v.copy(), (A, impulse), rows, zones, centred, impulse
+    )
 
 
 def _smooth(model: SolidModel, s: Scratch, v: Array) -> tuple[Array, Array]:
@@ -264,69 +245,3 @@ def _with_rows(
     push = np.where(zones == PUSHED_UP, 1.0, np.where(zones == PUSHED_DOWN, -1.0, 0.0))
     force = J.T @ (D * rows.aref[on]) + rows.J.T @ (push * rows.friction)
     return A + added, impulse + added @ v + dt * force
-
-
-def _along_dofs(model: SolidModel, s: Scratch, wrench: Array) -> Array:
-    """(nv,) component of the wrench (nbody, 6) of each dof's body along the dof's twist."""
-    return np.asarray((_dof_twists(model, s) * wrench[model.dof_body]).sum(axis=1))
-
-
-def _weight(model: SolidModel, s: Scratch) -> Array:
-    """(nbody, 6) force of gravity on each body's subtree and its torque about the world origin."""
-    wrench = np.empty((model.nbody, 6))
-    wrench[:, :3] = model.subtree_mass[:, None] * model.gravity
-    wrench[:, 3:] = cross(s.subtree_com, wrench[:, :3])
-    return wrench
-
-
-def _momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
-    """(nbody, 6) momentum of each body's subtree, linear and about the world origin."""
-    s.place(state.q, state.v)
-    mujoco.mj_subtreeVel(s.mj, s.data)
-    momentum = np.empty((model.nbody, 6))
-    momentum[:, :3] = model.subtree_mass[:, None] * s.subtree_linvel
-    momentum[:, 3:] = s.subtree_angmom + cross(s.subtree_com, momentum[:, :3])
-    return momentum
-
-
-def _halfway(model: SolidModel, s: Scratch, state: SolidState, dt: float) -> Array:
-    """As `_momentum`, when the positions have moved on for half a step."""
-    q = model.integrate(state.q, state.v, 0.5 * dt)
-    return _momentum(model, s, SolidState(q, state.v))
-
-
-def momentum(model: SolidModel, state: SolidState) -> Array:
-    """(2, 3) linear momentum (N s) and angular momentum about the world origin (N m s)."""
-    return _momentum(model, scratch(model), state)[0].reshape(2, 3)
-
-
-def halfway_momentum(model: SolidModel, state: SolidState, dt: float) -> Array:
-    """(2, 3) momentum of the pose half a step after `state` at the state's velocity.
-
-    The time scheme moves positions by dt v and then changes v, as leapfrog does: v belongs to the
-    middle of the next step, and this is the momentum that a free creature keeps to rounding.
-    `momentum` wavers about it by O(dt).
-    """
-    return _halfway(model, scratch(model), state, dt)[0].reshape(2, 3)
-
-
-def mass_matrix(model: SolidModel, q: Array) -> Array:
-    """(nv, nv) joint space mass matrix, armature included."""
-    s = scratch(model)
-    s.place(q)
-    mujoco.mj_makeM(s.mj, s.data)
-    return s.mass_matrix().copy()
-
-
-def kinetic_energy(model: SolidModel, state: SolidState) -> float:
-    """Kinetic energy, J; joint armature included."""
-    return float(0.5 * state.v @ mass_matrix(model, state.q) @ state.v)
-
-
-def potential_energy(model: SolidModel, state: SolidState) -> float:
-    """Energy in gravity and in springs of joints and tendons, J."""
-    s = scratch(model)
-    s.place(state.q)
-    mujoco.mj_tendon(s.mj, s.data)
-    mujoco.mj_energyPos(s.mj, s.data)
-    return float(s.data.energy[0])

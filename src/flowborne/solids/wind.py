@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.dynamics import Kinematics, cross
+from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import cross
 from flowborne.solids.surfaces import surfaces
 
 Array = NDArray[np.float64]

@@ -10,9 +10,10 @@ from flowborne.coupling.motion import Drive
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Grid
 from flowborne.scenes.tracks import MotionSinusoid
-from flowborne.solids.dynamics import halfway_momentum, kinematics, mass_matrix
+from flowborne.solids.dynamics import kinematics
 from flowborne.solids.effort import holding
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import halfway_momentum, mass_matrix
 from flowborne.solids.state import SolidState
 from flowborne.validation import pendulums
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near

@@ -6,12 +6,8 @@ import numpy as np
 
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
-from flowborne.solids.dynamics import (
-    halfway_momentum,
-    kinematics,
-    kinetic_energy,
-    potential_energy,
-)
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.momentum import halfway_momentum, kinetic_energy, potential_energy
 from flowborne.solids.state import SolidState
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.reference import reference, table

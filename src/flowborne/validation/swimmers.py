@@ -8,7 +8,8 @@ from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.scenes.tracks import MotionSinusoid
-from flowborne.solids.dynamics import halfway_momentum, kinematics
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.momentum import halfway_momentum
 from flowborne.validation.case import Case, Finding, GridSeries, at_most
 from flowborne.validation.worlds import RING, advance, mjcf, world_of
 
