@@ -60,12 +60,12 @@ def test_processes_answer_in_order_and_are_sent_the_shared_object_once() -> None
     assert again == [3.0]
 
 
-def test_packed_task_holds_a_mark_in_place_of_the_shared_object() -> None:
+def test_packed_tasks_hold_a_mark_in_place_of_the_shared_object() -> None:
     shared = np.arange(50_000.0)
     packed = executors.pack((np.sum, {"deep": [shared]}), shared)
     assert len(packed) < 500
     executors.receive_shared(pickle.dumps(shared))
-    assert executors.run_packed(executors.pack((np.sum, shared), shared)) == shared.sum()
+    assert executors.run_packed(executors.pack((np.sum, [shared]), shared)) == [shared.sum()]
 
 
 @pytest.mark.parametrize("chosen", [Serial(), Threads(2), Foreign(ThreadPoolExecutor(1))])

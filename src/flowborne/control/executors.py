@@ -8,11 +8,13 @@ its own: all there is are the interfaces of `concurrent.futures`.
 from __future__ import annotations
 
 import io
+import math
 import multiprocessing
 import os
 import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from itertools import chain
 from typing import Any, Protocol, TypeVar
 
 Task = TypeVar("Task")
@@ -114,7 +116,9 @@ class Processes(Pool):
     """Other processes of this machine, started anew: a fork would not carry the threads over.
 
     The shared object goes to each worker once, when the workers start; tasks that refer to it
-    carry a mark in its place. The main script must guard its start by `__name__ == "__main__"`.
+    carry a mark in its place. Each worker gets its part of the tasks in one parcel, so that what
+    they have in common travels once. The main script must guard its start by
+    `__name__ == "__main__"`.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -134,8 +138,11 @@ class Processes(Pool):
                 initializer=receive_shared,
                 initargs=(pickle.dumps(shared),),
             )
-        packed = [pack((function, task), shared) for task in tasks]
-        return collect([self._executor.submit(run_packed, each) for each in packed])
+        size = math.ceil(len(tasks) / self.workers)
+        parts = [tasks[n : n + size] for n in range(0, len(tasks), max(size, 1))]
+        submit = self._executor.submit
+        answers = collect([submit(run_packed, pack((function, p), shared)) for p in parts])
+        return list(chain.from_iterable(answers))
 
 
 class Foreign:
@@ -219,7 +226,7 @@ def receive_shared(pickled: bytes) -> None:
     _received["shared"] = pickle.loads(pickled)
 
 
-def run_packed(packed: bytes) -> Any:
-    """Apply the packed function to the packed task in a worker process."""
-    function, task = _Unpacker(io.BytesIO(packed)).load()
-    return function(task)
+def run_packed(packed: bytes) -> list[Any]:
+    """Apply the packed function to each of the packed tasks in a worker process."""
+    function, tasks = _Unpacker(io.BytesIO(packed)).load()
+    return [function(task) for task in tasks]

@@ -145,7 +145,10 @@ class ObjectiveVelocity:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveCallable:
-    """Any function of the measurement (a picklable one, if the evaluations run in processes)."""
+    """Any function of the measurement (a picklable one, if the evaluations run in processes).
+
+    A hypothetical world has no dye and no smoke.
+    """
 
     function: Callable[[Measurement], float]
     name: str = "callable"

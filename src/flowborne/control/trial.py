@@ -7,7 +7,7 @@ objective is read), 3.3 (what is outboard is rigid), 4.3 (settling).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -176,9 +176,18 @@ def run(trial: Trial) -> float:
     return trial.run()
 
 
+def without_scalars(world: World) -> World:
+    """The same world, its arrays shared, without dye and smoke: they push nothing."""
+    if world.fluid is None:
+        return world
+    return replace(world, fluid=replace(world.fluid, scalars={}))
+
+
 @dataclass(eq=False)
 class Trials:
     """The objective as a function of the pose, in the flow and time of `world`.
+
+    Dye and smoke are not carried along, so no objective sees them.
 
     world, step, objective, hypothesis, dofs, pose  as in `Trial`
     mapper  runs the trials
@@ -211,9 +220,10 @@ class Trials:
 
     def values(self, displacements: Array) -> Array:
         """(m,) objective in poses displaced by the rows of (m, n). Raises TrialError."""
+        world = without_scalars(self.world)
         trials = [
             Trial(
-                self.world,
+                world,
                 self.step,
                 self.objective,
                 self.hypothesis,

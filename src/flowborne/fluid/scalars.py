@@ -113,6 +113,8 @@ def carry_scalars(
     before, after  distance to the bodies at the nodes at both ends of the step, m
     time           s at the end of the step, for what enters through sides and sources
     """
+    if not scalars:
+        return {}
     counts = np.array(grid.shape)
     periodic = np.array(boundaries.periodic(), np.uint8)
     inside = np.empty(grid.shape, np.uint8)
@@ -143,8 +145,8 @@ def carry_scalars(
     for source in sources:
         if source.active(time):
             box = cells_in(source, grid)
-            for name, value in source.scalars.items():
-                later[name][box] = value
+            for name in later.keys() & source.scalars.keys():
+                later[name][box] = source.scalars[name]
     return later
 
 

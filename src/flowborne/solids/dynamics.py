@@ -30,7 +30,7 @@ FIRST_CONTACT = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 NEAR = 1e-11
 """A row within this share of its reference of a change of zone stays where it is."""
 
-SETTLED = 1e-12
+SETTLED = 1e-13
 """Forces of Coriolis are found to this share of the momentum."""
 
 
