@@ -12,7 +12,7 @@ from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.advection import OFFSETS, carry, cells_per_step, correct
 from flowborne.fluid.continuation import LAYERS, continue_into
 from flowborne.fluid.ghosts import impose_sides, pad, pad_faces
-from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.scalars import carry_scalars, cells_in
 
 
@@ -37,21 +37,19 @@ def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> C
     particle half-way; c is what is carried, along the paths of c, and dt/2 A is taken off where
     the particle arrives. The pressure solve then adds dt A for the new A, so a steady flow stays
     as it is and the step is second order in time. The semi-Lagrangian scheme of the paper carries
-    u itself.
+    u itself. So do particles that cross two cells or more in a step: extrapolation in time is not
+    stable there, see `centring`.
     """
     fluid, state = world.flow()
     grid, sides, time = fluid.grid, fluid.boundaries, world.time
     second_order = fluid.advection == "maccormack"
-    half = 0.5 * dt if second_order else 0.0
-    halfway = faces_of(
-        [u + half * a for u, a in zip(state.velocity, state.acceleration, strict=True)]
-    )
-    paths = faces_of(
-        [
-            c + half * a * o
-            for c, a, o in zip(state.carrier, state.acceleration, before.open, strict=True)
-        ]
-    )
+    if second_order:
+        share = centring(state.velocity, dt, grid)
+        ahead = [0.5 * dt * s * a for s, a in zip(share, state.acceleration, strict=True)]
+    else:
+        ahead = [np.zeros_like(a) for a in state.acceleration]
+    halfway = faces_of([u + a for u, a in zip(state.velocity, ahead, strict=True)])
+    paths = faces_of([c + a * o for c, a, o in zip(state.carrier, ahead, before.open, strict=True)])
     field = pad_faces(halfway, grid, sides, time)
     carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
     counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
@@ -77,7 +75,7 @@ def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> C
                 counts,
                 periodic,
             )
-            arrived[axis][:] -= half * state.acceleration[axis]
+            arrived[axis][:] -= ahead[axis]
     scalars = carry_scalars(
         state.scalars,
         carrier,
@@ -92,6 +90,24 @@ def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> C
     now = fluid_momentum(arrived, face_mass(after.open, grid, sides, fluid.density), grid)
     entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
     return Carried(arrived, scalars, now - was - entered)
+
+
+def centring(velocity: Faces, dt: float, grid: Grid) -> Faces:
+    """Share of the half-way acceleration that each face takes.
+
+    It is 1 where the fluid around the face crosses up to one cell in a step, and falls to 0 at two.
+    """
+    cells = np.zeros(grid.shape)
+    for axis in grid.axes:
+        speed = np.abs(velocity[axis])
+        for beside in (np.delete(speed, -1, axis), np.delete(speed, 0, axis)):
+            np.maximum(cells, beside, out=cells)
+    room = np.clip(2.0 - cells * (dt / grid.spacing), 0.0, 1.0)
+    share = grid.zeros_faces()
+    for axis in grid.axes:
+        around = np.pad(room, [(int(a == axis),) * 2 for a in range(3)], mode="edge")
+        share[axis][:] = np.minimum(np.delete(around, -1, axis), np.delete(around, 0, axis))
+    return share
 
 
 def faces_of(values: list[Array]) -> Faces:

@@ -33,6 +33,12 @@ NEAR = 1e-11
 SETTLED = 1e-13
 """Forces of Coriolis are found to this share of the momentum."""
 
+UNDAMPED = 8
+"""Turns after which contacts are searched for in half steps."""
+
+AT_REST = 1e-12
+"""What is slower than this is at rest, m/s and rad/s."""
+
 
 @dataclass(frozen=True)
 class Kinematics:
@@ -99,6 +105,7 @@ class SolidSystem:
     smooth   (A, r) without the constraint rows
     rows     constraint rows, and zones (k,), the state of each that A and impulse are made for
     halfway  the forces half-way through the step, and own (nv,), the impulse that they give here
+    at       (nv,) velocity whose zones these are, found in as many turns
     """
 
     A: Array
@@ -110,6 +117,8 @@ class SolidSystem:
     zones: Zones
     halfway: Halfway | None
     own: Array
+    at: Array
+    turns: int = 0
 
     @property
     def contacts(self) -> int:
@@ -124,18 +133,25 @@ class SolidSystem:
 
         None when it has them. The repeated solve is Newton's method on a piecewise quadratic
         function, and a fixed point for the forces of Coriolis. It ends after few turns as a rule;
-        the caller bounds their number.
+        when it has not, contacts are those half-way from where they were found before, so that it
+        does not go in circles. The caller bounds the number of turns.
         """
-        zones, own = self.zones, self.own
+        zones, own, at, settled = self.zones, self.own, v_plus, True
         if self.rows is not None:
             zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
+            settled = np.array_equal(zones, self.zones)
+            if not settled and self.turns >= UNDAMPED:
+                at = 0.5 * (self.at + v_plus)
+                zones = self.rows.zones((at - self.v) / self.dt, self.zones)
         if self.halfway is not None:
             own = self.halfway.impulse(v_plus)
-        A, impulse = self.smooth
-        room = SETTLED * (np.abs(A) @ np.abs(v_plus))
-        if np.array_equal(zones, self.zones) and bool((np.abs(own - self.own) <= room).all()):
+            room = SETTLED * (np.abs(self.A) @ (np.abs(v_plus) + AT_REST)) + self.halfway.rounding
+            settled = settled and bool((np.abs(own - self.own) <= room).all())
+        if settled:
             return None
-        return replace(self._with(zones, A, impulse + own - self.own), own=own)
+        A, impulse = self.smooth
+        system = self._with(zones, A, impulse + own - self.own)
+        return replace(system, own=own, at=at, turns=self.turns + 1)
 
     def pushed(self, force: Array) -> SolidSystem:
         """System with an additional generalised force (nv,)."""
@@ -195,10 +211,9 @@ def assemble(
     if before is not None:
         centred = halfway(model, s, before, state, dt, A, force + s.bias)
         impulse = centred.impulse(state.v)
-    full = _with_rows(A, impulse, state.v, dt, rows, zones)
-    return SolidSystem(
-        full[0], full[1], dt, state.v.copy(), (A, impulse), rows, zones, centred, impulse
-    )
+    v = state.v.copy()
+    full = _with_rows(A, impulse, v, dt, rows, zones)
+    return SolidSystem(full[0], full[1], dt, v, (A, impulse), rows, zones, centred, impulse, v)
 
 
 def _smooth(model: SolidModel, s: Scratch, v: Array) -> tuple[Array, Array]:

@@ -20,6 +20,9 @@ from flowborne.solids.state import SolidState
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-14
+"""Share of the terms of an impulse that rounding may change."""
+
 
 @dataclass(frozen=True)
 class Halfway:
@@ -43,6 +46,12 @@ class Halfway:
     mass: Array
     given: Array
     along: Array
+
+    @property
+    def rounding(self) -> Array:
+        """(nv,) impulses smaller than this are rounding errors."""
+        terms = (np.abs(self.along) * np.abs(self.given)[self.model.dof_body]).sum(axis=1)
+        return np.asarray(ROUNDING * (terms + self.dt * np.abs(self.outer)))
 
     def impulse(self, v_plus: Array) -> Array:
         """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,)."""
