@@ -6,7 +6,16 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from flowborne.fluid.advection import CENTRE, carry, correct, departure, inlined, sample_valid
+from flowborne.fluid.advection import (
+    CENTRE,
+    FEW,
+    carry,
+    correct,
+    departure,
+    inlined,
+    sample,
+    sample_valid,
+)
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, Source
 from flowborne.fluid.ghosts import edge, pad, pad_cells
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -35,11 +44,33 @@ def node_sample(nodes: Array, x: float, y: float, z: float) -> float:
     return value
 
 
+@inlined
+def mean_beside(field: Array, valid: Mask, after: Array, i: int, j: int, k: int) -> float:
+    """Mean of a padded field over the neighbours of cell (i, j, k) that stay outside every body.
+
+    Bodies are as thick as a cell's diagonal (`coupling.shapes.WATERTIGHT`), so neighbours that are
+    outside are on the cell's own side of a body. 0 where there are none.
+    """
+    layers, pz = (1, 0) if field.shape[2] <= 2 else (3, 1)
+    total, count = 0.0, 0
+    for m in range(-1, 2):
+        for n in range(-1, 2):
+            for p in range(layers):
+                q = k + p - pz
+                if valid[i + 1 + m, j + 1 + n, q + pz] and (
+                    node_sample(after, i + m + 0.5, j + n + 0.5, q + 0.5) > 0.0
+                ):
+                    total += field[i + 1 + m, j + 1 + n, q + pz]
+                    count += 1
+    return total / count if count else 0.0
+
+
 @kernel
 def carry_beside_bodies(
     out: Array,
     field: Array,
     valid: Mask,
+    known: Array,
     cx: Array,
     cy: Array,
     cz: Array,
@@ -51,6 +82,9 @@ def carry_beside_bodies(
 ) -> None:
     """Carry the cells near bodies along paths that stop at the bodies' sides.
 
+    A cell that a body has just left, and whose path ends where nothing was, is filled from beside.
+
+    known          `valid` as numbers
     before, after  distance to the bodies at the nodes at both ends of the step, m; between them
                    the distance at a place on the path changes linearly in time
     """
@@ -85,7 +119,10 @@ def carry_beside_bodies(
                         break
                     reached = s
                 xd, yd, zd = x + reached * dx, y + reached * dy, z + reached * dz
-                out[i, j, k] = sample_valid(field, valid, xd + 0.5, yd + 0.5, zd + 0.5)
+                if sample(known, xd + 0.5, yd + 0.5, zd + 0.5) > FEW:
+                    out[i, j, k] = sample_valid(field, valid, xd + 0.5, yd + 0.5, zd + 0.5)
+                else:
+                    out[i, j, k] = mean_beside(field, valid, after, i, j, k)
 
 
 @kernel
@@ -120,6 +157,7 @@ def carry_scalars(
     inside = np.empty(grid.shape, np.uint8)
     outside_bodies(before, inside)
     valid = pad(inside, grid.axes)
+    known = valid.astype(np.float64)
     later = {}
     for name, values in scalars.items():
         field = pad_cells(values, grid, boundaries)
@@ -130,10 +168,12 @@ def carry_scalars(
         padded = pad_cells(carried, grid, boundaries)
         enter_sides(padded, name, grid, boundaries, time)
         correct(out, padded, field, valid, *carrier, CENTRE, counts, periodic)
+        np.clip(out, field.min(), field.max(), out=out)
         carry_beside_bodies(
             out,
             field,
             valid,
+            known,
             *carrier,
             before,
             after,
