@@ -155,6 +155,19 @@ def test_a_kill_at_any_moment_and_resume_end_with_the_same_numbers(
         assert not list(out.rglob("*.partial")), f"killed at {moment}, then at {again}"
 
 
+def test_a_killed_run_in_a_flow_ends_with_the_same_numbers(tmp_path):
+    """A controlled chain in a fluid with dye: all of the state has to be in the checkpoint."""
+    settings = {"domain.resolution": "24", "time.frames": "8", "output.checkpoint_every": "3"}
+    scene = flowborne.load_scene("ns-chain-1", settings)
+    run(scene, tmp_path / "whole")
+    for moment in (32, 40):
+        out = tmp_path / f"run-{moment}"
+        assert killed_at(moment, lambda out=out: run(scene, out)) == signal.SIGKILL
+        assert 0 < len(numbers(out)[0]) < 8
+        run(scene, out, resume=True)
+        assert numbers(out) == numbers(tmp_path / "whole")
+
+
 def test_a_run_killed_before_its_scene_was_written_says_how_to_start_again(small_scene, tmp_path):
     out = tmp_path / "run"
     RunFolder.create(out)
@@ -226,6 +239,48 @@ def test_a_signal_between_a_frame_and_its_record_loses_nothing(small_scene, tmp_
         run(small_scene, tmp_path / "run")
     assert stopped.value.result.frames == len(numbers(tmp_path / "run")[0]) == 7
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_signal_that_a_kernel_turns_into_a_system_error_ends_the_run_well(
+    small_scene, tmp_path, monkeypatch, reference
+):
+    """As Numba's wrapper does when a handler raises in it."""
+    advance = Simulation.advance_frame
+
+    def interrupted(simulation):
+        if simulation.frame == 4:
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(1)
+            except KeyboardInterrupt as stop:
+                raise SystemError("returned a result with an exception set") from stop
+        return advance(simulation)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Simulation, "advance_frame", interrupted)
+        with pytest.raises(running.RunInterrupted, match="stopped after frame 4"):
+            run(small_scene, tmp_path / "run")
+    run(small_scene, tmp_path / "run", resume=True)
+    assert numbers(tmp_path / "run") == reference
+
+
+def test_an_error_of_a_kernel_is_no_interrupt(small_scene, tmp_path, monkeypatch):
+    def fail(simulation):
+        raise SystemError("unknown opcode")
+
+    monkeypatch.setattr(Simulation, "advance_frame", fail)
+    with pytest.raises(SystemError, match="unknown opcode"):
+        run(small_scene, tmp_path / "run")
+
+
+def test_a_scene_too_large_for_the_memory_writes_nothing(small_scene, tmp_path, monkeypatch):
+    def refuse(*args, **options):
+        raise MemoryError("Unable to allocate 74.5 GiB")
+
+    monkeypatch.setattr(running, "Simulation", refuse)
+    with pytest.raises(SceneError, match=r"scene small does not fit .* 74.5 GiB.*coarser"):
+        run(small_scene, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_run_in_another_thread_leaves_signals_alone(small_scene, tmp_path, reference):
@@ -376,14 +431,14 @@ def test_memory_does_not_grow_with_frames(small_scene, tmp_path):
     held = []
 
     def note(news):
-        if news.stage == "frame" and news.frame in (20, 100):
+        if news.stage == "frame" and news.frame in (100, 250):
             gc.collect()
             held.append(tracemalloc.get_traced_memory()[0])
 
     run(small_scene, tmp_path / "warm", frames=2)
     tracemalloc.start()
     try:
-        run(small_scene, tmp_path / "run", frames=100, progress=note)
+        run(small_scene, tmp_path / "run", frames=250, progress=note)
     finally:
         tracemalloc.stop()
     assert held[1] - held[0] < 8_000, held

@@ -14,6 +14,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from flowborne.compiling import compilation_watched
+from flowborne.errors import SceneError
 from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.io.history import History
 from flowborne.io.recorder import Recorder, write_model
@@ -90,9 +91,9 @@ def run(
     film      draw preview.png and preview.mp4 at the end
     progress  called with news of the run
     returns   the result; a run that blew up or filled the disc returns, too: see its outcome
-    raises    RunFolderError when `out` or the arguments are wrong, SceneError when the scene is;
-              nothing is then written. RunInterrupted (a KeyboardInterrupt) after Ctrl-C or
-              SIGTERM, when everything has been saved
+    raises    RunFolderError when `out` or the arguments are wrong, SceneError when the scene is or
+              does not fit into memory; nothing is then written. RunInterrupted (a
+              KeyboardInterrupt) after Ctrl-C or SIGTERM, when everything has been saved
     """
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.save import scene_files
@@ -110,7 +111,7 @@ def run(
         folder.check_new(replace=replace)
     wanted = with_frames(wanted, frames)
     files = scene_files(wanted)
-    with Simulation(wanted, workers=workers) as simulation:
+    with _simulation(wanted, workers) as simulation:
         job = _Run(simulation, folder, files, progress)
         with job.compilation_told():
             if resume:
@@ -118,6 +119,17 @@ def run(
             else:
                 job.begin(replace=replace)
             return job.finish(*job.go_on(), film=film)
+
+
+def _simulation(scene: Scene, workers: int | None) -> Simulation:
+    """The simulation of a scene. Raises SceneError when the machine has no room for it."""
+    try:
+        return Simulation(scene, workers=workers)
+    except MemoryError as error:
+        raise SceneError(
+            f"scene {scene.name} does not fit into the memory of this machine ({error}). "
+            "Make its grid coarser: lower [domain] resolution or cells."
+        ) from error
 
 
 class _Run:
@@ -184,7 +196,10 @@ class _Run:
                 try:
                     with signals.interruptible():
                         report = simulation.advance_frame()
-                except KeyboardInterrupt:
+                except (KeyboardInterrupt, SystemError) as stop:
+                    # an interrupt becomes a SystemError while a kernel hands back its result
+                    if isinstance(stop, SystemError) and not signals.asked:
+                        raise
                     if simulation.report is None or simulation.frame == self._rows():
                         break
                     report = simulation.report

@@ -22,7 +22,8 @@ class Carried:
 
     velocity  Faces u*, m/s
     scalars   name -> (nx, ny, nz)
-    lost      (3,) momentum that advection made or lost, N s
+    lost      (3,) momentum that advection made (or lost, when negative), N s; along periodic axes
+              it is taken out of `velocity` again
     """
 
     velocity: Faces
@@ -86,10 +87,14 @@ def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> C
         fluid.sources,
         time + dt,
     )
+    mass = face_mass(after.open, grid, sides, fluid.density)
     was = fluid_momentum(state.velocity, face_mass(before.open, grid, sides, fluid.density), grid)
-    now = fluid_momentum(arrived, face_mass(after.open, grid, sides, fluid.density), grid)
     entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
-    return Carried(arrived, scalars, now - was - entered)
+    lost = fluid_momentum(arrived, mass, grid) - was - entered
+    for axis in grid.axes:
+        if sides.periodic()[axis]:
+            arrived[axis][:] -= lost[axis] / mass[axis].sum()
+    return Carried(arrived, scalars, lost)
 
 
 def centring(velocity: Faces, dt: float, grid: Grid) -> Faces:

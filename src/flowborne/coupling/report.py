@@ -28,8 +28,9 @@ class Momentum:
     fluid            momentum of the fluid (open fraction x density x volume of each face)
     exchanged        impulse that the pressure solve gave to the bodies
     exchange_error   |impulse given to the bodies + impulse taken from the fluid and the walls|
-                     relative to the impulse exchanged
-    advection        change of the fluid's momentum in advection that no boundary accounts for
+                     relative to the impulses given to bodies and faces, added up in size
+    advection        change of the fluid's momentum in advection that no boundary accounts for;
+                     along periodic axes it was undone at once
     boundary         impulse of the sides of the domain on the fluid in the pressure solve
     """
 

@@ -189,9 +189,13 @@ def momentum_balance(world: World, cut: Geometry, solved: Solved) -> Momentum:
     mass = face_mass(cut.open, fluid.grid, fluid.boundaries, fluid.density)
     after = fluid_momentum(projected.velocity, mass, fluid.grid)
     gained = after - fluid_momentum(before, mass, fluid.grid)
+    moved = sum(
+        float(np.vdot(mass[axis], np.abs(projected.velocity[axis] - before[axis])))
+        for axis in fluid.grid.axes
+    )
     sides = dt * side_push(projected.pressure, fluid.grid, fluid.boundaries)
     exchanged = projected.impulse[:, :3].sum(axis=0)
-    scale = float(np.abs(projected.impulse[:, :3]).sum() + np.abs(gained).sum())
+    scale = float(np.abs(projected.impulse[:, :3]).sum()) + moved
     missing = float(np.abs(exchanged + gained - sides).max())
     return Momentum(
         fluid=after,

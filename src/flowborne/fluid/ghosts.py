@@ -7,6 +7,7 @@ at a closed or open side, the value across the domain at a periodic one.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -25,13 +26,16 @@ def edge(axis: int, at: int | slice) -> tuple[int | slice, ...]:
     return tuple(index)
 
 
+@lru_cache(maxsize=64)
 def side_coordinates(
     grid: Grid, axis: int, upper: bool, component: int
 ) -> tuple[Array, Array, Array]:
-    """Places on a side of the domain across `axis` at which `component` lives there, in m."""
+    """Places on a side across `axis` at which `component` lives there, in m; not to be written."""
     coordinates = list(grid.face_coordinates(component))
     coordinates[axis] = np.array([grid.upper[axis] if upper else grid.origin[axis]])
     x, y, z = np.meshgrid(*coordinates, indexing="ij")
+    for places in (x, y, z):
+        places.flags.writeable = False
     return x, y, z
 
 
@@ -49,8 +53,12 @@ def wall_velocity(
 
 def pad(values: NDArray[Scalar], axes: tuple[int, ...]) -> NDArray[Scalar]:
     """Copy with one more layer at both ends of each of `axes`; corners hold the nearest value."""
-    width = [(1, 1) if axis in axes else (0, 0) for axis in range(3)]
-    return np.pad(values, width, mode="edge")
+    padded = np.empty([n + 2 * (axis in axes) for axis, n in enumerate(values.shape)], values.dtype)
+    padded[tuple(slice(1, -1) if axis in axes else slice(None) for axis in range(3))] = values
+    for axis in axes:
+        padded[edge(axis, 0)] = padded[edge(axis, 1)]
+        padded[edge(axis, -1)] = padded[edge(axis, -2)]
+    return padded
 
 
 def pad_cells(values: Array, grid: Grid, boundaries: Boundaries) -> Array:

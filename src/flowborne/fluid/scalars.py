@@ -168,7 +168,6 @@ def carry_scalars(
         padded = pad_cells(carried, grid, boundaries)
         enter_sides(padded, name, grid, boundaries, time)
         correct(out, padded, field, valid, *carrier, CENTRE, counts, periodic)
-        np.clip(out, field.min(), field.max(), out=out)
         carry_beside_bodies(
             out,
             field,

@@ -22,6 +22,10 @@ ROBUST = 98.5
 """Percentile of the vorticity's size at which its colours are strongest."""
 
 
+STRONG = 75.0
+"""Percentile of a dye's values above half the largest at which it has its full colour."""
+
+
 class Field(Protocol):
     """What is shown of the fluid.
 
@@ -64,9 +68,7 @@ class FieldDye:
     def __init__(self, run: Run, dyes: Sequence[str]) -> None:
         self.dyes = tuple(dyes)
         sampled = run.sampled(SAMPLES)
-        self.full = {
-            dye: max(max(_largest(state[dye]) for state in sampled), 1e-12) for dye in self.dyes
-        }
+        self.full = {dye: full_strength([state[dye] for state in sampled]) for dye in self.dyes}
         self.colours = [style.DYES[n % len(style.DYES)] for n in range(len(self.dyes))]
         names = [dye.removeprefix("scalar_") for dye in self.dyes]
         self.legend: Sequence[tuple[str, str]] = list(zip(names, self.colours, strict=True))
@@ -115,6 +117,15 @@ class FieldVorticity:
         return self.table[levels]
 
 
+def full_strength(frames: Sequence[NDArray[np.floating]]) -> float:
+    """Value at which a dye has its full colour: that of most of what is strong, not the largest,
+    which is one of the swings that advection makes beside an edge."""
+    values = np.concatenate([frame.ravel() for frame in frames])
+    values = values[np.isfinite(values)]
+    strong = values[values > 0.5 * values.max(initial=0.0)]
+    return max(float(np.percentile(strong, STRONG)), 1e-12) if strong.size else 1.0
+
+
 def vorticity(state: State, grid: Grid) -> Array:
     """(nx, ny) vorticity about z at the cell centres, 1/s; closed cells continue their neighbours.
 
@@ -147,11 +158,6 @@ def _around(values: Array) -> Array:
     """Sum over the four neighbours of each cell."""
     padded = np.pad(values, 1)
     return np.asarray(padded[2:, 1:-1] + padded[:-2, 1:-1] + padded[1:-1, 2:] + padded[1:-1, :-2])
-
-
-def _largest(values: NDArray[np.floating]) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if finite.size else 0.0
 
 
 def _diverging(count: int) -> Pixels:

@@ -68,7 +68,10 @@ class Water(Artist):
         x0, y0, x1, y1 = (round(edge) for edge in self._axes.bbox.extents)
         small = Image.fromarray(np.ascontiguousarray(self.image[::-1]))
         large = small.resize((x1 - x0, y1 - y0), Image.Resampling.BICUBIC).convert("RGBA")
-        renderer.draw_image(renderer.new_gc(), x0, y0, np.asarray(large)[::-1])
+        # a cubic swings below its knots, which would show as black seams along dye
+        darkest = np.append(self.image.min(axis=(0, 1)), np.uint8(255))
+        pixels = np.maximum(np.asarray(large), darkest)[::-1]
+        renderer.draw_image(renderer.new_gc(), x0, y0, pixels)
 
 
 class Picture:

@@ -1,0 +1,31 @@
+"""Grids cut by bodies, for the tests of this folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.step import cut_by_bodies
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.grid import Grid
+from flowborne.validation.worlds import mjcf, world_of
+
+Cut = Callable[..., Geometry]
+
+
+def cut_grid(
+    grid: Grid, *bodies: str, q: np.ndarray | None = None, boundaries: Boundaries | None = None
+) -> Geometry:
+    """The grid cut by bodies (MJCF elements) in their rest pose, or at q."""
+    world = world_of(grid, mjcf(*bodies), boundaries=boundaries)
+    if q is not None:
+        world.solid.q[:] = q
+    return cut_by_bodies(world)
+
+
+@pytest.fixture(scope="session")
+def cut() -> Cut:
+    return cut_grid

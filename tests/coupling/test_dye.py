@@ -1,0 +1,82 @@
+"""Dye beside bodies that move: it never crosses them, and does not thin out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.coupling.world import World
+from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.fluid.grid import Array, Grid
+from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.validation.worlds import mjcf, world_of
+
+CELLS = 32
+H = 1.0 / CELLS
+SQUARE = Grid.slab(CELLS, CELLS, H, (0.0, 0.0))
+PLATE = '<geom type="box" size="{thin} {long} 0.1"/>'
+DISC = '<geom type="sphere" size="0.12"/>'
+
+
+def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = None) -> World:
+    """A body that moves along x and turns, by sinusoids of 1 s and 0.77 s; dye wherever it is."""
+    body = f"""<body pos="0.5 0.5 0"><joint type="slide" axis="1 0 0"/>
+      <joint type="hinge" axis="0 0 1"/>{geom}</body>"""
+    motions = (
+        MotionSinusoid(np.array([0]), shift, 1.0),
+        MotionSinusoid(np.array([1]), turn, 0.77),
+    )
+    return world_of(SQUARE, mjcf(body), boundaries=boundaries, motions=motions, scalars=("dye",))
+
+
+def ahead_of(world: World) -> Array:
+    """(nx, ny, 1) distance of the cells' centres in front of the plate's mid-plane, m."""
+    x, y, _ = np.meshgrid(*SQUARE.cell_coordinates(), indexing="ij")
+    place, angle = world.solid.q
+    return np.cos(angle) * (x - 0.5 - place) + np.sin(angle) * (y - 0.5)
+
+
+def outside(world: World) -> Array:
+    """(nx, ny) whether a cell's centre is outside the body."""
+    d = cut_by_bodies(world).distance[:, :, 0]
+    return d[1:, 1:] + d[1:, :-1] + d[:-1, 1:] + d[:-1, :-1] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("steps", "dt"), [(1000, 1 / 128), (100, 1 / 32)], ids=["0.6 cells a step", "2.4 cells a step"]
+)
+def test_dye_never_crosses_a_thin_plate_from_wall_to_wall(steps: int, dt: float) -> None:
+    """A piston of thickness h/4 that moves and turns between two open sides, dye on its right."""
+    sides = Boundaries(x_min=BoundaryOpen(), x_max=BoundaryOpen())
+    world = moved(PLATE.format(thin=H / 8, long=0.8), 0.1, 0.35, sides)
+    _, state = world.flow()
+    state.scalars["dye"][:] = ahead_of(world) > 0.0
+    for _ in range(steps):
+        report = step(world, dt)
+        assert report.outcome.name == "DONE", world.steps
+        assert not state.scalars["dye"][ahead_of(world) < 0.0].any(), world.steps
+        opened = cut_by_bodies(world).open
+        for u, o in zip(state.velocity[:2], opened[:2], strict=True):
+            assert np.abs(u[o > 0.5]).max() < 15.0, world.steps
+    assert state.scalars["dye"][ahead_of(world) > 2.0 * H].mean() > 0.95
+
+
+@pytest.mark.parametrize(
+    ("geom", "turn"),
+    [
+        (DISC, 0.0),
+        (PLATE.format(thin=0.1, long=0.2), 0.7),
+        (PLATE.format(thin=H / 8, long=0.2), 0.7),
+    ],
+    ids=["disc", "block", "plate"],
+)
+def test_dye_that_is_everywhere_stays_everywhere(geom: str, turn: float) -> None:
+    """Whatever a moving body leaves behind is filled from beside it."""
+    world = moved(geom, 0.1, turn)
+    _, state = world.flow()
+    state.scalars["dye"][:] = 1.0
+    for _ in range(100):
+        step(world, 1.0 / 64)
+        values = state.scalars["dye"][:, :, 0][outside(world)]
+        assert np.abs(values - 1.0).max() < 1e-6, world.steps

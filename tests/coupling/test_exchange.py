@@ -1,0 +1,167 @@
+"""What bodies gain in a coupled step is what the fluid and the walls lose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.operators import face_mass, fluid_momentum
+from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.coupling.world import World
+from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.fluid.grid import Array, Grid
+from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.solids.momentum import momentum
+from flowborne.validation.worlds import RING, advance, mjcf, set_velocity, world_of
+
+SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
+CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))
+
+DISC = '<body name="disc{n}" pos="{x} {y} 0"><freejoint/><geom type="sphere" size="{size}"/></body>'
+CHAIN = """
+<body name="a" pos="0.3 0.45 0"><freejoint/>
+  <geom type="box" size="0.1 0.03 0.1"/>
+  <body name="b" pos="0.1 0 0"><joint type="hinge" axis="0 0 1"/>
+    <geom type="box" size="0.1 0.03 0.1" pos="0.1 0 0"/>
+    <body name="c" pos="0.2 0 0"><joint type="hinge" axis="0 0 1"/>
+      <geom type="box" size="0.08 0.03 0.1" pos="0.08 0 0"/>
+    </body>
+  </body>
+</body>"""
+PADDLE = """
+<body name="paddle" pos="0.4 0.5 0"><joint name="turn" type="hinge" axis="0 0 1"/>
+  <geom type="box" size="0.12 0.04 0.1" pos="0.12 0 0"/></body>"""
+BALL = '<body name="ball" pos="0.4 0.55 0.45"><freejoint/><geom type="sphere" size="0.2"/></body>'
+
+
+def swirl(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+    """Vortices in the unit box, unequal in x and y, that no wall cuts."""
+    u = np.sin(np.pi * x) * np.cos(np.pi * y) + 0.5 * np.sin(2 * np.pi * x) * np.cos(np.pi * y)
+    v = -np.cos(np.pi * x) * np.sin(np.pi * y) - np.cos(2 * np.pi * x) * np.sin(np.pi * y)
+    return u, v, 0.0 * z
+
+
+def paddling(**options: object) -> World:
+    turn = MotionSinusoid(np.array([0]), 0.6, 0.7)
+    return world_of(SQUARE, mjcf(PADDLE), solid_density=2.0, motions=(turn,), **options)
+
+
+def of_discs(*density_and_place: tuple[float, float], density: float, **options: object) -> World:
+    discs = [DISC.format(n=n, x=x, y=y, size=0.11) for n, (x, y) in enumerate(density_and_place)]
+    return world_of(SQUARE, mjcf(*discs), solid_density=density, **options)
+
+
+def channel() -> Boundaries:
+    def profile(x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
+        return 0.5 + 0 * x, 0 * x, 0 * x
+
+    return Boundaries(x_min=BoundaryInflow(profile), x_max=BoundaryOpen())
+
+
+WORLDS: dict[str, Callable[[], World]] = {
+    "free disc": lambda: of_discs((0.37, 0.44), density=0.5),
+    "light disc": lambda: of_discs((0.37, 0.44), density=0.01),
+    "free disc, viscous": lambda: of_discs((0.37, 0.44), density=0.5, viscosity=0.01),
+    "free disc in a ring": lambda: of_discs((0.37, 0.44), density=0.5, boundaries=RING),
+    "free disc in a channel": lambda: of_discs((0.37, 0.44), density=0.5, boundaries=channel()),
+    "two discs": lambda: of_discs((0.37, 0.44), (0.6, 0.5), density=1.5),
+    "two discs that touch": lambda: of_discs((0.37, 0.44), (0.59, 0.44), density=1.5),
+    "chain": lambda: world_of(SQUARE, mjcf(CHAIN), solid_density=1.2),
+    "chain that falls": lambda: world_of(
+        SQUARE, mjcf(CHAIN), solid_density=1.2, gravity=(0.0, -1.0, 0.0)
+    ),
+    "prescribed paddle": paddling,
+    "prescribed paddle, viscous": lambda: paddling(viscosity=0.02),
+    "sphere": lambda: world_of(CUBE, mjcf(BALL), solid_density=0.3),
+}
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_bodies_gain_what_fluid_and_walls_lose(name: str) -> None:
+    world = WORLDS[name]()
+    set_velocity(world, swirl)
+    for _ in range(12):
+        report = step(world, 1.0 / 64)
+        assert report.outcome.name == "DONE"
+        assert np.linalg.norm(report.momentum.exchanged) > 1e-6
+        assert report.momentum.exchange_error < 1e-10
+
+
+@pytest.mark.parametrize(
+    "name", ["free disc", "light disc", "free disc in a ring", "two discs", "sphere"]
+)
+def test_free_bodies_gain_the_impulse_that_is_reported(name: str) -> None:
+    """Mass times change of velocity, against the pressure's wrench, body by body."""
+    world = WORLDS[name]()
+    set_velocity(world, swirl)
+    mass = world.setup.solid.body_mass[1:, None]
+    for _ in range(6):
+        before = world.solid.v.reshape(-1, 6)[:, :3].copy()
+        report = step(world, 1.0 / 64)
+        gained = mass * (world.solid.v.reshape(-1, 6)[:, :3] - before)
+        impulse = report.dt * report.pressure_wrench[1:, :3]
+        scale = np.abs(impulse).max()
+        np.testing.assert_allclose(gained, impulse, atol=1e-11 * scale)
+        np.testing.assert_allclose(report.momentum.exchanged, gained.sum(axis=0), atol=1e-11)
+        np.testing.assert_allclose(
+            report.momentum.solid, momentum(world.setup.solid, world.solid)[0], rtol=1e-12
+        )
+
+
+@pytest.mark.parametrize(
+    "name", ["free disc", "free disc in a ring", "two discs", "prescribed paddle", "sphere"]
+)
+def test_the_fluids_budget_closes(name: str) -> None:
+    """Momentum of the fluid changes by advection's loss, walls and bodies, and nothing else.
+
+    Along a periodic axis the loss is undone at once."""
+    world = WORLDS[name]()
+    set_velocity(world, swirl)
+    fluid, state = world.flow()
+
+    def whole() -> Array:
+        opened = cut_by_bodies(world).open
+        mass = face_mass(opened, fluid.grid, fluid.boundaries, fluid.density)
+        return fluid_momentum(state.velocity, mass, fluid.grid)
+
+    lasting = ~np.array(fluid.boundaries.periodic())
+    last = whole()
+    for _ in range(6):
+        budget = step(world, 1.0 / 64).momentum
+        now = whole()
+        change = lasting * budget.advection + budget.boundary - budget.exchanged
+        np.testing.assert_allclose(now - last, change, atol=1e-13)
+        np.testing.assert_allclose(now, budget.fluid, atol=1e-13)
+        last = now
+
+
+def test_without_walls_nothing_is_lost() -> None:
+    """Fluid and disc together keep their momentum, what advection loses included."""
+    world = WORLDS["free disc in a ring"]()
+    set_velocity(world, swirl)
+    advance(world, 1.0 / 64)
+    budgets = [advance(world, 1.0 / 64).momentum for _ in range(8)]
+    assert not any(budget.boundary.any() for budget in budgets)
+    for earlier, later in pairwise(budgets):
+        np.testing.assert_allclose(
+            later.solid + later.fluid, earlier.solid + earlier.fluid, atol=1e-13
+        )
+        assert later.advection.any()
+
+
+def test_a_world_in_balance_has_no_exchange_error() -> None:
+    """By symmetry nothing is given to the disc: rounding is no error."""
+    world = of_discs((0.5, 0.5), density=0.5)
+
+    def vortex(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        u = np.sin(np.pi * x) * np.cos(np.pi * y)
+        return u, -np.cos(np.pi * x) * np.sin(np.pi * y), 0.0 * z
+
+    set_velocity(world, vortex)
+    for _ in range(5):
+        report = advance(world, 1.0 / 64)
+        assert np.abs(report.momentum.exchanged).max() < 1e-14
+        assert report.momentum.exchange_error < 1e-10

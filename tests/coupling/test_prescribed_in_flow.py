@@ -1,0 +1,103 @@
+"""A prescribed joint is where its motion says, whatever pulls at it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.step import step
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.fluid.grid import Array, Grid
+from flowborne.scenes.tracks import Curve, MotionKeyframes, MotionSinusoid
+from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.model import SolidModel
+
+ARM = """
+<mujoco><compiler angle="radian"/><worldbody>
+  <geom type="plane" size="4 4 1" pos="0 -0.45 0" zaxis="0 1 0"/>
+  <body name="upper"><joint name="shoulder" type="hinge" axis="0 0 1"/>
+    <geom type="capsule" size="0.08 0.12" pos="0.2 0 0" zaxis="1 0 0" density="1300"/>
+    <body name="lower" pos="0.4 0 0"><joint name="elbow" type="hinge" axis="0 0 1"/>
+      <geom type="capsule" size="0.08 0.1" pos="0.15 0 0" zaxis="1 0 0" density="700"/>
+      <body name="hand" pos="0.3 0 0"><joint name="wrist" type="hinge" axis="0 0 1"/>
+        <geom type="sphere" size="0.09" pos="0.08 0 0" density="2000"/>
+      </body>
+    </body>
+  </body>
+</worldbody></mujoco>
+"""
+"""Shoulder and elbow are told what to do, the wrist is not; a floor lies below."""
+
+
+@dataclass(frozen=True)
+class Pulls:
+    """A random wrench on every body, new in every step, as strong as the bodies' weight."""
+
+    strength: float
+    random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(4))
+
+    def wrench(self, model: SolidModel, pose: Kinematics, v: Array, time: float) -> Array:
+        return self.strength * self.random.normal(size=(model.nbody, 6))
+
+
+def channel() -> Boundaries:
+    def profile(x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
+        return 1.5 + 0 * x, 0 * x, 0 * x
+
+    return Boundaries(x_min=BoundaryInflow(profile), x_max=BoundaryOpen())
+
+
+def arm(grid: Grid, *, viscosity: float = 0.0, pull: float = 300.0) -> World:
+    model = SolidModel.from_string(ARM, slab=grid.is_slab, gravity=(0.0, -9.81, 0.0))
+    frames = Curve((0.0, 0.2, 0.35, 0.6), (0.2, -0.9, -0.4, 0.8))
+    motions = (
+        MotionSinusoid(model.dofs_of("shoulder"), 0.5, 0.5, mean=-0.5),
+        MotionKeyframes(model.dofs_of("elbow"), frames),
+    )
+    fluid = Fluid(grid, 1000.0, viscosity, channel())
+    world = World.at_rest(Setup(model, fluid, motions, (Pulls(pull),)))
+    for motion in motions:
+        world.solid.q[model.dof_position[motion.dofs]] = motion.position(0.0)
+        world.solid.v[motion.dofs] = motion.velocity(0.0)
+    for faces in (world.flow()[1].velocity, world.flow()[1].carrier):
+        faces[0][:] = 1.5
+    return world
+
+
+SLAB = Grid.slab(40, 32, 1.6 / 32, (-0.7, -0.8))
+CUBE = Grid((20, 16, 10), 0.1, (-0.7, -0.8, -0.5))
+
+
+@pytest.mark.parametrize(
+    ("grid", "viscosity"), [(SLAB, 0.0), (SLAB, 5.0), (CUBE, 0.0)], ids=["slab", "viscous", "cube"]
+)
+def test_a_prescribed_joint_reaches_its_target_whatever_pulls_at_it(
+    grid: Grid, viscosity: float
+) -> None:
+    """Gravity, fluid, contact with a floor and a random wrench; 1e-8 rad and rad/s."""
+    world = arm(grid, viscosity=viscosity)
+    model, touched = world.setup.solid, 0
+    for _ in range(60):
+        report = step(world, 0.01)
+        assert report.outcome.name == "DONE"
+        touched += report.contacts > 0
+        for motion in world.setup.motions:
+            found = world.solid.q[model.dof_position[motion.dofs]]
+            assert np.abs(found - motion.position(world.time)).max() < 1e-8
+            assert np.abs(world.solid.v[motion.dofs] - motion.velocity(world.time)).max() < 1e-8
+        assert np.abs(report.actuator[:2]).min() > 0.0
+        assert report.actuator[2] == 0.0
+        assert report.momentum.exchange_error < 1e-10
+    assert touched > 5, "the arm never touched the floor"
+
+
+def test_the_random_wrench_changes_the_drives_force_and_not_the_motion() -> None:
+    forces = []
+    for pull in (0.0, 300.0):
+        world = arm(SLAB, pull=pull)
+        reports = [step(world, 0.01) for _ in range(10)]
+        forces.append(np.array([report.actuator[:2] for report in reports]))
+    assert np.abs(forces[1] - forces[0]).min(axis=0).max() > 1.0

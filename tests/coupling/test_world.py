@@ -1,0 +1,101 @@
+"""A world is all the state there is: copies, saved states and trials agree bit for bit."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+import flowborne
+from flowborne.coupling.step import step
+from flowborne.coupling.world import World
+from flowborne.simulation import Simulation
+
+SMALL = {"domain.resolution": "32", "time.frames": "4"}
+
+
+def bits(world: World) -> dict[str, bytes]:
+    return {name: values.tobytes() for name, values in world.arrays().items()}
+
+
+def swimming(scene: str = "ns-chain-2", **options: object) -> Simulation:
+    return Simulation(flowborne.load_scene(scene, SMALL), **options)
+
+
+@pytest.fixture
+def simulation() -> Simulation:
+    """Two frames into a chain of two controlled joints in a flow."""
+    simulation = swimming(workers=1)
+    for _ in range(2):
+        simulation.advance_frame()
+    return simulation
+
+
+def test_a_trial_leaves_the_world_untouched(simulation: Simulation) -> None:
+    world, controller = simulation.world, simulation.controller
+    assert controller is not None
+    before = bits(world)
+    trials = controller.trials(world, simulation._step)
+    values = trials.values(np.array([[0.1, 0.0], [0.0, -0.2], [0.3, 0.3]]))
+    assert np.unique(values).size == 3
+    assert bits(world) == before
+
+
+def test_a_decision_changes_nothing_but_the_controllers_memory(simulation: Simulation) -> None:
+    world, controller = simulation.world, simulation.controller
+    assert controller is not None
+    before = bits(world)
+    decision = controller.decide(world, simulation.frame_time, simulation._step)
+    assert decision.evaluations == 4
+    after = bits(world)
+    changed = {name for name in after if after[name] != before[name]}
+    assert changed
+    assert all(name.startswith("memory/") for name in changed)
+
+
+def test_a_copy_shares_no_memory_and_steps_alone(simulation: Simulation) -> None:
+    world = simulation.world
+    twin, before = world.copy(), bits(world)
+    for name, values in twin.arrays().items():
+        assert not np.shares_memory(values, world.arrays()[name]), name
+    step(twin, 0.01)
+    assert bits(world) == before
+    assert twin.steps == world.steps + 1
+
+
+@pytest.mark.parametrize("scene", ["ns-chain-2", "ns-block-effort"])
+def test_two_runs_are_the_same_bit_for_bit_with_any_number_of_workers(scene: str) -> None:
+    found = []
+    for workers in (1, 1, 2, 3):
+        with swimming(scene, workers=workers) as simulation:
+            for _ in range(3):
+                simulation.advance_frame()
+            measured = simulation.measure()
+            found.append((bits(simulation.world), np.array(list(measured.values())).tobytes()))
+    assert all(other == found[0] for other in found[1:])
+
+
+def test_a_saved_state_goes_on_bit_for_bit(simulation: Simulation) -> None:
+    """Through a file, in the middle of a run, with the dye and the controller's memory."""
+    file = io.BytesIO()
+    np.savez(file, **simulation.world.arrays())
+    file.seek(0)
+    with np.load(file) as loaded:
+        arrays = {name: loaded[name] for name in loaded.files}
+    with swimming(workers=1) as later:
+        restored = World.from_arrays(later.world.setup, arrays)
+        assert bits(restored) == bits(simulation.world)
+        later.restore(restored, simulation.frame)
+        for _ in range(2):
+            later.advance_frame()
+            simulation.advance_frame()
+        assert bits(later.world) == bits(simulation.world)
+
+
+def test_a_state_that_lacks_a_part_is_refused(simulation: Simulation) -> None:
+    arrays = simulation.world.arrays()
+    for name in ("clock", "solid/v", "fluid/pressure", "fluid/carrier_y"):
+        rest = {other: values for other, values in arrays.items() if other != name}
+        with pytest.raises(KeyError):
+            World.from_arrays(simulation.world.setup, rest)
