@@ -69,6 +69,8 @@ def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp
         (["check", "nowhere.toml"], "nowhere.toml"),
         (["film", "nowhere"], "there is no folder nowhere"),
         (["film", "taken"], "taken is not the folder of a run"),
+        (["figures", "--out", "taken.txt"], "taken.txt cannot be written (File exists)"),
+        (["figures", "--out", "taken.txt/new"], "taken.txt/new cannot be written"),
         (["fly"], "No such command 'fly'"),
     ],
 )
@@ -87,6 +89,71 @@ def test_bad_input_is_one_message_and_writes_nothing(
     assert err.startswith("flowborne: ")
     assert err.count("\n") == 1, err
     assert sorted(tmp_path.rglob("*")) == before
+
+
+WET = """
+dimensions = 2
+[time]
+frames = 4
+[domain]
+lower = [-1.0, -1.0]
+upper = [1.0, 1.0]
+resolution = 16
+[fluid]
+density = 1000.0
+[boundaries]
+x_min = { kind = "inflow", velocity = [1.0, 0.0] }
+x_max = "open"
+[solids]
+model = "block.xml"
+density = 1200.0
+[[motion]]
+kind = "keyframes"
+joint = "hinge"
+times = [0.0, 1.0]
+values = [0.0, 30.0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"block.xml"', '"brick.xml"', "[solids]: there is no model file"),
+        ("density = 1000.0", "densty = 1000.0", "unknown key 'densty'; did you mean 'density'?"),
+        ("density = 1200.0", "density = -1.0", "[solids] density: -1.0 is not greater than 0"),
+        ('"hinge"', '"hnige"', "joint 'hnige' is not in model block.xml; did you mean 'hinge'?"),
+        ("upper = [1.0", "upper = [0.5", "reaches from 0 to 1 m in x at the start, outside"),
+        ("resolution = 16", "resolution = 0", "resolution: 0 is less than 1"),
+        ("30.0]", "nan]", "values, entry 2: nan is not a finite number"),
+        ('x_max = "open"', 'y_min = "periodic"', "y_min is periodic and y_max is closed"),
+        ('x_max = "open"', 'x_max = "closed"', "no side is open"),
+        ("[fluid]", "[fluid", "line 9, column 7: this is not TOML"),
+    ],
+)
+def test_a_faulty_scene_is_refused_by_name_and_place(command, small_scene, old, new, said):
+    path = small_scene.with_name("wet.toml")
+    before = sorted([*small_scene.parent.iterdir(), path])
+    assert old in WET
+    path.write_text(WET.replace(old, new, 1))
+    code, out, err = command("run", path, "--out", path.with_name("run"))
+    assert (code, out) == (2, "")
+    assert said in err
+    for line in err.splitlines():
+        assert line.startswith("flowborne: scene wet.toml, "), err
+    assert sorted(small_scene.parent.iterdir()) == before
+
+
+def test_a_disc_without_room_is_found_before_the_run(command, small_scene, monkeypatch, tmp_path):
+    from collections import namedtuple
+
+    from flowborne.io import run_folder
+
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(run_folder.shutil, "disk_usage", lambda path: usage(10**9, 10**9, 10**6))
+    code, out, err = command("run", small_scene, "--out", "run")
+    assert (code, out) == (2, "")
+    assert "MB in run and 1 MB are free; make room, run fewer frames (--frames)" in err
+    assert not (tmp_path / "run").exists()
 
 
 def test_check_tells_every_problem_at_once(command, small_scene):
@@ -211,6 +278,36 @@ def test_an_unknown_case_is_refused(command, cases, arguments):
     assert (code, out, cases) == (2, "", [])
     assert "K3: there is no such" in err
     assert "did you mean K" in err
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """Stand-in for the figures; what is asked of it."""
+    asked = []
+
+    def make_figures(out, console=None):
+        asked.append(out)
+        if out.name == "wild":
+            raise ArithmeticError("ns-block-effort: frame 3, step 1: the fluid blew up")
+        (out / "figure-2.csv").write_text("run\n")
+
+    stand_in = ModuleType("flowborne.validation.figures")
+    stand_in.make_figures = make_figures
+    monkeypatch.setitem(sys.modules, "flowborne.validation.figures", stand_in)
+    return asked
+
+
+def test_figures_are_put_into_a_folder(command, figures, tmp_path):
+    code, out, err = command("figures", "--out", "new/one")
+    assert (code, err) == (0, "")
+    assert out == "written: new/one/figure-2.csv\n"
+    assert (tmp_path / "new" / "one" / "figure-2.csv").exists()
+
+
+def test_figures_of_a_run_that_blows_up_end_with_exit_code_1(command, figures):
+    code, out, err = command("figures", "--out", "wild")
+    assert (code, out) == (1, "")
+    assert err == "flowborne: ns-block-effort: frame 3, step 1: the fluid blew up\n"
 
 
 def test_the_command_starts_quickly():

@@ -195,6 +195,23 @@ def bench(
     _report(run_benches(chosen or None, on_result=show), as_json)
 
 
+@app.command()
+def figures(
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
+) -> None:
+    """Put our numbers into the paper's Fig. 2 and Fig. 10: tables and a plot."""
+    _make_folder(out)
+    from flowborne.simulation import BlowUpError
+    from flowborne.validation.figures import make_figures
+
+    try:
+        make_figures(out)
+    except (ArithmeticError, BlowUpError, OSError) as error:
+        _complain(str(error))
+        raise typer.Exit(FAILED) from error
+    print(f"written: {', '.join(str(path) for path in sorted(out.glob('figure-*')))}")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line, then leave with its exit code."""
     for name in BLAS_THREADS:
@@ -230,6 +247,16 @@ def _overrides(settings: list[str]) -> dict[str, str]:
             raise InputError(f"--set {setting} has no KEY=VALUE; write for example fluid.density=1")
         overrides[key.strip()] = value.strip()
     return overrides
+
+
+def _make_folder(path: Path) -> None:
+    """Make a folder if need be. Raises RunFolderError when it cannot be written into."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise RunFolderError(f"{path} cannot be written; name another folder with --out")
 
 
 def _known(asked: list[str], known: Sequence[str], kind: str, option: str) -> list[str]:

@@ -12,10 +12,13 @@ from flowborne.control.executors import Serial
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum
 from flowborne.control.phases import PhaseIntervals
-from flowborne.control.trial import Hypothesis, Trial, TrialError, Trials
+from flowborne.control.trial import Hypothesis, Trial, TrialError, Trials, without_scalars
+from flowborne.coupling import step as stepping
 from flowborne.coupling.motion import Drive
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
+from flowborne.scenes.build import build
+from flowborne.scenes.load import load_scene
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, Drive | None], StepReport]
@@ -123,6 +126,30 @@ def test_trial_starts_from_its_pose_and_leaves_the_world_alone(
     assert values == pytest.approx([0.6, 0.3], abs=1e-14)
     assert trials.evaluations == 2
     assert {name: values.tobytes() for name, values in world.arrays().items()} == before
+
+
+def test_trial_in_a_flow_leaves_it_alone_and_needs_no_dye() -> None:
+    built = build(load_scene("ns-block-drag-max", {"domain.resolution": "16"}))
+    world, controller = built.world, built.controller
+    assert controller is not None
+    for _ in range(3):
+        stepping.step(world, built.frame_time)
+    before = {name: values.tobytes() for name, values in world.arrays().items()}
+    assert world.flow()[1].scalars["dye"].any()
+    trials = controller.trials(world, stepping.step)
+    value = trials.values(np.array([[0.1]]))
+    assert {name: values.tobytes() for name, values in world.arrays().items()} == before
+    dyed = Trial(
+        world,
+        stepping.step,
+        controller.objective,
+        controller.hypothesis,
+        controller.dofs,
+        trials.pose,
+        np.array([0.1]),
+    )
+    assert dyed.run() == value
+    assert without_scalars(world).flow()[1].scalars == {}
 
 
 def test_phases_are_those_of_the_decision(make_world: MakeWorld, step: Step) -> None:

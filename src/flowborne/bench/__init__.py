@@ -15,7 +15,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from flowborne.bench.result import Result
 
-MODULES = {"pressure": "pressure"}
+MODULES = {
+    "pressure": "pressure",
+    "workers": "workers",
+    "chain": "chain",
+    "realtime": "realtime",
+    "parts": "parts",
+    "memory": "memory",
+    "first-run": "first_run",
+}
 """Name of each bench and the module here that holds it, in the order in which they run."""
 
 

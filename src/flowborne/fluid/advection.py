@@ -18,8 +18,8 @@ from flowborne.fluid.jit import kernel
 
 Mask = NDArray[np.uint8]
 
-inlined = njit(inline="always", cache=True)
-"""For what is called at every face: inlined by Numba itself, twice to three times as fast."""
+inlined = njit(forceinline=True, nogil=True, cache=True)
+"""For what is called at every face: inlined by LLVM, which compiles far sooner than by Numba."""
 
 FEW = 1e-3
 """Least weight of valid samples for which they alone are used."""

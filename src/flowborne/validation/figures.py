@@ -11,8 +11,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from flowborne.bench.frames import frame_times
 from flowborne.control.executors import cores
-from flowborne.fluid.jit import parallel_kernels
 from flowborne.io.atomic import write_atomically
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
@@ -35,7 +35,8 @@ def make_figures(out: Path, console: Console | None = None) -> None:
 
     out      folder; made when it is not there
     console  where the tables are printed
-    raises   ArithmeticError when a run blows up, OSError when a file cannot be written
+    raises   ArithmeticError or BlowUpError when a run blows up, OSError when a file cannot be
+             written
     """
     shown = console or Console()
     out.mkdir(parents=True, exist_ok=True)
@@ -94,14 +95,10 @@ def chain_figure(out: Path, console: Console) -> None:
 
 
 def frame_seconds(joints: int, workers: int, frames: int = CHAIN_FRAMES) -> float:
-    """Median time of a frame of ns-chain-`joints`, s."""
-    with (
-        parallel_kernels(False),
-        Simulation(load_scene(f"ns-chain-{joints}"), workers=workers) as simulation,
-    ):
-        simulation.advance_frame()
-        times = [simulation.advance_frame().seconds["total"] for _ in range(frames)]
-    return float(np.median(times))
+    """Median time of a frame of ns-chain-`joints`, s; several workers are processes."""
+    executor = "serial" if workers == 1 else "processes"
+    with Simulation(load_scene(f"ns-chain-{joints}"), workers, executor) as simulation:
+        return float(np.median(frame_times([simulation], frames)))
 
 
 def finish(

@@ -1,0 +1,81 @@
+"""Every bench on a small scene: what it measures, not how fast that is."""
+
+import os
+
+import numpy as np
+import pytest
+
+from flowborne.bench import chain, first_run, memory, parts, realtime, workers
+from flowborne.bench.frames import frame_times
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import PARTS, Simulation
+
+COARSE = {"domain.resolution": "16", "controller.settle_steps": "0"}
+
+
+@pytest.fixture
+def scene(small_scene):
+    """A scene without a fluid."""
+    return load_scene(small_scene)
+
+
+def judged(result, met):
+    """Whether a result says what its figure is worth."""
+    return result.target and result.verdict == ("pass" if met else "fail")
+
+
+def test_simulations_take_turns_and_the_first_frame_is_not_timed(scene):
+    with Simulation(scene, 1) as one, Simulation(scene, 1) as other:
+        times = frame_times([one, other], 3)
+        assert (one.frame, other.frame) == (4, 4)
+    assert times.shape == (2, 3)
+    assert np.all(times > 0.0)
+
+
+def test_workers_are_compared_in_threads_and_in_processes(scene):
+    result = workers.compare(scene, frames=2)
+    assert [line.split()[:2] for line in result.lines[1:]] == [
+        ["two", e] for e in workers.EXECUTORS
+    ]
+    assert result.title.endswith(workers.EXECUTORS)
+    assert judged(result, result.value >= workers.FASTER)
+
+
+def test_chain_of_equal_scenes_costs_a_line(scene):
+    result = chain.straightness([scene, scene], frames=2)
+    assert result.value == pytest.approx(0.0, abs=1e-9)
+    assert result.verdict == "pass"
+    assert len(result.lines) == 3
+    longer = chain.straightness([scene] * 3, frames=2)
+    assert judged(longer, longer.value <= chain.DEVIATION)
+
+
+def test_speed_is_frames_a_second_over_those_shown():
+    result = realtime.speed(load_scene(realtime.SCENE, COARSE), seconds=0.1)
+    assert result.value > 0.0
+    assert "16 x 16 cells" in result.title
+    assert judged(result, result.value >= 1.0)
+
+
+def test_parts_of_a_frame_add_up():
+    result = parts.shares(load_scene(parts.SCENES[0], COARSE), frames=2)
+    assert [line.split()[0] for line in result.lines] == [*PARTS, "rest"]
+    spent = [float(line.split()[1]) for line in result.lines]
+    assert min(spent) >= 0.0
+    assert sum(spent) == pytest.approx(result.value, abs=0.005 * len(spent))
+
+
+def test_memory_of_a_run_does_not_grow():
+    per_cell, growth = memory.footprint(load_scene(memory.SCENE, COARSE), early=3, late=9)
+    assert 100.0 < per_cell.value < 100_000.0
+    assert growth.verdict == "pass", growth
+    assert growth.value > 0.0
+
+
+def test_first_run_keeps_its_kernels_apart(small_scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(first_run, "SCENE", str(small_scene))
+    first, later = first_run.measure()
+    assert judged(first, first.value < first_run.COMPILING)
+    assert judged(later, later.value < first_run.COMPILED)
+    assert first_run.run_once(str(small_scene), tmp_path) > 0.0
+    assert os.listdir(tmp_path / "run")
