@@ -199,7 +199,7 @@ def bench(
 def figures(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
 ) -> None:
-    """Put our numbers into the paper's Fig. 2 and Fig. 10: tables and a plot."""
+    """Our numbers for Figures 2 and 10 of the paper, as tables and a plot."""
     _make_folder(out)
     from flowborne.simulation import BlowUpError
     from flowborne.validation.figures import make_figures

@@ -24,9 +24,11 @@ def test_figures_are_written_and_printed(tmp_path: Path, monkeypatch: pytest.Mon
     figures.make_figures(tmp_path / "new", Console(file=text, width=200))
     with (tmp_path / "new" / "figure-2.csv").open(newline="") as file:
         rows = {row["scene"]: row for row in csv.DictReader(file)}
-    assert rows["ns-block-drag-max"]["frames"] == "29"
+    assert rows["ns-block-drag-max"]["reached in frame"] == "29"
+    assert rows["ns-block-drag-max"]["stays from frame"] == "29"
     assert rows["ns-block-drag-max"]["frames in the paper"] == "56"
-    assert rows["ns-block-effort"]["frames"] == "none"
+    assert rows["ns-block-effort"]["reached in frame"] == "45"
+    assert rows["ns-block-effort"]["stays from frame"] == "never"
     with (tmp_path / "new" / "figure-10.csv").open(newline="") as file:
         serial = [float(row["serial s"]) for row in csv.DictReader(file)]
     assert serial == pytest.approx([0.1, 0.2, 0.3, 0.4])
