@@ -52,8 +52,8 @@ class StepReport:
     viscous_wrench   (nbody, 6) the same of the shear stress
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
     wind_wrench      (nbody, 6) the same of the simple winds
-    iterations       of the pressure solve
-    residual         its true relative residual
+    iterations       of the pressure solves
+    residual         true relative residual of the last of them
     divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
     momentum         the budget
     seconds          where the time went: advection, viscosity, projection, geometry, solids

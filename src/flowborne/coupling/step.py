@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from time import perf_counter
-
 import numpy as np
 
 from flowborne.coupling.flow import carry_fluid, forced, settle_state
@@ -20,26 +18,13 @@ from flowborne.coupling.operators import (
 )
 from flowborne.coupling.report import Momentum, Outcome, StepReport
 from flowborne.coupling.solve import Solved, solve_bodies, solve_together
+from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
 from flowborne.solids.momentum import halfway_momentum
 from flowborne.solids.prescribed import PrescribedSystem, prescribe
 from flowborne.solids.state import SolidState
-
-
-class Stopwatch:
-    """Seconds by part of a step."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._last = perf_counter()
-
-    def lap(self, part: str) -> None:
-        """Book the time since the last lap to `part`."""
-        now = perf_counter()
-        self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
-        self._last = now
 
 
 def step(world: World, dt: float, drive: Drive | None = None) -> StepReport:
@@ -90,7 +75,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     driven = equations(world, before, pose, wind + buoyancy, orders, dt)
     watch.lap("solids")
     # 6. viscosity, pressure, bodies, joints and contact in one solve
-    solved = solve_together(world, velocity, driven, pose, cut, orders.torque_limit, dt)
+    solved = solve_together(world, velocity, driven, pose, cut, orders.torque_limit, dt, watch)
     watch.lap("projection")
     # 7. the new state: it holds the promises of section 6 on the next step's leak-proof field
     assert solved.projected is not None

@@ -1,17 +1,19 @@
 """Implicit viscosity on cut cells, with no-slip bodies that may move freely.
 
-Finite volumes around every face: with mass m = a rho V, links k = mu A_open / h between
-neighbours, and a wall coefficient W where a body is beside the face,
+Finite volumes around every face f: with mass m = a rho V, links k = mu A_open / h to its
+neighbours g, and a wall coefficient W where a body closes a part of the links,
 
-    m (u+ - u*) / dt = sum_g k (u_g - u_f) - W (u_f - b_f) - sum_g k (b_g - b_f)
+    m (u+ - u*) / dt = sum_g k (u_g - u_f) - W (u_f - b)        b = velocity of the body at x_w
 
-b is the body's own rigid velocity at the face. W = sum_g k (d_g - d_f) / d_f with the distance d
-to the wall makes a linear shear exact; the last sum, over the same links as the first, makes a
-rigid rotation of body and fluid together exact. What the wall term takes from the fluid it gives
-to the body, and that is the whole moment of the stress mu (grad u + grad u^T): on a no-slip wall
-the part of the rotation itself cancels between the two gradients. Bodies enter through their
-six-component velocity s = s* + M (impulse), so the system for u alone stays symmetric positive
-definite with a low-rank term (Robinson-Mosher, Schroeder and Fedkiw 2011 do the same by hand).
+The open links leave  n = sum_g k (x_g - x_f)  behind, mu times the wall's area along its normal.
+W = sum_g k (d_g - d_f) / d_f with the distance d to the wall makes a linear shear exact, and the
+wall point  x_w = x_f - n / W  makes a rigid rotation of body and fluid together exact; n / W is
+the distance along the normal, and the wall's friction acts on the body at x_w.
+
+That friction belongs to the stress mu grad u. What mu (grad u)^T adds sums up to a couple on each
+body that the fluid does not feel: on a no-slip wall the whole stress is mu times the normal
+derivative of the velocity relative to the body, its rotation taken off, or  W (u_f - b_f)  with
+the body's velocity at x_f. A body of volume V and spin w feels  -2 mu V w  besides.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryNoSlip
@@ -32,18 +35,29 @@ Integers = NDArray[np.int64]
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
 
+TOUCHING = 1e-3
+"""Faces whose centres are not farther than this from a body move with it, cells."""
+
+SIDE_MASS = 0.75
+"""Part of the mass of the faces along a no-slip or inflow side that its friction slows down: what
+lies nearer to them than to the side. With it a parabola is exact."""
+
+OBLIQUE = 0.5
+"""Least cosine between a wall's area and its normal: bounds x_w where the cells are too coarse."""
+
 
 @dataclass
 class ViscousFaces:
     """The viscous system of the faces across one axis; arrays have the shape of the faces.
 
     kind      INACTIVE, UNKNOWN, GIVEN or TIED
-    mass      m / dt, kg/s
-    diagonal  m / dt + sum of links + W, kg/s
+    mass      m / dt, kg/s; see SIDE_MASS
+    diagonal  m / dt + sum of links + W of unknowns, else 0, kg/s
     links     (3, ...) k to the next face along each axis, between unknowns, kg/s
     given     force of neighbours and sides with prescribed velocity, N
-    wall      W, kg/s
-    turning   (..., 3) sum_g k (b_g - b_f) for unit rotation about x, y, z, kg m/s
+    beside    (n,) flat indices of the unknowns beside a body
+    wall      (n,) W, kg/s
+    gap       (n, 3) x_f - x_w of each, m
     """
 
     kind: NDArray[np.uint8]
@@ -51,46 +65,39 @@ class ViscousFaces:
     diagonal: Array
     links: Array
     given: Array
+    beside: Integers
     wall: Array
-    turning: Array
-
-
-@kernel
-def centre_distance(distance: Array, axis: int, i: int, j: int, k: int) -> float:
-    """Distance to the nearest body at the centre of a face: mean of its corners."""
-    dj, dk = (1, 1) if axis == 0 else ((0, 1) if axis == 1 else (1, 0))
-    di = 0 if axis == 0 else 1
-    if axis == 0:
-        return 0.25 * (
-            distance[i, j, k]
-            + distance[i, j + dj, k]
-            + distance[i, j, k + dk]
-            + distance[i, j + dj, k + dk]
-        )
-    return 0.25 * (
-        distance[i, j, k]
-        + distance[i + di, j, k]
-        + distance[i, j + dj, k + dk]
-        + distance[i + di, j + dj, k + dk]
-    )
+    gap: Array
 
 
 @kernel
 def face_distances(distance: Array, axis: int, out: Array) -> None:
-    """Distance at the centres of all faces across `axis`."""
-    for i in range(out.shape[0]):
+    """Distance to the nearest body at the centres of the faces across `axis`: mean of corners."""
+    ai, aj = int(axis != 0), int(axis == 0)
+    bj, bk = int(axis == 2), int(axis != 2)
+    for i in prange(out.shape[0]):
         for j in range(out.shape[1]):
             for k in range(out.shape[2]):
-                out[i, j, k] = centre_distance(distance, axis, i, j, k)
+                out[i, j, k] = 0.25 * (
+                    distance[i, j, k]
+                    + distance[i + ai, j + aj, k]
+                    + distance[i, j + bj, k + bk]
+                    + distance[i + ai, j + aj + bj, k + bk]
+                )
 
 
 @kernel
 def classify(
-    kind: NDArray[np.uint8], opened: Array, distance: Array, axis: int, codes: Integers
+    kind: NDArray[np.uint8],
+    opened: Array,
+    distance: Array,
+    axis: int,
+    codes: Integers,
+    touching: float,
 ) -> None:
     """Kind of every face across `axis`; `distance` is at the faces."""
     last = kind.shape[axis] - 1
-    for i in range(kind.shape[0]):
+    for i in prange(kind.shape[0]):
         for j in range(kind.shape[1]):
             for k in range(kind.shape[2]):
                 at = i if axis == 0 else (j if axis == 1 else k)
@@ -101,7 +108,7 @@ def classify(
                     kind[i, j, k] = GIVEN
                 elif at == last and codes[axis, 1] == PERIODIC:
                     kind[i, j, k] = INACTIVE
-                elif distance[i, j, k] <= 0.0:
+                elif distance[i, j, k] <= touching:
                     kind[i, j, k] = TIED
 
 
@@ -131,110 +138,107 @@ def aperture(
 
 
 @kernel
+def following(at: int, count: int, periodic: bool) -> int:
+    """Index after `at` among `count` distinct faces; -1 beyond the domain."""
+    if at + 1 < count:
+        return at + 1
+    return 0 if periodic else -1
+
+
+@kernel
 def link_faces(
     axis: int,
     d: int,
     kind: NDArray[np.uint8],
     opened: Array,
     across: Array,
-    phi: Array,
     velocity: Array,
     stiffness: float,
-    spacing: float,
-    slope: Array,
     diagonal: Array,
     link: Array,
     given: Array,
-    turning: Array,
-    codes: Integers,
+    periodic: bool,
 ) -> None:
     """Add the links along d to the system of the faces across `axis`.
 
-    stiffness  mu A / h, kg/s;  slope  gathers sum_g k (d_g - d_f)
+    stiffness  mu A / h, kg/s
+    periodic   whether the domain is along d
     """
-    ni, nj, nk = kind.shape
-    ei, ej, ek = int(d == 0), int(d == 1), int(d == 2)
     last = kind.shape[axis] - 1
-    periodic = codes[d, 0] == PERIODIC
-    ahead = kind.shape[d] - 1 if d == axis else kind.shape[d]
-    wrap_axis = codes[axis, 0] == PERIODIC
-    for i in range(ni):
-        for j in range(nj):
-            for k in range(nk):
-                at = i if d == 0 else (j if d == 1 else k)
-                gi, gj, gk = i + ei, j + ej, k + ek
-                if at == ahead - 1 and periodic:
-                    gi, gj, gk = (
-                        i - ei * (ahead - 1),
-                        j - ej * (ahead - 1),
-                        k - ek * (ahead - 1),
-                    )
-                elif gi >= ni or gj >= nj or gk >= nk:
-                    continue
-                if d == axis and wrap_axis and at >= ahead:
-                    continue
-                f, g = kind[i, j, k], kind[gi, gj, gk]
-                if f in (INACTIVE, TIED) or g in (INACTIVE, TIED):
-                    continue
-                if f == GIVEN and g == GIVEN:
-                    continue
-                coefficient = stiffness * aperture(opened, across, axis, d, i, j, k, last)
-                rise = phi[gi, gj, gk] - phi[i, j, k]
-                if f == UNKNOWN:
-                    diagonal[i, j, k] += coefficient
-                    slope[i, j, k] += coefficient * rise
-                    turn(turning, i, j, k, axis, d, coefficient * spacing)
-                if g == UNKNOWN:
-                    diagonal[gi, gj, gk] += coefficient
-                    slope[gi, gj, gk] -= coefficient * rise
-                    turn(turning, gi, gj, gk, axis, d, -coefficient * spacing)
-                if f == UNKNOWN and g == UNKNOWN:
-                    link[i, j, k] = coefficient
-                elif f == UNKNOWN:
-                    given[i, j, k] += coefficient * velocity[gi, gj, gk]
-                else:
-                    given[gi, gj, gk] += coefficient * velocity[i, j, k]
-
-
-@kernel
-def turn(turning: Array, i: int, j: int, k: int, axis: int, d: int, step: float) -> None:
-    """Add what a step along d changes in component `axis` of a unit rotation about each axis."""
-    if axis == 0:
-        if d == 2:
-            turning[i, j, k, 1] += step
-        elif d == 1:
-            turning[i, j, k, 2] -= step
-    elif axis == 1:
-        if d == 2:
-            turning[i, j, k, 0] -= step
-        elif d == 0:
-            turning[i, j, k, 2] += step
-    elif d == 1:
-        turning[i, j, k, 0] += step
-    elif d == 0:
-        turning[i, j, k, 1] -= step
-
-
-@kernel
-def finish_walls(
-    kind: NDArray[np.uint8],
-    phi: Array,
-    slope: Array,
-    wall: Array,
-    diagonal: Array,
-    turning: Array,
-    near: float,
-) -> None:
-    """Wall coefficients from slopes, where a body is within `near`; elsewhere no turning."""
+    count = kind.shape[d] - int(periodic and d == axis)
     for i in range(kind.shape[0]):
         for j in range(kind.shape[1]):
             for k in range(kind.shape[2]):
-                beside = kind[i, j, k] == UNKNOWN and phi[i, j, k] < near
-                if beside and slope[i, j, k] > 0.0:
-                    wall[i, j, k] = slope[i, j, k] / phi[i, j, k]
-                    diagonal[i, j, k] += wall[i, j, k]
-                if not beside:
-                    turning[i, j, k, :] = 0.0
+                at = i if d == 0 else (j if d == 1 else k)
+                to = following(at, count, periodic)
+                if at >= count or to < 0:
+                    continue
+                g = to if d == 0 else i, to if d == 1 else j, to if d == 2 else k
+                here, there = kind[i, j, k] == UNKNOWN, kind[g] == UNKNOWN
+                known = kind[i, j, k] == GIVEN or kind[g] == GIVEN
+                if not ((here and there) or (known and (here or there))):
+                    continue
+                coefficient = stiffness * aperture(opened, across, axis, d, i, j, k, last)
+                if here:
+                    diagonal[i, j, k] += coefficient
+                if there:
+                    diagonal[g] += coefficient
+                if here and there:
+                    link[i, j, k] = coefficient
+                elif here:
+                    given[i, j, k] += coefficient * velocity[g]
+                else:
+                    given[g] += coefficient * velocity[i, j, k]
+
+
+@kernel
+def meet_walls(
+    axis: int,
+    kind: NDArray[np.uint8],
+    opened: Faces,
+    phi: Array,
+    stiffness: float,
+    spacing: float,
+    codes: Integers,
+    beside: Integers,
+    wall: Array,
+    gap: Array,
+) -> None:
+    """Wall coefficient and x_f - x_w of the faces `beside`; both 0 where no link is cut.
+
+    beside  (n,) flat indices of unknown faces across `axis`
+    """
+    last = kind.shape[axis] - 1
+    area = np.zeros(3)
+    for n in range(beside.size):
+        f = beside[n]
+        i = f // (kind.shape[1] * kind.shape[2])
+        j, k = (f // kind.shape[2]) % kind.shape[1], f % kind.shape[2]
+        slope = 0.0
+        area[:] = 0.0
+        for d in range(2 if opened[0].shape[2] == 1 else 3):
+            periodic = codes[d, 0] == PERIODIC
+            count = kind.shape[d] - int(periodic and d == axis)
+            at = i if d == 0 else (j if d == 1 else k)
+            for side in (-1, 1):
+                to = at + side
+                if to < 0 or to >= count:
+                    if not periodic:
+                        continue
+                    to = (to + count) % count
+                g = to if d == 0 else i, to if d == 1 else j, to if d == 2 else k
+                link = 0.0
+                if kind[g] == UNKNOWN or kind[g] == GIVEN:
+                    low = g if side < 0 else (i, j, k)
+                    link = stiffness * aperture(
+                        opened[axis], opened[d], axis, d, low[0], low[1], low[2], last
+                    )
+                area[d] -= side * spacing * (stiffness - link)
+                slope += link * (phi[g] - phi[i, j, k])
+        size = np.sqrt((area**2).sum())
+        if size > 0.0:
+            wall[n] = max(slope, OBLIQUE * size) / phi[i, j, k]
+            gap[n] = area / wall[n]
 
 
 def assemble_viscosity(
@@ -255,28 +259,23 @@ def assemble_viscosity(
     time      s, of the sides' prescribed velocities
     """
     codes = side_codes(boundaries)
-    stiffness = viscosity * grid.face_area / grid.spacing
+    periodic = boundaries.periodic()
+    h = grid.spacing
+    stiffness = viscosity * grid.face_area / h
     systems = []
     for axis in grid.axes:
         shape = grid.face_shape(axis)
-        kind = np.empty(shape, np.uint8)
-        phi = np.empty(shape)
+        kind, phi = np.empty(shape, np.uint8), np.empty(shape)
         face_distances(distance, axis, phi)
-        classify(kind, opened[axis], phi, axis, codes)
+        classify(kind, opened[axis], phi, axis, codes, TOUCHING * h)
         mass = density * grid.cell_volume / dt * opened[axis]
         for end, layer in ((0, 0), (1, -1)):
             if codes[axis, end] == OPEN:
                 mass[edge(axis, layer)] *= 0.5
-        system = ViscousFaces(
-            kind,
-            mass,
-            mass.copy(),
-            np.zeros((3, *shape)),
-            np.zeros(shape),
-            np.zeros(shape),
-            np.zeros((*shape, 3)),
-        )
-        slope = np.zeros(shape)
+        friction, given = stick_to_sides(kind, stiffness, grid, boundaries, axis, time)
+        mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
+        diagonal = np.where(kind == UNKNOWN, mass + friction, 0.0)
+        links = np.zeros((3, *shape))
         for d in grid.axes:
             link_faces(
                 axis,
@@ -284,30 +283,42 @@ def assemble_viscosity(
                 kind,
                 opened[axis],
                 opened[d],
-                phi,
                 velocity[axis],
                 stiffness,
-                grid.spacing,
-                slope,
-                system.diagonal,
-                system.links[d],
-                system.given,
-                system.turning,
-                codes,
+                diagonal,
+                links[d],
+                given,
+                periodic[d],
             )
-            if d != axis:
-                for end, side in enumerate(boundaries.pair(d)):
-                    if isinstance(side, (BoundaryInflow, BoundaryNoSlip)):
-                        layer_index = edge(d, -1 if end else 0)
-                        wall = wall_velocity(side, grid, d, bool(end), axis, time)
-                        if isinstance(wall, np.ndarray):
-                            wall = wall[edge(d, 0)]
-                        unknown = kind[layer_index] == UNKNOWN
-                        coefficient = 2.0 * stiffness * unknown
-                        system.diagonal[layer_index] += coefficient
-                        system.given[layer_index] += coefficient * wall
-        finish_walls(
-            kind, phi, slope, system.wall, system.diagonal, system.turning, 2.0 * grid.spacing
-        )
-        systems.append(system)
+        beside = np.flatnonzero((kind == UNKNOWN) & (phi < 2.0 * h))
+        wall, gap = np.zeros(beside.size), np.zeros((beside.size, 3))
+        meet_walls(axis, kind, opened, phi, stiffness, h, codes, beside, wall, gap)
+        cut = wall > 0.0
+        beside, wall, gap = beside[cut], wall[cut], gap[cut]
+        diagonal.reshape(-1)[beside] += wall
+        systems.append(ViscousFaces(kind, mass, diagonal, links, given, beside, wall, gap))
     return systems
+
+
+def stick_to_sides(
+    kind: NDArray[np.uint8],
+    stiffness: float,
+    grid: Grid,
+    boundaries: Boundaries,
+    axis: int,
+    time: float,
+) -> tuple[Array, Array]:
+    """Friction of the domain's sides on the faces across `axis`, kg/s, and the force of moving
+    ones, N."""
+    friction, given = np.zeros(kind.shape), np.zeros(kind.shape)
+    for d in grid.axes:
+        for end, side in enumerate(boundaries.pair(d)):
+            if d != axis and isinstance(side, (BoundaryInflow, BoundaryNoSlip)):
+                layer = edge(d, -1 if end else 0)
+                wall = wall_velocity(side, grid, d, bool(end), axis, time)
+                if isinstance(wall, np.ndarray):
+                    wall = wall[edge(d, 0)]
+                coefficient = 2.0 * stiffness * (kind[layer] == UNKNOWN)
+                friction[layer] += coefficient
+                given[layer] += coefficient * wall
+    return friction, given

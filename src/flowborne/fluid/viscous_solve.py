@@ -1,220 +1,277 @@
-"""The viscous system over all components and bodies, and its solution (see `viscosity`)."""
+"""The viscous system over all components and bodies, and its solution (see `viscosity`).
+
+With B the velocity of the wall points and C the couple of the bodies' own rotation,
+
+    (m/dt + L + W) u - W B s = m u*/dt + given          s = s* + M dt (B^T W (u - B s) - C s)
+
+where L are the links and M the twists that unit wrench impulses give. Tied faces, whose velocity is
+B s, count among the walls with the weight m/dt. The bodies are eliminated exactly,
+
+    s = s* + N dt (B^T W (u - B s*) - C s*)             N = (M^-1 + dt (B^T W B + C))^-1
+
+and what is left for u is symmetric positive definite, with a term of low rank (Robinson-Mosher,
+Schroeder and Fedkiw 2011 do the same).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.conjugate_gradients import descend, dot, turn
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.jit import kernel
-from flowborne.fluid.viscosity import TIED, UNKNOWN, ViscousFaces
+from flowborne.fluid.viscosity import TIED, ViscousFaces
 
 Integers = NDArray[np.int64]
 
 
+WIDTH = 256
+"""Faces in a row of the vectors of the conjugate gradients."""
+
+ROUNDING = 1e-15
+"""Relative size of residuals, in the matrix scaled to a diagonal of 1, that are rounding errors."""
+
+MOST = 20
+"""Iterations for each cell along the longest edge of the domain, at most; and at least as many as
+for a domain of MOST cells."""
+
+
 @kernel
-def apply_component(
-    out: Array,
-    x: Array,
-    kind: NDArray[np.uint8],
-    diagonal: Array,
-    links: Array,
-    wraps: Integers,
-) -> None:
-    """out = diagonal x - sum of links to neighbours, for one component.
+def apply_component(out: Array, x: Array, scale: Array, links: Array, wraps: Integers) -> None:
+    """out = x - scale sum of links (scale x) of the neighbours, for one component.
 
     wraps  (3,) number of distinct faces along each axis where the domain is periodic, else 0
     """
-    ni, nj, nk = kind.shape
-    for i in range(ni):
+    _, ni, nj, nk = links.shape
+    steps = nj * nk, nk, 1
+    link = links.reshape(3, -1)
+    for plane in prange(ni):
+        i = np.int64(plane)
         for j in range(nj):
             for k in range(nk):
-                out[i, j, k] = diagonal[i, j, k] * x[i, j, k] if kind[i, j, k] == UNKNOWN else 0.0
-    for d in range(3):
-        ei, ej, ek = int(d == 0), int(d == 1), int(d == 2)
-        for i in range(ni):
-            for j in range(nj):
-                for k in range(nk):
-                    coefficient = links[d, i, j, k]
-                    if coefficient == 0.0:
-                        continue
-                    gi, gj, gk = i + ei, j + ej, k + ek
+                f = i * steps[0] + j * steps[1] + k
+                total = 0.0
+                for d in range(3):
                     at = i if d == 0 else (j if d == 1 else k)
-                    if wraps[d] and at == wraps[d] - 1:
-                        gi, gj, gk = i - ei * at, j - ej * at, k - ek * at
-                    out[i, j, k] -= coefficient * x[gi, gj, gk]
-                    out[gi, gj, gk] -= coefficient * x[i, j, k]
+                    around = steps[d] * (wraps[d] - 1)
+                    if link[d, f] != 0.0:
+                        g = f - around if at + 1 == wraps[d] else f + steps[d]
+                        total += link[d, f] * scale[g] * x[g]
+                    if at != wraps[d]:
+                        g = f - steps[d] if at > 0 else f + around
+                        total += link[d, g] * scale[g] * x[g]
+                out[f] = x[f] - scale[f] * total
 
 
 @dataclass(frozen=True)
 class Walls:
-    """Faces beside bodies, listed over all components.
+    """Faces beside bodies and faces tied to one, listed over all components.
 
     index   (n,) position among the concatenated faces
-    body    (n,) the body beside the face
-    arm     (n, 6) velocity of the face for each component of that body's twist
+    tied    (n,) whether the face moves with the body
+    weight  (n,) W, or m/dt of tied faces, kg/s
+    body    (n,) the body
+    across  (n, 3) unit vector of the axis that the face is across
+    point   (n, 3) wall point, or centre of the tied face, m
+    gap     (n, 3) from there to the centre of the face, m
     """
 
     index: Integers
+    tied: NDArray[np.bool_]
+    weight: Array
     body: Integers
-    arm: Array
+    across: Array
+    point: Array
+    gap: Array
+
+    def arms(self) -> Array:
+        """(n, 6) velocity of the points along their axes for each component of a twist."""
+        return np.concatenate([self.across, np.cross(self.point, self.across)], axis=1)
+
+    def couples(self, bodies: int) -> Array:
+        """(bodies, 3, 3) C: couple that each body feels for unit spin about each axis, N m s.
+
+        Friction in proportion to the velocity relative to the body at the face, instead of that
+        at the wall point, is larger by this; about any point for a closed surface, else about
+        the middle of its wall points. Symmetric but for the coarseness of the cells, and made so.
+        """
+        couples = np.zeros((bodies, 3, 3))
+        for body in np.unique(self.body):
+            own = self.body == body
+            point, across, gap = self.point[own], self.across[own], self.gap[own]
+            lever = np.cross(point - point.mean(axis=0), across)
+            couple = (self.weight[own, None] * lever).T @ np.cross(gap, across)
+            share, axes = np.linalg.eigh(0.5 * (couple + couple.T))
+            couples[body] = (axes * np.maximum(share, 0.0)) @ axes.T
+        return couples
 
 
-def wall_faces(systems: list[ViscousFaces], nearest: Integers, grid: Grid) -> Walls:
-    """Faces with a wall coefficient and faces tied to a body.
+def walls_of(systems: list[ViscousFaces], distance: Array, nearest: Integers, grid: Grid) -> Walls:
+    """The wall faces of all components.
 
-    nearest  (nx+1, ny+1, nz+1) nearest body at the nodes
+    distance  (nx+1, ny+1, nz+1) to the nearest body at the nodes, m
+    nearest   (nx+1, ny+1, nz+1) that body
     """
-    index, body, arm = [], [], []
+    parts = []
     first = 0
     for axis, system in zip(grid.axes, systems, strict=True):
-        beside = (system.wall > 0.0) | (system.kind == TIED)
-        at = np.nonzero(beside)
-        coordinates = grid.face_coordinates(axis)
-        places = np.stack([coordinates[d][at[d]] for d in range(3)], axis=1)
-        if grid.is_slab:
-            places[:, 2] = 0.0
-        direction = np.zeros(3)
-        direction[axis] = 1.0
-        index.append(first + np.flatnonzero(beside))
-        body.append(nearest[at])
-        unit = np.broadcast_to(direction, places.shape)
-        arm.append(np.concatenate([unit, np.cross(places, direction)], axis=1))
+        parts.append(walls_across(axis, first, system, distance, nearest, grid))
         first += system.kind.size
-    return Walls(np.concatenate(index), np.concatenate(body), np.concatenate(arm))
+    names = [field.name for field in fields(Walls)]
+    return Walls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def columns_of(body: Integers) -> Integers:
-    """(n, 6) places of each entry's body components in the concatenated twist."""
-    return 6 * body[:, None] + np.arange(6)
+def walls_across(
+    axis: int, first: int, system: ViscousFaces, distance: Array, nearest: Integers, grid: Grid
+) -> Walls:
+    """The wall faces across `axis`; each belongs to the body nearest to one of its corners.
+
+    first  position of the component among the concatenated faces
+    """
+    moved = np.flatnonzero(system.kind == TIED)
+    index = np.concatenate([system.beside, moved])
+    at = np.stack(np.unravel_index(index, system.kind.shape), axis=1)
+    coordinates = grid.face_coordinates(axis)
+    centre = np.stack([coordinates[d][at[:, d]] for d in range(3)], axis=1)
+    if grid.is_slab:
+        centre[:, 2] = 0.0
+    gap = np.concatenate([system.gap, np.zeros((moved.size, 3))])
+    one, other = np.delete(np.eye(3, dtype=np.int64), axis, 0)
+    corners = np.stack([at, at + one, at + other, at + one + other])
+    which = np.argmin(distance[tuple(np.moveaxis(corners, -1, 0))], axis=0)
+    corner = corners[which, np.arange(index.size)]
+    return Walls(
+        index=first + index,
+        tied=np.arange(index.size) >= system.beside.size,
+        weight=np.concatenate([system.wall, system.mass.reshape(-1)[moved]]),
+        body=nearest[tuple(corner.T)],
+        across=np.tile(np.eye(3)[axis], (index.size, 1)),
+        point=centre - gap,
+        gap=gap,
+    )
 
 
 class ViscousSystem:
     """The assembled system over all components and bodies.
 
     systems   of each component (see `assemble_viscosity`)
-    nearest   (nx+1, ny+1, nz+1) nearest body at the nodes
-    response  (6 nb, 6 nb) M: twist that a unit wrench impulse gives, 1/kg; None without bodies
+    walls     of all components (see `walls_of`)
+    response  (6 nb, 6 nb) M, 1/kg
     """
 
     def __init__(
         self,
         systems: list[ViscousFaces],
-        nearest: Integers,
-        response: Array | None,
+        walls: Walls,
+        response: Array,
         grid: Grid,
         boundaries: Boundaries,
         dt: float,
     ) -> None:
-        self.systems, self.grid, self.dt = systems, grid, dt
+        self.systems, self.walls, self.grid, self.dt = systems, walls, grid, dt
         periodic = boundaries.periodic()
         self.wraps = np.array([n if p else 0 for n, p in zip(grid.shape, periodic, strict=True)])
-        self.kind = np.concatenate([system.kind.ravel() for system in systems])
-        self.unknown = self.kind == UNKNOWN
         self.diagonal = np.concatenate([system.diagonal.ravel() for system in systems])
-        self.walls = wall_faces(systems, nearest, grid)
-        place = self.walls.index
-        wall = np.concatenate([system.wall.ravel() for system in systems])[place]
-        mass = dt * np.concatenate([system.mass.ravel() for system in systems])[place]
-        self.tied = self.kind[place] == TIED
-        self.weight = np.where(self.tied, mass / dt, wall)
-        self.columns = columns_of(self.walls.body)
-        size = 6 * (int(self.walls.body.max()) + 1) if place.size else 6
-        self.size = size if response is None else response.shape[0]
-        drag = np.zeros((self.size, self.size))
-        blocks = dt * self.weight[:, None, None] * self.walls.arm[:, :, None]
-        rows = self.columns[:, :, None], self.columns[:, None, :]
-        np.add.at(drag, rows, blocks * self.walls.arm[:, None, :])
-        self.response = np.zeros_like(drag) if response is None else response
-        self.share = np.linalg.inv(np.eye(self.size) + self.response @ drag)
-        self.low_rank = dt * self.share @ self.response
-        self.drag = drag
+        unknown = self.diagonal > 0.0
+        self.scale = np.where(unknown, 1.0 / np.sqrt(np.where(unknown, self.diagonal, 1.0)), 0.0)
+        self.most = MOST * max(MOST, *grid.shape)
+        self.arm = walls.arms()
+        self.columns = 6 * walls.body[:, None] + np.arange(6)
+        self.couple, drag = np.zeros_like(response), np.zeros_like(response)
+        for body, couple in enumerate(walls.couples(len(response) // 6)):
+            twist, spin = slice(6 * body, 6 * body + 6), slice(6 * body + 3, 6 * body + 6)
+            own = walls.body == body
+            self.couple[spin, spin] = couple
+            drag[twist, twist] = (walls.weight[own, None] * self.arm[own]).T @ self.arm[own]
+        drag += self.couple
+        self.answer = Answer(response, dt * drag)
+        self.yielding = self.answer.compliance()
 
-    def wrench(self, velocity: Array, tied: bool) -> Array:
-        """(6 nb,) sum of weight x velocity x arm over the tied or the other wall faces, N."""
-        chosen = self.tied == tied
-        total = np.zeros(self.size)
-        force = (self.weight * velocity[self.walls.index])[chosen, None] * self.walls.arm[chosen]
-        np.add.at(total, self.columns[chosen], force)
-        return total
+    def force(self, velocity: Array, twist: Array, tied: bool = True) -> Array:
+        """(6 nb,) wrench B^T W (u - B s) on every body, N and N m.
 
-    def at_faces(self, twist: Array) -> Array:
-        """(n,) rigid velocity of the bodies at the wall faces, m/s."""
-        return np.einsum("nm,nm->n", self.walls.arm, twist[self.columns])
+        velocity  over the concatenated faces, m/s;  twist  (6 nb,) s
+        tied      whether tied faces count
+        """
+        walls = self.walls
+        relative = velocity[walls.index] - self.at_walls(twist)
+        pull = walls.weight * relative * (tied | ~walls.tied)
+        wrench = (pull[:, None] * self.arm).ravel()
+        return np.asarray(np.bincount(self.columns.ravel(), wrench, minlength=twist.size), float)
+
+    def at_walls(self, twist: Array) -> Array:
+        """(n,) B s: velocity of the bodies at the wall faces, m/s."""
+        return np.einsum("nm,nm->n", self.arm, twist[self.columns])
+
+    def drawn(self, twist: Array) -> Array:
+        """(n,) W B s: force of the bodies' motion on the wall faces, N; none on tied ones."""
+        return np.where(self.walls.tied, 0.0, self.walls.weight * self.at_walls(twist))
 
     def apply(self, x: Array) -> Array:
-        """The matrix times x over the concatenated faces."""
-        out = np.empty_like(x)
+        """The matrix with the bodies eliminated, scaled to a diagonal of 1, times x (see
+        `spread`)."""
+        out = np.zeros_like(x)
+        product, given = out.reshape(-1), x.reshape(-1)
         first = 0
         for system in self.systems:
-            shape, count = system.kind.shape, system.kind.size
-            part = slice(first, first + count)
-            apply_component(
-                out[part].reshape(shape),
-                x[part].reshape(shape),
-                system.kind,
-                system.diagonal,
-                system.links,
-                self.wraps,
-            )
-            first += count
-        if self.low_rank.any():
-            back = self.low_rank @ self.wrench(x, tied=False)
-            pull = np.where(self.tied, 0.0, self.weight * self.at_faces(back))
-            out[self.walls.index] -= pull
+            part = slice(first, first + system.kind.size)
+            apply_component(product[part], given[part], self.scale[part], system.links, self.wraps)
+            first += system.kind.size
+        if self.yielding.any():
+            still = np.zeros(len(self.yielding))
+            wrench = self.force(self.scale * given[: self.scale.size], still, tied=False)
+            at = self.walls.index
+            product[at] -= self.scale[at] * self.drawn(self.dt * self.yielding @ wrench)
         return out
 
-    def solve(self, velocity: Faces, twist: Array, tolerance: float) -> tuple[Faces, Array, int]:
+    def solve(self, velocity: Faces, twist: Array, tolerance: float) -> tuple[Faces, Array, bool]:
         """Velocity after viscosity, and the impulse that it gave to each body.
 
         velocity   Faces u*, m/s
         twist      (6 nb,) s*: the bodies' twists without this impulse
         tolerance  relative residual
-        returns    Faces; (6 nb,) wrench impulse about the origin, N s and N m s; iterations
+        returns    Faces; (6 nb,) wrench impulse about the origin, N s and N m s; whether the
+                   residual was reached
         """
         start = np.concatenate([velocity[axis].ravel() for axis in self.grid.axes])
         mass = np.concatenate([system.mass.ravel() for system in self.systems])
         given = np.concatenate([system.given.ravel() for system in self.systems])
-        turning = np.concatenate([system.turning.reshape(-1, 3) for system in self.systems])
-        carried = self.dt * self.wrench(start, tied=True)
-        rest = self.share @ (twist + self.response @ carried)
-        expected = rest + self.low_rank @ self.wrench(start, tied=False)
-        rhs = np.where(self.unknown, mass * start + given, 0.0)
-        rhs[self.walls.index] += np.where(self.tied, 0.0, self.weight * self.at_faces(rest))
-        spin = expected[self.columns[:, 3:]]
-        turn_force = np.einsum("nm,nm->n", turning[self.walls.index], spin)
-        rhs[self.walls.index] -= np.where(self.tied, 0.0, turn_force)
-        x, iterations = self._conjugate_gradients(
-            rhs, np.where(self.unknown, start, 0.0), tolerance
-        )
-        after = rest + self.low_rank @ self.wrench(x, tied=False)
-        impulse = self.dt * self.wrench(x, tied=False) + carried - self.drag @ after
-        result = np.where(self.unknown, x, start)
-        fixed = self.walls.index[self.tied]
-        result[fixed] = self.at_faces(after)[self.tied]
-        return self._split(result, velocity), impulse, iterations
+        unknown = self.diagonal > 0.0
+        rhs = np.where(unknown, mass * start + given, 0.0)
+        known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist))[0]
+        rhs[self.walls.index] += self.drawn(twist + known)
+        x, converged = self._conjugate_gradients(rhs, np.where(unknown, start, 0.0), tolerance)
+        result = np.where(unknown, x, start)
+        change, impulse = self.answer.to(self.push(result, twist))
+        tied = self.walls.tied
+        result[self.walls.index[tied]] = self.at_walls(twist + change)[tied]
+        return self._split(result, velocity), impulse, converged
 
-    def _conjugate_gradients(self, rhs: Array, x: Array, tolerance: float) -> tuple[Array, int]:
-        inverse = np.where(self.unknown, 1.0 / np.where(self.unknown, self.diagonal, 1.0), 0.0)
-        residual = rhs - self.apply(x)
-        goal = tolerance * np.sqrt(rhs @ (inverse * rhs))
-        direction = inverse * residual
-        norm = residual @ direction
-        iterations = 0
-        while np.sqrt(norm) > goal and iterations < 10 * int(np.sqrt(rhs.size)) + 100:
+    def push(self, velocity: Array, twist: Array) -> Array:
+        """(6 nb,) impulse on bodies that keep their twist, dt (B^T W (u - B s) - C s)."""
+        return np.asarray(self.dt * (self.force(velocity, twist) - self.couple @ twist))
+
+    def _conjugate_gradients(self, rhs: Array, x: Array, tolerance: float) -> tuple[Array, bool]:
+        """Solution from the guess x, and whether the residual is within the tolerance."""
+        y, right = spread(x * np.sqrt(self.diagonal)), spread(self.scale * rhs)
+        residual = right - self.apply(y)
+        direction = np.zeros_like(y)
+        goal = max(tolerance**2 * dot(right, right), ROUNDING**2 * dot(y, y))
+        square, beta, iterations = dot(residual, residual), 0.0, 0
+        while square > goal and iterations < self.most:
+            turn(direction, residual, beta)
             image = self.apply(direction)
-            step = norm / (direction @ image)
-            x = x + step * direction
-            residual = residual - step * image
-            scaled = inverse * residual
-            previous, norm = norm, residual @ scaled
-            direction = scaled + norm / previous * direction
+            step = square / dot(direction, image)
+            before, square = square, descend(y, residual, direction, image, step)
+            beta = square / before
             iterations += 1
-        return x, iterations
+        return self.scale * y.reshape(-1)[: x.size], bool(square <= goal)
 
     def _split(self, values: Array, like: Faces) -> Faces:
         """Concatenated components as faces; periodic ends joined; a slab's z as it was."""
@@ -228,3 +285,43 @@ class ViscousSystem:
                 parts[axis][edge(axis, -1)] = parts[axis][edge(axis, 0)]
             first += count
         return parts[0], parts[1], parts[2]
+
+
+def spread(values: Array) -> Array:
+    """A vector over the concatenated faces in rows of WIDTH, filled up with zeros."""
+    rows = np.zeros((-(-values.size // WIDTH), 1, WIDTH))
+    rows.reshape(-1)[: values.size] = values
+    return rows
+
+
+class Answer:
+    """How bodies answer friction that grows with their velocity, however large M or the drag are.
+
+    With M = R R^T the drag D and  z = (1 + R^T D R)^-1 R^T J0,  an impulse J0 on bodies that keep
+    their twist is  J = J0 - D R z  on bodies that change theirs by R z. J is taken from z where the
+    bodies can move, which is free of the cancellation in J0 - D R z.
+
+    response  (k, k) M, positive semidefinite, 1/kg
+    drag      (k, k) D, positive semidefinite, kg
+    """
+
+    def __init__(self, response: Array, drag: Array) -> None:
+        share, axes = np.linalg.eigh(response)
+        moving = share > ROUNDING * len(share) * np.abs(share).max()
+        self.root = axes[:, moving] * np.sqrt(share[moving])
+        self.lift = axes[:, moving] / np.sqrt(share[moving])
+        self.held = axes[:, ~moving]
+        self.drag = drag
+        self.inside = np.linalg.cholesky(np.eye(len(self.root.T)) + self.root.T @ drag @ self.root)
+
+    def compliance(self) -> Array:
+        """(k, k) N = (M^-1 + D)^-1, exactly symmetric."""
+        part = np.linalg.solve(self.inside, self.root.T)
+        return np.asarray(part.T @ part)
+
+    def to(self, push: Array) -> tuple[Array, Array]:
+        """(k,) change of the twist, N J0, and (k,) J for J0 = `push`."""
+        z = np.linalg.solve(self.inside.T, np.linalg.solve(self.inside, self.root.T @ push))
+        change = self.root @ z
+        impulse = self.lift @ z + self.held @ (self.held.T @ (push - self.drag @ change))
+        return change, impulse

@@ -59,18 +59,22 @@ def run_cases(
     quick: bool,
     on_result: Callable[[Result], None] | None = None,
 ) -> list[Result]:
-    """Run cases one after the other, each on all of the machine's cores.
+    """Run cases one after the other, each on all of the machine's cores, and BLAS on one: its
+    solves are small.
 
     ids        which; every one when None
     quick      coarser grids and shorter runs
     on_result  called with every result as its case ends
     """
+    from threadpoolctl import threadpool_limits
+
     from flowborne.fluid.jit import parallel_kernels
 
     results = []
     for name in case_ids() if ids is None else ids:
-        with parallel_kernels():
-            found = case(name).run(quick)
+        wanted = case(name)
+        with parallel_kernels(), threadpool_limits(limits=1, user_api="blas"):
+            found = wanted.run(quick)
         for result in found:
             if on_result is not None:
                 on_result(result)

@@ -27,7 +27,7 @@ LENGTH, HEIGHT = 2.2, 0.41
 VISCOSITY = 1e-3
 """Pa s, in the channel; the fluid's density is 1 kg/m^3 everywhere."""
 
-STEADY_GRIDS = {True: (10,), False: (10, 20, 40)}
+STEADY_GRIDS = {True: (10,), False: (20, 40, 80)}
 SHEDDING_GRIDS = {True: (10,), False: (10, 20, 40)}
 """Cells across D of B1 and B2, by quick; multiples of 10 fit the channel."""
 

@@ -1,0 +1,351 @@
+"""Implicit viscosity: analytic flows, and what fluid and bodies give each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.solve import VISCOUS_TOLERANCE
+from flowborne.coupling.step import cut_by_bodies
+from flowborne.fluid.boundary import Boundaries, BoundaryNoSlip
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.viscosity import TIED, UNKNOWN, assemble_viscosity
+from flowborne.fluid.viscous_solve import Answer, ViscousSystem, spread, walls_of
+from flowborne.validation.viscous import measured
+from flowborne.validation.worlds import PERIODIC, RING, mjcf, world_of
+
+DENSITY, VISCOSITY = 1.3, 0.7
+"""kg/m^3 and Pa s."""
+
+BOX = Boundaries(PERIODIC, PERIODIC, PERIODIC, PERIODIC, PERIODIC, PERIODIC)
+SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
+CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))
+
+DISC = (
+    '<body name="{name}" pos="{x} {y} {z}"><freejoint/><geom type="sphere" size="{size}"/></body>'
+)
+CENTRES = np.array([[0.37, 0.41, 0.44], [0.71, 0.68, 0.58]])
+RADII = np.array([0.17, 0.11])
+"""m, of two discs or balls."""
+
+
+@dataclass
+class Case:
+    """A viscous system and what it was made of; body 0 is the world."""
+
+    grid: Grid
+    cut: Geometry
+    system: ViscousSystem
+
+    def mass(self) -> Faces:
+        """Mass of the unknown and the tied faces, kg."""
+        masses = self.grid.zeros_faces()
+        for axis, part in zip(self.grid.axes, self.system.systems, strict=True):
+            counts = (part.kind == UNKNOWN) | (part.kind == TIED)
+            masses[axis][:] = np.where(counts, part.mass * self.system.dt, 0.0)
+        return masses
+
+    def momentum(self, velocity: Faces) -> Array:
+        """(3,) N s."""
+        return np.array([float((m * u).sum()) for m, u in zip(self.mass(), velocity, strict=True)])
+
+
+def case_of(
+    grid: Grid,
+    *bodies: str,
+    boundaries: Boundaries,
+    dt: float,
+    response: Array | None = None,
+    viscosity: float = VISCOSITY,
+) -> Case:
+    """Bodies (MJCF elements) that answer with `response`; by default they do not yield."""
+    world = world_of(grid, mjcf(*bodies), boundaries=boundaries)
+    cut = cut_by_bodies(world)
+    still = grid.zeros_faces()
+    parts = assemble_viscosity(
+        cut.distance, cut.open, still, grid, boundaries, DENSITY, viscosity, dt, 0.0
+    )
+    size = 6 * world.setup.solid.nbody
+    system = ViscousSystem(
+        parts,
+        walls_of(parts, cut.distance, cut.nearest, grid),
+        np.zeros((size, size)) if response is None else response,
+        grid,
+        boundaries,
+        dt,
+    )
+    return Case(grid, cut, system)
+
+
+def round_bodies(grid: Grid) -> list[str]:
+    """MJCF of the two discs or balls."""
+    places = CENTRES * [1.0, 1.0, 0.0 if grid.is_slab else 1.0]
+    return [
+        DISC.format(name=f"disc{n}", x=x, y=y, z=z, size=size)
+        for n, ((x, y, z), size) in enumerate(zip(places, RADII, strict=True))
+    ]
+
+
+def free(grid: Grid, density: float) -> Array:
+    """M of the two discs or balls of this density when they are free, twists about the origin."""
+    response = np.zeros((18, 18))
+    for n, (centre, radius) in enumerate(zip(CENTRES, RADII, strict=True)):
+        if grid.is_slab:
+            mass = density * np.pi * radius**2
+            parts = np.array([mass, mass, np.inf, np.inf, np.inf, 0.5 * mass * radius**2])
+            centre = centre * [1.0, 1.0, 0.0]
+        else:
+            mass = density * 4.0 / 3.0 * np.pi * radius**3
+            parts = np.repeat([mass, 0.4 * mass * radius**2], 3)
+        motion = np.eye(6)
+        motion[:3, 3:] = np.cross(centre, np.eye(3)).T
+        part = slice(6 * n + 6, 6 * n + 12)
+        response[part, part] = motion @ np.diag(1.0 / parts) @ motion.T
+    return response
+
+
+def noise(grid: Grid, seed: int = 0) -> Faces:
+    """Random velocity; periodic ends agree."""
+    random = np.random.default_rng(seed)
+    velocity = grid.zeros_faces()
+    for axis in grid.axes:
+        values = random.standard_normal(velocity[axis].shape)
+        ends = np.moveaxis(values, axis, 0)
+        ends[-1] = ends[0]
+        velocity[axis][:] = values
+    return velocity
+
+
+def of(grid: Grid, field: object) -> Faces:
+    """A velocity field (x, y, z) -> (u, v, w) on the faces."""
+    velocity = grid.zeros_faces()
+    for axis in grid.axes:
+        x, y, z = np.meshgrid(*grid.face_coordinates(axis), indexing="ij")
+        velocity[axis][:] = field(x, y, z)[axis]  # type: ignore[operator]
+    return velocity
+
+
+@pytest.mark.parametrize("along", [0, 1, 2])
+def test_shear_wave_decays_at_second_order_to_the_analytic_rate(along: int) -> None:
+    """The factor by which a wave of one component decays in a time, with dt as h^2."""
+    across = (along + 1) % 3
+    cells, errors = (8, 16, 32), []
+    nu, duration = VISCOSITY / DENSITY, 0.02
+    for n in cells:
+        shape = [2, 2, 2]
+        shape[across] = n
+        grid = Grid((shape[0], shape[1], shape[2]), 1.0 / n)
+        steps = n * n // 16
+        case = case_of(grid, boundaries=BOX, dt=duration / steps)
+        velocity = grid.zeros_faces()
+        wave = np.sin(2.0 * np.pi * grid.face_coordinates(along)[across])
+        velocity[along][:] = np.expand_dims(wave, tuple({0, 1, 2} - {across}))
+        first = velocity[along].copy()
+        for _ in range(steps):
+            velocity, _, converged = case.system.solve(velocity, np.zeros(6), 1e-12)
+            assert converged
+        factor = float((velocity[along] * first).sum() / (first**2).sum())
+        np.testing.assert_allclose(velocity[along], factor * first, atol=1e-9)
+        errors.append(abs(factor - np.exp(-nu * (2.0 * np.pi) ** 2 * duration)))
+    slope = -np.polyfit(np.log(cells), np.log(errors), 1)[0]
+    assert abs(slope - 2.0) < 0.1, f"measured order {slope:.3f}"
+    assert errors[-1] < 2e-3
+
+
+PLATES = [
+    '<body pos="0.5 {low} 0"><geom type="box" size="2 0.2 1"/></body>'.replace("{low}", "-0.039"),
+    '<body pos="0.5 {high} 0"><geom type="box" size="2 0.2 1"/></body>'.replace("{high}", "1.063"),
+]
+BOTTOM, TOP = 0.161, 0.863
+"""m: where two plates that reach across a periodic box face each other."""
+
+
+def test_couette_flow_between_plates_and_its_wall_force_are_exact() -> None:
+    sides = Boundaries(PERIODIC, PERIODIC)
+    case = case_of(SQUARE, *PLATES, boundaries=sides, dt=1e7)
+    twist = np.zeros(18)
+    twist[12] = 2.0
+    velocity, impulse, converged = case.system.solve(SQUARE.zeros_faces(), twist, 1e-13)
+    assert converged
+    stress = VISCOSITY * 2.0 / (TOP - BOTTOM)
+    force = impulse.reshape(3, 6)[:, 0] / 1e7
+    np.testing.assert_allclose(force, [0.0, stress, -stress], atol=1e-8)
+    torque = impulse.reshape(3, 6)[:, 5] / 1e7
+    np.testing.assert_allclose(torque, [0.0, -BOTTOM * stress, TOP * stress], atol=1e-8)
+    y = SQUARE.face_coordinates(0)[1]
+    between = (y > BOTTOM) & (y < TOP)
+    exact = 2.0 * (y[between] - BOTTOM) / (TOP - BOTTOM)
+    np.testing.assert_allclose(velocity[0][5, between, 0], exact, atol=1e-7)
+
+
+def driven(case: Case, drive: float, bodies: int) -> tuple[Faces, Array]:
+    """Velocity and impulse of the last step of a flow along x that `drive` (Pa/m) makes steady."""
+    velocity = case.grid.zeros_faces()
+    for _ in range(12):
+        velocity[0][:] += case.system.dt * drive / DENSITY
+        velocity, impulse, converged = case.system.solve(velocity, np.zeros(6 * bodies), 1e-13)
+        assert converged
+    return velocity, impulse
+
+
+def test_poiseuille_flow_between_plates_pushes_them_with_all_that_drives_it() -> None:
+    """The profile is second order; the force of the walls is what drives the flow, exactly."""
+    drive, dt = 3.0, 10.0
+    errors = []
+    for n in (32, 64):
+        grid = Grid.slab(n, n, 1.0 / n, (0.0, 0.0))
+        case = case_of(grid, *PLATES, boundaries=Boundaries(PERIODIC, PERIODIC), dt=dt)
+        velocity, impulse = driven(case, drive, 3)
+        force = impulse.reshape(3, 6)[1:, 0].sum() / dt
+        assert force == pytest.approx(drive * (TOP - BOTTOM), rel=1e-9)
+        y = grid.face_coordinates(0)[1]
+        inside = (y > BOTTOM) & (y < TOP)
+        exact = 0.5 * drive / VISCOSITY * (y - BOTTOM) * (TOP - y)
+        errors.append(np.abs(velocity[0][5, :, 0] - exact)[inside].max())
+    assert errors[0] < 0.01 * 0.125 * drive / VISCOSITY * (TOP - BOTTOM) ** 2
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_poiseuille_flow_between_no_slip_sides_is_exact() -> None:
+    sides = Boundaries(PERIODIC, PERIODIC, BoundaryNoSlip(), BoundaryNoSlip())
+    velocity, _ = driven(case_of(SQUARE, boundaries=sides, dt=10.0), 3.0, 1)
+    y = SQUARE.face_coordinates(0)[1]
+    np.testing.assert_allclose(velocity[0][5, :, 0], 1.5 / VISCOSITY * y * (1.0 - y), rtol=1e-8)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.2, 0.5, 0.78, 1.3])
+def test_linear_shear_along_an_oblique_wall_stays(angle: float) -> None:
+    """A wall through the middle of the box, the flow along it proportional to the distance."""
+    t, n = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    wall = np.array([0.5, 0.5]) + 0.011 * n
+    low = wall - 0.3 * n
+    plate = (
+        f'<body pos="{low[0]} {low[1]} 0" euler="0 0 {angle}">'
+        '<geom type="box" size="2 0.3 1"/></body>'
+    )
+    h = SQUARE.spacing
+    case = case_of(SQUARE, plate, boundaries=Boundaries(), dt=1e-3 * DENSITY * h**2 / VISCOSITY)
+
+    def shear(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        away = np.maximum((x - wall[0]) * n[0] + (y - wall[1]) * n[1], 0.0)
+        return away * t[0], away * t[1], 0.0 * z
+
+    start = of(SQUARE, shear)
+    after, _, converged = case.system.solve(start, np.zeros(12), 1e-13)
+    assert converged
+    assert max(part.wall.size for part in case.system.systems) > 20
+    for axis, part in zip(SQUARE.axes, case.system.systems, strict=True):
+        x, y, _ = np.meshgrid(*SQUARE.face_coordinates(axis), indexing="ij")
+        inner = (np.abs(x - 0.5) < 0.3) & (np.abs(y - 0.5) < 0.3) & (part.kind == UNKNOWN)
+        np.testing.assert_allclose(after[axis][inner], start[axis][inner], atol=1e-10)
+
+
+def test_rigid_rotation_of_fluid_and_disc_stays() -> None:
+    """The wall's friction at its points and the couple of the disc's own rotation even out."""
+    x0, y0 = CENTRES[0, :2]
+    h = SQUARE.spacing
+    dt = 1e-3 * DENSITY * h**2 / VISCOSITY
+    disc = DISC.format(name="disc", x=x0, y=y0, z=0, size=0.17)
+    case = case_of(SQUARE, disc, boundaries=Boundaries(), dt=dt)
+    twist = np.zeros(12)
+    twist[6:] = [y0, -x0, 0.0, 0.0, 0.0, 1.0]
+    start = of(SQUARE, lambda x, y, z: (y0 - y, x - x0, 0.0 * z))
+    after, impulse, converged = case.system.solve(start, twist, 1e-13)
+    assert converged
+    for axis, part in zip(SQUARE.axes, case.system.systems, strict=True):
+        x, y, _ = np.meshgrid(*SQUARE.face_coordinates(axis), indexing="ij")
+        inner = (np.hypot(x - x0, y - y0) < 0.3) & (part.kind == UNKNOWN)
+        np.testing.assert_allclose(after[axis][inner], start[axis][inner], atol=1e-10)
+    force = impulse[6:8] / dt
+    torque = impulse[11] / dt - x0 * force[1] + y0 * force[0]
+    assert np.abs(force).max() < 1e-9
+    assert abs(torque) < 1e-9
+    couple = case.system.couple[11, 11]
+    assert couple == pytest.approx(2.0 * VISCOSITY * np.pi * 0.17**2, rel=0.1)
+
+
+@pytest.mark.parametrize("grid", [SQUARE, CUBE], ids=["slab", "box"])
+@pytest.mark.parametrize("density", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("stiff", [0.1, 1e3])
+def test_bodies_get_what_the_fluid_loses(grid: Grid, density: float, stiff: float) -> None:
+    """Linear momentum in a periodic box; stiff is mu dt / (rho h^2)."""
+    dt = stiff * DENSITY * grid.spacing**2 / VISCOSITY
+    sides = RING if grid.is_slab else BOX
+    response = free(grid, density)
+    case = case_of(grid, *round_bodies(grid), boundaries=sides, dt=dt, response=response)
+    start, twist = noise(grid), np.zeros(18)
+    twist[6:] = free(grid, 1.0)[6:, 6:] @ np.full(12, 1e-3)
+    after, impulse, converged = case.system.solve(start, twist, VISCOUS_TOLERANCE)
+    assert converged
+    gained = impulse.reshape(3, 6)[:, :3].sum(axis=0)
+    lost = case.momentum(start) - case.momentum(after)
+    walls = case.system.walls
+    moved = twist + response @ impulse
+    ends = np.concatenate([after[axis].ravel() for axis in grid.axes])[walls.index]
+    rigid = case.system.at_walls(moved)
+    exchanged = dt * float(np.abs(walls.weight * (ends - rigid)).sum())
+    np.testing.assert_allclose(gained, lost, rtol=0.0, atol=1e-10 * exchanged)
+    np.testing.assert_allclose(ends[walls.tied], rigid[walls.tied], atol=1e-9)
+
+
+@pytest.mark.parametrize("grid", [SQUARE, CUBE], ids=["slab", "box"])
+@pytest.mark.parametrize("density", [1e-3, 1e3])
+def test_matrix_is_symmetric_and_positive_definite(grid: Grid, density: float) -> None:
+    sides = RING if grid.is_slab else BOX
+    response = free(grid, density)
+    case = case_of(grid, *round_bodies(grid), boundaries=sides, dt=10.0, response=response)
+    known = case.system.scale == 0.0
+    random = np.random.default_rng(2)
+    for _ in range(4):
+        x, y = (np.where(known, 0.0, random.standard_normal(known.size)) for _ in range(2))
+        ax, ay = case.system.apply(spread(x)), case.system.apply(spread(y))
+        xy, yx = float((spread(y) * ax).sum()), float((spread(x) * ay).sum())
+        assert xy == pytest.approx(yx, abs=1e-12 * np.linalg.norm(x) * np.linalg.norm(y))
+        assert float((spread(x) * ax).sum()) > 0.0
+
+
+@pytest.mark.parametrize("density", [1e-3, 1.0, 10.0])
+def test_light_free_bodies_and_fluid_go_together_however_long_the_step(density: float) -> None:
+    """After a step without end all moves with the mean velocity."""
+    dt = 1e5
+    response = free(SQUARE, density)
+    case = case_of(SQUARE, *round_bodies(SQUARE), boundaries=RING, dt=dt, response=response)
+    start, twist = noise(SQUARE), np.zeros(18)
+    start[0][:] += 1.0
+    twist[6:] = [3.0, -2.0, 0, 0, 0, 0, -1.0, 1.0, 0, 0, 0, 0]
+    after, impulse, converged = case.system.solve(start, twist, VISCOUS_TOLERANCE)
+    assert converged
+    masses = density * np.pi * RADII**2
+    carried = masses @ twist.reshape(3, 6)[1:, :2]
+    fluid = np.array([m.sum() for m in case.mass()])[:2]
+    mean = (case.momentum(start)[:2] + carried) / (fluid + masses.sum())
+    for axis, part in zip(SQUARE.axes, case.system.systems, strict=True):
+        moving = (part.kind == UNKNOWN) | (part.kind == TIED)
+        np.testing.assert_allclose(after[axis][moving], mean[axis], atol=1e-4)
+    moved = (twist + response @ impulse).reshape(3, 6)[1:]
+    np.testing.assert_allclose(moved[:, 5], 0.0, atol=1e-4)
+    np.testing.assert_allclose(moved[:, :2], np.tile(mean, (2, 1)), atol=1e-4)
+
+
+def test_bodies_answer_friction_as_their_equation_of_motion_says() -> None:
+    """J = J0 - D (M J) for bodies of which some motions are held."""
+    random = np.random.default_rng(3)
+    root, pull = random.standard_normal((2, 6, 6))
+    root[:, 4:] = 0.0
+    response, drag, push = root @ root.T, pull @ pull.T, random.standard_normal(6)
+    answer = Answer(response, drag)
+    change, impulse = answer.to(push)
+    np.testing.assert_allclose(impulse, push - drag @ change, atol=1e-12)
+    np.testing.assert_allclose(change, response @ impulse, atol=1e-12)
+    np.testing.assert_allclose(answer.compliance() @ push, change, atol=1e-12)
+    assert not Answer(np.zeros((6, 6)), drag).compliance().any()
+
+
+def test_V8_torque_between_cylinders_and_spin_down() -> None:
+    """Steady torque within 1 %, rate of a free cylinder within 2 %, at 24 cells across b."""
+    torque, rate = measured(24)
+    assert torque == pytest.approx(1.0, abs=0.01)
+    assert rate == pytest.approx(1.0, abs=0.02)
