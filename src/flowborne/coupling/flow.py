@@ -14,6 +14,7 @@ from flowborne.fluid.continuation import LAYERS, continue_into
 from flowborne.fluid.ghosts import impose_sides, pad, pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.scalars import carry_scalars, cells_in
+from flowborne.solids.momentum import halfway_momentum
 
 
 @dataclass
@@ -22,8 +23,8 @@ class Carried:
 
     velocity  Faces u*, m/s
     scalars   name -> (nx, ny, nz)
-    lost      (3,) momentum that advection made (or lost, when negative), N s; along periodic axes
-              it is taken out of `velocity` again
+    lost      (3,) momentum that advection made (or lost, when negative), N s, before it was given
+              back along periodic axes
     """
 
     velocity: Faces
@@ -31,7 +32,9 @@ class Carried:
     lost: Array
 
 
-def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> Carried:
+def carry_fluid(
+    world: World, before: Geometry, after: Geometry, drift: Array, dt: float
+) -> Carried:
     """Advect velocity and scalars by the leak-proof field (section 6, items 2 and 3).
 
     With the acceleration A = (u - u*)/dt of the last step, c = u + dt/2 A is the velocity of a
@@ -40,6 +43,12 @@ def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> C
     as it is and the step is second order in time. The semi-Lagrangian scheme of the paper carries
     u itself. So do particles that cross two cells or more in a step: extrapolation in time is not
     stable there, see `centring`.
+
+    Neither scheme keeps momentum. Along periodic axes, where no side can make up for it, what was
+    lost is given back evenly; a creature in a periodic box swims by its strokes alone. The mass of
+    cut cells wavers a little as bodies move over the grid: that part moves with the whole.
+
+    drift  (3,) velocity of the whole, m/s
     """
     fluid, state = world.flow()
     grid, sides, time = fluid.grid, fluid.boundaries, world.time
@@ -87,14 +96,28 @@ def carry_fluid(world: World, before: Geometry, after: Geometry, dt: float) -> C
         fluid.sources,
         time + dt,
     )
-    mass = face_mass(after.open, grid, sides, fluid.density)
-    was = fluid_momentum(state.velocity, face_mass(before.open, grid, sides, fluid.density), grid)
-    entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
-    lost = fluid_momentum(arrived, mass, grid) - was - entered
+    mass_before = face_mass(before.open, grid, sides, fluid.density)
+    mass_after = face_mass(after.open, grid, sides, fluid.density)
+    was = fluid_momentum(state.velocity, mass_before, grid)
+    now = fluid_momentum(arrived, mass_after, grid)
     for axis in grid.axes:
         if sides.periodic()[axis]:
-            arrived[axis][:] -= lost[axis] / mass[axis].sum()
-    return Carried(arrived, scalars, lost)
+            mass = mass_after[axis].sum()
+            kept = was[axis] + (mass - mass_before[axis].sum()) * drift[axis]
+            arrived[axis][:] += (kept - now[axis]) / mass
+    entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
+    return Carried(arrived, scalars, now - was - entered)
+
+
+def drift_velocity(world: World, cut: Geometry, dt: float) -> Array:
+    """(3,) velocity of the centre of mass of fluid and bodies together, m/s."""
+    fluid, state = world.flow()
+    model = world.setup.solid
+    mass = face_mass(cut.open, fluid.grid, fluid.boundaries, fluid.density)
+    total = fluid_momentum(state.velocity, mass, fluid.grid)
+    total += halfway_momentum(model, world.solid, dt)[0]
+    masses = np.array([m.sum() for m in mass]) + model.body_mass.sum()
+    return np.asarray(np.divide(total, masses, out=np.zeros(3), where=masses > 0.0))
 
 
 def centring(velocity: Faces, dt: float, grid: Grid) -> Faces:

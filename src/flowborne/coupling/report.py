@@ -30,7 +30,7 @@ class Momentum:
     exchange_error   |impulse given to the bodies + impulse taken from the fluid and the walls|
                      relative to the impulses given to bodies and faces, added up in size
     advection        change of the fluid's momentum in advection that no boundary accounts for;
-                     along periodic axes it was undone at once
+                     along periodic axes it is given back at once
     boundary         impulse of the sides of the domain on the fluid in the pressure solve
     """
 

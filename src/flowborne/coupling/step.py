@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.flow import carry_fluid, forced, settle_state
+from flowborne.coupling.flow import carry_fluid, drift_velocity, forced, settle_state
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.motion import Drive
 from flowborne.coupling.operators import (
@@ -56,6 +56,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     """A step of bodies and fluid: the seven items of section 6."""
     fluid, state = world.flow()
     cut_before = cut_by_bodies(world)
+    drift = drift_velocity(world, cut_before, dt)
     watch.lap("geometry")
     # 1. the bodies move with the velocity they have, driven joints as they are told
     before, pose = move_bodies(world, orders, dt)
@@ -63,7 +64,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     cut = cut_by_bodies(world, pose)
     watch.lap("geometry")
     # 2. and 3. velocity and scalars are carried by the leak-proof field
-    carried = carry_fluid(world, cut_before, cut, dt)
+    carried = carry_fluid(world, cut_before, cut, drift, dt)
     # 4. forces on the fluid
     velocity = forced(carried.velocity, fluid, world.time + dt, dt)
     watch.lap("advection")
