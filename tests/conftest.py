@@ -1,6 +1,10 @@
 """Fixtures that several folders share."""
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("same every time", derandomize=True)
+settings.load_profile("same every time")
 
 MODEL = """
 <mujoco>

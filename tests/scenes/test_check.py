@@ -88,6 +88,15 @@ ONE_FAULT = {
         "scene swim.toml, [boundaries] z_min is open, but a scene of 2 dimensions has no sides "
         "in z. Drop it.",
     ),
+    "inflow that faces a periodic side": (
+        {'x_max = "open"': 'x_max = "periodic"'},
+        "scene swim.toml, [boundaries]: x_min is inflow and x_max is periodic. "
+        "Make both of them periodic or neither.",
+    ),
+    "gravity that is not finite": (
+        {"gravity = [0.0, -9.81]": "gravity = [inf, -9.81]"},
+        "scene swim.toml, gravity, entry 1: inf is not a finite number. Give a finite number.",
+    ),
     "gravity out of the plane": (
         {"gravity = [0.0, -9.81]": "gravity = [0.0, 0.0, -9.81]"},
         "scene swim.toml, gravity: [0.0, 0.0, -9.81] leaves the plane of a scene of 2 dimensions. "

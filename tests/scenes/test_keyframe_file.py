@@ -42,9 +42,15 @@ def test_a_motion_takes_the_column_that_it_names(write: Write, tmp_path: Path) -
         (None, "[[motion]] 2: there is no file"),
         ("", "[[motion]] 2: walk.csv has no column 'time'"),
         ("time,rial\n0,1\n1,2\n", "walk.csv has no column 'rail'; did you mean 'rial'?"),
-        ("time,rail\n0,1\n1,abc\n", "walk.csv, line 3, column 'rail': 'abc' is not a number"),
-        ("time,rail\n0,1\n1\n", "walk.csv, line 3, column 'rail': '' is not a number"),
-        ("time,rail\n0,1\n1,nan\n", "[[motion]] 2, values, entry 2: nan is not a finite number"),
+        (
+            "time,rail\n0,1\n1,abc\n",
+            "walk.csv, line 3, column 'rail': 'abc' is not a finite number",
+        ),
+        ("time,rail\n0,1\n1\n", "walk.csv, line 3, column 'rail': '' is not a finite number"),
+        (
+            "time,rail\n0,1\n1,nan\n",
+            "walk.csv, line 3, column 'rail': 'nan' is not a finite number",
+        ),
         ("time,rail\n1,1\n0,2\n", "[[motion]] 2 has times that do not increase"),
         ("time,rail\n1,1\n", "[[motion]] 2 has 1 times. Give at least two"),
     ],

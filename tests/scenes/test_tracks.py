@@ -51,6 +51,10 @@ def test_curve_passes_exactly_through_its_keyframes(curve: Curve) -> None:
     assert [curve.value(time) for time in curve.times] == pytest.approx(curve.values, abs=1e-13)
 
 
+def test_curve_may_be_all_but_flat() -> None:
+    assert Curve((0.0, 1.0, 2.0), (0.0, 1e-310, 3e-310)).value(1.0) == 1e-310
+
+
 @given(curves(), st.floats(0.0, 1.0))
 def test_curve_stays_between_its_keyframes(curve: Curve, part: float) -> None:
     for t0, t1, v0, v1 in zip(

@@ -79,11 +79,16 @@ def check_fluid(draft: Draft) -> Iterator[str]:
     yield from _check_boxes(draft, scene.domain)
 
 
+def _half_periodic(low: str, high: str) -> bool:
+    """Whether just one of two opposite kinds of sides is periodic."""
+    return (low == "periodic") != (high == "periodic")
+
+
 def _check_sides(draft: Draft, boundaries: BoundariesTable) -> Iterator[str]:
     sides = dict(boundaries)
     for axis, name in enumerate("xyz"):
         low, high = sides[f"{name}_min"], sides[f"{name}_max"]
-        if (low.kind == "periodic") != (high.kind == "periodic"):
+        if _half_periodic(low.kind, high.kind):
             yield (
                 f"{draft.at('boundaries')}: {name}_min is {low.kind} and {name}_max is "
                 f"{high.kind}. Make both of them periodic or neither."
@@ -104,7 +109,9 @@ def _check_sides(draft: Draft, boundaries: BoundariesTable) -> Iterator[str]:
 def _check_outlet(draft: Draft, boundaries: BoundariesTable, domain: Domain) -> Iterator[str]:
     """Fluid that comes in must be able to leave: it does not give way."""
     scene = draft.scene
-    if any(side.kind == "open" for _, side in boundaries):
+    kinds = {name: side.kind for name, side in boundaries}
+    unclear = any(_half_periodic(kinds[f"{a}_min"], kinds[f"{a}_max"]) for a in "xyz")
+    if unclear or "open" in kinds.values():
         return
     total, largest = 0.0, 0.0
     for name, side in boundaries:

@@ -8,6 +8,7 @@ numbers into the scene, so that a written scene needs the CSV file no more.
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 from typing import Any
 
@@ -67,11 +68,19 @@ def read_columns(path: Path, column: str, where: str) -> tuple[list[float], list
             continue
         for target, index in zip((times, values), places, strict=True):
             cell = row[index] if index < len(row) else ""
-            try:
-                target.append(float(cell))
-            except ValueError:
+            number = as_number(cell)
+            if not math.isfinite(number):
                 raise SceneError(
                     f"{where}: {path.name}, line {line}, column '{header[index]}': "
-                    f"'{cell}' is not a number. Give a number."
-                ) from None
+                    f"'{cell}' is not a finite number. Give one."
+                )
+            target.append(number)
     return times, values
+
+
+def as_number(text: str) -> float:
+    """The number that a text is; NaN when it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

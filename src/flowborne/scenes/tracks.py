@@ -84,7 +84,8 @@ class Curve:
     def __post_init__(self) -> None:
         times, values = self.times, self.values
         before, after = times[0] - (times[1] - times[0]), times[-1] + (times[-1] - times[-2])
-        curve = PchipInterpolator((before, *times, after), (values[0], *values, values[-1]))
+        with np.errstate(over="ignore"):  # of 1 / slope: a slope of 1e-310 becomes 0, as it should
+            curve = PchipInterpolator((before, *times, after), (values[0], *values, values[-1]))
         object.__setattr__(self, "_curve", curve)
         object.__setattr__(self, "_slope", curve.derivative())
 

@@ -87,7 +87,8 @@ def _tables_in(annotation: Any) -> list[type[Table]]:
 
 def _is_list_of_tables(key: str) -> bool:
     field = Scene.model_fields.get(key)
-    return field is not None and get_origin(field.annotation) is tuple
+    listed = field is not None and get_origin(field.annotation) is tuple
+    return listed and bool(tables_of(Scene, key))
 
 
 def _kind_of(value: Any) -> Any:
