@@ -16,6 +16,9 @@ from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.scalars import carry_scalars, cells_in
 from flowborne.solids.momentum import halfway_momentum
 
+WHOLE = 0.9
+"""A face as open as this counts as uncut."""
+
 
 @dataclass
 class Carried:
@@ -42,7 +45,7 @@ def carry_fluid(
     the particle arrives. The pressure solve then adds dt A for the new A, so a steady flow stays
     as it is and the step is second order in time. The semi-Lagrangian scheme of the paper carries
     u itself. So do particles that cross two cells or more in a step: extrapolation in time is not
-    stable there, see `centring`.
+    stable there. What cut faces hold beside free-slip bodies is not carried, see `beside_walls`.
 
     Neither scheme keeps momentum. Along periodic axes, where no side can make up for it, what was
     lost is given back evenly; a creature in a periodic box swims by its strokes alone. The mass of
@@ -53,24 +56,26 @@ def carry_fluid(
     fluid, state = world.flow()
     grid, sides, time = fluid.grid, fluid.boundaries, world.time
     second_order = fluid.advection == "maccormack"
+    crossed = courant(state.velocity, dt, grid)
     if second_order:
-        share = centring(state.velocity, dt, grid)
+        share = [np.clip(2.0 - c, 0.0, 1.0) for c in crossed]
         ahead = [0.5 * dt * s * a for s, a in zip(share, state.acceleration, strict=True)]
     else:
         ahead = [np.zeros_like(a) for a in state.acceleration]
     halfway = faces_of([u + a for u, a in zip(state.velocity, ahead, strict=True)])
+    resident = grid.zeros_faces()
+    if fluid.viscosity == 0.0:
+        resident = beside_walls(halfway, before.open, crossed, grid)
     paths = faces_of([c + a * o for c, a, o in zip(state.carrier, ahead, before.open, strict=True)])
     field = pad_faces(halfway, grid, sides, time)
     carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
     counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
-    sticky = fluid.viscosity > 0.0
-    valid = [
-        pad(np.ones(o.shape, np.uint8) if sticky else (o > 0.0).view(np.uint8), grid.axes)
-        for o in before.open
-    ]
+    everywhere = [np.ones(u.shape, np.uint8) for u in field]
     arrived = grid.zeros_faces()
     for axis in grid.axes:
-        carry(arrived[axis], field[axis], valid[axis], *carrier, OFFSETS[axis], counts, periodic)
+        carry(
+            arrived[axis], field[axis], everywhere[axis], *carrier, OFFSETS[axis], counts, periodic
+        )
     if second_order:
         impose_sides(arrived, grid, sides, time + dt)
         there = pad_faces(arrived, grid, sides, time + dt)
@@ -79,13 +84,15 @@ def carry_fluid(
                 arrived[axis],
                 there[axis],
                 field[axis],
-                valid[axis],
+                everywhere[axis],
                 *carrier,
                 OFFSETS[axis],
                 counts,
                 periodic,
             )
             arrived[axis][:] -= ahead[axis]
+    for axis in grid.axes:
+        arrived[axis][:] += resident[axis]
     scalars = carry_scalars(
         state.scalars,
         carrier,
@@ -120,22 +127,42 @@ def drift_velocity(world: World, cut: Geometry, dt: float) -> Array:
     return np.asarray(np.divide(total, masses, out=np.zeros(3), where=masses > 0.0))
 
 
-def centring(velocity: Faces, dt: float, grid: Grid) -> Faces:
-    """Share of the half-way acceleration that each face takes.
+def beside_walls(carried: Faces, opened: Faces, crossed: Faces, grid: Grid) -> Faces:
+    """Make the flow beside free-slip bodies that of the whole faces around, in place.
 
-    It is 1 where the fluid around the face crosses up to one cell in a step, and falls to 0 at two.
+    A cut face holds the mean over what is left of it. Carried off as if it were the flow there, it
+    would leave a wake behind a body that has none. So the flow over whole faces, continued along
+    straight lines, is carried in its place.
+
+    opened, crossed  open fraction, and cells crossed in a step
+    returns          Faces, what cut faces held besides and keep until new fluid has come to them:
+                     all of it in a short step, none once half a cell is crossed
     """
+    resident = grid.zeros_faces()
+    for axis in grid.axes:
+        whole, cut = opened[axis] > WHOLE, opened[axis] > 0.0
+        if whole.all():
+            continue
+        held = carried[axis].copy()
+        continue_into(carried[axis], whole.view(np.uint8), LAYERS)
+        stays = np.clip(1.0 - 2.0 * crossed[axis], 0.0, 1.0)
+        resident[axis][cut] = (stays * (held - carried[axis]))[cut]
+    return resident
+
+
+def courant(velocity: Faces, dt: float, grid: Grid) -> Faces:
+    """Cells that the fluid around each face crosses in a step."""
     cells = np.zeros(grid.shape)
     for axis in grid.axes:
         speed = np.abs(velocity[axis])
         for beside in (np.delete(speed, -1, axis), np.delete(speed, 0, axis)):
             np.maximum(cells, beside, out=cells)
-    room = np.clip(2.0 - cells * (dt / grid.spacing), 0.0, 1.0)
-    share = grid.zeros_faces()
+    cells *= dt / grid.spacing
+    around = grid.zeros_faces()
     for axis in grid.axes:
-        around = np.pad(room, [(int(a == axis),) * 2 for a in range(3)], mode="edge")
-        share[axis][:] = np.minimum(np.delete(around, -1, axis), np.delete(around, 0, axis))
-    return share
+        wide = pad(cells, (axis,))
+        around[axis][:] = np.maximum(np.delete(wide, -1, axis), np.delete(wide, 0, axis))
+    return around
 
 
 def faces_of(values: list[Array]) -> Faces:

@@ -144,8 +144,8 @@ class SolidSystem:
                 at = 0.5 * (self.at + v_plus)
                 zones = self.rows.zones((at - self.v) / self.dt, self.zones)
         if self.halfway is not None:
-            own = self.halfway.impulse(v_plus)
-            room = SETTLED * (np.abs(self.A) @ (np.abs(v_plus) + AT_REST)) + self.halfway.rounding
+            own, rounding = self.halfway.impulse(v_plus)
+            room = SETTLED * (np.abs(self.A) @ (np.abs(v_plus) + AT_REST)) + rounding
             settled = settled and bool((np.abs(own - self.own) <= room).all())
         if settled:
             return None
@@ -210,7 +210,7 @@ def assemble(
     centred, impulse = None, A @ state.v + dt * force
     if before is not None:
         centred = halfway(model, s, before, state, dt, A, force + s.bias)
-        impulse = centred.impulse(state.v)
+        impulse, _ = centred.impulse(state.v)
     v = state.v.copy()
     full = _with_rows(A, impulse, v, dt, rows, zones)
     return SolidSystem(full[0], full[1], dt, v, (A, impulse), rows, zones, centred, impulse, v)

@@ -47,14 +47,9 @@ class Halfway:
     given: Array
     along: Array
 
-    @property
-    def rounding(self) -> Array:
-        """(nv,) impulses smaller than this are rounding errors."""
-        terms = (np.abs(self.along) * np.abs(self.given)[self.model.dof_body]).sum(axis=1)
-        return np.asarray(ROUNDING * (terms + self.dt * np.abs(self.outer)))
-
-    def impulse(self, v_plus: Array) -> Array:
-        """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,)."""
+    def impulse(self, v_plus: Array) -> tuple[Array, Array]:
+        """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,), and (nv,) how much of it
+        may be rounding errors."""
         model, dt, v = self.model, self.dt, self.state.v
         s = scratch(model)
         later = subtree_halfway_momentum(model, s, SolidState(self.state.q, v_plus), dt)
@@ -64,7 +59,10 @@ class Halfway:
         change = (self.along * (self.given - later)[model.dof_body]).sum(axis=1)
         change += self.mass @ v_plus - model.armature * (v_plus - v) + (self.A - self.mass) @ v
         moved = np.where(model.conserved, change, self.A @ v - dt * bias)
-        return np.asarray(moved + dt * self.outer)
+        scale = (np.abs(self.along) * (np.abs(self.given) + np.abs(later))[model.dof_body]).sum(
+            axis=1
+        )
+        return moved + dt * self.outer, ROUNDING * (scale + dt * np.abs(self.outer))
 
 
 def halfway(
