@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from flowborne.coupling.distance import Integers
+from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array
 
 

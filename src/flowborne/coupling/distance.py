@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from flowborne.coupling.shapes import signed_distance
+from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array
-
-Integers = NDArray[np.int64]
 
 BAND = 4.0
 """Distances are known up to this many cells from a body; beyond, they are this large."""

@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit
 
 from flowborne.coupling.closed import add_closed, list_closed, share_closed
-from flowborne.coupling.distance import BAND, Integers, merge, node_box, sample_body
+from flowborne.coupling.distance import BAND, merge, node_box, sample_body
 from flowborne.coupling.shapes import Shapes
+from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 

@@ -10,14 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from flowborne.coupling.fractions import Geometry
+from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.solids.dynamics import Kinematics
-
-Integers = NDArray[np.int64]
 
 
 def twists(kinematics: Kinematics, v: Array) -> Array:

@@ -56,8 +56,9 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     """A step of bodies and fluid: the seven items of section 6."""
     fluid, state = world.flow()
     cut_before = cut_by_bodies(world)
-    drift = drift_velocity(world, cut_before, dt)
     watch.lap("geometry")
+    drift = drift_velocity(world, cut_before, dt)
+    watch.lap("advection")
     # 1. the bodies move with the velocity they have, driven joints as they are told
     before, pose = move_bodies(world, orders, dt)
     watch.lap("solids")

@@ -1,4 +1,4 @@
-"""Types of the arrays that the pressure solver's kernels take."""
+"""Types of the arrays that kernels take."""
 
 from __future__ import annotations
 

@@ -24,13 +24,12 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryNoSlip
 from flowborne.fluid.ghosts import edge, wall_velocity
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.jit import kernel
 from flowborne.fluid.projection import OPEN, PERIODIC, side_codes
-
-Integers = NDArray[np.int64]
 
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""

@@ -21,15 +21,13 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.conjugate_gradients import descend, dot, turn
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.jit import kernel
 from flowborne.fluid.viscosity import TIED, ViscousFaces
-
-Integers = NDArray[np.int64]
-
 
 WIDTH = 256
 """Faces in a row of the vectors of the conjugate gradients."""
