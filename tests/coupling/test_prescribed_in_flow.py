@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
@@ -101,3 +102,52 @@ def test_the_random_wrench_changes_the_drives_force_and_not_the_motion() -> None
         reports = [step(world, 0.01) for _ in range(10)]
         forces.append(np.array([report.actuator[:2] for report in reports]))
     assert np.abs(forces[1] - forces[0]).min(axis=0).max() > 1.0
+
+
+PUPPET = """
+<mujoco><worldbody>
+  <body name="torso"><freejoint name="root"/>
+    <geom type="box" size="0.12 0.1 0.15" density="900"/>
+    <body name="arm" pos="0.15 0 0"><joint name="shoulder" type="ball"/>
+      <geom type="capsule" size="0.06 0.1" pos="0.15 0 0" zaxis="1 0 0" density="1100"/>
+      <body name="hand" pos="0.3 0 0"><joint name="wrist" type="ball"/>
+        <geom type="sphere" size="0.07" pos="0.06 0 0" density="1500"/>
+      </body>
+    </body>
+  </body>
+</worldbody></mujoco>
+"""
+
+
+@dataclass(frozen=True)
+class Tumble:
+    """A root that circles and turns about z, and a shoulder that swings about its own x."""
+
+    dofs: NDArray[np.int64]
+
+    def position(self, time: float) -> Array:
+        turn, swing = 0.5 * 2.0 * time, 0.5 * 0.6 * np.sin(5.0 * time)
+        place = [0.1 * np.cos(3.0 * time), 0.1 * np.sin(3.0 * time), 0.05]
+        root = [np.cos(turn), 0.0, 0.0, np.sin(turn)]
+        return np.array([*place, *root, np.cos(swing), np.sin(swing), 0.0, 0.0])
+
+    def velocity(self, time: float) -> Array:
+        place = [-0.3 * np.sin(3.0 * time), 0.3 * np.cos(3.0 * time), 0.0]
+        return np.array([*place, 0.0, 0.0, 2.0, 3.0 * np.cos(5.0 * time), 0.0, 0.0])
+
+
+def test_free_and_ball_joints_follow_a_motion_too() -> None:
+    model = SolidModel.from_string(PUPPET, gravity=(0.0, 0.0, -9.81))
+    motion = Tumble(np.arange(9))
+    grid = Grid((12, 12, 12), 0.125, (-0.75, -0.75, -0.75))
+    setup = Setup(model, Fluid(grid, 1000.0, 0.0, Boundaries()), (motion,), (Pulls(2.0),))
+    world = World.at_rest(setup)
+    world.solid.q[:11], world.solid.v[:9] = motion.position(0.0), motion.velocity(0.0)
+    for _ in range(30):
+        report = step(world, 0.01)
+        assert report.outcome.name == "DONE"
+        assert np.abs(world.solid.q[:11] - motion.position(world.time)).max() < 1e-8
+        assert np.abs(world.solid.v[:9] - motion.velocity(world.time)).max() < 1e-8
+    assert np.abs(report.actuator[:9]).min() > 0.0
+    assert np.all(report.actuator[9:] == 0.0), "nothing drives the wrist"
+    assert np.abs(world.solid.q[11:] - [1.0, 0.0, 0.0, 0.0]).max() > 0.01, "but it swings"

@@ -131,7 +131,7 @@ class Controller:
         pose, value, gradient, evaluations = self._descend(world, frame_time, step)
         model, state = creature.parts(world)
         memory["target"] = pose
-        memory["displacement"] = creature.difference(model, state.q, pose)[self.dofs]
+        memory["displacement"] = model.difference(state.q, pose)[self.dofs]
         memory["gradient"] = gradient
         memory["objective"] = np.array([value])
         memory["schedule"] = np.array([self.every - 1.0, frame_time])
@@ -150,7 +150,7 @@ class Controller:
         if "target" in world.memory:
             left, frame_time = world.memory["schedule"]
             remaining = max(frame_end_time + left * frame_time - world.time, dt)
-            gap = creature.difference(model, state.q, world.memory["target"])[self.dofs]
+            gap = model.difference(state.q, world.memory["target"])[self.dofs]
             move, hold = self.servo.velocity(gap, state.v[self.dofs], float(remaining), dt)
         drive.set(self.dofs, move, hold, np.asarray(self.servo.torque_limit, dtype=np.float64))
         return drive

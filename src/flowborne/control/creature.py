@@ -74,13 +74,6 @@ def moved(model: SolidModel, q: Array, displacement: Array) -> Array:
     return model.integrate(q, displacement, 1.0)
 
 
-def difference(model: SolidModel, start: Array, end: Array) -> Array:
-    """(nv,) displacement that leads from pose `start` to pose `end`, both (nq,)."""
-    displacement = np.zeros(model.nv)
-    mujoco.mj_differentiatePos(model.mj, displacement, 1.0, start, end)
-    return displacement
-
-
 def within_range(model: SolidModel, q: Array, displacement: Array) -> Array:
     """(nv,) the part of a displacement from pose `q` that the joints' ranges allow.
 

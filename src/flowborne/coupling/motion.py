@@ -14,17 +14,17 @@ Array = NDArray[np.float64]
 class Motion(Protocol):
     """A prescribed motion of some dofs, known for all time.
 
-    dofs  (k,) indices into v; hinge and slide dofs, whose positions are scalars
+    dofs  (k,) indices into v, ascending: all dofs of each of its joints
     """
 
     dofs: NDArray[np.int64]
 
     def position(self, time: float) -> Array:
-        """(k,) joint positions at `time` (s), rad or m."""
+        """(m,) the joints' entries of q at `time` (s): rad, m, unit quaternions."""
         ...
 
     def velocity(self, time: float) -> Array:
-        """(k,) joint velocities at `time` (s), rad/s or m/s."""
+        """(k,) their entries of v, rad/s or m/s: the derivative of the positions."""
         ...
 
 

@@ -103,9 +103,10 @@ def command(world: World, dt: float, drive: Drive | None) -> Drive:
         at = np.flatnonzero(drive.prescribed)
         orders.set(at, drive.move[at], drive.hold[at], drive.torque_limit[at])
     for motion in world.setup.motions:
-        position = world.solid.q[model.dof_position[motion.dofs]]
         later = world.time + dt
-        move = (motion.position(later) - position) / dt
+        goal = world.solid.q.copy()
+        goal[model.places_of(motion.dofs)] = motion.position(later)
+        move = model.difference(world.solid.q, goal)[motion.dofs] / dt
         orders.set(motion.dofs, move, motion.velocity(later))
     orders.set(np.flatnonzero(model.locked), 0.0, 0.0)
     return orders

@@ -127,6 +127,17 @@ class SolidModel:
         mujoco.mj_integratePos(self.mj, moved, velocity, dt)
         return moved
 
+    def difference(self, start: Array, end: Array) -> Array:
+        """(nv,) displacement that leads from positions `start` to `end`, both (nq,); the inverse of
+        `integrate`, so a ball's is a rotation vector in its own frame."""
+        displacement = np.zeros(self.nv)
+        mujoco.mj_differentiatePos(self.mj, displacement, 1.0, start, end)
+        return displacement
+
+    def places_of(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(m,) places in q of the joints that `dofs` belong to, ascending."""
+        return np.flatnonzero(np.isin(self._joint_of_place, self.mj.dof_jntid[dofs]))
+
     def dofs_of(self, joint: str) -> NDArray[np.int64]:
         """Dofs of a joint. Raises ValueError for an unknown name."""
         j = self.joint(joint)
@@ -167,6 +178,8 @@ class SolidModel:
     def _set_dofs(self) -> None:
         mj = self.mj
         self.joint_names = _names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)
+        widths = [WIDTHS[int(kind)] for kind in mj.jnt_type]
+        self._joint_of_place = np.repeat(np.arange(mj.njnt), widths)
         names: list[str] = []
         self.dof_position: NDArray[np.int64] = np.full(self.nv, -1)
         self.dof_range: Array = np.tile([-np.inf, np.inf], (self.nv, 1))
