@@ -10,6 +10,7 @@ import pytest
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import (
     ObjectiveCallable,
+    ObjectiveDrag,
     ObjectiveEffort,
     ObjectiveInputMotion,
     ObjectivePressureDrag,
@@ -51,6 +52,13 @@ def test_drags_are_forces_of_their_scope_along_a_unit_vector(measured: Measureme
     assert drag == pytest.approx(-(wind[1, 1] + wind[3, 1]))
     lift = ObjectivePressureDrag(bodies, (3.0, 4.0, 0.0)).value(measured)
     assert lift == pytest.approx((pressure[[1, 3], :2] @ [0.6, 0.8]).sum())
+
+
+def test_drag_is_what_winds_and_moving_fluid_do(measured: Measurement) -> None:
+    report = measured.report
+    wrench = report.wind_wrench + report.pressure_wrench + report.viscous_wrench
+    drag = ObjectiveDrag(np.array([1, 2]), (2.0, 0.0, 0.0)).value(measured)
+    assert drag == pytest.approx(wrench[1, 0] + wrench[2, 0])
 
 
 def test_direction_rides_on_a_body(measured: Measurement) -> None:

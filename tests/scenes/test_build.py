@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from numpy.typing import NDArray
 
 from flowborne.control.gradients import GradientCentral, GradientOneSided
 from flowborne.control.measurement import Measurement
@@ -17,8 +18,11 @@ from flowborne.control.objectives import ObjectiveCallable, ObjectivePressureDra
 from flowborne.control.phases import PhaseIntervals, PhaseTrack
 from flowborne.control.rules import GoldenSection
 from flowborne.control.servo import ServoPD
+from flowborne.coupling.stream import WindStream
 from flowborne.fluid.boundary import BoundaryInflow, BoundaryNoSlip
 from flowborne.scenes.build import Built, build
+from flowborne.scenes.build_wind import Gusts
+from flowborne.scenes.inflow import FactorSteady
 from flowborne.scenes.load import load_scene
 from flowborne.solids.wind import WindFaces, WindForce
 
@@ -28,6 +32,11 @@ Write = Callable[..., Path]
 def cost(measurement: Measurement) -> float:
     """A user's own objective."""
     return 3.0 * measurement.dt
+
+
+def whirl(x: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    """A user's own wind."""
+    return np.stack([-x[:, 1], x[:, 0], 0.0 * x[:, 0]], axis=1)
 
 
 def built(write: Write, append: str = "", **replaced: str) -> Built:
@@ -149,6 +158,49 @@ bodies = ["hand"]
     assert (faces.velocity, faces.density, faces.bodies) == ((5.0, 0.0, 0.0), 1.2, None)
     assert isinstance(force, WindForce)
     assert (force.force, force.bodies) == ((2.0, 0.0, 0.0), ("hand",))
+
+
+def test_winds_over_the_ground_and_in_gusts(write: Write) -> None:
+    made = built(
+        write,
+        """
+[[wind]]
+kind = "faces"
+velocity = [8.0, 0.0]
+times = [0.0, 2.0]
+factors = [0.5, 1.0]
+[[wind]]
+kind = "python"
+function = "WHIRL"
+""".replace("WHIRL", f"{__name__}:whirl"),
+    )
+    gusts, whirl = made.world.setup.winds
+    assert isinstance(gusts, WindFaces)
+    assert callable(gusts.velocity)
+    places = np.array([[0.0, 0.0, 0.0], [3.0, 1.0, 0.0]])
+    assert_allclose(gusts.velocity(places, 0.0)[:, 0], 4.0)
+    assert_allclose(gusts.velocity(places, 5.0)[:, 0], 8.0)
+    assert isinstance(whirl, WindFaces)
+    assert callable(whirl.velocity)
+    assert_allclose(whirl.velocity(places, 0.0), [[0.0, 0.0, 0.0], [-1.0, 3.0, 0.0]])
+    ground = Gusts((8.0, 0.0, 0.0), 0.5, 4.0, FactorSteady())
+    heights = np.array([[0.0, 0.0, z] for z in (-1.0, 0.0, 1.0, 4.0)])
+    assert_allclose(ground(heights, 1.0)[:, 0], [0.0, 0.0, 4.0, 8.0])
+
+
+@pytest.mark.parametrize(
+    ("coupling", "kind"), [("none", WindFaces), ("one-way", WindStream), ("two-way", None)]
+)
+def test_a_stream_stands_for_the_fluid_where_that_does_not_push(
+    write: Write, coupling: str, kind: type | None
+) -> None:
+    stream = '[[wind]]\nkind = "stream"\nvelocity = [1.0, 0.0]\n'
+    made = build(load_scene(write(append=stream), {"fluid.coupling": coupling}))
+    assert (made.world.setup.fluid is None) == (coupling == "none")
+    winds = made.world.setup.winds
+    assert [type(wind) for wind in winds] == ([] if kind is None else [kind])
+    if made.world.setup.fluid is not None:
+        assert made.world.setup.fluid.one_way == (coupling == "one-way")
 
 
 def test_densities_of_the_scene_replace_those_of_the_model(write: Write) -> None:

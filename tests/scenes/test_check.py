@@ -132,7 +132,7 @@ ONE_FAULT = {
     "an objective without its kind": (
         {'kind = "effort"': 'goal = "least"'},
         "scene swim.toml, [[objectives]] 1: key 'kind' is missing. Give one of: effort, wind-drag, "
-        "pressure-drag, pressure-lift, input-motion, velocity, python.",
+        "drag, pressure-drag, pressure-lift, input-motion, velocity, python.",
     ),
     "a wind objective without wind": (
         {'kind = "effort"': 'kind = "wind-drag"\ndirection = [1.0, 0.0]'},
@@ -216,6 +216,20 @@ APPENDED_FAULT = {
     "a wind on no body": (
         '[[wind]]\nkind = "force"\nforce = [1.0, 0.0]\nbodies = ["arms"]',
         "scene swim.toml, [[wind]] 1: body 'arms' is not in model squid.xml; did you mean 'arm'?",
+    ),
+    "a wind that grows with a height that is not there": (
+        '[[wind]]\nkind = "faces"\nvelocity = [1.0, 0.0]\nexponent = 0.2',
+        "scene swim.toml, [[wind]] 1: an exponent makes the wind grow with z, which a scene of 2 "
+        "dimensions does not have. Drop it.",
+    ),
+    "gusts without their times": (
+        '[[wind]]\nkind = "faces"\nvelocity = [1.0, 0.0]\nfactors = [0.0, 1.0]',
+        "scene swim.toml, [[wind]] 1 has no times. Give both times and factors.",
+    ),
+    "a wind that Python does not find": (
+        '[[wind]]\nkind = "python"\nfunction = "nowhere_at_all:blow"',
+        "scene swim.toml, [[wind]] 1: Python does not find module 'nowhere_at_all' of "
+        "'nowhere_at_all:blow'.",
     ),
     "a short vector": (
         '[[wind]]\nkind = "faces"\nvelocity = [1.0]',

@@ -88,6 +88,26 @@ class ObjectiveWindDrag:
 
 
 @dataclass(frozen=True, eq=False)
+class ObjectiveDrag:
+    """Force of the winds and the moving fluid on `bodies` along `direction`, N; not buoyancy.
+
+    raises  ValueError for a direction of no length
+    """
+
+    bodies: Integers
+    direction: Vector
+    name: str = "drag"
+
+    def __post_init__(self) -> None:
+        unit(self.direction)
+
+    def value(self, measurement: Measurement) -> float:
+        report = measurement.report
+        wrench = report.wind_wrench + report.pressure_wrench + report.viscous_wrench
+        return float(force(wrench, self.bodies) @ unit(self.direction))
+
+
+@dataclass(frozen=True, eq=False)
 class ObjectivePressureDrag:
     """Force of the fluid's pressure on `bodies` along `direction`, eq. (10), N.
 

@@ -19,6 +19,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Momentum, Outcome, StepReport
 from flowborne.coupling.solve import Solved, solve_bodies, solve_together
 from flowborne.coupling.stopwatch import Stopwatch
+from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
@@ -139,14 +140,6 @@ def move_bodies(world: World, orders: Drive, dt: float) -> tuple[SolidState, Kin
     velocity = np.where(told, orders.move, before.v)
     world.solid.q[:] = world.setup.solid.integrate(before.q, velocity, dt)
     return before, kinematics(world.setup.solid, world.solid.q)
-
-
-def winds_on(world: World, pose: Kinematics) -> Array:
-    """(nbody, 6) wrench of the simple winds."""
-    total = np.zeros((len(pose.body_position), 6))
-    for wind in world.setup.winds:
-        total += wind.wrench(world.setup.solid, pose, world.solid.v, world.time)
-    return total
 
 
 def equations(

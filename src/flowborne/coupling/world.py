@@ -30,6 +30,7 @@ class Fluid:
     body_force    (3,) uniform force per mass on the fluid, m/s^2, besides gravity
     advection     "maccormack" or "semi-lagrangian"
     tolerance     relative residual of the pressure solve
+    one_way       whether the fluid does not feel the bodies, and pushes them as a wind alone
     """
 
     grid: Grid
@@ -41,6 +42,7 @@ class Fluid:
     body_force: tuple[float, float, float] = (0.0, 0.0, 0.0)
     advection: str = "maccormack"
     tolerance: float = 1e-9
+    one_way: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,9 +62,10 @@ class Setup:
 
     @cached_property
     def shapes(self) -> Shapes:
-        """The bodies' geometries as the fluid's grid sees them."""
+        """The bodies' geometries as the fluid's grid sees them: none if it does not feel them."""
         assert self.fluid is not None
-        return shapes(self.solid, self.fluid.grid)
+        seen = SolidModel.empty() if self.fluid.one_way else self.solid
+        return shapes(seen, self.fluid.grid)
 
 
 @dataclass

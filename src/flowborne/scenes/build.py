@@ -14,10 +14,9 @@ from flowborne.fluid.state import FluidState
 from flowborne.scenes.bodies import initial_state, load_model, motion_of
 from flowborne.scenes.build_control import controller_of
 from flowborne.scenes.build_fluid import fluid_of
+from flowborne.scenes.build_wind import winds_of
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_solids import WindFacesTable, WindTable
 from flowborne.solids.model import SolidModel
-from flowborne.solids.wind import Wind, WindFaces, WindForce
 
 Array = NDArray[np.float64]
 
@@ -51,7 +50,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     model = SolidModel.empty() if scene.solids is None else load_model(scene)
     motions = tuple(motion_of(table, model) for table in scene.motion)
     fluid = fluid_of(scene)
-    setup = Setup(model, fluid, motions, tuple(_wind(table) for table in scene.wind))
+    setup = Setup(model, fluid, motions, winds_of(scene))
     world = World.at_rest(setup)
     world.solid = initial_state(scene, model)
     if world.fluid is not None:
@@ -69,14 +68,3 @@ def _set_velocity(state: FluidState, scene: Scene) -> None:
     for faces in (state.velocity, state.carrier):
         for values, component in zip(faces, scene.fluid.velocity, strict=True):
             values.fill(component)
-
-
-def _wind(table: WindTable) -> Wind:
-    if isinstance(table, WindFacesTable):
-        return WindFaces(_triple(table.velocity), table.density, table.bodies)
-    return WindForce(_triple(table.force), table.bodies)
-
-
-def _triple(vector: tuple[float, ...]) -> tuple[float, float, float]:
-    x, y, z = vector
-    return x, y, z

@@ -13,6 +13,7 @@ from flowborne.control.gradients import Gradient, GradientCentral, GradientOneSi
 from flowborne.control.objectives import (
     Objective,
     ObjectiveCallable,
+    ObjectiveDrag,
     ObjectiveEffort,
     ObjectiveInputMotion,
     ObjectivePressureDrag,
@@ -122,6 +123,8 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
         return ObjectiveEffort(_dofs_of(model, joints))
     if isinstance(table, tables.ObjectiveWindDragTable):
         return ObjectiveWindDrag(_bodies(model, table.bodies), _triple(table.direction))
+    if isinstance(table, tables.ObjectiveDragTable):
+        return ObjectiveDrag(_bodies(model, table.bodies), _triple(table.direction))
     if isinstance(table, tables.ObjectivePressureTable):
         frame = None if table.frame is None else model.body(table.frame)
         bodies = _bodies(model, table.bodies)

@@ -58,8 +58,8 @@ def grid_of(domain: Domain) -> Grid:
 
 
 def fluid_of(scene: Scene) -> Fluid | None:
-    """The fluid's fixed properties; None when the scene has no domain."""
-    if scene.domain is None:
+    """The fluid's fixed properties; None when the scene has none, or leaves it out."""
+    if scene.domain is None or not scene.has_fluid:
         return None
     assert scene.fluid is not None
     assert scene.boundaries is not None
@@ -80,6 +80,7 @@ def fluid_of(scene: Scene) -> Fluid | None:
         body_force=(x, y, z),
         advection=table.advection,
         tolerance=table.tolerance,
+        one_way=table.coupling == "one-way",
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from flowborne.errors import SceneError
 from flowborne.scenes.bodies import (
     BALL,
     FREE,
@@ -18,6 +19,8 @@ from flowborne.scenes.bodies import (
     joint_unit,
 )
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.python_function import find_function
+from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
 from flowborne.scenes.wording import Key, suggestion
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
@@ -68,6 +71,16 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     for index, wind in enumerate(scene.wind):
         for body in wind.bodies or ():
             named += unknown_body(draft, model, body, "wind", index)
+        if isinstance(wind, WindPythonTable):
+            try:
+                find_function(wind.function)
+            except SceneError as error:
+                named.append(f"{draft.at('wind', index)}: {error}")
+        if isinstance(wind, WindFacesTable) and wind.exponent > 0.0 and scene.is_slab:
+            named.append(
+                f"{draft.at('wind', index)}: an exponent makes the wind grow with z, which a scene "
+                "of 2 dimensions does not have. Drop it."
+            )
     yield from named
     state = [*_check_initial(draft, model), *_check_motions(draft, model)]
     yield from state
@@ -151,7 +164,7 @@ def _check_ranges(draft: Draft, model: SolidModel) -> Iterator[str]:
 def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
     """No body may start outside the domain; a fixed one may reach out of it."""
     domain = draft.scene.domain
-    if domain is None or not draft.sound("domain", "solids"):
+    if domain is None or not draft.scene.has_fluid or not draft.sound("domain", "solids"):
         return
     pose = kinematics(model, initial_state(draft.scene, model).q)
     axes = min(len(domain.lower), draft.scene.dimensions)

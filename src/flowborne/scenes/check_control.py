@@ -10,6 +10,7 @@ from flowborne.scenes.check_bodies import out_of_plane, unknown_body, unknown_jo
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.python_function import find_function
 from flowborne.scenes.schema_control import (
+    ObjectiveDragTable,
     ObjectiveEffortTable,
     ObjectiveInputMotionTable,
     ObjectivePressureTable,
@@ -81,7 +82,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
                     f"{where}: joint '{joint}' makes no effort, being free. "
                     "Name joints of [[control]] or [[motion]]."
                 )
-    if isinstance(table, ObjectiveWindDragTable | ObjectivePressureTable):
+    if isinstance(table, ObjectiveWindDragTable | ObjectiveDragTable | ObjectivePressureTable):
         for body in table.bodies or ():
             yield from unknown_body(draft, model, body, "objectives", index)
         if not any(table.direction):
@@ -89,7 +90,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
     if isinstance(table, ObjectiveWindDragTable) and not scene.wind and draft.sound("wind"):
         yield f"{where}: there is no wind to drag. Add a [[wind]], or use 'pressure-drag'."
     if isinstance(table, ObjectivePressureTable):
-        if scene.domain is None and draft.sound("domain"):
+        if not scene.has_fluid and draft.sound("domain", "fluid"):
             yield f"{where}: there is no fluid to press. Add a [domain], or use 'wind-drag'."
         if table.frame is not None:
             yield from unknown_body(draft, model, table.frame, "objectives", index, "frame")

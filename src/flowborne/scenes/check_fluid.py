@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.schema_fluid import BoundariesTable, Domain, DyeBands, InflowSide, NoSlipSide
-from flowborne.scenes.schema_solids import WindFacesTable
+from flowborne.scenes.schema_solids import WindFacesTable, WindForceTable, WindStreamTable
 from flowborne.scenes.wording import Key
 
 NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "dye")
@@ -46,9 +46,9 @@ def _vectors(draft: Draft) -> Iterator[tuple[tuple[Key, ...], tuple[float, ...]]
         if source.velocity is not None:
             yield ("sources", index, "velocity"), source.velocity
     for index, wind in enumerate(scene.wind):
-        if isinstance(wind, WindFacesTable):
+        if isinstance(wind, WindFacesTable | WindStreamTable):
             yield ("wind", index, "velocity"), wind.velocity
-        else:
+        elif isinstance(wind, WindForceTable):
             yield ("wind", index, "force"), wind.force
 
 

@@ -26,6 +26,9 @@ WholeNumber = Annotated[int, Strict(), Field(ge=0)]
 
 Text = Annotated[str, Field(min_length=1)]
 
+FUNCTION = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
+"""Form of a Python function's name, "module:function"."""
+
 
 def _two_or_three(values: tuple[float, ...]) -> tuple[float, ...]:
     if len(values) not in (2, 3):

@@ -1,4 +1,4 @@
-"""Objectives that a user wrote: "module:function" in a scene."""
+"""Objectives and winds that a user wrote: "module:function" in a scene."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from flowborne.errors import SceneError
 
 
-def find_function(name: str) -> Callable[[Any], float]:
+def find_function(name: str) -> Callable[..., Any]:
     """The function "module:function". Raises SceneError when Python does not find it."""
     module, _, function = name.partition(":")
     try:

@@ -24,6 +24,7 @@ from flowborne.scenes.schema_solids import (
     SolidsTable,
     WindFacesTable,
     WindForceTable,
+    WindStreamTable,
     WindTable,
 )
 
@@ -88,6 +89,11 @@ class Scene(Table):
         return data
 
     @property
+    def has_fluid(self) -> bool:
+        """Whether a fluid is simulated."""
+        return self.fluid is not None and self.fluid.coupling != "none"
+
+    @property
     def is_slab(self) -> bool:
         return self.dimensions == 2
 
@@ -130,7 +136,8 @@ class Scene(Table):
         """
         sides = [] if self.boundaries is None else [side for _, side in self.boundaries]
         found = [side.velocity for side in sides if isinstance(side, InflowSide)]
-        found += [wind.velocity for wind in self.wind if isinstance(wind, WindFacesTable)]
+        blowing = WindFacesTable | WindStreamTable
+        found += [wind.velocity for wind in self.wind if isinstance(wind, blowing)]
         found += [wind.force for wind in self.wind if isinstance(wind, WindForceTable)]
         found += [] if self.fluid is None else [self.fluid.velocity]
         return next((vector for vector in found if any(vector)), None)

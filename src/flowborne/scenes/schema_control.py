@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from flowborne.scenes.fields import (
+    FUNCTION,
     ByKind,
     Count,
     Number,
@@ -105,6 +106,14 @@ class ObjectiveWindDragTable(ObjectiveTable):
     bodies: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
 
 
+class ObjectiveDragTable(ObjectiveTable):
+    """Force of the fluid and the winds on bodies along `direction`; on every body unless given."""
+
+    kind: Literal["drag"]
+    direction: Vector
+    bodies: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+
+
 class ObjectivePressureTable(ObjectiveTable):
     """Pressure force (eq. 10) on bodies along `direction`; drag and lift differ by the name alone.
 
@@ -157,12 +166,13 @@ class ObjectivePythonTable(ObjectiveTable):
     """Python function "module:name" that takes a Measurement and gives a number."""
 
     kind: Literal["python"]
-    function: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
+    function: Annotated[str, Field(pattern=FUNCTION)]
 
 
 AnyObjective = Annotated[
     ObjectiveEffortTable
     | ObjectiveWindDragTable
+    | ObjectiveDragTable
     | ObjectivePressureTable
     | ObjectiveInputMotionTable
     | ObjectiveVelocityTable

@@ -128,6 +128,9 @@ class FluidTable(Table):
     body_force  uniform force per mass besides gravity, m/s^2
     advection   scheme that carries the velocity
     tolerance   relative residual at which the pressure solve stops
+    coupling    "two-way": fluid and bodies push each other. "one-way": the fluid does not feel the
+                bodies, and pushes them by winds of kind "stream". "none": it is left out, and those
+                winds blow with their own velocity
     """
 
     density: Positive = 1000.0
@@ -136,6 +139,7 @@ class FluidTable(Table):
     body_force: Vector = (0.0, 0.0, 0.0)
     advection: Literal["maccormack", "semi-lagrangian"] = "maccormack"
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
+    coupling: Literal["two-way", "one-way", "none"] = "two-way"
 
 
 class ClosedSide(Table):

@@ -10,7 +10,17 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.fields import ByKind, JointValues, Number, Positive, Table, Text, Vector
+from flowborne.scenes.fields import (
+    FUNCTION,
+    ByKind,
+    JointValues,
+    NotNegative,
+    Number,
+    Positive,
+    Table,
+    Text,
+    Vector,
+)
 from flowborne.scenes.schema_fluid import check_table
 
 
@@ -86,13 +96,58 @@ MotionTable = Annotated[MotionConstantTable | MotionSinusoidTable | MotionKeyfra
 class WindFacesTable(Table):
     """Simple wind of the paper's eq. (2): every face is pushed by its own exposure.
 
-    velocity  of the wind, m/s
+    velocity  of the wind, m/s; with an exponent, at `height`
     density   kg/m^3
     bodies    that it blows on; every body unless given
+    exponent  of the wind over the ground: it grows as (z / height)^exponent; 0 is uniform
+    height    m
+    times     s, keyframes of gusts between which `factors` of the velocity change smoothly
     """
 
     kind: Literal["faces"]
     velocity: Vector
+    density: Positive = 1.2
+    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
+    exponent: NotNegative = 0.0
+    height: Positive = 10.0
+    times: tuple[Number, ...] | None = None
+    factors: tuple[Number, ...] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.times is not None or self.factors is not None:
+            check_table(self.times, self.factors, "times", "factors")
+        return self
+
+
+class WindStreamTable(Table):
+    """The fluid as a simple wind of eq. (2), for a fluid that does not feel the bodies.
+
+    It blows with the fluid's own velocity where fluid.coupling is "one-way", with `velocity` where
+    it is "none" or there is no fluid. Where it is "two-way" the fluid itself pushes and it does not
+    blow at all.
+
+    velocity  m/s
+    density   kg/m^3
+    bodies    that it blows on; every body unless given
+    """
+
+    kind: Literal["stream"]
+    velocity: Vector
+    density: Positive = 1.2
+    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
+
+
+class WindPythonTable(Table):
+    """Simple wind of eq. (2) from a Python function "module:name".
+
+    function  takes places (n, 3) in m and a time in s, and gives velocities (n, 3) in m/s
+    density   kg/m^3
+    bodies    that it blows on; every body unless given
+    """
+
+    kind: Literal["python"]
+    function: Annotated[str, Field(pattern=FUNCTION)]
     density: Positive = 1.2
     bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
 
@@ -105,4 +160,4 @@ class WindForceTable(Table):
     bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
 
 
-WindTable = Annotated[WindFacesTable | WindForceTable, *ByKind]
+WindTable = Annotated[WindFacesTable | WindStreamTable | WindPythonTable | WindForceTable, *ByKind]

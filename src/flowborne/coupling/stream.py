@@ -1,0 +1,64 @@
+"""One-way coupling: the fluid's own velocity as a simple wind on the bodies (eq. 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.model import SolidModel
+from flowborne.solids.wind import Wind, WindFaces
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A velocity on faces as a field of place; outside the grid it is that of the nearest face."""
+
+    velocity: Faces
+    grid: Grid
+
+    def __call__(self, x: Array, time: float) -> Array:
+        """(n, 3) velocity in m/s at the places x (n, 3), linear between faces."""
+        inside = ((x - np.array(self.grid.origin)) / self.grid.spacing).T
+        values = np.zeros_like(x)
+        for axis in self.grid.axes:
+            at = inside - 0.5
+            at[axis] += 0.5
+            if self.grid.is_slab:
+                at[2] = 0.0
+            values[:, axis] = map_coordinates(self.velocity[axis], at, order=1, mode="nearest")
+        return values
+
+
+@dataclass(frozen=True)
+class WindStream:
+    """The simple wind on every face, eq. (2), with the velocity that the fluid has there.
+
+    Meant for a fluid that does not feel the bodies.
+
+    density  rho, kg/m^3
+    bodies   names of the bodies that it blows on; all when None
+    """
+
+    density: float
+    bodies: tuple[str, ...] | None = None
+
+    def wrench(self, model: SolidModel, kinematics: Kinematics, v: Array, time: float) -> Array:
+        """Raises ValueError: a stream blows in a world with a fluid only, by `winds_on`."""
+        raise ValueError("a wind of kind 'stream' needs a world with a fluid: give its setup one")
+
+
+def winds_on(world: World, pose: Kinematics) -> Array:
+    """(nbody, 6) wrench of the simple winds on each body about the world origin."""
+    total = np.zeros((len(pose.body_position), 6))
+    for wind in world.setup.winds:
+        blowing: Wind = wind
+        if isinstance(wind, WindStream) and world.fluid is not None:
+            field = Sampled(world.fluid.velocity, world.flow()[0].grid)
+            blowing = WindFaces(field, wind.density, wind.bodies)
+        total += blowing.wrench(world.setup.solid, pose, world.solid.v, world.time)
+    return total
