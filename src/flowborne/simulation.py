@@ -119,7 +119,9 @@ class Simulation:
         if workers is not None and workers < 1:
             raise ValueError(f"workers is {workers}; give 1 or more")
         self.scene: Scene = load_scene(scene) if isinstance(scene, str | Path) else scene
-        count = workers or default_workers(len(self.scene.controlled_joints()))
+        count = workers or default_workers(
+            len(self.scene.controlled_joints()), self.scene.has_fluid
+        )
         kind = ("serial" if count == 1 else "threads") if executor is None else executor
         built = build(self.scene, mapper(kind, count))
         self.controller: Controller | None = built.controller
@@ -259,9 +261,12 @@ def turning_dofs(model: SolidModel) -> NDArray[np.bool_]:
     return turning
 
 
-def default_workers(joints: int) -> int:
-    """As many workers as a controller of so many joints has trials, but no more than processors."""
-    return max(1, min(2 * joints, _processors()))
+def default_workers(joints: int, fluid: bool) -> int:
+    """As many workers as a controller of so many joints has trials, but no more than processors.
+
+    Without a fluid one: a trial then takes less time than handing it to a thread.
+    """
+    return max(1, min(2 * joints, _processors())) if fluid else 1
 
 
 def _processors() -> int:

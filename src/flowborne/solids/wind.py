@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from flowborne.solids.dynamics import Kinematics
@@ -14,6 +15,7 @@ from flowborne.solids.momentum import cross
 from flowborne.solids.surfaces import surfaces
 
 Array = NDArray[np.float64]
+Bodies = NDArray[np.int64]
 
 
 class Wind(Protocol):
@@ -57,17 +59,16 @@ class WindFaces:
     def wrench(self, model: SolidModel, kinematics: Kinematics, v: Array, time: float) -> Array:
         """(nbody, 6) force and torque about the world origin on each body."""
         patches = surfaces(model)
-        body, area = patches.body, patches.area
-        rotation = kinematics.body_rotation[body]
-        normal = np.matmul(rotation, patches.normal[:, :, None])[:, :, 0]
-        x = kinematics.body_position[body]
-        x = x + np.matmul(rotation, patches.centre[:, :, None])[:, :, 0]
-        twist = (kinematics.twist_jacobian @ v)[body]
-        wind = self.velocity(x, time) if callable(self.velocity) else np.array(self.velocity)
-        inflow = ((wind - twist[:, :3] - cross(twist[:, 3:], x)) * normal).sum(axis=1)
-        force = (self.density * area * inflow * np.abs(inflow))[:, None] * normal
-        wrench = np.zeros((model.nbody, 6))
-        np.add.at(wrench, body, np.concatenate([force, cross(x, force)], axis=1))
+        pose = kinematics.body_position, kinematics.body_rotation
+        wind = (
+            np.array([self.velocity])
+            if not callable(self.velocity)
+            else self.velocity(places(patches.body, patches.centre, *pose), time)
+        )
+        twist = kinematics.twist_jacobian @ v
+        wrench = self.density * pushed(
+            patches.body, patches.centre, patches.normal, patches.area, *pose, twist, wind
+        )
         return _only(model, wrench, self.bodies)
 
 
@@ -88,6 +89,62 @@ class WindForce:
         wrench = np.concatenate([force, cross(kinematics.mass_centre, force)], axis=1)
         wrench[0] = 0.0
         return _only(model, wrench, self.bodies)
+
+
+@njit(nogil=True, cache=True)
+def places(body: Bodies, centre: Array, position: Array, rotation: Array) -> Array:
+    """(n, 3) patches' centres in the world: position + rotation centre."""
+    x = np.empty_like(centre)
+    for n in range(len(body)):
+        for i in range(3):
+            x[n, i] = position[body[n], i]
+            for j in range(3):
+                x[n, i] += rotation[body[n], i, j] * centre[n, j]
+    return x
+
+
+@njit(nogil=True, cache=True)
+def pushed(
+    body: Bodies,
+    centre: Array,
+    normal: Array,
+    area: Array,
+    position: Array,
+    rotation: Array,
+    twist: Array,
+    wind: Array,
+) -> Array:
+    """(nbody, 6) eq. (2) for unit density: the sum over each body's patches of f and x cross f with
+
+        f = sign(u.n) A (u.n)^2 n        u = wind - v - omega cross x
+
+    in the world, patches being given in their bodies' frames (`Patches`).
+
+    position, rotation, twist  (nbody, 3), (nbody, 3, 3), (nbody, 6) of the bodies
+    wind                       (n, 3) m/s at each patch, or (1, 3) for all
+    """
+    wrench = np.zeros((len(position), 6))
+    x, out, f = np.empty(3), np.empty(3), np.empty(3)
+    for n in range(len(body)):
+        b = body[n]
+        w = wind[n if len(wind) > 1 else 0]
+        for i in range(3):
+            x[i], out[i] = position[b, i], 0.0
+            for j in range(3):
+                x[i] += rotation[b, i, j] * centre[n, j]
+                out[i] += rotation[b, i, j] * normal[n, j]
+        v, omega = twist[b, :3], twist[b, 3:]
+        inflow = 0.0
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            inflow += (w[i] - v[i] - omega[j] * x[k] + omega[k] * x[j]) * out[i]
+        for i in range(3):
+            f[i] = area[n] * inflow * abs(inflow) * out[i]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            wrench[b, i] += f[i]
+            wrench[b, 3 + i] += x[j] * f[k] - x[k] * f[j]
+    return wrench
 
 
 def _only(model: SolidModel, wrench: Array, bodies: tuple[str, ...] | None) -> Array:

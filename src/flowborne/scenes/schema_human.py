@@ -1,0 +1,59 @@
+"""Tables of a scene that describe a walking human: the body, and the clip that it follows."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from flowborne.scenes.fields import NotNegative, Positive, Table, Text, WholeNumber
+from flowborne.scenes.schema_fluid import check_interval
+
+
+class HumanTable(Table):
+    """[human]: a body of 23 rigid parts, in place of [solids].
+
+    mass    kg
+    sex     whose proportions of mass it has
+    height  m, of the standard skeleton; where a clip's file gives the bones it is not used
+    """
+
+    mass: Positive = 73.0
+    sex: Literal["male", "female"] = "male"
+    height: Positive = 1.741
+
+
+class ClipTable(Table):
+    """[clip]: captured motion that joints follow.
+
+    file         BVH file, found from the folder of the scene file; without it, a walk by published
+                 curves of a gait (for [human])
+    unit         m per unit of length of the file
+    up           axis of the file that points up
+    skip         frames dropped at the start, which often hold a T-pose
+    start, stop  s, the part that is used, counted after the skipped frames
+    loop         whether it starts again when it ends, from where it has come to
+    blend        s over which it leaves the starting pose, comes to rest at the end, or passes from
+                 one round of a loop to the next
+    smooth       Hz below which motion is kept; all of it unless given
+    mapping      joint of the model -> joint of the clip, where their names do not tell
+    joints       joints of the model that follow; unless given all that the clip has and that are
+                 not controlled
+    """
+
+    file: Text | None = None
+    unit: Positive = 1.0
+    up: Literal["y", "z"] = "y"
+    skip: WholeNumber = 0
+    start: NotNegative = 0.0
+    stop: Positive | None = None
+    loop: bool = False
+    blend: NotNegative = 0.0
+    smooth: Positive | None = None
+    mapping: dict[str, Text] = Field(default_factory=dict)
+    joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_interval(self.start, self.stop)
+        return self
