@@ -19,6 +19,7 @@ from flowborne.control.objectives import (
     ObjectiveSum,
     ObjectiveWindDrag,
 )
+from flowborne.control.servo import ServoExact
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
@@ -188,3 +189,29 @@ def test_decision_in_a_fluid_leaves_the_world_alone_and_has_the_same_bits() -> N
         assert {name: after[name].tobytes() for name in before} == before
     assert decisions[0].gradient.any()
     assert len({each.target.tobytes() + each.gradient.tobytes() for each in decisions}) == 1
+
+
+@pytest.mark.parametrize("limit", [np.inf, 1e6])
+def test_a_drive_that_may_give_way_arrives_as_one_that_may_not(limit: float) -> None:
+    """Its dof moves with the velocity it has, so it looks one step ahead and does not swing."""
+    world = world_of([0.0], 0.0)
+    controller = Controller(
+        np.array([0]),
+        ObjectiveSum.of(ObjectiveEffort(np.array([0]))),
+        Hypothesis(FRAME),
+        strength=STRENGTH,
+        servo=ServoExact(limit),
+    )
+    path = []
+    for _ in range(3):
+        world.memory["target"] = world.solid.q + np.radians(1.0)
+        world.memory["schedule"] = np.array([0.0, FRAME])
+        end = world.time + FRAME
+        for _ in range(4):
+            step(world, FRAME / 4, controller.drive(world, end, FRAME / 4))
+        path.append(float(np.degrees(world.solid.q[0])))
+    assert path == pytest.approx([1.0, 2.0, 3.0], abs=1e-9)
+    for _ in range(6):
+        step(world, FRAME / 4, controller.drive(world, end, FRAME / 4))
+    assert np.degrees(world.solid.q) == pytest.approx(3.0, abs=1e-9)
+    assert world.solid.v == pytest.approx(0.0, abs=1e-9)

@@ -150,8 +150,15 @@ class Controller:
         if "target" in world.memory:
             left, frame_time = world.memory["schedule"]
             remaining = max(frame_end_time + left * frame_time - world.time, dt)
-            gap = model.difference(state.q, world.memory["target"])[self.dofs]
-            move, hold = self.servo.velocity(gap, state.v[self.dofs], float(remaining), dt)
+            gap, v = (
+                model.difference(state.q, world.memory["target"])[self.dofs],
+                state.v[self.dofs],
+            )
+            move, hold = self.servo.velocity(gap, v, float(remaining), dt)
+            # a drive that may give way moves with the velocity it has: it steers the step after
+            later = float(max(remaining - dt, dt))
+            ahead, _ = self.servo.velocity(gap - dt * v, v, later, dt)
+            hold = np.where(np.isfinite(self.servo.torque_limit), ahead, hold)
         drive.set(self.dofs, move, hold, np.asarray(self.servo.torque_limit, dtype=np.float64))
         return drive
 
