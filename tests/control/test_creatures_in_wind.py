@@ -18,6 +18,7 @@ from flowborne.control.objectives import (
     ObjectivePressureDrag,
     ObjectiveSum,
     ObjectiveWindDrag,
+    WeightedObjective,
 )
 from flowborne.control.servo import ServoExact
 from flowborne.control.trial import Hypothesis
@@ -215,3 +216,40 @@ def test_a_drive_that_may_give_way_arrives_as_one_that_may_not(limit: float) -> 
         step(world, FRAME / 4, controller.drive(world, end, FRAME / 4))
     assert np.degrees(world.solid.q) == pytest.approx(3.0, abs=1e-9)
     assert world.solid.v == pytest.approx(0.0, abs=1e-9)
+
+
+def test_joints_that_want_different_things_each_follow_their_own() -> None:
+    """The shoulder wants its own effort alone; the elbow the sum of its own and the shoulder's."""
+    shoulder, elbow = (ObjectiveEffort(np.array([dof])) for dof in (0, 1))
+    own = WeightedObjective(shoulder, wanted_by=np.array([0]))
+    both = [
+        WeightedObjective(o, w, wanted_by=np.array([1])) for o, w in ((shoulder, 0.5), (elbow, 1))
+    ]
+    world = world_of([-30.0, 20.0], GRAVITY)
+    controller = Controller(
+        np.arange(2),
+        ObjectiveSum((own, *both)),
+        Hypothesis(FRAME),
+        STRENGTH,
+        GradientCentral((np.radians(1.0), np.radians(2.0))),
+        executor=Serial(),
+    )
+    decision = controller.decide(world, FRAME, step)
+    d = np.radians([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]])
+    efforts = [
+        controller.trials(world, step, objective=ObjectiveSum.of(o)).values(d)
+        for o in (shoulder, elbow)
+    ]
+    slope = (efforts[0][0] - efforts[0][1]) / np.radians(2.0)
+    mixed = 0.5 * efforts[0] + efforts[1]
+    assert decision.gradient == pytest.approx(
+        [slope, (mixed[2] - mixed[3]) / np.radians(4.0)], rel=1e-12
+    )
+    assert np.abs(decision.displacement) == pytest.approx(STRENGTH * FRAME), "both go at full pace"
+    assert decision.evaluations == 4
+
+
+def test_a_joint_that_wants_nothing_is_named() -> None:
+    wish = WeightedObjective(ObjectiveEffort(np.array([0])), wanted_by=np.array([0]))
+    with pytest.raises(ValueError, match="controlled dof 1 wants nothing"):
+        ObjectiveSum((wish,)).shared_out(np.array([0, 1]))

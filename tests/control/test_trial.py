@@ -121,6 +121,7 @@ def test_trial_starts_from_its_pose_and_leaves_the_world_alone(
         SHOULDER,
         np.array([0.5, 0.0, 0.0]),
         Serial(),
+        np.array([0]),
     )
     values = trials.values(np.array([[0.1], [-0.2]]))
     assert values == pytest.approx([0.6, 0.3], abs=1e-14)

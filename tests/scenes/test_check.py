@@ -160,6 +160,11 @@ ONE_FAULT = {
         {'kind = "effort"': 'kind = "python"\nfunction = "nowhere_at_all:cost"'},
         "Python does not find module 'nowhere_at_all' of 'nowhere_at_all:cost'.",
     ),
+    "a wish of a joint that is not controlled": (
+        {'kind = "effort"': 'kind = "effort"\nwanted_by = ["wirst"]'},
+        "scene swim.toml, [[objectives]] 1, wanted_by: joint 'wirst' is not controlled; "
+        "did you mean 'wrist'?",
+    ),
     "one table where several may be": (
         {"[[control]]": "[control]"},
         "scene swim.toml: [control] may be there several times. Write [[control]].",

@@ -167,11 +167,30 @@ class Controller:
         measurement = Measurement(world, report)
         return {"objective": self.objective.value(measurement)} | self.objective.values(measurement)
 
-    def trials(self, world: World, step: Step, pose: Array | None = None) -> Trials:
-        """The objective as a function of displacements from `pose` (nq,); None: the present."""
+    def trials(
+        self,
+        world: World,
+        step: Step,
+        pose: Array | None = None,
+        objective: ObjectiveSum | None = None,
+        places: Integers | None = None,
+    ) -> Trials:
+        """An objective as a function of displacements from `pose` (nq,); None: the present.
+
+        objective  the controller's own when None
+        places     (m,) those of the controlled dofs that are displaced; all when None
+        """
         _, state = creature.parts(world)
-        start = (state.q if pose is None else pose).copy()
-        return Trials(world, step, self.objective, self.hypothesis, self.dofs, start, self.executor)
+        return Trials(
+            world,
+            step,
+            self.objective if objective is None else objective,
+            self.hypothesis,
+            self.dofs,
+            (state.q if pose is None else pose).copy(),
+            self.executor,
+            np.arange(self.dofs.size) if places is None else places,
+        )
 
     def positions(self, world: World) -> Array:
         """(n,) present positions of controlled scalar joints, rad or m; NaN for ball dofs."""
@@ -189,25 +208,33 @@ class Controller:
     def _descend(
         self, world: World, frame_time: float, step: Step
     ) -> tuple[Array, float, Array, int]:
-        """Pose to go to; objective and gradient in the present pose; number of trials run."""
+        """Pose to go to; objective and gradient in the present pose; number of trials run.
+
+        Dofs that want different things each descend on what they want, all from the same pose.
+        """
         n = self.dofs.size
-        trials = self.trials(world, step)
-        if not self.objective.active(world.time):
-            return trials.pose, 0.0, np.zeros(n), 0
+        model, state = creature.parts(world)
+        pose, value, gradient, evaluations = state.q.copy(), 0.0, np.zeros(n), 0
         limit = np.broadcast_to(np.asarray(self.strength), (n,)) * (self.every * frame_time)
-        first = estimate = self.gradient.estimate(trials)
-        evaluations = 0
+        groups = [
+            (places, wanted)
+            for places, wanted in self.objective.shared_out(self.dofs)
+            if wanted.active(world.time)
+        ]
         for iteration in range(self.iterations):
-            if iteration:
-                estimate = self.gradient.estimate(trials)
-            wanted = self.rule.step(trials, estimate.gradient, limit)
-            displacement = trials.within_range(wanted)
-            evaluations += trials.evaluations
-            pose = trials.moved(displacement) if displacement.any() else trials.pose
-            trials = self.trials(world, step, pose)
+            displacement = np.zeros(model.nv)
+            for places, wanted in groups:
+                trials = self.trials(world, step, pose, wanted, places)
+                estimate = self.gradient.of(places).estimate(trials)
+                if iteration == 0:
+                    value, gradient[places] = value + estimate.value, estimate.gradient
+                move = self.rule.step(trials, estimate.gradient, limit[places])
+                displacement[self.dofs[places]] = trials.within_range(move)
+                evaluations += trials.evaluations
             if not displacement.any():
                 break
-        return trials.pose, first.value, first.gradient, evaluations
+            pose = creature.moved(model, pose, displacement)
+        return pose, value, gradient, evaluations
 
     def _decision(self, world: World, decided: bool, evaluations: int, started: float) -> Decision:
         memory = world.memory

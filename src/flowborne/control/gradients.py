@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,10 @@ class Estimate:
 class Gradient(Protocol):
     """Estimates the gradient of the objective."""
 
+    def of(self, places: NDArray[np.int64]) -> Gradient:
+        """The same for some of the dofs."""
+        ...
+
     def estimate(self, poses: Poses) -> Estimate:
         """Objective and gradient in the present pose."""
         ...
@@ -72,6 +76,11 @@ class FiniteDifference:
             )
         if not 0.0 <= self.resolution < 1.0:
             raise ValueError(f"resolution is {self.resolution}: give a number from 0 to below 1")
+
+    def of(self, places: NDArray[np.int64]) -> Self:
+        """The same for the dofs at some places (m,) of all that have a displacement."""
+        d = np.asarray(self.displacement, dtype=np.float64)
+        return replace(self, displacement=tuple(d[places].tolist())) if d.ndim else self
 
     def displacements(self, count: int) -> Array:
         """(n,) d of each dof. Raises ValueError when there are not as many as dofs."""

@@ -179,11 +179,15 @@ class ObjectiveCallable:
 
 @dataclass(frozen=True, eq=False)
 class WeightedObjective:
-    """An objective in a sum: its weight (negative to maximise) and when it counts."""
+    """An objective in a sum: its weight (negative to maximise), when it counts, and for whom.
+
+    wanted_by  (k,) controlled dofs that want it; every one when None
+    """
 
     objective: Objective
     weight: float = 1.0
     phases: Phases = field(default_factory=PhaseAlways)
+    wanted_by: Integers | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,6 +213,26 @@ class ObjectiveSum:
     def of(cls, objective: Objective, weight: float = 1.0) -> ObjectiveSum:
         """Sum of a single objective that always counts."""
         return cls((WeightedObjective(objective, weight),))
+
+    def shared_out(self, dofs: Integers) -> list[tuple[Integers, ObjectiveSum]]:
+        """Groups of places in `dofs` (n,) that want the same terms, each with their sum.
+
+        raises  ValueError when a dof wants nothing
+        """
+        groups: dict[tuple[int, ...], list[int]] = {}
+        for place, dof in enumerate(dofs):
+            wanted = tuple(
+                n
+                for n, term in enumerate(self.terms)
+                if term.wanted_by is None or dof in term.wanted_by
+            )
+            if not wanted:
+                raise ValueError(f"controlled dof {dof} wants nothing: give it an objective")
+            groups.setdefault(wanted, []).append(place)
+        return [
+            (np.array(places), ObjectiveSum(tuple(self.terms[n] for n in wanted)))
+            for wanted, places in groups.items()
+        ]
 
     def active(self, time: float) -> bool:
         """Whether any term counts at `time`."""

@@ -191,6 +191,8 @@ class Trials:
 
     world, step, objective, hypothesis, dofs, pose  as in `Trial`
     mapper  runs the trials
+    places  (m,) those of `dofs` that are displaced, of which all displacements here speak; the
+            others stay
     evaluations  number of trials run so far
     """
 
@@ -201,26 +203,26 @@ class Trials:
     dofs: Integers
     pose: Array
     mapper: Mapper
+    places: Integers
     evaluations: int = 0
 
     @property
     def count(self) -> int:
-        """n, number of controlled dofs."""
-        return int(self.dofs.size)
+        """m, number of dofs that are displaced."""
+        return int(self.places.size)
 
     def within_range(self, displacement: Array) -> Array:
-        """(n,) the part of a displacement (n,) that the joints' ranges allow."""
+        """(m,) the part of a displacement (m,) that the joints' ranges allow."""
         model, _ = creature.parts(self.world)
-        return creature.within_range(model, self.pose, self._full(displacement))[self.dofs]
-
-    def moved(self, displacement: Array) -> Array:
-        """(nq,) the pose displaced by (n,)."""
-        model, _ = creature.parts(self.world)
-        return creature.moved(model, self.pose, self._full(displacement))
+        full = np.zeros(model.nv)
+        full[self.dofs[self.places]] = displacement
+        return creature.within_range(model, self.pose, full)[self.dofs[self.places]]
 
     def values(self, displacements: Array) -> Array:
-        """(m,) objective in poses displaced by the rows of (m, n). Raises TrialError."""
+        """(k,) objective in poses displaced by the rows of (k, m). Raises TrialError."""
         world = without_scalars(self.world)
+        moves = np.zeros((len(displacements), self.dofs.size))
+        moves[:, self.places] = displacements
         trials = [
             Trial(
                 world,
@@ -231,12 +233,7 @@ class Trials:
                 self.pose,
                 displacement,
             )
-            for displacement in displacements
+            for displacement in moves
         ]
         self.evaluations += len(trials)
         return np.array(self.mapper.map(run, trials, self.world.setup))
-
-    def _full(self, displacement: Array) -> Array:
-        full = np.zeros(creature.parts(self.world)[0].nv)
-        full[self.dofs] = displacement
-        return full

@@ -114,6 +114,7 @@ def _weighted(
         _objective(table, scene, model),
         sign * table.weight,
         _phases(table.phases, scene, model, motions),
+        None if table.wanted_by is None else _dofs_of(model, table.wanted_by),
     )
 
 

@@ -19,6 +19,7 @@ from flowborne.scenes.schema_control import (
     ObjectiveWindDragTable,
     PhaseMotionTable,
 )
+from flowborne.scenes.wording import suggestion
 from flowborne.solids.model import SolidModel
 
 
@@ -38,6 +39,30 @@ def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
         )
     for index in range(len(scene.objectives)):
         yield from _check_objective(draft, model, index)
+    yield from _check_wishes(draft)
+
+
+def _check_wishes(draft: Draft) -> Iterator[str]:
+    """Only controlled joints want something, and every one does."""
+    scene, controlled = draft.scene, draft.scene.controlled_joints()
+    if not draft.sound("control", "objectives"):
+        return
+    wishing: set[str] = set()
+    for index, table in enumerate(scene.objectives):
+        wishing |= set(controlled if table.wanted_by is None else table.wanted_by)
+        for joint in table.wanted_by or ():
+            if joint not in controlled:
+                end = suggestion(joint, controlled, "Controlled are")
+                yield (
+                    f"{draft.at('objectives', index, 'wanted_by')}: joint '{joint}' is not "
+                    f"controlled{end}"
+                )
+    for joint in () if wishing - set(controlled) else controlled:
+        if scene.objectives and joint not in wishing:
+            yield (
+                f"{draft.at('control')}: joint '{joint}' is controlled and wants nothing. Name it "
+                "in wanted_by of an objective, or do not control it."
+            )
 
 
 def _check_joints(draft: Draft, model: SolidModel) -> Iterator[str]:

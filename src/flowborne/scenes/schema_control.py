@@ -81,14 +81,17 @@ PhaseTable = Annotated[PhaseIntervalsTable | PhaseMotionTable, *ByKind]
 class ObjectiveTable(Table):
     """What every objective has.
 
-    goal    "least" or "most" of it
-    weight  its share in the sum
-    phases  when it counts; always unless given
+    goal       "least" or "most" of it
+    weight     its share in the sum
+    phases     when it counts; always unless given
+    wanted_by  controlled joints that want it; all of them unless given. Joints that want different
+               things each follow their own sum
     """
 
     goal: Literal["least", "most"] = "least"
     weight: Positive = 1.0
     phases: PhaseTable | None = None
+    wanted_by: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
 
 
 class ObjectiveEffortTable(ObjectiveTable):
