@@ -1,0 +1,254 @@
+"""BVH in and out.
+
+A BVH is y up as a rule, its character facing +z, its left at +x; where z is up the left is at +x
+as well, so that it faces -y (Blender's way). Lengths have no unit, angles are degrees, and a
+joint's rotation is the product of its rotation channels in the file's order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.errors import SceneError
+from flowborne.io.atomic import write_atomically, write_text
+from flowborne.io.bvh_file import BvhFile, BvhJoint, load_bvh
+from flowborne.io.clip import Clip
+from flowborne.io.euler import angles_of, quaternions_of
+from flowborne.quaternions import angle, inverse, product
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TO_WORLD: dict[str, Array] = {
+    "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "z": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+}
+"""Axis that is up in the file -> (3, 3) rotation of its axes to x forward, y left, z up."""
+
+STILL = 1e-3
+"""m; a bone whose length channels move less counts as rigid: exporters round and solve so far."""
+
+SAME = 1e-6
+"""rad; a rotation this near to the file's own keeps the file's numbers."""
+
+DEGREES_OF_FREEDOM = 0.01
+"""degrees that may be lost where a joint of the file has fewer than three rotation channels."""
+
+ZXY = (2, 0, 1)
+"""Axes of the rotation channels in clips that have no file to take after."""
+
+
+def read_bvh(path: str | Path, unit: float = 1.0, up: str = "y", skip: int = 0) -> Clip:
+    """The motion of a BVH file.
+
+    unit    m per length of the file
+    up      axis of the file that is up, "y" or "z"
+    skip    frames left out at the start, such as a T-pose that an exporter put there
+    raises  SceneError when the file is missing, none, cut or not finite, when a bone changes its
+            length by more than 1 mm, and when `skip` leaves no frame
+    note    where the root has position channels they are its place and its OFFSET is not added
+    """
+    bvh = load_bvh(Path(path))
+    if not 0 <= skip < len(bvh.values):
+        raise SceneError(
+            f"{bvh.name} has {len(bvh.values)} frames, and {skip} of them are to be skipped. "
+            "Skip fewer."
+        )
+    values, world = bvh.values[skip:], TO_WORLD[up]
+    root, *others = bvh.joints
+    offsets = [np.zeros(3)] + [_offset(bvh, joint, values, unit) for joint in others]
+    return Clip(
+        names=tuple(joint.name for joint in bvh.joints),
+        parents=np.array([joint.parent for joint in bvh.joints], dtype=np.int64),
+        offsets=unit * np.array(offsets) @ world.T,
+        ends={j.name: unit * world @ j.end for j in bvh.joints if j.end is not None},
+        frame_time=bvh.frame_time,
+        rotations=np.stack([_rotations(j, values, world) for j in bvh.joints], axis=1),
+        translation=unit * _positions(root, values)[0] @ world.T,
+    )
+
+
+def write_bvh(
+    path: str | Path,
+    source: str | Path,
+    rotations: Mapping[str, Array],
+    *,
+    up: str = "y",
+    first: int = 0,
+    last: int | None = None,
+) -> None:
+    """Write a BVH file anew with other rotations of some joints; all else stays as it came.
+
+    source     file whose skeleton, channels, frame time and numbers are taken over, verbatim
+    rotations  joint -> (frames, 4) unit quaternions relative to its parent in the file, in the
+               world's axes. Their angles go on from frame to frame without a turn of 360 degrees;
+               those of a rotation that is the file's own stay the file's
+    up         as in `read_bvh`
+    first      frame of the file with which the new one begins, skipped ones counted
+    last       frame after the last one; the file's end by default
+    raises     SceneError when the file is bad, lacks a joint or a channel, or has no frame in the
+               range; OSError
+    """
+    bvh = load_bvh(Path(source))
+    span = slice(first, last)
+    rows, values = bvh.rows[span], bvh.values[span]
+    if not rows:
+        raise SceneError(
+            f"{bvh.name} has {len(bvh.rows)} frames, none of them from {first} to {last}. "
+            "Give a range that has frames."
+        )
+    joints = {joint.name: joint for joint in bvh.joints}
+    words = [row.split() for row in rows] if rotations else []
+    for name, wanted in rotations.items():
+        if name not in joints:
+            raise SceneError(f"{bvh.name} has no joint '{name}'. It has: {', '.join(joints)}.")
+        columns, angles, new = _replaced(bvh, joints[name], values, wanted, TO_WORLD[up])
+        for frame in np.flatnonzero(new):
+            for column, degrees in zip(columns, angles[frame], strict=True):
+                words[frame][column] = f"{degrees:.6f}"
+    lines = [" ".join(row) for row in words] or rows
+    text = f"{bvh.hierarchy}Frames: {len(rows)}\nFrame Time: {bvh.time_text}\n"
+    whole = (text + "\n".join(lines) + "\n").encode(bvh.encoding)
+    write_atomically(Path(path), lambda stream: stream.write(whole))
+
+
+def write_clip(path: str | Path, clip: Clip, unit: float = 1.0) -> None:
+    """Write a clip as a BVH file: y up, facing +z, channels Zrotation Xrotation Yrotation.
+
+    unit    m per length of the file
+    raises  OSError
+    """
+    back = TO_WORLD["y"].T
+    columns = [clip.translation @ back.T / unit]
+    for joint in range(len(clip.names)):
+        local = _in_axes(clip.rotations[:, joint], back)
+        columns.append(angles_of(local, ZXY, np.zeros(3)))
+    offsets = clip.offsets @ back.T / unit
+    ends = {name: back @ end / unit for name, end in clip.ends.items()}
+    lines = ["HIERARCHY", *_block(clip, offsets, ends, 0, 0), "MOTION", f"Frames: {clip.frames}"]
+    lines.append(f"Frame Time: {clip.frame_time:.10g}")
+    lines += [_spaced(row, 8) for row in np.concatenate(columns, axis=1)]
+    write_text(Path(path), "\n".join(lines) + "\n")
+
+
+def _positions(joint: BvhJoint, values: Array) -> tuple[Array, bool]:
+    """(frames, 3) a joint's position channels, OFFSET where there are none; whether it has any."""
+    result = np.tile(joint.offset, (len(values), 1))
+    given = False
+    for column, (axis, turns) in enumerate(joint.channels, start=joint.first):
+        if not turns:
+            result[:, axis], given = values[:, column], True
+    return result, given
+
+
+def _offset(bvh: BvhFile, joint: BvhJoint, values: Array, unit: float) -> Array:
+    """(3,) place of a joint other than the root in its parent's axes, in the file's unit.
+
+    Some tools write the whole place into position channels, others what comes on top of OFFSET:
+    the numbers are nearer to OFFSET in the first case and nearer to 0 in the second.
+    """
+    places, given = _positions(joint, values)
+    if not given:
+        return joint.offset
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2.0
+    moved = np.abs(places - middle).max(axis=1) * unit
+    if moved.max() > STILL:
+        frame = int(moved.argmax()) + len(bvh.values) - len(values)
+        raise SceneError(
+            f"{bvh.name}, line {bvh.lines[frame]}: the position channels of joint "
+            f"'{joint.name}' move by {2.0 * moved.max():.3g} m, and bones are rigid here. "
+            "Export the clip without stretching bones, or skip frames that are none of the motion."
+        )
+    if np.linalg.norm(middle - joint.offset) <= np.linalg.norm(middle):
+        return middle
+    moving = [axis for axis, turns in joint.channels if not turns]
+    result = joint.offset.copy()
+    result[moving] += middle[moving]
+    return result
+
+
+def _turning(joint: BvhJoint) -> tuple[list[int], list[int]]:
+    """Columns and axes of a joint's rotation channels."""
+    found = [(joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if turns]
+    return [column for column, _ in found], [axis for _, axis in found]
+
+
+def _rotations(joint: BvhJoint, values: Array, world: Array) -> Array:
+    """(frames, 4) relative to the parent, in the world's axes."""
+    columns, axes = _turning(joint)
+    return quaternions_of(values[:, columns], world.T[axes])
+
+
+def _in_axes(rotations: Array, axes: Array) -> Array:
+    """(frames, 4) the same rotations seen from axes turned by a (3, 3) rotation."""
+    return np.concatenate([rotations[:, :1], rotations[:, 1:] @ axes.T], axis=1)
+
+
+def _replaced(
+    bvh: BvhFile, joint: BvhJoint, values: Array, wanted: Array, world: Array
+) -> tuple[list[int], Array, Mask]:
+    """Columns, angles (frames, k) in degrees for them, and the frames where they are new."""
+    if wanted.shape != (len(values), 4):
+        raise ValueError(f"{wanted.shape} is not the shape of {len(values)} quaternions.")
+    columns, axes = _turning(joint)
+    if len(set(axes)) != len(axes):
+        raise SceneError(
+            f"{bvh.name}, line {joint.line}: joint '{joint.name}' turns twice about one axis. "
+            "Export the clip with three different rotation channels to have its motion out."
+        )
+    own = _rotations(joint, values, world)
+    new = angle(product(inverse(own), wanted)) > SAME
+    if not new.any():
+        return columns, values[:, columns], new
+    missing = [axis for axis in range(3) if axis not in axes]
+    i, j, k = axes + missing
+    start = np.concatenate([values[0, columns], np.zeros(len(missing))])
+    result = values[:, columns].copy()
+    for begin, end in _runs(new):
+        if begin > 0:
+            start[: len(columns)] = result[begin - 1]
+        angles = angles_of(_in_axes(wanted[begin:end], world.T), (i, j, k), start)
+        lost = np.abs(angles[:, len(columns) :]).max(initial=0.0)
+        if lost > DEGREES_OF_FREEDOM:
+            raise SceneError(
+                f"{bvh.name}, line {joint.line}: joint '{joint.name}' has {len(columns)} rotation "
+                f"channels, and its motion turns {lost:.3g} degrees about axes that have none. "
+                "Export the clip with three rotation channels to have its motion out."
+            )
+        result[begin:end] = angles[:, : len(columns)]
+    return columns, result, new
+
+
+def _runs(marked: Mask) -> list[tuple[int, int]]:
+    """Begin and end of each run of marked frames."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _block(
+    clip: Clip, offsets: Array, ends: Mapping[str, Array], joint: int, depth: int
+) -> list[str]:
+    """Lines of a joint and all below it."""
+    name, inner = clip.names[joint], "\t" * (depth + 1)
+    places = "6 Xposition Yposition Zposition" if joint == 0 else "3"
+    lines = [
+        f"{'ROOT' if joint == 0 else 'JOINT'} {name}",
+        "{",
+        f"\tOFFSET {_spaced(offsets[joint], 8)}",
+        f"\tCHANNELS {places} Zrotation Xrotation Yrotation",
+    ]
+    lines = ["\t" * depth + line for line in lines]
+    for child in np.flatnonzero(clip.parents == joint):
+        lines += _block(clip, offsets, ends, int(child), depth + 1)
+    if name in ends:
+        tip = f"{inner}\tOFFSET {_spaced(ends[name], 8)}"
+        lines += [f"{inner}End Site", f"{inner}{{", tip, f"{inner}}}"]
+    return [*lines, "\t" * depth + "}"]
+
+
+def _spaced(numbers: Array, digits: int) -> str:
+    return " ".join(f"{number:.{digits}f}" for number in numbers)

@@ -1,0 +1,60 @@
+"""A motion clip: a skeleton of rigid bones and how it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.quaternions import product, turned
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """Motion of a skeleton of rigid bones; z up, x forward, y left.
+
+    names        (n) joints, parents before children; the first is the root
+    parents      (n,) int64 number of the parent, -1 for the root
+    offsets      (n, 3) m, from the parent's joint when no joint is turned; root: 0
+    ends         joint name -> (3,) m, end site of a last bone, likewise
+    frame_time   s
+    rotations    (frames, n, 4) unit quaternions, joint relative to parent (root: to the world)
+    translation  (frames, 3) m, place of the root
+    """
+
+    names: tuple[str, ...]
+    parents: NDArray[np.int64]
+    offsets: Array
+    ends: Mapping[str, Array]
+    frame_time: float
+    rotations: Array
+    translation: Array
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(self.rotations)
+
+    @property
+    def duration(self) -> float:
+        """s from the first frame to the last."""
+        return (self.frames - 1) * self.frame_time
+
+    def places(self, frame: int | slice = slice(None)) -> tuple[Array, Array]:
+        """Where the joints are in the world, in one frame or in several.
+
+        returns  (..., n, 3) m, places and (..., n, 4) unit quaternions, the joints' rotations;
+                 without the leading axis for a single frame
+        """
+        local, root = self.rotations[frame], self.translation[frame]
+        places, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)
+        places[..., 0, :], rotations[..., 0, :] = root, local[..., 0, :]
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            above = rotations[..., parent, :]
+            rotations[..., joint, :] = product(above, local[..., joint, :])
+            places[..., joint, :] = places[..., parent, :] + turned(above, self.offsets[joint])
+        return places, rotations
