@@ -1,0 +1,172 @@
+"""The skeleton that a clip was made with, completed where the clip says nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flowborne.errors import SceneError
+from flowborne.io.clip import Clip
+from flowborne.scenes.human.skeleton import BODIES, PARENTS, SIDES, TIPS, Array, Skeleton
+from flowborne.scenes.human.standard import FOREARM, HAND, standard_skeleton
+from flowborne.scenes.wording import suggestion
+
+NAMES = tuple(joint for _, joint, _ in BODIES)
+"""Joints, parents first."""
+
+TINY = 1e-6
+"""Of a bone's standard length: what is shorter is no bone."""
+
+THORAX = 0.117 / 0.242
+"""Of the standard thorax, the bone that BVH files of the CMU database lack: neck and collar bones
+start together at its end (117 mm in the ASF file of subject 02, which still has it)."""
+
+
+def skeleton_of(clip: Clip, mapping: Mapping[str, str]) -> Skeleton:
+    """Skeleton with a clip's own bones, no joint of the clip turned.
+
+    mapping  joint of the model -> joint of the clip; the root must be among them
+    returns  joints that are mapped are where the clip has them. Where one lies on its mapped
+             parent, other than the root, the file lacks the bone between: it is put in, and all
+             beyond moves with it. A joint that is not mapped is placed by the standard skeleton:
+             between its neighbours, or beyond the last of them in the direction of its bone.
+             Head and toes end at the clip's end sites; a hand points to the farthest of them and
+             has the forearm's proportion, as clips end hands anywhere between wrist and fingertip
+    raises   SceneError for unknown joints, when the root or every other joint is missing, and when
+             two joints lie on each other that a bone of any length must part
+    """
+    _check_names(clip, mapping)
+    standard = standard_skeleton()
+    found = _found(clip, mapping)
+    scale = _scale(found, standard)
+    _insert_lost_bones(found, standard, scale)
+    for name in (*NAMES, *TIPS):
+        if name not in found:
+            found[name] = _filled(name, found, standard, scale)
+    for side in SIDES:
+        wrist, tip = found[f"{side}_wrist"], found[f"{side}_fingertip"]
+        length = HAND / FOREARM * float(np.linalg.norm(wrist - found[f"{side}_elbow"]))
+        found[f"{side}_fingertip"] = wrist + length * (tip - wrist) / np.linalg.norm(tip - wrist)
+    return Skeleton({name: found[name] for name in NAMES}, {tip: found[tip] for tip in TIPS})
+
+
+def _check_names(clip: Clip, mapping: Mapping[str, str]) -> None:
+    problems = []
+    for joint, name in mapping.items():
+        if joint not in NAMES:
+            end = suggestion(joint, NAMES, "The human's joints are")
+            problems.append(f"clip, mapping: the human has no joint '{joint}'{end}")
+        if name not in clip.names:
+            end = suggestion(name, clip.names, "The clip's joints are")
+            problems.append(f"clip, mapping {joint}: the clip has no joint '{name}'{end}")
+    if "root" not in mapping:
+        problems.append("clip, mapping: the joint 'root' is missing. Map it to the clip's root.")
+    if len(mapping) < 2:
+        problems.append("clip, mapping: no joint but the root. Map the joints of a leg at least.")
+    if problems:
+        raise SceneError(problems)
+
+
+def _found(clip: Clip, mapping: Mapping[str, str]) -> dict[str, Array]:
+    """Places of the mapped joints, and of the tips below them, m."""
+    place: dict[str, Array] = {}
+    for number, name in enumerate(clip.names):
+        parent = int(clip.parents[number])
+        above = place[clip.names[parent]] if parent >= 0 else np.zeros(3)
+        place[name] = above + clip.offsets[number]
+    found = {joint: place[mapping[joint]] for joint in NAMES if joint in mapping}
+    for tip, joint in TIPS.items():
+        if joint not in mapping:
+            continue
+        start = found[joint]
+        ends = [
+            place[name] + offset
+            for name, offset in clip.ends.items()
+            if mapping[joint] in _lineage(clip, name)
+        ]
+        far = max(ends, key=lambda end: float(np.linalg.norm(end - start)), default=start)
+        if np.linalg.norm(far - start) > 0.0:
+            found[tip] = far
+    return found
+
+
+def _lineage(clip: Clip, name: str) -> list[str]:
+    """A joint of the clip and all above it."""
+    names = []
+    number = clip.names.index(name)
+    while number >= 0:
+        names.append(clip.names[number])
+        number = int(clip.parents[number])
+    return names
+
+
+def _scale(found: Mapping[str, Array], standard: Skeleton) -> float:
+    """Clip's size over the standard's, by the joints that both have and their nearest above."""
+    ours = theirs = 0.0
+    for joint in found:
+        if joint == "root" or joint in TIPS:
+            continue
+        above = _above(joint, found)
+        length = float(np.linalg.norm(found[joint] - found[above]))
+        usual = float(np.linalg.norm(standard[joint] - standard[above]))
+        if length > TINY * usual:
+            ours, theirs = ours + length, theirs + usual
+    if theirs == 0.0:
+        raise SceneError(
+            "clip: all mapped joints are at one place. Map joints that have bones between them."
+        )
+    return ours / theirs
+
+
+def _above(name: str, found: Mapping[str, Array]) -> str:
+    """Nearest joint above that the clip has."""
+    above = PARENTS[name]
+    while above not in found:
+        above = PARENTS[above]
+    return above
+
+
+def _insert_lost_bones(found: dict[str, Array], standard: Skeleton, scale: float) -> None:
+    for joint in NAMES[1:]:
+        above = PARENTS[joint]
+        if joint not in found or above not in found or above == "root":
+            continue
+        bone = scale * (standard[joint] - standard[above])
+        if above == "thorax":
+            bone = THORAX * scale * (standard["lower_neck"] - standard["thorax"])
+        if np.linalg.norm(found[joint] - found[above]) > TINY * np.linalg.norm(bone):
+            continue
+        for name in found:
+            if name == joint or joint in _ancestors(name):
+                found[name] = found[name] + bone
+
+
+def _ancestors(name: str) -> list[str]:
+    names = []
+    while name in PARENTS:
+        name = PARENTS[name]
+        names.append(name)
+    return names
+
+
+def _filled(name: str, found: Mapping[str, Array], standard: Skeleton, scale: float) -> Array:
+    """Place of a joint or tip whose parent is known: the standard one, turned and scaled to fit."""
+    above = PARENTS[name]
+    below = next((n for n in (*NAMES, *TIPS) if n in found and name in _ancestors(n)), None)
+    offset = standard[name] - standard[above]
+    if below is not None:
+        ours, theirs = found[below] - found[above], standard[below] - standard[above]
+        scale = float(np.linalg.norm(ours) / np.linalg.norm(theirs))
+    elif above == "root":
+        return found[above] + scale * offset
+    else:
+        ours = found[above] - found[PARENTS[above]]
+        theirs = standard[above] - standard[PARENTS[above]]
+    if not np.any(ours):
+        raise SceneError(
+            f"clip: the joints around '{name}' lie on each other. Leave one out of the mapping."
+        )
+    turn, _ = Rotation.align_vectors(ours[None], theirs[None])
+    return np.asarray(found[above] + scale * turn.apply(offset))

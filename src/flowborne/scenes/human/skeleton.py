@@ -1,0 +1,128 @@
+"""Where the joints of the human are at rest, and which body hangs on which."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SIDES = ("left", "right")
+
+Names = tuple[str, str, str]
+
+
+def _leg(side: str) -> tuple[Names, ...]:
+    return (
+        (f"{side}_thigh", f"{side}_hip", "root"),
+        (f"{side}_shank", f"{side}_knee", f"{side}_hip"),
+        (f"{side}_foot", f"{side}_ankle", f"{side}_knee"),
+        (f"{side}_toes", f"{side}_toes", f"{side}_ankle"),
+    )
+
+
+def _arm(side: str) -> tuple[Names, ...]:
+    return (
+        (f"{side}_clavicle", f"{side}_clavicle", "thorax"),
+        (f"{side}_upper_arm", f"{side}_shoulder", f"{side}_clavicle"),
+        (f"{side}_forearm", f"{side}_elbow", f"{side}_shoulder"),
+        (f"{side}_hand", f"{side}_wrist", f"{side}_elbow"),
+    )
+
+
+BODIES: tuple[Names, ...] = (
+    ("pelvis", "root", ""),
+    *_leg("left"),
+    *_leg("right"),
+    ("lower_back", "lower_back", "root"),
+    ("upper_back", "upper_back", "lower_back"),
+    ("thorax", "thorax", "upper_back"),
+    ("lower_neck", "lower_neck", "thorax"),
+    ("upper_neck", "upper_neck", "lower_neck"),
+    ("head", "head", "upper_neck"),
+    *_arm("left"),
+    *_arm("right"),
+)
+"""(body, its joint, its parent's joint) of the 23 bodies, parents first."""
+
+TIPS: Mapping[str, str] = MappingProxyType(
+    {"head_top": "head"}
+    | {f"{side}_fingertip": f"{side}_wrist" for side in SIDES}
+    | {f"{side}_toe_tip": f"{side}_toes" for side in SIDES}
+)
+"""End of a last bone -> its joint."""
+
+PARENTS: Mapping[str, str] = MappingProxyType(
+    {joint: parent for _, joint, parent in BODIES[1:]} | dict(TIPS)
+)
+"""Joint or tip -> the joint that carries it; the root is not in it."""
+
+_BRANCHES = ("root", "thorax")
+_FAR_ENDS = {parent: name for name, parent in PARENTS.items() if parent not in _BRANCHES}
+_FAR_ENDS["thorax"] = "lower_neck"
+"""Joint -> the joint or tip at which its body ends."""
+
+HEEL = 1.0 / 3.0
+"""Heel behind the ankle, per length from ankle to toe tip: a quarter of the whole foot."""
+
+KNUCKLES = 86.2 / 187.9
+"""Wrist to third knuckle, per length from wrist to fingertip (de Leva 1996, Table 4, men)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Rest positions; z up, x forward, y left, m. No joint is turned there.
+
+    joints  name -> (3,), all 23
+    tips    name -> (3,): head_top, left_ and right_fingertip and _toe_tip
+    """
+
+    joints: Mapping[str, Array]
+    tips: Mapping[str, Array]
+
+    def __getitem__(self, name: str) -> Array:
+        """(3,) place of a joint or tip."""
+        return self.joints[name] if name in self.joints else self.tips[name]
+
+    @property
+    def mid_hip(self) -> Array:
+        """(3,) between the hips."""
+        return 0.5 * (self.joints["left_hip"] + self.joints["right_hip"])
+
+    def bone(self, body: str) -> tuple[Array, Array]:
+        """Ends (3,) of a body's bone: its joint and the next; a pelvis starts at mid hip, a foot
+        at the heel.
+        """
+        joint = joint_of(body)
+        if body == "pelvis":
+            return self.mid_hip, self.joints["lower_back"]
+        start = self.heel(body.split("_")[0]) if body.endswith("_foot") else self.joints[joint]
+        return start, self[_FAR_ENDS[joint]]
+
+    def along_foot(self, side: str) -> Array:
+        """(3,) unit, from the joint of the toes to their tip, which lie flat at rest."""
+        along = self.tips[f"{side}_toe_tip"] - self.joints[f"{side}_toes"]
+        return np.asarray(along / np.linalg.norm(along))
+
+    def heel(self, side: str) -> Array:
+        """(3,) on the line of the toes, a quarter of the foot behind the ankle."""
+        along, tip = self.along_foot(side), self.tips[f"{side}_toe_tip"]
+        before = float((tip - self.joints[f"{side}_ankle"]) @ along)
+        return np.asarray(tip - (1.0 + HEEL) * before * along)
+
+    def knuckle(self, side: str) -> Array:
+        """(3,) third knuckle, between wrist and fingertip."""
+        wrist = self.joints[f"{side}_wrist"]
+        return np.asarray(wrist + KNUCKLES * (self.tips[f"{side}_fingertip"] - wrist))
+
+
+_JOINTS = {body: joint for body, joint, _ in BODIES}
+
+
+def joint_of(body: str) -> str:
+    """The joint on which a body turns."""
+    return _JOINTS[body]
