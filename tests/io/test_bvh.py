@@ -19,7 +19,7 @@ MOCAP = Path(__file__).parents[3] / "shared" / "mocap"
 CMU = 0.056444
 
 in_one_folder = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
