@@ -119,6 +119,7 @@ def test_the_kernel_is_eq_2_patch_by_patch() -> None:
         f = (np.sign(inflow) * area * inflow**2)[:, None] * out
         expected = np.zeros((nbody, 6))
         np.add.at(expected, body, np.concatenate([f, np.cross(x, f)], axis=1))
-        found = pushed(body, centre, normal, area, position, rotation, twist, wind)
+        screw = np.concatenate([normal, np.cross(centre, normal)], axis=1)
+        found = pushed(body, screw, area, position, rotation, twist, wind)
         assert found == pytest.approx(expected, abs=1e-12)
         assert places(body, centre, position, rotation) == pytest.approx(x, abs=1e-12)

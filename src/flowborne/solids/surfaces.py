@@ -31,12 +31,14 @@ class Patches:
     centre  (n, 3) m
     normal  (n, 3) unit, outward
     area    (n,) m^2; length in a slab, m
+    screw   (n, 6) normal n and centre x n
     """
 
     body: NDArray[np.int64]
     centre: Array
     normal: Array
     area: Array
+    screw: Array
 
 
 _known: weakref.WeakKeyDictionary[SolidModel, Patches] = weakref.WeakKeyDictionary()
@@ -66,12 +68,9 @@ def _surfaces(model: SolidModel) -> Patches:
     vector = np.concatenate(vectors)
     area = np.linalg.norm(vector, axis=1)
     real = area > 0.0
-    return Patches(
-        np.concatenate(bodies)[real],
-        np.concatenate(centres)[real],
-        vector[real] / area[real, None],
-        area[real],
-    )
+    centre, normal = np.concatenate(centres)[real], vector[real] / area[real, None]
+    screw = np.concatenate([normal, np.cross(centre, normal)], axis=1)
+    return Patches(np.concatenate(bodies)[real], centre, normal, area[real], screw)
 
 
 def _outline(model: SolidModel, geom: int) -> tuple[Array, Array]:

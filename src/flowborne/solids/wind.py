@@ -60,16 +60,13 @@ class WindFaces:
         """(nbody, 6) force and torque about the world origin on each body."""
         patches = surfaces(model)
         pose = kinematics.body_position, kinematics.body_rotation
-        wind = (
-            np.array([self.velocity])
-            if not callable(self.velocity)
-            else self.velocity(places(patches.body, patches.centre, *pose), time)
-        )
+        if callable(self.velocity):
+            wind = self.velocity(places(patches.body, patches.centre, *pose), time)
+        else:
+            wind = np.array([self.velocity])
         twist = kinematics.twist_jacobian @ v
-        wrench = self.density * pushed(
-            patches.body, patches.centre, patches.normal, patches.area, *pose, twist, wind
-        )
-        return _only(model, wrench, self.bodies)
+        wrench = pushed(patches.body, patches.screw, patches.area, *pose, twist, wind)
+        return _only(model, self.density * wrench, self.bodies)
 
 
 @dataclass(frozen=True)
@@ -106,44 +103,43 @@ def places(body: Bodies, centre: Array, position: Array, rotation: Array) -> Arr
 @njit(nogil=True, cache=True)
 def pushed(
     body: Bodies,
-    centre: Array,
-    normal: Array,
+    screw: Array,
     area: Array,
     position: Array,
     rotation: Array,
     twist: Array,
     wind: Array,
 ) -> Array:
-    """(nbody, 6) eq. (2) for unit density: the sum over each body's patches of f and x cross f with
+    """(nbody, 6) eq. (2) for unit density: force and torque about the world origin on each body.
 
-        f = sign(u.n) A (u.n)^2 n        u = wind - v - omega cross x
+    In a body's frame the wind meets a patch with G.(u, -omega), u being its velocity relative to
+    the frame's origin and G = (n, c x n); the patch passes on A |G.(u, -omega)| G.(u, -omega) G.
 
-    in the world, patches being given in their bodies' frames (`Patches`).
-
+    body, screw, area          of the patches (`Patches`)
     position, rotation, twist  (nbody, 3), (nbody, 3, 3), (nbody, 6) of the bodies
     wind                       (n, 3) m/s at each patch, or (1, 3) for all
     """
     wrench = np.zeros((len(position), 6))
-    x, out, f = np.empty(3), np.empty(3), np.empty(3)
-    for n in range(len(body)):
-        b = body[n]
-        w = wind[n if len(wind) > 1 else 0]
-        for i in range(3):
-            x[i], out[i] = position[b, i], 0.0
-            for j in range(3):
-                x[i] += rotation[b, i, j] * centre[n, j]
-                out[i] += rotation[b, i, j] * normal[n, j]
-        v, omega = twist[b, :3], twist[b, 3:]
-        inflow = 0.0
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            inflow += (w[i] - v[i] - omega[j] * x[k] + omega[k] * x[j]) * out[i]
-        for i in range(3):
-            f[i] = area[n] * inflow * abs(inflow) * out[i]
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            wrench[b, i] += f[i]
-            wrench[b, 3 + i] += x[j] * f[k] - x[k] * f[j]
+    meets, own = np.empty(6), np.zeros(6)
+    first = 0
+    while first < len(body):
+        b, R, x = body[first], rotation[body[first]], position[body[first]]
+        v = twist[b, :3] + np.cross(twist[b, 3:], x)
+        meets[3:] = -R.T @ twist[b, 3:]
+        own[:] = 0.0
+        n = first
+        while n < len(body) and body[n] == b:
+            if n == first or len(wind) > 1:
+                meets[:3] = R.T @ (wind[n if len(wind) > 1 else 0] - v)
+            inflow = 0.0
+            for i in range(6):
+                inflow += screw[n, i] * meets[i]
+            for i in range(6):
+                own[i] += area[n] * abs(inflow) * inflow * screw[n, i]
+            n += 1
+        wrench[b, :3] = R @ own[:3]
+        wrench[b, 3:] = R @ own[3:] + np.cross(x, wrench[b, :3])
+        first = n
     return wrench
 
 
