@@ -76,12 +76,13 @@ def wandering(frames: int = 121, frame_time: float = 1.0 / 60.0, seed: int = 1) 
     )
     rotations = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_quat(scalar_first=True)
     rotations = rotations.reshape(6, frames, 4).swapaxes(0, 1)
-    rotations[:, 4] = about(HINGE, 3.0 * np.sin(2.0 * time))
+    rotations[:, 4] = about(HINGE, 4.0 * np.sin(2.0 * time))
     turn = Rotation.from_rotvec(np.outer(0.4 * time, [0.0, 0.0, 1.0]))
     tilt = Rotation.from_quat(rotations[:, 0], scalar_first=True)
     rotations[:, 0] = (turn * tilt).as_quat(scalar_first=True)
     path = [1.3 * time, 0.2 * time**2, 0.9 + 0.05 * np.sin(5.0 * time)]
     translation = np.stack(path, axis=-1)
+    rotations *= rng.choice([-1.0, 1.0], rotations.shape[:2])[..., None]  # the same rotations
     return Clip(NAMES, PARENTS, OFFSETS, {}, frame_time, rotations, translation)
 
 
@@ -93,6 +94,7 @@ def circling(frames: int = 61, turn: float = np.pi / 3.0) -> Clip:
     rotations = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_quat(scalar_first=True)
     rotations = rotations.reshape(frames, 6, 4)
     rotations[:, 4] = about(HINGE, np.sin(wave[:, 4]))
+    rotations[:, 5] = about(HINGE, wave[:, 5])  # once round: its quaternion ends with other signs
     heading = Rotation.from_rotvec(np.outer(turn * phase, [0.0, 0.0, 1.0]))
     tilt = Rotation.from_quat(rotations[:, 0], scalar_first=True)
     rotations[:, 0] = (heading * tilt).as_quat(scalar_first=True)

@@ -138,6 +138,21 @@ def test_blend_starts_from_the_pose_given_at_the_place_and_heading_of_the_clip()
     assert_allclose(m.position(0.5), motion(clip).position(0.5), atol=1e-12)
 
 
+def test_blend_goes_the_short_way_whatever_the_sign_of_a_quaternion() -> None:
+    plain = MOTIONS["plain"]
+    for sign in (-1.0, 1.0):
+        pose = whole(plain, 0.0)
+        pose[MODEL.positions_of("hip")] *= sign
+        m = motion(blend=0.2, initial=pose)
+        for time in (0.05, 0.1, 0.15):
+            here, there, start = (
+                whole(each, at)[MODEL.positions_of("hip")]
+                for each, at in ((m, time), (plain, time), (plain, 0.0))
+            )
+            away = angle(product(inverse(start), there))
+            assert angle(product(inverse(here), there)) < away
+
+
 def test_clip_slows_down_along_its_own_path() -> None:
     plain, braked = MOTIONS["plain"], MOTIONS["blended"]
     assert_allclose(braked.position(2.3), plain.position(2.0), atol=1e-12)
