@@ -64,7 +64,7 @@ class Columns:
         return rows[..., 4 * self.balls + 3 * len(self.free) :]
 
     def moved(self, rows: Array, turn: Array, shift: Array) -> Array:
-        """Rows after a turn (4,) of the free joints about the world's origin and a shift (3,)."""
+        """Rows after a turn (4,) of free joints about the world's origin and a shift (..., 3)."""
         result = rows.copy()
         here = self.quaternions(result)
         here[..., self.free, :] = product(turn, here[..., self.free, :])

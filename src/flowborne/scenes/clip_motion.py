@@ -84,8 +84,9 @@ class MotionClip:
 
     def _strode(self, rows: Rows, stride: Stride, cycles: int) -> Rows:
         turn, shift = stride.times(cycles)
-        still = np.zeros(3)
-        return self.columns.moved(rows[0], turn, shift), self.columns.moved(rows[1], turn, still)
+        shifts = np.stack([shift, np.zeros(3)])[:, None]
+        row, rate = self.columns.moved(np.stack(rows), turn, shifts)
+        return row, rate
 
     def _slowed(self, time: float) -> tuple[float, float]:
         """Clip's time since the start, and how fast it goes."""
