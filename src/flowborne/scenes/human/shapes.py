@@ -24,8 +24,9 @@ class Form:
     kind     "capsule" along the bone, "ellipsoid" about it, "box" under it, or "lump": an ellipsoid
              of fixed proportions at the bone's end, where clips differ in where the bone starts
     density  kg/m^3 (Winter 2009, Table 4.1)
-    flat     size from back to front over size from side to side; of a box, height over breadth
-    half     half length of an ellipsoid over its bone's length; of a lump, over its half breadth
+    flat     size from back to front over size from side to side
+    half     half length of an ellipsoid over its bone's length, of a lump over its half breadth;
+             half height of a box over the toes'
     middle   of the bone's length, middle of an ellipsoid from the bone's start; of a lump's half
              length, from the bone's end
     ahead    of its own half depth, how far an ellipsoid or a lump is in front of the bone
@@ -56,8 +57,8 @@ FORMS: dict[str, Form] = {
     "hand": Form("ellipsoid", 1160.0, SKIN, 2.8),
     "thigh": Form("ellipsoid", 1050.0, TROUSERS, 1.15, 0.62, 0.42),
     "shank": Form("ellipsoid", 1090.0, TROUSERS, 1.1, 0.61, 0.45),
-    "foot": Form("box", 1100.0, SHOES, 0.45),
-    "toes": Form("box", 1100.0, SHOES, 0.3),
+    "foot": Form("box", 1100.0, SHOES, half=1.4),
+    "toes": Form("box", 1100.0, SHOES, half=1.0),
 }
 """Depths over breadths of chest, waist and head: Gordon et al. 1989, means of men. The rest, and
 the places of the ellipsoids, by eye; hips narrower than theirs, so that a hanging arm is free."""
@@ -99,7 +100,7 @@ def _shape(body: str, skeleton: Skeleton, masses: dict[str, float]) -> Shape:
         radius = _capsule_radius(volume, length)
         return Shape("capsule", (radius, 0.5 * length), 0.5 * (start + end), axes, form.colour)
     if form.kind == "box":
-        return _box(body, skeleton, masses)
+        return _box(body, skeleton, volume)
     size = _ellipsoid(form, volume, length)
     if form.kind == "lump":
         centre = end + form.middle * size[2] * axes[:, 2]
@@ -120,24 +121,17 @@ def _ellipsoid(form: Form, volume: float, length: float) -> tuple[float, float, 
     return form.flat * breadth, breadth, half
 
 
-def _box(body: str, skeleton: Skeleton, masses: dict[str, float]) -> Shape:
-    """Foot or toes, their soles in one plane: the toes' bone runs through the middle of theirs."""
-    side = body.split("_")[0]
+def _box(body: str, skeleton: Skeleton, volume: float) -> Shape:
+    """Foot or toes on the sole, as broad as the volume asks for."""
+    form, side = _form(body), body.split("_")[0]
     start, end = skeleton.bone(body)
     axes, length = axes_of(start, end), float(np.linalg.norm(end - start))
-    high, broad = _section(body, skeleton, masses)
-    sole = _section(f"{side}_toes", skeleton, masses)[0]
-    centre = 0.5 * (start + end) + (high - sole) * axes[:, 0]
-    return Shape("box", (high, broad, 0.5 * length), centre, axes, _form(body).colour)
-
-
-def _section(body: str, skeleton: Skeleton, masses: dict[str, float]) -> tuple[float, float]:
-    """Half height and half breadth of a box, m."""
-    form = _form(body)
-    start, end = skeleton.bone(body)
-    area = masses[body] / form.density / float(np.linalg.norm(end - start))
-    broad = 0.5 * float(np.sqrt(area / form.flat))
-    return form.flat * broad, broad
+    down = skeleton.to_sole(side)
+    thin = float(np.linalg.norm(down))
+    high = form.half * thin
+    size = (high, 0.125 * volume / (high * 0.5 * length), 0.5 * length)
+    centre = 0.5 * (start + end) + (1.0 - high / thin) * down
+    return Shape("box", size, centre, axes, form.colour)
 
 
 def _capsule_radius(volume: float, length: float) -> float:

@@ -69,6 +69,9 @@ _FAR_ENDS["thorax"] = "lower_neck"
 HEEL = 1.0 / 3.0
 """Heel behind the ankle, per length from ankle to toe tip: a quarter of the whole foot."""
 
+SOLE = 0.06
+"""Of the foot's length, half the thickness of the toes: how far the sole is below their bone."""
+
 KNUCKLES = 86.2 / 187.9
 """Wrist to third knuckle, per length from wrist to fingertip (de Leva 1996, Table 4, men)."""
 
@@ -113,6 +116,13 @@ class Skeleton:
         along, tip = self.along_foot(side), self.tips[f"{side}_toe_tip"]
         before = float((tip - self.joints[f"{side}_ankle"]) @ along)
         return np.asarray(tip - (1.0 + HEEL) * before * along)
+
+    def to_sole(self, side: str) -> Array:
+        """(3,) m, from the line of heel and toes straight down to the sole."""
+        along = self.along_foot(side)
+        up = np.array([0.0, 0.0, 1.0]) - along[2] * along
+        length = np.linalg.norm(self.tips[f"{side}_toe_tip"] - self.heel(side))
+        return np.asarray(-SOLE * length * up / np.linalg.norm(up))
 
     def knuckle(self, side: str) -> Array:
         """(3,) third knuckle, between wrist and fingertip."""

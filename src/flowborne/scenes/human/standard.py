@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.scenes.human.skeleton import BODIES, SIDES, TIPS, Skeleton
+from flowborne.scenes.human.skeleton import BODIES, SIDES, SOLE, TIPS, Skeleton
 
 STATURE = 1.741
 """m, mean of de Leva's men."""
@@ -21,9 +21,6 @@ as far apart as the deltoids, 49.2 cm in men 1.756 m tall (Gordon et al. 1989)."
 
 BALL = 0.73
 """Of the foot's length, heel to the joint of the toes (Gordon et al. 1989)."""
-
-SOLE = 0.016
-"""m, half the thickness of the toes."""
 
 VERTEX, NAPE = 0.01, -0.045
 """m before mid hip, of vertex and C7: de Leva's head and trunk are straight lines between them."""
@@ -74,8 +71,8 @@ def _limbs(nape: float, drop: float) -> dict[str, tuple[float, float, float]]:
         "hip": (0.0, HIP, hip),
         "knee": (0.0, HIP, hip - THIGH),
         "ankle": (0.0, HIP, ankle),
-        "toes": ((BALL - 0.25) * FOOT, HIP, SOLE),
-        "toe_tip": (0.75 * FOOT, HIP, SOLE),
+        "toes": ((BALL - 0.25) * FOOT, HIP, SOLE * FOOT),
+        "toe_tip": (0.75 * FOOT, HIP, SOLE * FOOT),
         "clavicle": (0.03, 0.025, nape - 0.0714),
         "shoulder": (-0.02, SHOULDER, shoulder),
         "elbow": (-0.02, SHOULDER, elbow),
