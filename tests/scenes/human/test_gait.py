@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from flowborne.scenes.clip_following import motion_of_clip
 from flowborne.scenes.human.body import human_mjcf
 from flowborne.scenes.human.clip_skeleton import skeleton_of
 from flowborne.scenes.human.gait import CYCLE, NAMES, gait_clip, leg_turns, standing_clip
@@ -224,3 +225,14 @@ def test_standing_is_still_on_the_ground(model):
 def test_a_cycle_lasts():
     with pytest.raises(ValueError, match=r"cycle of 0\.0 s"):
         gait_clip(standard_skeleton(), 0.0)
+
+
+def test_the_walk_goes_on_round_after_round(model, clip):
+    """Played as a loop through a scene's motion, without a jump of place or velocity."""
+    motion = motion_of_clip(model, clip, {name: name for name in NAMES}, loop=True)
+    stride = clip.translation[-1, 0] - clip.translation[0, 0]
+    start = motion.position(0.0)
+    np.testing.assert_allclose(motion.position(3.0 * CYCLE)[0] - start[0], 3.0 * stride, rtol=1e-9)
+    np.testing.assert_allclose(motion.position(3.0 * CYCLE)[1:], start[1:], atol=1e-9)
+    before, after = (motion.velocity(CYCLE + 1e-6 * side) for side in (-1.0, 1.0))
+    np.testing.assert_allclose(before, after, atol=1e-3)

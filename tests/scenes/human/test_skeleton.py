@@ -1,15 +1,20 @@
 """The standard skeleton, and skeletons of clips."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from flowborne.errors import SceneError
+from flowborne.io.bvh import read_bvh
 from flowborne.io.clip import Clip
 from flowborne.scenes.human.body import human_mjcf
 from flowborne.scenes.human.clip_skeleton import NAMES, skeleton_of
 from flowborne.scenes.human.skeleton import PARENTS, TIPS, Skeleton
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.solids.model import SolidModel
+
+MOCAP = Path(__file__).parents[4] / "shared" / "mocap"
 
 
 def distance(skeleton, start, end):
@@ -164,3 +169,34 @@ def test_joints_at_one_place_are_told():
     )
     with pytest.raises(SceneError, match="at one place"):
         skeleton_of(flat, mapping)
+
+
+@pytest.mark.skipif(not MOCAP.is_dir(), reason="no motion capture beside the repository")
+def test_real_clip_gives_a_person():
+    clip = read_bvh(MOCAP / "131_01_metres.bvh", skip=1)
+    names = {
+        "root": "Hips",
+        "lower_back": "lowerback",
+        "upper_back": "Chest",
+        "thorax": "Chest2",
+        "lower_neck": "lowerneck",
+        "upper_neck": "Neck",
+        "head": "Head",
+    }
+    limbs = ("hip", "knee", "ankle", "clavicle", "shoulder", "elbow", "wrist", "toes")
+    theirs = ("Hip", "Knee", "Ankle", "Collar", "Shoulder", "Elbow", "Wrist", "Toe")
+    for side in ("left", "right"):
+        for joint, name in zip(limbs, theirs, strict=True):
+            names[f"{side}_{joint}"] = side.capitalize() + name
+    skeleton = skeleton_of(clip, names)
+    assert distance(skeleton, "left_hip", "left_knee") == pytest.approx(0.4115, abs=1e-3)
+    assert distance(skeleton, "right_knee", "right_ankle") == pytest.approx(0.3935, abs=1e-3)
+    assert 0.2 < np.linalg.norm(skeleton["left_toe_tip"] - skeleton.heel("left")) < 0.28
+    assert 0.12 < distance(skeleton, "left_wrist", "left_fingertip") < 0.2
+    legs = distance(skeleton, "left_hip", "left_knee") + distance(
+        skeleton, "left_knee", "left_ankle"
+    )
+    trunk = np.linalg.norm(skeleton["lower_neck"] - skeleton.mid_hip)
+    assert 0.5 < trunk / legs < 0.8
+    model = SolidModel.from_string(human_mjcf(skeleton, 65.0, "female"))
+    assert model.body_mass.sum() == pytest.approx(65.0)
