@@ -29,6 +29,9 @@ FAILED, WRONG, INTERRUPTED = 1, 2, 130
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Our solves are small: more threads in BLAS are slower, and their sums differ."""
 
+FILE_KEYS = ("clip.file", "solids.model")
+"""Keys of a scene that name files: on the command line a path starts from where one is."""
+
 app = typer.Typer(
     name="flowborne",
     help="Creatures that answer the fluid around them.",
@@ -165,6 +168,22 @@ def film(
 
 
 @app.command()
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="BVH file to write.")],
+) -> None:
+    """Write the motion of a run as BVH, on the skeleton of its clip."""
+    path = RunFolder.existing(folder).path
+    from flowborne.io.motion_out import export_bvh
+
+    try:
+        export_bvh(path, out)
+    except OSError as error:
+        raise cannot_write(out, error) from error
+    print(f"written: {out}")
+
+
+@app.command()
 def validate(
     case: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="Only this case; may be repeated.")
@@ -239,13 +258,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _overrides(settings: list[str]) -> dict[str, str]:
-    """What --set says. Raises InputError when one has no key or no '='."""
+    """What --set says; files are found from here first, then from the scene's folder.
+
+    raises  InputError when one has no key or no '='
+    """
     overrides = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not equals or not key.strip():
             raise InputError(f"--set {setting} has no KEY=VALUE; write for example fluid.density=1")
-        overrides[key.strip()] = value.strip()
+        key, value = key.strip(), value.strip()
+        if key in FILE_KEYS and Path(value).is_file():
+            value = str(Path(value).absolute())
+        overrides[key] = value
     return overrides
 
 

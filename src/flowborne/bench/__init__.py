@@ -20,6 +20,7 @@ MODULES = {
     "workers": "workers",
     "chain": "chain",
     "realtime": "realtime",
+    "human": "human",
     "parts": "parts",
     "memory": "memory",
     "first-run": "first_run",

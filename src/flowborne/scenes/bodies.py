@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Motion
 from flowborne.errors import SceneError
+from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import MotionConstantTable, MotionSinusoidTable, MotionTable
 from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes, MotionSinusoid
@@ -26,13 +27,18 @@ JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free j
 
 
 def load_model(scene: Scene) -> SolidModel:
-    """The model of a scene. Raises SceneError when its file is missing or MuJoCo refuses it."""
+    """The model of a scene, its human or its file.
+
+    raises  SceneError when a file is missing or MuJoCo refuses it
+    """
+    x, y, z = scene.gravity
+    if scene.human is not None:
+        return SolidModel.from_string(human_of(scene), gravity=(x, y, z))
     path = scene.model_path
     assert path is not None
     assert scene.solids is not None
     if not path.is_file():
         raise SceneError(f"there is no model file {path}. Correct solids.model.")
-    x, y, z = scene.gravity
     try:
         return SolidModel.from_file(
             path,
@@ -73,8 +79,19 @@ def motion_of(table: MotionTable, model: SolidModel) -> Motion:
     return MotionKeyframes(dofs, Curve(table.times, tuple(unit * v for v in table.values)))
 
 
-def initial_state(scene: Scene, model: SolidModel) -> SolidState:
-    """Where the bodies start: the model's own pose, `initial`, and the prescribed motions."""
+def motions_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Motion, ...]:
+    """All prescribed motions: those of [[motion]] in their order, then that of [clip].
+
+    start   (nq,) pose from which a clip is entered
+    raises  SceneError when the clip cannot be used
+    """
+    motions: list[Motion] = [motion_of(table, model) for table in scene.motion]
+    clip = clip_motion(scene, model, start)
+    return (*motions,) if clip is None else (*motions, clip)
+
+
+def posed(scene: Scene, model: SolidModel) -> SolidState:
+    """The model's own pose and `initial`, before any motion."""
     state = model.rest()
     for joint, values in scene.initial.positions.items():
         places = model.positions_of(joint)
@@ -90,8 +107,15 @@ def initial_state(scene: Scene, model: SolidModel) -> SolidState:
         if joint_kind(model, joint) == FREE:
             units[:3] = 1.0
         state.v[model.dofs_of(joint)] = units * values
-    for table in scene.motion:
-        motion = motion_of(table, model)
-        state.q[model.positions_of(table.joint)] = motion.position(0.0)
-        state.v[model.dofs_of(table.joint)] = motion.velocity(0.0)
+    return state
+
+
+def initial_state(scene: Scene, model: SolidModel) -> SolidState:
+    """Where the bodies start: the model's own pose, `initial`, and the prescribed motions."""
+    state = posed(scene, model)
+    motions = motions_of(scene, model, state.q.copy())
+    pose_controlled(scene, model, state.q)
+    for motion in motions:
+        state.q[model.places_of(motion.dofs)] = motion.position(0.0)
+        state.v[motion.dofs] = motion.velocity(0.0)
     return state

@@ -11,7 +11,7 @@ from flowborne.control.controller import Controller
 from flowborne.control.executors import Mapper, Serial
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import FluidState
-from flowborne.scenes.bodies import initial_state, load_model, motion_of
+from flowborne.scenes.bodies import initial_state, load_model, motions_of, posed
 from flowborne.scenes.build_control import controller_of
 from flowborne.scenes.build_fluid import fluid_of
 from flowborne.scenes.build_wind import winds_of
@@ -47,8 +47,8 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     executor  runs the controller's trials; one after the other when None
     raises    SceneError when the model file cannot be read
     """
-    model = SolidModel.empty() if scene.solids is None else load_model(scene)
-    motions = tuple(motion_of(table, model) for table in scene.motion)
+    model = load_model(scene) if scene.has_bodies else SolidModel.empty()
+    motions = motions_of(scene, model, posed(scene, model).q)
     fluid = fluid_of(scene)
     setup = Setup(model, fluid, motions, winds_of(scene))
     world = World.at_rest(setup)

@@ -120,8 +120,9 @@ def _weighted(
 
 def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> Objective:
     if isinstance(table, tables.ObjectiveEffortTable):
-        joints = table.joints if table.joints is not None else scene.controlled_joints()
-        return ObjectiveEffort(_dofs_of(model, joints))
+        if table.joints is None:
+            return ObjectiveEffort(_dofs_of(model, scene.controlled_joints()))
+        return ObjectiveEffort(_dofs_of(model, table.joints), f"effort_{'+'.join(table.joints)}")
     if isinstance(table, tables.ObjectiveWindDragTable):
         return ObjectiveWindDrag(_bodies(model, table.bodies), _triple(table.direction))
     if isinstance(table, tables.ObjectiveDragTable):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from flowborne.errors import SceneError
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
+from flowborne.scenes.check_clip import check_clip, check_followers
 from flowborne.scenes.check_control import check_control
 from flowborne.scenes.check_fluid import check_dimensions, check_fluid
 from flowborne.scenes.draft import Draft
@@ -13,10 +14,17 @@ from flowborne.scenes.draft import Draft
 def cross_check(draft: Draft) -> list[str]:
     """Everything that is wrong with a scene that the schema accepts."""
     problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
-    if draft.scene.solids is None or not draft.sound("dimensions", "gravity"):
+    unusable = list(check_clip(draft))
+    problems += unusable
+    scene = draft.scene
+    if not scene.has_bodies or unusable or not draft.sound("dimensions", "gravity", "clip"):
         return problems
     try:
-        model = load_model(draft.scene)
+        model = load_model(scene)
     except SceneError as error:
-        return problems + [f"{draft.at('solids')}: {problem}" for problem in error.problems]
+        table = "solids" if scene.human is None else "human"
+        return problems + [f"{draft.at(table)}: {problem}" for problem in error.problems]
+    lost = list(check_followers(draft, model))
+    if lost:
+        return problems + lost
     return [*problems, *check_bodies(draft, model), *check_control(draft, model)]

@@ -25,12 +25,12 @@ from flowborne.scenes.wording import Key, suggestion
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 
-NEEDS_BODIES = ("initial", "motion", "wind", "control", "objectives", "controller")
+NEEDS_BODIES = ("clip", "initial", "motion", "wind", "control", "objectives", "controller")
 
 
 def check_without_bodies(draft: Draft) -> Iterator[str]:
     """Tables that speak of bodies need bodies."""
-    if draft.scene.solids is not None or not draft.sound("solids"):
+    if draft.scene.has_bodies or not draft.sound("solids", "human"):
         return
     for table in NEEDS_BODIES:
         if draft.gives(table):
@@ -55,18 +55,17 @@ def _unknown(
 ) -> list[str]:
     if name in known:
         return []
-    assert draft.scene.model_path is not None
     end = suggestion(name, known, listed)
-    file = draft.scene.model_path.name
-    return [f"{draft.at(*keys)}: {what} '{name}' is not in model {file}{end}"]
+    path = draft.scene.model_path
+    model = "the human" if path is None else f"model {path.name}"
+    return [f"{draft.at(*keys)}: {what} '{name}' is not in {model}{end}"]
 
 
 def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     """Names, initial state, motions and winds against the model."""
     scene = draft.scene
-    assert scene.solids is not None
     named = []
-    for body in scene.solids.densities:
+    for body in () if scene.solids is None else scene.solids.densities:
         named += unknown_body(draft, model, body, "solids", "densities")
     for index, wind in enumerate(scene.wind):
         for body in wind.bodies or ():

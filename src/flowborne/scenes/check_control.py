@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from flowborne.errors import SceneError
 from flowborne.scenes.bodies import FREE, HINGE, JOINT_KINDS, SLIDE, joint_kind
+from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.check_bodies import out_of_plane, unknown_body, unknown_joint
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.python_function import find_function
@@ -97,6 +98,9 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
     scene, table = draft.scene, draft.scene.objectives[index]
     where = draft.at("objectives", index)
     driven = {*scene.controlled_joints(), *(motion.joint for motion in scene.motion)}
+    capture = capture_of(scene)
+    if capture is not None:
+        driven |= set(followers(scene, capture, model))
     whole = draft.sound("control", "motion")
     if isinstance(table, ObjectiveEffortTable):
         for joint in table.joints or ():
@@ -105,7 +109,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
             if not unknown and joint not in driven and whole:
                 yield (
                     f"{where}: joint '{joint}' makes no effort, being free. "
-                    "Name joints of [[control]] or [[motion]]."
+                    "Name joints of [[control]], [[motion]] or [clip]."
                 )
     if isinstance(table, ObjectiveWindDragTable | ObjectiveDragTable | ObjectivePressureTable):
         for body in table.bodies or ():

@@ -63,7 +63,7 @@ def check_fluid(draft: Draft) -> Iterator[str]:
                         f"{draft.at(table)}: there is no [domain] to fill. "
                         "Add [domain], or drop this table."
                     )
-            if scene.solids is None and draft.sound("solids"):
+            if not scene.has_bodies and draft.sound("solids", "human"):
                 yield (
                     f"{draft.at()} has neither [domain] nor [solids]: there is nothing to "
                     "simulate. Add one of them."

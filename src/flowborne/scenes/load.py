@@ -33,6 +33,11 @@ BUILT_IN = (
     "ns-chain-2",
     "ns-chain-3",
     "ns-chain-4",
+    "human-gravity-back",
+    "human-gravity-arms",
+    "human-wind-back",
+    "human-wind-arms",
+    "human-wind-drag",
 )
 
 

@@ -44,6 +44,13 @@ def _named(sides: tuple[str, str], legs: str, spine: str, arms: str) -> Conventi
 
 WORDS, LETTERS = ("left", "right"), ("l", "r")
 CONVENTIONS = (
+    # ours
+    _named(
+        WORDS,
+        "*hip *knee *ankle *toes",
+        "root lowerback upperback thorax lowerneck upperneck head",
+        "*clavicle *shoulder *elbow *wrist",
+    ),
     # CMU's clips as converted for 3ds Max
     _named(
         WORDS,

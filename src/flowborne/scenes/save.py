@@ -6,9 +6,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from flowborne.errors import SceneError
+from flowborne.scenes.capture import human_of
 from flowborne.scenes.schema import Scene
 
 SCENE_FILE = "scene.toml"
+HUMAN_FILE = "human.xml"
+"""The model of a scene's human, for other programs; the scene itself makes it anew."""
+
 ASSETS = "assets"
 FOLDER_KEYS = {
     "mesh": ("meshdir", "assetdir"),
@@ -44,6 +48,14 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
         files = _model_files(model)
         solids = scene.solids.model_copy(update={"model": model.name})
         scene = scene.model_copy(update={"solids": solids})
+    if scene.human is not None:
+        files[HUMAN_FILE] = human_of(scene).encode()
+    if scene.clip is not None and scene.clip.file is not None:
+        path = scene.folder / scene.clip.file
+        files[path.name] = _read(path)
+        scene = scene.model_copy(
+            update={"clip": scene.clip.model_copy(update={"file": path.name})}
+        ).in_folder(scene.folder)
     return {SCENE_FILE: scene.to_toml().encode()} | files
 
 
@@ -110,6 +122,4 @@ def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SceneError(
-            f"model file {path} cannot be read: {error.strerror}. Put it there."
-        ) from None
+        raise SceneError(f"file {path} cannot be read: {error.strerror}. Put it there.") from None

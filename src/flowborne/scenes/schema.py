@@ -18,6 +18,7 @@ from flowborne.scenes.schema_fluid import (
     InflowSide,
     SourceTable,
 )
+from flowborne.scenes.schema_human import ClipTable, HumanTable
 from flowborne.scenes.schema_solids import (
     InitialTable,
     MotionTable,
@@ -70,6 +71,8 @@ class Scene(Table):
     sources: tuple[SourceTable, ...] = ()
     dye: tuple[DyeTable, ...] = ()
     solids: SolidsTable | None = None
+    human: HumanTable | None = None
+    clip: ClipTable | None = None
     initial: InitialTable = InitialTable()
     motion: tuple[MotionTable, ...] = ()
     wind: tuple[WindTable, ...] = ()
@@ -89,6 +92,11 @@ class Scene(Table):
         return data
 
     @property
+    def has_bodies(self) -> bool:
+        """Whether there is anything to move."""
+        return self.solids is not None or self.human is not None
+
+    @property
     def has_fluid(self) -> bool:
         """Whether a fluid is simulated."""
         return self.fluid is not None and self.fluid.coupling != "none"
@@ -104,7 +112,7 @@ class Scene(Table):
 
     @property
     def model_path(self) -> Path | None:
-        """The MJCF file, or None in a scene without bodies."""
+        """The MJCF file, or None in a scene without one."""
         return None if self.solids is None else self._folder / self.solids.model
 
     @property

@@ -20,8 +20,9 @@ from flowborne.solids.state import SolidState
 
 Array = NDArray[np.float64]
 
-ROUNDING = 1e-14
-"""Share of the terms of an impulse that rounding may change."""
+ROUNDING, OF_THE_WHOLE = 1e-14, 1e-15
+"""Shares of the terms of an impulse, and of the largest impulse of all, that rounding may change: a
+hand's forces are sums in which those of the whole creature cancel."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,8 @@ class Halfway:
         scale = (np.abs(self.along) * (np.abs(self.given) + np.abs(later))[model.dof_body]).sum(
             axis=1
         )
-        return moved + dt * self.outer, ROUNDING * (scale + dt * np.abs(self.outer))
+        own = ROUNDING * (scale + dt * np.abs(self.outer))
+        return moved + dt * self.outer, own + OF_THE_WHOLE * float(scale.max(initial=0.0))
 
 
 def halfway(

@@ -37,6 +37,9 @@ MODULES = {
     "K5": "controller_in_flow",
     "K6": "controller_in_flow",
     "K7": "gradients",
+    "K8": "human",
+    "K9": "human",
+    "K10": "human_wind",
     "S5": "swimmers",
 }
 """Case -> module that holds it, in the order of the list; a module is imported when it is run."""

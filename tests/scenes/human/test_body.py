@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from flowborne.coupling.step import step
 from flowborne.scenes.human.body import human_mjcf
 from flowborne.scenes.human.skeleton import BODIES, Skeleton
 from flowborne.scenes.human.standard import standard_skeleton
@@ -168,3 +169,16 @@ def test_a_mass_that_cannot_be_is_refused(mass):
 def test_only_elbows_can_be_hinges():
     with pytest.raises(ValueError, match="'left_knee' cannot be a hinge"):
         human_mjcf(standard_skeleton(), MASS, "male", ("left_knee",))
+
+
+def test_it_falls_freely_as_one_and_stays_as_it_is() -> None:
+    world = world_of(
+        None,
+        human_mjcf(standard_skeleton(), 73.0, "male"),
+        slab=False,
+        gravity=(0.0, 0.0, -9.81),
+    )
+    for _ in range(20):
+        assert step(world, 0.01).outcome.name == "DONE"
+    assert world.solid.v[2] == pytest.approx(-9.81 * 0.2, rel=1e-12)
+    assert np.abs(np.delete(world.solid.v, 2)).max() < 1e-11

@@ -31,7 +31,11 @@ STRUCK = (
 
 
 def human_mjcf(
-    skeleton: Skeleton, mass: float, sex: Sex, hinged_elbows: Collection[str] = ()
+    skeleton: Skeleton,
+    mass: float,
+    sex: Sex,
+    hinged_elbows: Collection[str] = (),
+    touching: Collection[str] = SIDES,
 ) -> str:
     """MJCF of a human at rest: the root is free, every other joint a ball.
 
@@ -41,6 +45,8 @@ def human_mjcf(
     mass           kg
     hinged_elbows  names of elbows that are hinges instead: 0 is the pose at rest, positive bends
                    the forearm forward, from 0 to 150 degrees
+    touching       sides, "left" and "right", whose forearm and hand collide. An arm that follows a
+                   clip should not: its body is thicker or thinner than the actor's
     raises         ValueError for a mass that is not positive, another joint than an elbow, and an
                    upper arm that points forward at rest where its elbow is to be a hinge
     """
@@ -63,7 +69,8 @@ def human_mjcf(
         elements[joint] = element
         _add_joint(element, joint, skeleton, joint in hinged_elbows)
         _add_inertia(element, inertia[body], skeleton)
-        _add_geom(element, shape[body], skeleton)
+        strikes = body in STRIKING and body.split("_")[0] in touching
+        _add_geom(element, shape[body], skeleton, strikes)
     ElementTree.indent(top)
     return ElementTree.tostring(top, encoding="unicode")
 
@@ -118,7 +125,9 @@ def _add_inertia(element: ElementTree.Element, inertia: Inertia, skeleton: Skele
     )
 
 
-def _add_geom(element: ElementTree.Element, shape: Shape, skeleton: Skeleton) -> None:
+def _add_geom(
+    element: ElementTree.Element, shape: Shape, skeleton: Skeleton, strikes: bool
+) -> None:
     body = element.attrib["name"]
     ElementTree.SubElement(
         element,
@@ -129,7 +138,7 @@ def _add_geom(element: ElementTree.Element, shape: Shape, skeleton: Skeleton) ->
         pos=_text(shape.centre - skeleton.joints[joint_of(body)]),
         xyaxes=_text(shape.axes[:, :2].T),
         rgba=_text(shape.colour),
-        contype=str(int(body in STRIKING)),
+        contype=str(int(strikes)),
         conaffinity=str(int(body in STRUCK)),
         friction="0.6",
     )

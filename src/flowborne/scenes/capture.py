@@ -1,0 +1,170 @@
+"""The clip of a scene, the human that it moves, and which joints follow it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.errors import SceneError
+from flowborne.io.bvh import read_bvh
+from flowborne.io.clip import Clip
+from flowborne.scenes.clip_following import motion_of_clip
+from flowborne.scenes.clip_motion import MotionClip
+from flowborne.scenes.clip_scale import check_scale, leg_length
+from flowborne.scenes.human.body import ELBOWS, human_mjcf
+from flowborne.scenes.human.clip_skeleton import skeleton_of
+from flowborne.scenes.human.gait import gait_clip
+from flowborne.scenes.human.skeleton import SIDES, Skeleton
+from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.scenes.mapping import mapping_of
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.wording import suggestion
+from flowborne.solids.model import SolidModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A clip and what it means.
+
+    clip      the motion
+    mapping   joint of the model -> joint of the clip
+    skeleton  of the human with the clip's bones; None in a scene without [human]
+    """
+
+    clip: Clip
+    mapping: Mapping[str, str]
+    skeleton: Skeleton | None
+
+
+def capture_of(scene: Scene) -> Capture | None:
+    """The clip that the scene's joints follow; None when there is none.
+
+    raises  SceneError when the file cannot be used
+    """
+    table = scene.clip
+    if table is None:
+        return None
+    if table.file is None:
+        assert scene.human is not None
+        skeleton = standard_skeleton(scene.human.height)
+        clip = gait_clip(skeleton)
+        return Capture(clip, {joint: joint for joint in clip.names}, skeleton)
+    path = scene.folder / table.file
+    clip = _read(path, _stamp(path), table.unit, table.up, table.skip)
+    if scene.human is None:
+        return Capture(clip, _named(clip, table.mapping), None)
+    mapping = mapping_of(clip, table.mapping)
+    check_scale(leg_length(clip, mapping), table.unit)
+    return Capture(clip, mapping, skeleton_of(clip, mapping))
+
+
+def _named(clip: Clip, table: Mapping[str, str]) -> Mapping[str, str]:
+    """The mapping for a creature whose joints' names say nothing: it is the table itself."""
+    problems = [
+        f"the clip has no joint '{bone}' for '{joint}'{suggestion(bone, clip.names, 'It has')}"
+        for joint, bone in table.items()
+        if bone not in clip.names
+    ]
+    if not table:
+        problems.append("mapping is missing. Say which joint of the clip each joint follows.")
+    if problems:
+        raise SceneError(problems)
+    return table
+
+
+def human_of(scene: Scene) -> str:
+    """MJCF of the scene's human: with the bones of the clip's file, or else the standard ones.
+
+    Controlled elbows are hinges, and arms that are controlled collide with the rest.
+    """
+    assert scene.human is not None
+    capture = capture_of(scene)
+    skeleton = None if capture is None else capture.skeleton
+    if skeleton is None:
+        skeleton = standard_skeleton(scene.human.height)
+    controlled = set(scene.controlled_joints())
+    touching = [side for side in SIDES if {f"{side}_shoulder", f"{side}_elbow"} & controlled]
+    hinged = controlled & set(ELBOWS)
+    return human_mjcf(skeleton, scene.human.mass, scene.human.sex, hinged, touching)
+
+
+def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, ...]:
+    """Joints of the model that follow the clip, in the model's order."""
+    assert scene.clip is not None
+    taken = {*scene.controlled_joints(), *(table.joint for table in scene.motion)}
+    chosen = capture.mapping if scene.clip.joints is None else scene.clip.joints
+    return tuple(
+        joint
+        for joint in model.joint_names
+        if joint in chosen and (scene.clip.joints is not None or joint not in taken)
+    )
+
+
+def clip_motion(scene: Scene, model: SolidModel, start: Array) -> MotionClip | None:
+    """The prescribed motion that the scene's clip gives; None without one, or if none follows.
+
+    start   (nq,) pose from which a blend leads into the clip
+    raises  SceneError when trim, loop, blend or smooth do not fit the clip
+    """
+    capture = capture_of(scene)
+    if capture is None:
+        return None
+    return _following(scene, model, capture, followers(scene, capture, model), start)
+
+
+def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:
+    """Put the controlled joints that the clip has where it begins, in place, but those in initial.
+
+    q       (nq,) pose from which a blend leads into the clip
+    raises  SceneError as `clip_motion` does
+    """
+    capture = capture_of(scene)
+    if capture is None:
+        return
+    own = set(scene.controlled_joints()) - set(scene.initial.positions)
+    joints = tuple(joint for joint in model.joint_names if joint in own & set(capture.mapping))
+    motion = _following(scene, model, capture, joints, q)
+    if motion is not None:
+        q[model.places_of(motion.dofs)] = motion.position(0.0)
+
+
+def _following(
+    scene: Scene, model: SolidModel, capture: Capture, joints: tuple[str, ...], start: Array
+) -> MotionClip | None:
+    table = scene.clip
+    if table is None or not joints:
+        return None
+    return motion_of_clip(
+        model,
+        capture.clip,
+        capture.mapping,
+        joints=joints,
+        start=table.start,
+        stop=table.stop,
+        loop=table.loop,
+        blend=table.blend,
+        smooth=table.smooth,
+        initial=start,
+    )
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """What changes when a file does."""
+    try:
+        status = path.stat()
+    except OSError:
+        return 0, 0
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, stamp: tuple[int, int], unit: float, up: str, skip: int) -> Clip:
+    """A file is read once, though model, motion and checks all ask for it."""
+    return read_bvh(path, unit, up, skip)
