@@ -129,6 +129,14 @@ def positions(world: World, dofs: Integers) -> Array:
     return positions_in(model, state.q, dofs)
 
 
+def away(world: World, dofs: Integers, places: Array) -> Array:
+    """(k,) displacement from given entries of q (m,) of the joints of `dofs` to their present."""
+    model, state = parts(world)
+    start = state.q.copy()
+    start[model.places_of(dofs)] = places
+    return model.difference(start, state.q)[dofs]
+
+
 def body_rotation(world: World, body: int) -> Array:
     """(3, 3) columns are the body's axes in the world."""
     model, state = parts(world)

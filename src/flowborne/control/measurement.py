@@ -45,6 +45,10 @@ class Measurement:
         """(k,) positions of scalar joints, rad or m; NaN for dofs of ball and free joints."""
         return creature.positions(self.world, dofs)
 
+    def joints_away(self, dofs: Integers, places: Array) -> Array:
+        """(k,) displacement to the present pose of the joints of `dofs` from given entries of q."""
+        return creature.away(self.world, dofs, places)
+
     def body_rotation(self, body: int) -> Array:
         """(3, 3) columns are the body's axes in the world."""
         return creature.body_rotation(self.world, body)

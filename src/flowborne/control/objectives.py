@@ -135,10 +135,12 @@ class ObjectivePressureDrag:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveInputMotion:
-    """Sum of squared distances of scalar joints from a given motion, rad^2 or m^2.
+    """Sum of squared distances of joints from a given motion, rad^2 or m^2.
 
-    dofs       (k,) hinge and slide dofs
-    reference  motion whose position has one entry for each of them
+    The distance of a ball joint is the angle of the rotation that is left.
+
+    dofs       (k,) all dofs of the joints, ascending
+    reference  motion of these joints
     """
 
     dofs: Integers
@@ -147,7 +149,7 @@ class ObjectiveInputMotion:
 
     def value(self, measurement: Measurement) -> float:
         wanted = self.reference.position(measurement.world.time)
-        return float(np.sum((measurement.joint_positions(self.dofs) - wanted) ** 2))
+        return float(np.sum(measurement.joints_away(self.dofs, wanted) ** 2))
 
 
 @dataclass(frozen=True, eq=False)

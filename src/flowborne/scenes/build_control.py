@@ -28,7 +28,8 @@ from flowborne.control.servo import Servo, ServoExact, ServoPD
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Motion
 from flowborne.scenes import schema_control as tables
-from flowborne.scenes.bodies import joint_unit
+from flowborne.scenes.bodies import joint_unit, posed
+from flowborne.scenes.capture import clip_motion
 from flowborne.scenes.python_function import find_function
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes
@@ -132,13 +133,18 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
         bodies = _bodies(model, table.bodies)
         return ObjectivePressureDrag(bodies, _triple(table.direction), frame, table.kind)
     if isinstance(table, tables.ObjectiveInputMotionTable):
-        return ObjectiveInputMotion(_dofs_of(model, (table.joint,)), _reference(table, model))
+        dofs = _dofs_of(model, (table.joint,))
+        return ObjectiveInputMotion(dofs, _reference(table, scene, model))
     if isinstance(table, tables.ObjectiveVelocityTable):
         return ObjectiveVelocity(model.body(table.body), _triple(table.target))
     return ObjectiveCallable(find_function(table.function), table.function)
 
 
-def _reference(table: tables.ObjectiveInputMotionTable, model: SolidModel) -> Motion:
+def _reference(table: tables.ObjectiveInputMotionTable, scene: Scene, model: SolidModel) -> Motion:
+    if table.values is None:
+        motion = clip_motion(scene, model, posed(scene, model).q, (table.joint,))
+        assert motion is not None
+        return motion
     unit, dofs = joint_unit(model, table.joint), model.dofs_of(table.joint)
     values = tuple(unit * value for value in table.values)
     if len(values) == 1:

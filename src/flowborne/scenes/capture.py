@@ -107,16 +107,33 @@ def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, .
     )
 
 
-def clip_motion(scene: Scene, model: SolidModel, start: Array) -> MotionClip | None:
-    """The prescribed motion that the scene's clip gives; None without one, or if none follows.
+def clip_motion(
+    scene: Scene, model: SolidModel, start: Array, joints: tuple[str, ...] | None = None
+) -> MotionClip | None:
+    """The motion that the scene's clip gives to joints; None without one, or without joints.
 
     start   (nq,) pose from which a blend leads into the clip
+    joints  names; those that follow the clip when None
     raises  SceneError when trim, loop, blend or smooth do not fit the clip
     """
-    capture = capture_of(scene)
-    if capture is None:
+    capture, table = capture_of(scene), scene.clip
+    if capture is None or table is None:
         return None
-    return _following(scene, model, capture, followers(scene, capture, model), start)
+    chosen = followers(scene, capture, model) if joints is None else joints
+    if not chosen:
+        return None
+    return motion_of_clip(
+        model,
+        capture.clip,
+        capture.mapping,
+        joints=chosen,
+        start=table.start,
+        stop=table.stop,
+        loop=table.loop,
+        blend=table.blend,
+        smooth=table.smooth,
+        initial=start,
+    )
 
 
 def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:
@@ -130,29 +147,9 @@ def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:
         return
     own = set(scene.controlled_joints()) - set(scene.initial.positions)
     joints = tuple(joint for joint in model.joint_names if joint in own & set(capture.mapping))
-    motion = _following(scene, model, capture, joints, q)
+    motion = clip_motion(scene, model, q, joints)
     if motion is not None:
         q[model.places_of(motion.dofs)] = motion.position(0.0)
-
-
-def _following(
-    scene: Scene, model: SolidModel, capture: Capture, joints: tuple[str, ...], start: Array
-) -> MotionClip | None:
-    table = scene.clip
-    if table is None or not joints:
-        return None
-    return motion_of_clip(
-        model,
-        capture.clip,
-        capture.mapping,
-        joints=joints,
-        start=table.start,
-        stop=table.stop,
-        loop=table.loop,
-        blend=table.blend,
-        smooth=table.smooth,
-        initial=start,
-    )
 
 
 def _stamp(path: Path) -> tuple[int, int]:

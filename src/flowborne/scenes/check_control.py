@@ -126,9 +126,18 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
     if isinstance(table, ObjectiveInputMotionTable):
         unknown = unknown_joint(draft, model, table.joint, "objectives", index)
         yield from unknown
-        if not unknown and joint_kind(model, table.joint) not in (HINGE, SLIDE):
+        if not unknown and table.values is None:
+            if capture is None or table.joint not in capture.mapping:
+                yield (
+                    f"{where}: there is no clip from which joint '{table.joint}' has a motion. "
+                    "Give times and values."
+                )
+        elif not unknown and joint_kind(model, table.joint) not in (HINGE, SLIDE):
             kind = JOINT_KINDS[joint_kind(model, table.joint)]
-            yield f"{where}: joint '{table.joint}' is a {kind}. Name a hinge or a slide."
+            yield (
+                f"{where}: joint '{table.joint}' is a {kind}, for which a table of values is too "
+                "little. Name a hinge or a slide, or drop values to take the clip's motion."
+            )
         if not unknown and table.joint not in scene.controlled_joints() and whole:
             yield (
                 f"{where}: joint '{table.joint}' is not controlled. "

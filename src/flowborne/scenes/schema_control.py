@@ -134,16 +134,21 @@ class ObjectiveInputMotionTable(ObjectiveTable):
     """Squared distance of a controlled joint from a motion that it would have on its own.
 
     joint          the joint
-    times, values  keyframes of the motion, s and degrees or m; one of each is a fixed pose
+    times, values  keyframes of the motion of a hinge or slide, s and degrees or m; one of each is a
+                   fixed pose. Without them the motion is the clip's
     """
 
     kind: Literal["input-motion"]
     joint: Text
     times: Annotated[tuple[Number, ...], Field(min_length=1)] = (0.0,)
-    values: Annotated[tuple[Number, ...], Field(min_length=1)]
+    values: Annotated[tuple[Number, ...], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.values is None:
+            if "times" in self.model_fields_set:
+                raise ValueError("has times and no values. Give both, or neither")
+            return self
         if len(self.times) != len(self.values):
             raise ValueError(
                 f"has {len(self.times)} times and {len(self.values)} values. Give as many of both"

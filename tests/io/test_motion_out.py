@@ -1,0 +1,112 @@
+"""The motion of a run as BVH: what was controlled is replaced, the rest stays as it came."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flowborne.errors import SceneError
+from flowborne.io.bvh import read_bvh, write_clip
+from flowborne.io.motion_out import export_bvh
+from flowborne.quaternions import angle, inverse, product
+from flowborne.running import run
+from flowborne.scenes.human.gait import gait_clip
+from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.scenes.load import load_scene
+
+SCENE = """
+gravity = [0.0, 0.0, -9.81]
+[time]
+frames_per_second = 30.0
+frames = 12
+[human]
+[clip]
+"""
+
+CONTROL = """
+[initial]
+positions = { lower_back = [0.98, 0.0, 0.2, 0.0] }
+[[control]]
+joints = ["lower_back", "left_elbow"]
+strength = 90.0
+[[objectives]]
+kind = "effort"
+"""
+
+Finished = Callable[..., Path]
+
+
+@pytest.fixture
+def finished(tmp_path: Path) -> Finished:
+    """Runs a walk by a file in inches with skipped frames, or by the generated gait."""
+
+    def finished(clip: str = "", append: str = "") -> Path:
+        gait = gait_clip(standard_skeleton())
+        write_clip(tmp_path / "walk.bvh", gait, 0.0254)
+        (tmp_path / "scene.toml").write_text(SCENE + clip + append)
+        run(load_scene(tmp_path / "scene.toml"), out=tmp_path / "run", film=False)
+        return tmp_path / "run"
+
+    return finished
+
+
+FILE = 'file = "walk.bvh"\nunit = 0.0254\nskip = 2\nstart = 0.1\n'
+
+
+def turned_away(first: np.ndarray, second: np.ndarray) -> float:
+    """Largest angle between two rotations (frames, 4), degrees."""
+    return float(np.degrees(np.abs(angle(product(inverse(first), second))).max()))
+
+
+def test_an_untouched_clip_comes_back(finished: Finished, tmp_path: Path) -> None:
+    export_bvh(finished(FILE), tmp_path / "out.bvh")
+    source, out = (read_bvh(tmp_path / f, 0.0254) for f in ("walk.bvh", "out.bvh"))
+    assert out.names == source.names
+    assert out.frames == 49, "0.4 s at the clip's own rate"
+    part = slice(14, 14 + out.frames)
+    assert np.abs(out.translation - source.translation[part]).max() < 1e-6
+    for n in range(len(out.names)):
+        assert turned_away(out.rotations[:, n], source.rotations[part, n]) < 1e-4
+
+
+def test_controlled_joints_have_their_own_motion(finished: Finished, tmp_path: Path) -> None:
+    folder = finished(FILE, CONTROL)
+    export_bvh(folder, tmp_path / "out.bvh")
+    source, out = (read_bvh(tmp_path / f, 0.0254) for f in ("walk.bvh", "out.bvh"))
+    part = slice(14, 14 + out.frames)
+    away = {
+        name: turned_away(out.rotations[:, n], source.rotations[part, n])
+        for n, name in enumerate(out.names)
+    }
+    assert {name for name, degrees in away.items() if degrees > 1e-4} == {
+        "lower_back",
+        "left_elbow",
+    }
+    back = out.rotations[:, out.names.index("lower_back")]
+    for frame in (0, 5, 12):
+        with np.load(folder / "states" / f"{frame:06d}.npz") as state:
+            world, pelvis = state["body_rotation"][11], state["body_rotation"][1]
+        # the pose of the run, 30 frames a second, is found in the clip's 120
+        relative = pelvis.T @ world
+        w, x, y, z = back[4 * frame]
+        own = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+        assert own == pytest.approx(relative[:, 2], abs=1e-5)
+
+
+def test_a_generated_walk_is_written_anew(finished: Finished, tmp_path: Path) -> None:
+    export_bvh(finished("loop = true\n"), tmp_path / "out.bvh")
+    out, gait = read_bvh(tmp_path / "out.bvh", 0.01), gait_clip(standard_skeleton())
+    assert out.frames == 13
+    assert out.frame_time == pytest.approx(1 / 30)
+    knee = gait.names.index("right_knee")
+    assert turned_away(out.rotations[::3, knee], gait.rotations[:60:12, knee]) < 1e-2
+    assert out.translation[-1] == pytest.approx(gait.translation[48], abs=1e-4)
+
+
+def test_a_run_without_a_clip_is_refused(tmp_path: Path) -> None:
+    run(load_scene("block-effort-wind"), out=tmp_path / "run", film=False, frames=2)
+    with pytest.raises(SceneError, match=r"follows no clip, and a BVH needs one"):
+        export_bvh(tmp_path / "run", tmp_path / "out.bvh")
