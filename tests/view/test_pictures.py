@@ -31,7 +31,7 @@ def cut_out(pixels: Pixels, box: Box) -> Pixels:
 
 def pixel_of(picture: Picture, x: float, y: float) -> tuple[int, int]:
     """(row, column) in the map of a place in m."""
-    x0, x1, y0, y1 = picture.view
+    x0, x1, y0, y1 = picture.map.view
     box = picture.layout.map
     return int((y1 - y) / (y1 - y0) * box.height), int((x - x0) / (x1 - x0) * box.width)
 

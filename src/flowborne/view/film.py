@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -26,13 +27,14 @@ def make_preview(folder: Path, progress: Callable[[int, int], None] | None = Non
     folder    of the run; nothing else is read
     progress  called with (frames drawn, frames in all)
     raises    ValueError when there is no frame, when there is only one (the picture is then drawn
-              and the film is not), or when the run is not two-dimensional; OSError when the disc
-              refuses
+              and the film is not), or when it has three dimensions and nothing can draw them here;
+              OSError when the disc refuses
     """
     files = RunFolder(folder)
     run = Run.read(folder)
-    picture = Picture(run, PICTURE_SCALE).draw(len(run) - 1)[:, :, :3]
-    write_atomically(files.picture, lambda file: imageio.imwrite(file, picture, extension=".png"))
+    with closing(Picture(run, PICTURE_SCALE)) as picture:
+        last = picture.draw(len(run) - 1)[:, :, :3]
+    write_atomically(files.picture, lambda file: imageio.imwrite(file, last, extension=".png"))
     if len(run) < 2:
         raise ValueError(
             f"{folder} has one frame, which makes a picture and no film; "
@@ -46,7 +48,12 @@ def write_film(run: Run, path: Path, progress: Callable[[int, int], None] | None
 
     raises  OSError when the file cannot be written; what was there is then still there
     """
-    picture = Picture(run)
+    with closing(Picture(run)) as picture:
+        _write(picture, path, progress)
+
+
+def _write(picture: Picture, path: Path, progress: Callable[[int, int], None] | None) -> None:
+    run = picture.run
     partial = path.with_name(partial_name(path.name))
     writer = imageio_ffmpeg.write_frames(
         str(partial),

@@ -14,14 +14,10 @@ from numpy.typing import NDArray
 from flowborne.fluid.grid import Grid
 from flowborne.io.history import history_columns, history_rows
 from flowborne.io.run_folder import STATE_NAME, RunFolder
-from flowborne.solids.slab import Section, section
 
 Array = NDArray[np.float64]
 State = dict[str, NDArray[Any]]
 """Arrays of one file of states/, by name."""
-
-ARC = 72
-"""Corners of a full circle in a drawn outline."""
 
 PLOTTED = ("objective", "angle_", "position_")
 """Beginnings of the columns of the history that are read besides frame and time."""
@@ -31,12 +27,14 @@ PLOTTED = ("objective", "angle_", "position_")
 class Geom:
     """One drawn geometry of a body; sizes as MuJoCo has them.
 
+    rgba  colour that the model gives it
     mesh  vertices (k, 3) in the geometry's frame and faces (m, 3), or None
     """
 
     kind: str
     size: Array
     body: int
+    rgba: Array
     mesh: tuple[Array, NDArray[np.int64]] | None
 
 
@@ -49,8 +47,9 @@ class Run:
     accented           numbers of the bodies that controlled joints carry
     controlled         names of the controlled joints
     grid               of the fluid; None without fluid
-    outlines           (k, 3) closed cross-section of each geometry, in the geometry's own frame
-    outline_body       body of each geometry
+    slab               whether it is a run in two dimensions
+    gravity            (3,) m/s^2
+    geoms              what is drawn of the bodies, in the order of geom_position
     frames_per_second  of the film
     wind               (n, 3) streams to draw where there is no fluid
     picture            what the scene wants to see of the fluid
@@ -63,8 +62,9 @@ class Run:
     accented: frozenset[int]
     controlled: tuple[str, ...]
     grid: Grid | None
-    outlines: tuple[Array, ...]
-    outline_body: tuple[int, ...]
+    slab: bool
+    gravity: Array
+    geoms: tuple[Geom, ...]
     frames_per_second: float
     wind: Array
     picture: Literal["dye", "vorticity", "none"]
@@ -89,7 +89,6 @@ class Run:
                 f"{path} is a run in three dimensions, and previews are drawn of slabs; "
                 "read its states/ with another viewer"
             )
-        geoms = [_geom(entry) for entry in model["geoms"]]
         carriers = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
         return cls(
             name=scene.get("name", path.name),
@@ -97,8 +96,9 @@ class Run:
             accented=frozenset(carriers[j] for j in model["controlled"] if j in carriers),
             controlled=tuple(model["controlled"]),
             grid=_grid(model["grid"]),
-            outlines=_outlines(geoms, read_state(states[0])),
-            outline_body=tuple(geom.body for geom in geoms),
+            slab=bool(model["slab"]),
+            gravity=np.asarray(scene.get("gravity", (0.0, 0.0, 0.0)), float),
+            geoms=tuple(_geom(entry) for entry in model["geoms"]),
             frames_per_second=float(model["frames_per_second"]),
             wind=np.asarray(model["wind"], float).reshape(-1, 3),
             picture=scene.get("output", {}).get("picture", "vorticity"),
@@ -133,16 +133,6 @@ class Run:
         rows = np.flatnonzero(self.history["frame"] == frame)
         return int(rows[0]) if rows.size else None
 
-    def placed(self, state: State) -> list[Array]:
-        """(k, 2) outline of each geometry in the x-y plane, m."""
-        if not self.outlines:
-            return []
-        centres, turns = state["geom_position"], state["geom_rotation"]
-        return [
-            (centre + outline @ turn.T)[:, :2]
-            for outline, centre, turn in zip(self.outlines, centres, turns, strict=True)
-        ]
-
 
 def read_state(path: Path) -> State:
     """Arrays of a file of states/."""
@@ -168,43 +158,8 @@ def _geom(entry: dict[str, Any]) -> Geom:
     mesh = None
     if entry["type"] == "mesh":
         mesh = (np.asarray(entry["vertices"], float), np.asarray(entry["faces"], np.int64))
-    return Geom(entry["type"], np.asarray(entry["size"], float), int(entry["body"]), mesh)
-
-
-def _outlines(geoms: list[Geom], state: State) -> tuple[Array, ...]:
-    """Closed outline of the cross-section of each geometry, in the geometry's frame."""
-    return tuple(
-        _loop(
-            section(
-                geom.kind,
-                geom.size,
-                state["geom_rotation"][n].astype(float),
-                float(state["geom_position"][n, 2]),
-                geom.mesh,
-            )
-        )
-        for n, geom in enumerate(geoms)
-    )
-
-
-def _loop(cut: Section) -> Array:
-    """(k, 3) corners of a cross-section one after the other; of several loops the longest."""
-    segments = cut.outline(ARC)
-    if cut.family != "segments":
-        return np.asarray(segments[:, 0])
-    reach = np.ptp(segments.reshape(-1, 3), axis=0).max()
-    keys = [tuple(key) for key in np.rint(segments[:, 0] / (1e-6 * reach)).astype(int).tolist()]
-    ends = [tuple(key) for key in np.rint(segments[:, 1] / (1e-6 * reach)).astype(int).tolist()]
-    following = {key: n for n, key in enumerate(keys)}
-    longest: list[int] = []
-    left = set(range(len(segments)))
-    while left:
-        loop = [left.pop()]
-        while (n := following.get(ends[loop[-1]])) in left:
-            left.remove(n)
-            loop.append(n)
-        longest = max(longest, loop, key=len)
-    return np.asarray(segments[longest, 0])
+    size, rgba = np.asarray(entry["size"], float), np.asarray(entry["rgba"], float)
+    return Geom(entry["type"], size, int(entry["body"]), rgba, mesh)
 
 
 def _history(path: Path) -> dict[str, Array]:

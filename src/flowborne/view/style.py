@@ -17,6 +17,8 @@ ACCENT = "#ffb81f"
 WIND = "#2f4a66"
 EDGE = "#05090f"
 FORCE = "#6dffb0"
+FLOOR = "#16273b"
+SQUARES = "#2c425b"
 
 DYES = ("#2fd3ee", "#ff72b6", "#b9f24d", "#a992ff")
 CURVES = ("#ffb81f", "#5cc8ff", "#ff72b6", "#b9f24d", "#a992ff", "#ff8a5c")
@@ -31,3 +33,10 @@ SPIN_RIGHT = ("#d9f0ff", "#2f9dff", "#15457f")
 def rgb(colour: str) -> NDArray[np.float64]:
     """(3,) red, green and blue from 0 to 1 of "#rrggbb"."""
     return np.array([int(colour[n : n + 2], 16) / 255.0 for n in (1, 3, 5)])
+
+
+def body_colour(body: int, accented: frozenset[int]) -> str:
+    """Colour of a body: what stands fixed, what controlled joints carry, and the others."""
+    if body == 0:
+        return FIXED
+    return ACCENT if body in accented else BODY
