@@ -22,6 +22,16 @@ DISC = """
 </mujoco>
 """
 
+BALL = """
+<mujoco>
+  <worldbody>
+    <body name="ball" pos="0.13 -0.07 0.02">
+      <freejoint/><geom name="ball" type="sphere" size="0.5"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
 TETRAHEDRON = """
 <mujoco>
   <asset><mesh name="fin" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset>
@@ -63,6 +73,22 @@ def test_a_state_holds_what_a_picture_needs_in_single_precision(tmp_path):
     assert state["scalar_smoke"].shape == state["open"].shape == (16, 16, 1)
     np.testing.assert_allclose(state["fluid_centre"][1], [0.13, -0.07, 0.0], atol=1e-7)
     assert path.stat().st_size == pytest.approx(recorder.bytes_per_frame(world), rel=0.1)
+
+
+def test_a_state_in_space_holds_all_three_axes(tmp_path):
+    model = SolidModel.from_string(BALL)
+    grid = Grid((20, 18, 16), 0.1, (-1.0, -0.9, -0.8))
+    setup = Setup(model, Fluid(grid, 1.0, scalars=("smoke",)))
+    world = World(setup, model.rest(), FluidState.at_rest(grid, ("smoke",)))
+    recorder = Recorder(RunFolder.create(tmp_path / "run"))
+    recorder.write(0, world, None)
+    path = recorder.folder.state(0)
+    state = np.load(path)
+    for axis, name in enumerate("xyz"):
+        assert state[f"velocity_{name}"].shape == grid.face_shape(axis)
+    closed = (1.0 - state["open"]).sum() * grid.cell_volume
+    assert closed == pytest.approx(4.0 / 3.0 * np.pi * 0.5**3, rel=0.025)
+    assert path.stat().st_size == pytest.approx(recorder.bytes_per_frame(world), rel=0.05)
 
 
 def test_model_json_describes_a_mesh_and_the_grid(tmp_path):

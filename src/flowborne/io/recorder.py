@@ -54,7 +54,7 @@ class Recorder:
     def bytes_per_frame(self, world: World) -> int:
         """About the size of a state file."""
         solid = world.setup.solid
-        numbers, members = 24 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
+        numbers, members = 18 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
         if world.fluid is not None and world.setup.fluid is not None:
             moving = [world.fluid.velocity[axis] for axis in world.setup.fluid.grid.axes]
             kept = [*moving, *world.fluid.scalars.values()]
