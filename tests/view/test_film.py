@@ -73,14 +73,6 @@ def test_a_folder_without_frames_says_so(write_run: Write) -> None:
         make_preview(folder)
 
 
-def test_a_run_in_three_dimensions_is_refused(write_run: Write) -> None:
-    folder = write_run(frames=1)
-    model = json.loads((folder / "model.json").read_text())
-    (folder / "model.json").write_text(json.dumps(model | {"slab": False}))
-    with pytest.raises(ValueError, match="run in three dimensions"):
-        make_preview(folder)
-
-
 def test_a_wide_and_a_high_run_have_even_sides(write_run: Write) -> None:
     folder = write_run(frames=1)
     model = json.loads((folder / "model.json").read_text())

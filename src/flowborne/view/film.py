@@ -53,6 +53,7 @@ def write_film(run: Run, path: Path, progress: Callable[[int, int], None] | None
 
 
 def _write(picture: Picture, path: Path, progress: Callable[[int, int], None] | None) -> None:
+    """Code one picture after the other into a file beside `path`, which then takes its place."""
     run = picture.run
     partial = path.with_name(partial_name(path.name))
     writer = imageio_ffmpeg.write_frames(

@@ -53,10 +53,10 @@ class Forces:
             force = state["fluid_force"][body, : self._axes].astype(float)
             vector = self.reach / self.large * force
             length = float(np.linalg.norm(vector))
-            if not SHORTEST * pixel <= length < np.inf:
+            tail = state["fluid_centre"][body, : self._axes].astype(float)
+            if not SHORTEST * pixel <= length < np.inf or not np.isfinite(tail).all():
                 continue
-            vector *= min(1.0, CUT_FORCE * self.reach / length)
-            arrows.append((body, state["fluid_centre"][body, : self._axes].astype(float), vector))
+            arrows.append((body, tail, min(1.0, CUT_FORCE * self.reach / length) * vector))
         return arrows
 
     def _large(self, run: Run) -> float:

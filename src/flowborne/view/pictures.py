@@ -5,7 +5,11 @@ Whatever does not change from frame to frame is drawn once; a frame redraws only
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Protocol
+
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
@@ -14,10 +18,11 @@ from numpy.typing import NDArray
 
 from flowborne.view import style
 from flowborne.view.arrows import arrow, round_number
-from flowborne.view.forces import SHAFT
+from flowborne.view.forces import SHAFT, Forces
 from flowborne.view.layout import MARGIN, Layout
 from flowborne.view.map_slab import MapSlab
-from flowborne.view.run import Run
+from flowborne.view.run import Run, State
+from flowborne.view.space.map_space import MapSpace
 from flowborne.view.strips import Strip, joint_curves, strip_curves
 
 Array = NDArray[np.float64]
@@ -29,8 +34,39 @@ NAMED = 3
 """Joints whose positions are written beside the time."""
 
 
+class Map(Protocol):
+    """The part of a picture that shows the run itself.
+
+    width   m across the map, where the bodies are
+    aspect  its height over its width
+    forces  the scale of the arrows of forces
+    legend  (name, colour) of each thing of the fluid that is shown in a colour of its own
+    scale   (colours from lowest to highest (k, 3), lowest, highest, name), or None
+    """
+
+    width: float
+    aspect: float
+    forces: Forces
+    legend: Sequence[tuple[str, str]]
+    scale: tuple[Array, float, float, str] | None
+
+    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
+        """Draw what stands still in `axes`, `pixels` wide at scale 1; the artists of what moves."""
+        ...
+
+    def show(self, number: int, state: State) -> None:
+        """Make what moves that of the `number`-th state."""
+        ...
+
+    def close(self) -> None:
+        """Let go of what the map holds besides memory; it cannot be drawn after."""
+        ...
+
+
 class Picture:
-    """Draws the frames of a run, all on the same scales.
+    """Draws the frames of a run, all on the same scales. Close it after use.
+
+    Making one raises ValueError when the run has three dimensions and nothing can draw them here.
 
     layout  sizes at scale 1; a picture is `scale` times as large
     map     what the picture shows of the run itself
@@ -38,7 +74,7 @@ class Picture:
 
     def __init__(self, run: Run, scale: float = 1.0) -> None:
         self.run = run
-        self.map = MapSlab(run)
+        self.map: Map = MapSlab(run) if run.slab else MapSpace(run)
         curves = strip_curves(run)
         self.layout = Layout.of(self.map.aspect, len(curves))
         self._metres = self.map.width / self.layout.map.width

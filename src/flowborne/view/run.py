@@ -75,8 +75,7 @@ class Run:
     def read(cls, path: Path) -> Run:
         """The run in folder `path`.
 
-        raises  ValueError when it has no frame, or is not two-dimensional; OSError when a file is
-                not there
+        raises  ValueError when it has no frame; OSError when a file is not there
         """
         folder = RunFolder(path)
         states = _states(folder.states)
@@ -84,11 +83,6 @@ class Run:
             raise ValueError(f"{path} has no frame to draw; let the run go on with --resume")
         scene = tomllib.loads(folder.scene.read_text(encoding="utf-8"))
         model = json.loads(folder.model.read_text(encoding="utf-8"))
-        if not model["slab"]:
-            raise ValueError(
-                f"{path} is a run in three dimensions, and previews are drawn of slabs; "
-                "read its states/ with another viewer"
-            )
         carriers = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
         return cls(
             name=scene.get("name", path.name),

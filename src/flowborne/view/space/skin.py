@@ -1,0 +1,46 @@
+"""Where a line from within a body leaves it, so that the arrow of a force starts at the skin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from flowborne.view.run import Geom, State
+
+Array = NDArray[np.float64]
+
+
+class Skin:
+    """The bodies as convex parts bounded by planes.
+
+    meshes  of the geometries, in their own frames
+    """
+
+    def __init__(self, geoms: Sequence[Geom], meshes: Sequence[pv.PolyData]) -> None:
+        self._planes = [_planes(mesh) for mesh in meshes]
+        self._parts: dict[int, list[int]] = {}
+        for n, geom in enumerate(geoms):
+            self._parts.setdefault(geom.body, []).append(n)
+
+    def reach(self, body: int, place: Array, vector: Array, state: State) -> float:
+        """m along `vector` (3,) from `place` (3,) to the surface of a body; 0 from outside it."""
+        along = vector / np.linalg.norm(vector)
+        farthest = 0.0
+        for part in self._parts[body]:
+            turn, centre = state["geom_rotation"][part], state["geom_position"][part]
+            normals, heights = self._planes[part]
+            room = heights - normals @ ((place - centre) @ turn)
+            slope = normals @ (along @ turn)
+            if (room > 0.0).all():
+                farthest = max(farthest, float((room[slope > 0.0] / slope[slope > 0.0]).min()))
+        return farthest
+
+
+def _planes(mesh: pv.PolyData) -> tuple[Array, Array]:
+    """Outward normals (m, 3) of a mesh's faces, and their heights (m,) over the origin, m."""
+    normals = np.asarray(mesh.face_normals, float)
+    middles = np.asarray(mesh.cell_centers().points, float)
+    return normals, np.einsum("ij,ij->i", normals, middles)

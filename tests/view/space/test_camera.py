@@ -1,0 +1,121 @@
+"""The camera keeps the bodies in the map, of one size, without shaking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flowborne.fluid.grid import Grid
+from flowborne.view.run import Geom, Run
+from flowborne.view.space.camera import (
+    FILLED,
+    FILLED_BY_FLUID,
+    RIGHT,
+    TOWARD,
+    UP,
+    camera_of,
+    outermost,
+    swept,
+)
+
+Make = Callable[..., Run]
+
+BALL = ("sphere", (0.1, 0.0, 0.0))
+TIMES = np.arange(97) / 24.0
+
+
+def on_map(run: Run) -> np.ndarray:
+    """(frames, n, 2) places on the map of what the bodies sweep."""
+    camera = camera_of(run)
+    places = swept(run, range(len(run.geoms)))
+    return np.stack([camera.project(n, points) for n, points in enumerate(places)])
+
+
+def walk(sway: float = 0.0) -> np.ndarray:
+    """(97, 2, 3) two balls, one over the other, that walk along x and bob up and down."""
+    middle = np.outer(TIMES, [1.3, 0.2, 0.0])
+    middle[:, 2] += sway * np.sin(2.0 * np.pi * 2.0 * TIMES)
+    return middle[:, None] + np.array([[0.0, 0.0, 0.3], [0.2, 0.0, 1.6]])
+
+
+def test_bodies_fill_the_map_and_stay_within_it_over_the_whole_run(run_of: Make) -> None:
+    run = run_of([BALL, BALL], walk(0.1))
+    places = on_map(run)
+    low, high = 0.5 - 0.5 * FILLED, 0.5 + 0.5 * FILLED
+    assert places.min() > low - 1e-3
+    assert places.max() < high + 1e-3
+    assert np.ptp(places[..., 1]) == pytest.approx(FILLED, abs=0.02)
+
+
+def test_a_body_keeps_its_size_and_place_while_it_walks(run_of: Make) -> None:
+    places = on_map(run_of([BALL, BALL], walk()))
+    np.testing.assert_allclose(places, np.broadcast_to(places[:1], places.shape), atol=1e-4)
+
+
+def test_the_camera_does_not_bob_with_the_bodies(run_of: Make) -> None:
+    """Steps at 2 Hz come through with less than a tenth of their size."""
+    focus = camera_of(run_of([BALL, BALL], walk(0.1))).focus
+    assert np.ptp(focus[:, 2]) < 0.02
+    speed = 24.0 * np.diff(focus[:, 0])
+    np.testing.assert_allclose(speed, 1.3, rtol=1e-3)
+
+
+def test_bodies_that_fly_apart_are_kept_in_the_map(run_of: Make) -> None:
+    centres = np.zeros((49, 3, 3))
+    rng = np.random.default_rng(3)
+    centres += np.linspace(0.0, 2.0, 49)[:, None, None] * rng.normal(size=(3, 3))
+    places = on_map(run_of([BALL, BALL, ("box", (0.5, 0.1, 0.2))], centres))
+    assert 0.05 < places.min() < places.max() < 0.95
+
+
+def test_lost_numbers_do_not_lose_the_camera(run_of: Make) -> None:
+    centres = walk()
+    whole = camera_of(run_of([BALL, BALL], centres[:80]))
+    centres[80:] = np.nan
+    camera = camera_of(run_of([BALL, BALL], centres))
+    np.testing.assert_allclose(camera.focus[:80], whole.focus)
+    np.testing.assert_allclose(camera.focus[80:], np.broadcast_to(whole.focus[-1], (17, 3)))
+    assert camera.distance == whole.distance
+
+
+def test_a_fluid_is_seen_whole_unless_it_is_much_larger(run_of: Make, box_of_fluid: Grid) -> None:
+    centres = walk()[:, :1] - [2.0, 0.0, 0.3]
+    camera = camera_of(run_of([("sphere", (0.4, 0.0, 0.0))], centres, grid=box_of_fluid))
+    assert np.ptp(camera.focus, axis=0).max() == 0.0
+    low, high = np.array(box_of_fluid.origin), np.array(box_of_fluid.upper)
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    places = camera.project(0, corners)
+    assert np.ptp(places, axis=0).max() == pytest.approx(FILLED_BY_FLUID, abs=0.01)
+    lake = Grid((50, 50, 50), 0.4, (-10.0, -10.0, -10.0))
+    followed = camera_of(run_of([BALL], centres, grid=lake))
+    assert np.ptp(followed.focus[:, 0]) == pytest.approx(np.ptp(centres[..., 0]), rel=0.01)
+    assert followed.height < 2.0
+
+
+def test_the_maps_axes_are_a_frame_and_x_leads_to_the_right_and_nearer() -> None:
+    np.testing.assert_allclose(np.stack([RIGHT, UP, TOWARD]) @ np.stack([RIGHT, UP, TOWARD]).T,
+                               np.eye(3), atol=1e-15)  # fmt: skip
+    assert np.linalg.det([RIGHT, UP, TOWARD]) > 0.0
+    assert RIGHT[0] > 0.5
+    assert TOWARD[0] > 0.3
+    assert UP[2] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "reach"),
+    [
+        ("sphere", (0.2, 0.0, 0.0), (0.2, 0.2, 0.2)),
+        ("capsule", (0.2, 0.5, 0.0), (0.2, 0.2, 0.7)),
+        ("cylinder", (0.2, 0.5, 0.0), (0.2, 0.2, 0.5)),
+        ("box", (0.2, 0.5, 0.3), (0.2, 0.5, 0.3)),
+        ("ellipsoid", (0.2, 0.5, 0.3), (0.2, 0.5, 0.3)),
+    ],
+)
+def test_outermost_places_reach_as_far_as_the_geometry(
+    kind: str, size: tuple[float, ...], reach: tuple[float, ...]
+) -> None:
+    places = outermost(Geom(kind, np.array(size), 1, np.ones(4), None))
+    np.testing.assert_allclose(places.max(axis=0), reach)
+    np.testing.assert_allclose(places.min(axis=0), -np.array(reach))
