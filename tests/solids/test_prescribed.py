@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.model import SolidModel
-from flowborne.solids.prescribed import PrescribedSystem, prescribe, release
+from flowborne.solids.prescribed import PrescribedSystem, prescribe, within_limits
 from flowborne.solids.state import SolidState
 
 CREATURE = SolidModel.from_string("""<mujoco><worldbody><geom type="plane" size="5 5 .1"/>
@@ -75,7 +75,7 @@ def test_everything_prescribed_has_no_answer_to_the_fluid() -> None:
     np.testing.assert_array_equal(driven.after(np.ones(model.nv)), np.full(model.nv, 0.1))
 
 
-def test_release_pushes_with_the_limit() -> None:
+def test_a_weak_drive_pushes_with_its_limit() -> None:
     """Of two driven joints one is too weak: it gives way and uses exactly its limit."""
     model, dt = CREATURE, 0.01
     state, none = model.rest(), np.zeros(model.nv)
@@ -85,7 +85,7 @@ def test_release_pushes_with_the_limit() -> None:
     limit = np.array([np.inf] * 6 + [np.inf, 0.5])
     driven = prescribe(assemble(model, state, none, dt), prescribed, hold)
     driven, v_plus = settled(driven, none)
-    weak = release(driven, limit, driven.actuator(v_plus, none))
+    weak = within_limits(driven, limit, v_plus, driven.actuator(v_plus, none))
     assert weak is not None
     weak, v_plus = settled(weak, none)
     actuator = weak.actuator(v_plus, none)
@@ -96,16 +96,16 @@ def test_release_pushes_with_the_limit() -> None:
     applied = assemble(model, state, np.array([0.0] * 7 + [-0.5]), dt)
     alone = prescribe(applied, weak.prescribed, hold)
     np.testing.assert_allclose(settled(alone, none)[1], v_plus, atol=1e-12)
-    assert release(weak, limit, actuator) is None
+    assert within_limits(weak, limit, v_plus, actuator) is None
 
 
-def test_release_leaves_drives_below_their_limits() -> None:
+def test_drives_below_their_limits_keep_their_velocities() -> None:
     model = CREATURE
     prescribed = np.array([False] * 6 + [True, True])
     system = assemble(model, model.rest(), np.zeros(model.nv), 0.01)
     driven = prescribe(system, prescribed, np.zeros(model.nv))
     actuator = np.array([9.0] * 6 + [0.9, -0.9])
-    assert release(driven, np.ones(model.nv), actuator) is None
+    assert within_limits(driven, np.ones(model.nv), np.zeros(model.nv), actuator) is None
 
 
 def test_singular_matrix_is_refused() -> None:
@@ -115,3 +115,31 @@ def test_singular_matrix_is_refused() -> None:
     broken = replace(system, A=flat)
     with pytest.raises(ValueError, match="not positive definite at free dof 3"):
         prescribe(broken, np.zeros(8, bool), np.zeros(8))
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=60, deadline=None)
+def test_every_drive_holds_or_pushes_short_of_its_velocity(seed: int) -> None:
+    """The complementarity of velocities and limits, whatever the drives and limits are."""
+    random = np.random.default_rng(seed)
+    model, none = CREATURE, np.zeros(8)
+    state = model.rest()
+    state.q[2] = 3.0
+    prescribed = random.random(8) < 0.8
+    hold, limit = random.normal(size=8), np.exp(random.normal(2.0, 2.0, 8))
+    driven = prescribe(assemble(model, state, none, 0.01), prescribed, hold)
+    for _ in range(100):
+        v_plus = driven.after(none)
+        force = driven.actuator(v_plus, none)
+        later = driven.updated(v_plus)
+        changed = within_limits(later or driven, limit, v_plus, force) or later
+        if changed is None:
+            break
+        driven = changed
+    assert changed is None, "the drives did not settle"
+    assert np.all(np.abs(force) <= limit * (1.0 + 1e-8))
+    kept = prescribed & ~driven.limited
+    np.testing.assert_array_equal(v_plus[kept], hold[kept])
+    short = np.sign(force) * (hold - v_plus)
+    assert np.all(short[driven.limited] >= -1e-8)
+    assert np.all(force[~prescribed] == 0.0)

@@ -36,7 +36,7 @@ from flowborne.fluid.projection import face_weights, outflow, push
 from flowborne.fluid.viscosity import assemble_viscosity
 from flowborne.fluid.viscous_solve import ViscousSystem, walls_of
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.prescribed import PrescribedSystem, release
+from flowborne.solids.prescribed import PrescribedSystem, within_limits
 
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
@@ -95,7 +95,8 @@ def correct(
 ) -> PrescribedSystem | None:
     """The bodies' system with the contacts and drives that the solution implies; None if it has
     them."""
-    return driven.updated(v) or release(driven, limit, actuator)
+    later = driven.updated(v)
+    return within_limits(later or driven, limit, v, actuator) or later
 
 
 def solve_bodies(driven: PrescribedSystem, torque_limit: Array, nbody: int) -> Solved:

@@ -8,7 +8,7 @@ Partial inverse dynamics: with P the prescribed dofs and F the free ones,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 OVER = 1e-9
-"""A drive may exceed its torque limit by this share before it is released."""
+"""Share by which a drive may exceed its limit, or a dof its velocity, before that counts."""
+
+AT_ONCE = 6
+"""Turns in which all drives that are wrong change; after them one at a time does."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,7 @@ class PrescribedSystem:
     velocity    (nv,) v*, velocity after the step when there is no impulse
     limited     (nv,) dofs whose drive reached its limit; they are free and pushed by `push`
     push        (nv,) generalised force of limited drives, already in `system`
+    turns       times that drives were released or taken up
     """
 
     system: SolidSystem
@@ -43,6 +47,7 @@ class PrescribedSystem:
     velocity: Array
     limited: Mask
     push: Array = field(repr=False)
+    turns: int = 0
 
     def after(self, impulse: Array) -> Array:
         """(nv,) velocity after the step with a generalised impulse (nv,), the fluid's for one."""
@@ -59,7 +64,8 @@ class PrescribedSystem:
         system = self.system.updated(v_plus)
         if system is None:
             return None
-        return _solved(system, self.prescribed, self.hold, self.limited, self.push)
+        solved = _solved(system, self.prescribed, self.hold, self.limited, self.push)
+        return replace(solved, turns=self.turns)
 
 
 def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedSystem:
@@ -71,25 +77,35 @@ def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedS
     return _solved(system, prescribed, hold, none, np.zeros(len(hold)))
 
 
-def release(driven: PrescribedSystem, limit: Array, actuator: Array) -> PrescribedSystem | None:
-    """Free the dofs whose drive is over its limit and push them with the limit instead.
+def within_limits(
+    driven: PrescribedSystem, limit: Array, v_plus: Array, actuator: Array
+) -> PrescribedSystem | None:
+    """The system with the drives that the solution implies; None when it has them already.
+
+    A drive either keeps its dof at `hold` with a force within its limit, or pushes with all that
+    it has towards a velocity that the dof does not reach: one that needs more is released, one
+    whose dof runs past `hold` takes it up again. Together it is a linear complementarity problem
+    of a positive definite matrix; changing one drive at a time, the first, ends for certain
+    (Murty 1974), and all at once ends sooner as a rule.
 
     limit     (nv,) largest |generalised force| of each drive, inf for none
-    actuator  (nv,) force that the drives need, as `driven.actuator` gives it
-    returns   the system to solve again, or None when no drive is over its limit
+    v_plus    (nv,) velocity of the solution
+    actuator  (nv,) force that its drives supply, as `driven.actuator` gives it
     """
     over = driven.prescribed & (np.abs(actuator) > limit * (1.0 + OVER))
-    if not over.any():
+    room = OVER * (np.abs(v_plus) + np.abs(driven.hold))
+    past = driven.limited & (np.sign(driven.push) * (v_plus - driven.hold) > room)
+    wrong = np.flatnonzero(over | past)
+    if wrong.size == 0:
         return None
-    more = np.zeros(len(limit))
-    more[over] = np.sign(actuator[over]) * limit[over]
-    return _solved(
-        driven.system.pushed(more),
-        driven.prescribed & ~over,
-        driven.hold,
-        driven.limited | over,
-        driven.push + more,
-    )
+    if driven.turns >= AT_ONCE:
+        wrong = wrong[:1]
+    prescribed, limited, push = driven.prescribed.copy(), driven.limited.copy(), driven.push.copy()
+    prescribed[wrong], limited[wrong] = past[wrong], over[wrong]
+    push[wrong] = np.where(over[wrong], np.sign(actuator[wrong]) * limit[wrong], 0.0)
+    system = driven.system.pushed(push - driven.push)
+    solved = _solved(system, prescribed, driven.hold, limited, push)
+    return replace(solved, turns=driven.turns + 1)
 
 
 def _solved(
