@@ -10,7 +10,7 @@ from PIL import Image
 
 
 class MapImage(Artist):
-    """A small image, smoothly enlarged to fill its axes; drawn anew in every frame.
+    """An image, smoothly enlarged to fill its axes; drawn anew in every frame.
 
     matplotlib's own images say the same at five times the cost.
 
@@ -33,11 +33,12 @@ class MapImage(Artist):
     def draw(self, renderer: RendererBase) -> None:
         x0, y0, *_ = self._edges()
         small = Image.fromarray(np.ascontiguousarray(self.image[::-1]))
-        large = small.resize(self.pixels, Image.Resampling.BICUBIC).convert("RGBA")
-        # a cubic swings below its knots, which would show as black seams along dye
-        darkest = np.append(self.image.min(axis=(0, 1)), np.uint8(255))
-        pixels = np.maximum(np.asarray(large), darkest)[::-1]
-        renderer.draw_image(renderer.new_gc(), x0, y0, pixels)
+        pixels = np.asarray(small.resize(self.pixels, Image.Resampling.BICUBIC).convert("RGBA"))
+        if small.size != self.pixels:
+            # a cubic swings below its knots, which would show as black seams along dye
+            darkest = np.append(self.image.min(axis=(0, 1)), np.uint8(255))
+            pixels = np.maximum(pixels, darkest)
+        renderer.draw_image(renderer.new_gc(), x0, y0, pixels[::-1])
 
     def _edges(self) -> tuple[int, int, int, int]:
         x0, y0, x1, y1 = (round(edge) for edge in self._axes.bbox.extents)

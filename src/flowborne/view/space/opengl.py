@@ -47,7 +47,7 @@ def off_screen(width: int, height: int) -> Plotter:
 def _silent(log: Any) -> Iterator[None]:
     """Keep VTK from telling of each kind of window that it tries in vain."""
     before = log.GetCurrentVerbosityCutoff()
-    pass
+    log.SetStderrVerbosity(log.VERBOSITY_OFF)
     try:
         yield
     finally:
