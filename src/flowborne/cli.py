@@ -218,14 +218,14 @@ def bench(
 def figures(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
 ) -> None:
-    """Our numbers for Figures 2 and 10 of the paper, as tables and a plot."""
+    """Our numbers for Figures 2, 9 b and 10 of the paper, as tables and pictures."""
     _make_folder(out)
     from flowborne.simulation import BlowUpError
     from flowborne.validation.figures import make_figures
 
     try:
         make_figures(out)
-    except (ArithmeticError, BlowUpError, OSError) as error:
+    except (ArithmeticError, BlowUpError, OSError, ValueError) as error:
         _complain(str(error))
         raise typer.Exit(FAILED) from error
     print(f"written: {', '.join(str(path) for path in sorted(out.glob('figure-*')))}")

@@ -1,4 +1,4 @@
-"""The paper's Fig. 2 and Fig. 10 with our numbers: tables and a plot."""
+"""The paper's Figs. 2, 9 b and 10 with our numbers: tables, a picture and a plot."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from flowborne.control.executors import cores
 from flowborne.io.atomic import write_atomically
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
+from flowborne.validation.blocked_arms import COLUMNS, blocked_rows, draw_frame
 from flowborne.validation.controller_in_flow import SCENES, course
 from flowborne.validation.reference import reference
 from flowborne.view.plots import ChainCost, plot_chain_cost
@@ -29,18 +30,20 @@ CHAIN_FRAMES = 20
 
 
 def make_figures(out: Path, console: Console | None = None) -> None:
-    """Run the scenes of Fig. 2 and Fig. 10 and write what they gave.
+    """Run the scenes of Figs. 2, 9 b and 10 and write what they gave.
 
-    Writes figure-2.csv, figure-10.csv and figure-10.png, and prints both tables.
+    Writes figure-2.csv, figure-9b.csv, figure-9b.png, figure-10.csv and figure-10.png, and prints
+    the tables.
 
     out      folder; made when it is not there
     console  where the tables are printed
     raises   ArithmeticError or BlowUpError when a run blows up, OSError when a file cannot be
-             written
+             written, ValueError when this machine cannot draw in three dimensions
     """
     shown = console or Console()
     out.mkdir(parents=True, exist_ok=True)
     convergence_figure(out, shown)
+    arms_figure(out, shown)
     chain_figure(out, shown)
 
 
@@ -69,6 +72,13 @@ def convergence_figure(out: Path, console: Console) -> None:
         out / "figure-2.csv",
         console,
     )
+
+
+def arms_figure(out: Path, console: Console) -> None:
+    """Fig. 9 b: the leg blocks the arm, which stays ahead, and the torso answers."""
+    rows, frame = blocked_rows()
+    finish("Fig. 9 b: arms in the way", COLUMNS, rows, out / "figure-9b.csv", console)
+    draw_frame(frame, out / "figure-9b.png")
 
 
 def chain_figure(out: Path, console: Console) -> None:

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 
 MOST_CURVES = 6
 
+EFFORT = "objective_effort_"
+"""Beginning of the columns with the effort of named joints."""
+
 
 def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
     """(title with unit, name -> values) of the joints worth a look.
@@ -45,12 +48,30 @@ def objective_curve(run: Run) -> Array | None:
     return None if values is None or not np.isfinite(values).any() else values
 
 
+def effort_curves(run: Run) -> dict[str, Array]:
+    """Joint or joints -> effort after every frame, of objectives that name the joints.
+
+    None where such an effort is all of the objective.
+    """
+    if sum(column.startswith("objective_") for column in run.history) < 2:
+        return {}
+    named = {
+        column.removeprefix(EFFORT).replace("_", " "): values
+        for column, values in run.history.items()
+        if column.startswith(EFFORT)
+    }
+    return dict(list(named.items())[:MOST_CURVES])
+
+
 def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
     """(title, name -> values) of every strip of a run."""
     strips: list[tuple[str, dict[str, Array]]] = []
     objective = objective_curve(run)
     if objective is not None:
         strips.append(("objective", {"": objective}))
+    efforts = effort_curves(run)
+    if efforts:
+        strips.append(("effort (N m s)", efforts))
     title, joints = joint_curves(run)
     if joints:
         strips.append((title, joints))
