@@ -219,10 +219,10 @@ def cut(
         shares_x.append(np.zeros((d[0] + 1, d[1], d[2])))
         shares_y.append(np.zeros((d[0], d[1] + 1, d[2])))
         shares_z.append(np.zeros((d[0], d[1], d[2] + 1)))
-        parts += share_closed(shares_x[n], ox, tx, distance, phis[n], box, 0, walls[0])
-        parts += share_closed(shares_y[n], oy, ty, distance, phis[n], box, 1, walls[1])
+        parts += share_closed(shares_x[n], ox, tx, distance, nearest, phis[n], box, 0, walls[0])
+        parts += share_closed(shares_y[n], oy, ty, distance, nearest, phis[n], box, 1, walls[1])
         if not flat:
-            parts += share_closed(shares_z[n], oz, tz, distance, phis[n], box, 2, walls[2])
+            parts += share_closed(shares_z[n], oz, tz, distance, nearest, phis[n], box, 2, walls[2])
     for n in range(bodies.size):
         rows = list_cells(
             shares_x[n],
