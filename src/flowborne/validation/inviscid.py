@@ -167,7 +167,7 @@ IN_BOX = 0.1
 """D/L of the bob in its box, the key of I2's table."""
 
 
-WIDE_GRIDS = (64, 128, 192)
+WIDE_GRIDS = (64, 128, 256, 384)
 """Cells across the box for the wider swings; beyond 90 degrees the bob would leave the box."""
 
 
