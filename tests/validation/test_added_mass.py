@@ -55,6 +55,18 @@ def test_I1_added_mass_of_plates_falls_towards_the_exact_one() -> None:
     assert float(along.value) < 0.002
 
 
+def test_I1_added_mass_of_a_disc_continued_to_no_thickness() -> None:
+    raw, limit = case.disc(True)
+    assert limit.passed, f"{limit.quantity}: {limit.value}"
+    assert 1.0 < float(raw.value) < 1.08
+
+
+def test_continuation_to_no_thickness_finds_the_limit() -> None:
+    grids = (16, 32, 64)
+    values = [1.3 - 2.0 / n * np.log(1.0 / n) + 0.7 / n for n in grids]
+    assert case.without_thickness(grids, values) == pytest.approx(1.3, rel=1e-12)
+
+
 def test_box_correction_undoes_the_box() -> None:
     """I2's own numbers, corrected, are the unbounded ones, for round and for long bodies."""
     for ratio, boxed in table("I2", "cylinder in closed square, Ca vs D/L").items():

@@ -361,19 +361,41 @@ def plates(quick: bool) -> list[Finding]:
     return [*findings, at_most(title, along[-1], 0.01, series=lengthwise)]
 
 
+def quarter(cells: int) -> Grid:
+    """A quarter of the cube of 1 m, `cells` across, between the planes x = 0 and z = 0 about which
+    body and flow are symmetric."""
+    return Grid((cells // 2, cells, cells // 2), 1.0 / cells, (0.0, -0.5, 0.0))
+
+
+def without_thickness(grids: Grids, values: Sequence[float]) -> float:
+    """Limit of values on three grids as the thickness that the fluid sees, which is in proportion
+    to e = 1/cells, falls to zero.
+
+    The flow round a thin rim of any shape adds terms in e ln e and e.
+    """
+    e = 1.0 / np.array(grids)
+    return float(np.linalg.solve(np.column_stack([e**0, e * np.log(e), e]), values)[0])
+
+
 def disc(quick: bool) -> list[Finding]:
-    """A disc broadside; the fluid sees it 1.75 cells thick."""
+    """A disc broadside; the fluid sees it 1.75 cells thick, and a disc as thick as that has the
+    added mass that the series shows. The list's disc has no thickness: the limit is shown besides
+    the finest grid, which is what counts."""
     half = 0.2
-    grids = (8, 16, 32) if quick else (8, 16, 32, 64)
+    grids = (16, 32, 64) if quick else (32, 64, 128)
     geom = f'<geom type="cylinder" size="{half} {THIN}" zaxis="0 1 0"/>'
     displaced, exact = 2.0 * THIN * np.pi * half**2, 8.0 / 3.0 * half**3
     values = []
     for n in grids:
-        added = pushed(box(round(n / (2.0 * half)), solid=True), geom, UP)
+        added = 4.0 * pushed(quarter(round(n / (2.0 * half))), geom, UP)
         values.append(unbounded(added, displaced, solid=True) / exact)
     series = series_of("cells across the disc", grids, values, 1.0)
     title = "m_a of a disc broadside over 8/3 rho a^3"
-    return [near(title, values[-1], 1.0, relative=0.01, series=series)]
+    found = without_thickness(grids, values)
+    return [
+        near(title, values[-1], 1.0, relative=0.01, series=series),
+        near(f"{title}, continued to no thickness", found, 1.0, relative=0.01, falling=series),
+    ]
 
 
 def unbounded_bodies(quick: bool) -> list[Finding]:
