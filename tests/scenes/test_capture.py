@@ -105,6 +105,26 @@ def test_controlled_joints_start_where_the_clip_has_them_and_do_not_follow(write
     assert np.degrees(q[model.positions_of("left_elbow")]) == pytest.approx(20.0, abs=26.0)
 
 
+def test_elbows_go_with_their_shoulders(tmp_path: Path) -> None:
+    scene = load_scene("human-gravity-arms", {"human.elbows": "true"})
+    assert scene.controlled_joints() == (
+        "lower_back",
+        *("left_shoulder", "right_shoulder", "left_elbow", "right_elbow"),
+    )
+    wanted = [table.wanted_by for table in scene.objectives]
+    assert wanted[0] == ("lower_back",)
+    assert wanted[1] == wanted[2] == ("left_shoulder", "left_elbow")
+    again = load_scene(save_scene(scene, tmp_path))
+    assert scene_files(again) == scene_files(scene)
+    with Simulation(scene) as simulation:
+        model = simulation.world.setup.solid
+        start = simulation.world.solid.q[model.positions_of("right_elbow")].copy()
+        for _ in range(6):
+            simulation.advance_frame()
+        moved = simulation.world.solid.q[model.positions_of("right_elbow")] - start
+        assert 1.0 < np.degrees(np.abs(moved)) < 40.0
+
+
 def test_what_is_saved_stands_on_its_own(write: Write, tmp_path: Path) -> None:
     scene = load_scene(write(CONTROL))
     saved = save_scene(scene, tmp_path / "elsewhere")

@@ -149,7 +149,7 @@ def _reference(table: tables.ObjectiveInputMotionTable, scene: Scene, model: Sol
     values = tuple(unit * value for value in table.values)
     if len(values) == 1:
         return MotionConstant(dofs, values[0])
-    return MotionKeyframes(dofs, Curve(table.times, values))
+    return MotionKeyframes(dofs, Curve(table.keyframe_times(), values))
 
 
 def _bodies(model: SolidModel, names: tuple[str, ...] | None) -> Integers:

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from flowborne.errors import SceneError
 from flowborne.scenes.check import cross_check
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.elbows import join_elbows
 from flowborne.scenes.keyframe_file import inline_keyframes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import explain, keys_of, suggestion
@@ -80,6 +81,7 @@ def _examine(
     except SceneError as error:
         return None, error.problems
     raw.setdefault("name", path.stem)
+    join_elbows(raw)
     problems = inline_keyframes(raw, path.parent, path.name)
     draft, more = _validate(raw, path)
     problems += more

@@ -134,32 +134,37 @@ class ObjectiveInputMotionTable(ObjectiveTable):
     """Squared distance of a controlled joint from a motion that it would have on its own.
 
     joint          the joint
-    times, values  keyframes of the motion of a hinge or slide, s and degrees or m; one of each is a
-                   fixed pose. Without them the motion is the clip's
+    times, values  keyframes of the motion of a hinge or slide, s and degrees or m; one value alone
+                   is a fixed pose. Without them the motion is the clip's
     """
 
     kind: Literal["input-motion"]
     joint: Text
-    times: Annotated[tuple[Number, ...], Field(min_length=1)] = (0.0,)
+    times: Annotated[tuple[Number, ...], Field(min_length=1)] | None = None
     values: Annotated[tuple[Number, ...], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.values is None:
-            if "times" in self.model_fields_set:
+            if self.times is not None:
                 raise ValueError("has times and no values. Give both, or neither")
             return self
-        if len(self.times) != len(self.values):
+        times = self.keyframe_times()
+        if len(times) != len(self.values):
             raise ValueError(
-                f"has {len(self.times)} times and {len(self.values)} values. Give as many of both"
+                f"has {len(times)} times and {len(self.values)} values. Give as many of both"
             )
-        for before, after in zip(self.times, self.times[1:], strict=False):
+        for before, after in zip(times, times[1:], strict=False):
             if after <= before:
                 raise ValueError(
                     f"has times that do not increase: {after:g} s after {before:g} s. "
                     "Put them in order, each once"
                 )
         return self
+
+    def keyframe_times(self) -> tuple[float, ...]:
+        """s; 0 for a fixed pose."""
+        return (0.0,) if self.times is None else self.times
 
 
 class ObjectiveVelocityTable(ObjectiveTable):

@@ -16,11 +16,14 @@ class HumanTable(Table):
     mass    kg
     sex     whose proportions of mass it has
     height  m, of the standard skeleton; where a clip's file gives the bones it is not used
+    elbows  whether each elbow goes with its shoulder wherever the scene names that: controlled as a
+            hinge, wanting what the shoulder wants
     """
 
     mass: Positive = 73.0
     sex: Literal["male", "female"] = "male"
     height: Positive = 1.741
+    elbows: bool = False
 
 
 class ClipTable(Table):
