@@ -5,6 +5,7 @@ Angles are degrees, lengths metres, as everywhere in a scene.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -154,7 +155,7 @@ class ObjectiveInputMotionTable(ObjectiveTable):
             raise ValueError(
                 f"has {len(times)} times and {len(self.values)} values. Give as many of both"
             )
-        for before, after in zip(times, times[1:], strict=False):
+        for before, after in pairwise(times):
             if after <= before:
                 raise ValueError(
                     f"has times that do not increase: {after:g} s after {before:g} s. "

@@ -48,12 +48,17 @@ def objective_curve(run: Run) -> Array | None:
     return None if values is None or not np.isfinite(values).any() else values
 
 
+def _terms(run: Run) -> list[str]:
+    """Columns of the terms of the objective."""
+    return [column for column in run.history if column.startswith("objective_")]
+
+
 def effort_curves(run: Run) -> dict[str, Array]:
     """Joint or joints -> effort after every frame, of objectives that name the joints.
 
     None where such an effort is all of the objective.
     """
-    if sum(column.startswith("objective_") for column in run.history) < 2:
+    if len(_terms(run)) < 2:
         return {}
     named = {
         column.removeprefix(EFFORT).replace("_", " "): values
@@ -68,7 +73,9 @@ def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
     strips: list[tuple[str, dict[str, Array]]] = []
     objective = objective_curve(run)
     if objective is not None:
-        strips.append(("objective", {"": objective}))
+        terms = [column.removeprefix("objective_").replace("_", " ") for column in _terms(run)]
+        title = f"objective: {terms[0]}" if len(terms) == 1 else "objective"
+        strips.append((title, {"": objective}))
     efforts = effort_curves(run)
     if efforts:
         strips.append(("effort (N m s)", efforts))
