@@ -54,7 +54,7 @@ def test_implausible_leg_names_a_unit_that_fits(length: float, unit: float, reme
     with pytest.raises(SceneError) as caught:
         check_scale(length, unit)
     assert str(caught.value) == (
-        f"clip: with unit = {unit:g} its legs are {length:.3g} m long from hip to ankle. "
+        f"with unit = {unit:g} its legs are {length:.3g} m long from hip to ankle. "
         f"Set unit = {remedy}."
     )
 

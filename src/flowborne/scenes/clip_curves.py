@@ -120,16 +120,16 @@ def _sorted(model: SolidModel, mapping: Mapping[str, str], joints: Sequence[str]
     for name in joints:
         if name not in model.joint_names:
             end = suggestion(name, model.joint_names, "Its joints are")
-            raise SceneError(f"clip: joint '{name}' is not in the model{end}")
+            raise SceneError(f"joint '{name}' is not in the model{end}")
         if name not in mapping:
             raise SceneError(
-                f"clip: joint '{name}' is to follow the clip and is mapped to none of its joints. "
+                f"joint '{name}' is to follow the clip and is mapped to none of its joints. "
                 "Map it, or leave it out."
             )
         kind = int(model.mj.jnt_type[model.joint(name)])
         if kind not in (FREE, BALL, HINGE):
             raise SceneError(
-                f"clip: joint '{name}' slides, and a clip only turns bones. Leave it out."
+                f"joint '{name}' slides, and a clip only turns bones. Leave it out."
             )
     return sorted({model.joint(name) for name in joints})
 
@@ -144,7 +144,7 @@ def _mapped_bodies(model: SolidModel, clip: Clip, mapping: Mapping[str, str]) ->
         body = int(model.mj.jnt_bodyid[model.joint(name)])
         if body in names:
             raise SceneError(
-                f"clip: joints '{names[body]}' and '{name}' are of one body. Map one of them: "
+                f"joints '{names[body]}' and '{name}' are of one body. Map one of them: "
                 "a ball joint takes the whole rotation."
             )
         names[body] = name

@@ -75,12 +75,12 @@ def motion_of_clip(
 def _check_times(clip: Clip, start: float, stop: float, blend: float) -> None:
     if not 0.0 <= start < stop <= clip.duration * (1.0 + 1e-9):
         raise SceneError(
-            f"clip: it lasts {clip.duration:g} s, and is to go from {start:g} s to {stop:g} s. "
+            f"it lasts {clip.duration:g} s, and is to go from {start:g} s to {stop:g} s. "
             "Give a start before a stop within the clip."
         )
     if blend > (stop - start) / 2.0:
         raise SceneError(
-            f"clip: blend {blend:g} s is more than half of the {stop - start:g} s from start to "
+            f"blend {blend:g} s is more than half of the {stop - start:g} s from start to "
             "stop. Make it shorter."
         )
 
@@ -121,7 +121,7 @@ def _joined(
     if overlap == 0.0:
         size, joint = mismatch(columns, begin, end, stride)
         raise SceneError(
-            f"clip: it is to loop without a blend, and joint '{joint}' ends {size:.3g} rad or m "
+            f"it is to loop without a blend, and joint '{joint}' ends {size:.3g} rad or m "
             "from where it begins. Give a blend, or start and stop one whole cycle apart."
         )
     return stride
@@ -133,7 +133,7 @@ def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
     if not 0.0 < one_pass < 0.5 / frame_time:
         most = 0.5 / frame_time * (np.sqrt(2.0) - 1.0) ** 0.25
         raise SceneError(
-            f"clip: smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the most for a clip "
+            f"smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the most for a clip "
             f"of {1.0 / frame_time:.4g} frames a second. Leave it out or lower it."
         )
     filters = butter(2, one_pass, fs=1.0 / frame_time, output="sos")

@@ -47,7 +47,7 @@ def check_scale(length: float, unit: float) -> None:
         return
     if length <= 0.0:
         raise SceneError(
-            "clip: its legs have no length from hip to ankle. Correct the mapping or the file."
+            "its legs have no length from hip to ankle. Correct the mapping or the file."
         )
     best = min(UNITS, key=lambda candidate: abs(math.log(length / unit * candidate / USUAL)))
     if SHORTEST <= length / unit * best <= LONGEST:
@@ -55,5 +55,5 @@ def check_scale(length: float, unit: float) -> None:
     else:
         remedy = f"Set unit = {unit * USUAL / length:.2g} or so"
     raise SceneError(
-        f"clip: with unit = {unit:g} its legs are {length:.3g} m long from hip to ankle. {remedy}."
+        f"with unit = {unit:g} its legs are {length:.3g} m long from hip to ankle. {remedy}."
     )

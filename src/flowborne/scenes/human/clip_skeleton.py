@@ -115,7 +115,7 @@ def _scale(found: Mapping[str, Array], standard: Skeleton) -> float:
             ours, theirs = ours + length, theirs + usual
     if theirs == 0.0:
         raise SceneError(
-            "clip: all mapped joints are at one place. Map joints that have bones between them."
+            "all mapped joints are at one place. Map joints that have bones between them."
         )
     return ours / theirs
 
@@ -166,7 +166,7 @@ def _filled(name: str, found: Mapping[str, Array], standard: Skeleton, scale: fl
         theirs = standard[above] - standard[PARENTS[above]]
     if not np.any(ours):
         raise SceneError(
-            f"clip: the joints around '{name}' lie on each other. Leave one out of the mapping."
+            f"the joints around '{name}' lie on each other. Leave one out of the mapping."
         )
     turn, _ = Rotation.align_vectors(ours[None], theirs[None])
     return np.asarray(found[above] + scale * turn.apply(offset))
