@@ -172,6 +172,32 @@ def side_push(pressure: Array, grid: Grid, boundaries: Boundaries) -> Array:
     return force
 
 
+def energy_carried_in(
+    velocity: Faces, opened: Faces, grid: Grid, boundaries: Boundaries, density: float
+) -> tuple[float, float]:
+    """Kinetic energy per time that the flow carries in and out through the sides, W."""
+    inward, outward = 0.0, 0.0
+    for axis in grid.axes:
+        for end, side in enumerate(boundaries.pair(axis)):
+            if side.kind not in ("open", "inflow"):
+                continue
+            layer, sign = (-1, -1.0) if end else (0, 1.0)
+            normal = velocity[axis].take(layer, axis)
+            square = normal * normal
+            for other in grid.axes:
+                if other != axis:
+                    tangential = velocity[other].take(layer, axis) ** 2
+                    along = other - 1 if other > axis else other
+                    square = square + 0.5 * (
+                        np.delete(tangential, -1, along) + np.delete(tangential, 0, along)
+                    )
+            flux = sign * density * grid.face_area * normal * opened[axis].take(layer, axis)
+            power = 0.5 * flux * square
+            inward += float(power[power > 0.0].sum())
+            outward -= float(power[power < 0.0].sum())
+    return inward, outward
+
+
 def carried_in(
     velocity: Faces, opened: Faces, grid: Grid, boundaries: Boundaries, density: float
 ) -> Array:

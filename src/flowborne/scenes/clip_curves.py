@@ -128,9 +128,7 @@ def _sorted(model: SolidModel, mapping: Mapping[str, str], joints: Sequence[str]
             )
         kind = int(model.mj.jnt_type[model.joint(name)])
         if kind not in (FREE, BALL, HINGE):
-            raise SceneError(
-                f"joint '{name}' slides, and a clip only turns bones. Leave it out."
-            )
+            raise SceneError(f"joint '{name}' slides, and a clip only turns bones. Leave it out.")
     return sorted({model.joint(name) for name in joints})
 
 

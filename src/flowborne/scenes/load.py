@@ -39,6 +39,8 @@ BUILT_IN = (
     "human-wind-back",
     "human-wind-arms",
     "human-wind-drag",
+    "flyer-base",
+    "flyer-twist",
 )
 
 
