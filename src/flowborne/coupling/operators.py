@@ -182,8 +182,8 @@ def energy_carried_in(
             if side.kind not in ("open", "inflow"):
                 continue
             layer, sign = (-1, -1.0) if end else (0, 1.0)
-            normal = velocity[axis].take(layer, axis)
-            square = normal * normal
+            normal: Array = np.asarray(velocity[axis].take(layer, axis))
+            square: Array = normal * normal
             for other in grid.axes:
                 if other != axis:
                     tangential = velocity[other].take(layer, axis) ** 2
