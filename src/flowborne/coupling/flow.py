@@ -80,6 +80,7 @@ def carry_fluid(
     carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
     counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
     everywhere = [np.ones(u.shape, np.uint8) for u in field]
+    mass_before = face_mass(before.open, grid, sides, fluid.density)
     arrived = grid.zeros_faces()
     for axis in grid.axes:
         carry(
@@ -100,10 +101,9 @@ def carry_fluid(
                 counts,
                 periodic,
             )
-        mass = face_mass(before.open, grid, sides, fluid.density)
         came, went = energy_carried_in(halfway, before.open, grid, sides, fluid.density)
-        most = energy(halfway, mass) + dt * (came - went + SLACK * (came + went))
-        without_gain(arrived, plain, mass, most)
+        most = energy(halfway, mass_before) + dt * (came - went + SLACK * (came + went))
+        without_gain(arrived, plain, mass_before, most)
         for axis in grid.axes:
             arrived[axis][:] -= ahead[axis]
     for axis in grid.axes:
@@ -118,7 +118,6 @@ def carry_fluid(
         fluid.sources,
         time + dt,
     )
-    mass_before = face_mass(before.open, grid, sides, fluid.density)
     mass_after = face_mass(after.open, grid, sides, fluid.density)
     was = fluid_momentum(state.velocity, mass_before, grid)
     now = fluid_momentum(arrived, mass_after, grid)

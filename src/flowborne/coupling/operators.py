@@ -186,11 +186,10 @@ def energy_carried_in(
             square: Array = normal * normal
             for other in grid.axes:
                 if other != axis:
-                    tangential = velocity[other].take(layer, axis) ** 2
-                    along = other - 1 if other > axis else other
-                    square = square + 0.5 * (
-                        np.delete(tangential, -1, along) + np.delete(tangential, 0, along)
-                    )
+                    tangential: Array = velocity[other].take(layer, axis) ** 2
+                    along = np.moveaxis(tangential, other - 1 if other > axis else other, 0)
+                    mean = 0.5 * (along[:-1] + along[1:])
+                    square = square + np.moveaxis(mean, 0, other - 1 if other > axis else other)
             flux = sign * density * grid.face_area * normal * opened[axis].take(layer, axis)
             power = 0.5 * flux * square
             inward += float(power[power > 0.0].sum())

@@ -3,13 +3,35 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from flowborne.fluid.grid import Array, Faces
 
 
+@njit(nogil=True, cache=True)
+def weighted(m: Array, a: Array, b: Array) -> float:
+    """Sum of m a b."""
+    total = 0.0
+    for n in range(m.size):
+        total += m.flat[n] * a.flat[n] * b.flat[n]
+    return total
+
+
+@njit(nogil=True, cache=True)
+def towards(u: Array, w: Array, share: float) -> None:
+    """u + share (w - u), in place."""
+    for n in range(u.size):
+        u.flat[n] += share * (w.flat[n] - u.flat[n])
+
+
 def energy(velocity: Faces, mass: Faces) -> float:
     """Kinetic energy of the velocity on faces with these masses (kg), J."""
-    return 0.5 * sum(float(np.vdot(m, u * u)) for u, m in zip(velocity, mass, strict=True))
+    return 0.5 * product(mass, velocity, velocity)
+
+
+def product(mass: Faces, a: Faces, b: Faces) -> float:
+    """Sum of mass a b over all faces."""
+    return sum(float(weighted(*three)) for three in zip(mass, a, b, strict=True))
 
 
 def without_gain(carried: Faces, plain: Faces, mass: Faces, most: float) -> float:
@@ -25,17 +47,17 @@ def without_gain(carried: Faces, plain: Faces, mass: Faces, most: float) -> floa
     most     J
     returns  s, from 0 to 1; 1 also where even the plain scheme is above the bound
     """
-    excess = energy(carried, mass) - most
+    both = product(mass, carried, carried)
+    excess = 0.5 * both - most
     if excess <= 0.0:
         return 0.0
-    change: list[Array] = [w - u for w, u in zip(plain, carried, strict=True)]
-    slope = sum(float(np.vdot(m, u * d)) for m, u, d in zip(mass, carried, change, strict=True))
-    curve = sum(float(np.vdot(m, d * d)) for m, d in zip(mass, change, strict=True))
+    across = product(mass, carried, plain)
     # excess + slope s + curve s^2 / 2 = 0
+    slope, curve = across - both, product(mass, plain, plain) - 2.0 * across + both
     root = slope * slope - 2.0 * curve * excess
     share = 1.0
     if slope < 0.0 and root >= 0.0:
-        share = min(2.0 * excess / (-slope + np.sqrt(root)), 1.0)
-    for u, d in zip(carried, change, strict=True):
-        u += share * d
+        share = min(2.0 * excess / (-slope + float(np.sqrt(root))), 1.0)
+    for u, w in zip(carried, plain, strict=True):
+        towards(u, w, share)
     return share
