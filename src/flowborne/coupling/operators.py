@@ -186,7 +186,7 @@ def energy_carried_in(
             square: Array = normal * normal
             for other in grid.axes:
                 if other != axis:
-                    tangential: Array = velocity[other].take(layer, axis) ** 2
+                    tangential = np.asarray(velocity[other].take(layer, axis) ** 2)
                     along = np.moveaxis(tangential, other - 1 if other > axis else other, 0)
                     mean = 0.5 * (along[:-1] + along[1:])
                     square = square + np.moveaxis(mean, 0, other - 1 if other > axis else other)
