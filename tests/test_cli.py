@@ -72,6 +72,8 @@ def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp
         (["figures", "--out", "taken.txt"], "taken.txt cannot be written (File exists)"),
         (["figures", "--out", "taken.txt/new"], "taken.txt/new cannot be written"),
         (["fly"], "No such command 'fly'"),
+        (["figures", "3"], "NAME 3: there is no such figure; there are 2, 9b, 10, 11"),
+        (["export", "taken", "--out", "walk.bvh"], "taken is not the folder of a run"),
     ],
 )
 def test_bad_input_is_one_message_and_writes_nothing(
@@ -285,14 +287,15 @@ def figures(monkeypatch):
     """Stand-in for the figures; what is asked of it."""
     asked = []
 
-    def make_figures(out, console=None):
-        asked.append(out)
+    def make_figures(out, names=None, console=None):
+        asked.append((out, names))
         if out.name == "wild":
             raise ArithmeticError("ns-block-effort: frame 3, step 1: the fluid blew up")
         (out / "figure-2.csv").write_text("run\n")
 
     stand_in = ModuleType("flowborne.validation.figures")
     stand_in.make_figures = make_figures
+    stand_in.figure_names = lambda: ("2", "10")
     monkeypatch.setitem(sys.modules, "flowborne.validation.figures", stand_in)
     return asked
 

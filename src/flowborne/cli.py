@@ -216,15 +216,19 @@ def bench(
 
 @app.command()
 def figures(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Which; all when none is named.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
 ) -> None:
-    """Our numbers for Figures 2, 9 b and 10 of the paper, as tables and pictures."""
-    _make_folder(out)
+    """Our numbers for Figures 2, 9b, 10 and 11 of the paper, as tables and pictures."""
     from flowborne.simulation import BlowUpError
-    from flowborne.validation.figures import make_figures
+    from flowborne.validation.figures import figure_names, make_figures
 
+    chosen = _known(names or [], figure_names(), "figure", "NAME")
+    _make_folder(out)
     try:
-        make_figures(out)
+        make_figures(out, chosen or None)
     except (ArithmeticError, BlowUpError, OSError, ValueError) as error:
         _complain(str(error))
         raise typer.Exit(FAILED) from error

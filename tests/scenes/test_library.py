@@ -27,8 +27,8 @@ def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
     assert scene.figure
     assert scene.description
     assert "\n" not in scene.description
-    assert scene.controlled_joints()
-    assert scene.stream() is not None or name.startswith("human-gravity")
+    assert scene.controlled_joints() or name == "flyer-base"
+    assert scene.stream() is not None or name.startswith(("human-gravity", "flyer"))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -55,7 +55,8 @@ def test_what_a_worker_needs_survives_pickling(name: str) -> None:
     world, controller = pickle.loads(pickle.dumps((made.world, made.controller)))
     for key, values in made.world.arrays().items():
         assert_array_equal(world.arrays()[key], values)
-    assert controller.strength == made.controller.strength
+    if made.controller is not None:
+        assert controller.strength == made.controller.strength
 
 
 def test_effort_scenes_come_to_rest_within_their_frames() -> None:

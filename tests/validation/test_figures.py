@@ -21,7 +21,7 @@ def test_figures_are_written_and_printed(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(figures, "course", found.__getitem__)
     monkeypatch.setattr(figures, "frame_seconds", lambda joints, workers: 0.1 * joints / workers)
     text = io.StringIO()
-    figures.make_figures(tmp_path / "new", Console(file=text, width=200))
+    figures.make_figures(tmp_path / "new", ["2", "9b", "10"], Console(file=text, width=200))
     with (tmp_path / "new" / "figure-2.csv").open(newline="") as file:
         rows = {row["scene"]: row for row in csv.DictReader(file)}
     assert rows["ns-block-drag-max"]["reached in frame"] == "29"

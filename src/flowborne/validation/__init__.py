@@ -40,6 +40,7 @@ MODULES = {
     "K8": "human",
     "K9": "human",
     "K10": "human_wind",
+    "K11": "flyer",
     "S5": "swimmers",
 }
 """Case -> module that holds it, in the order of the list; a module is imported when it is run."""

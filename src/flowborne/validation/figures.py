@@ -1,10 +1,10 @@
-"""The paper's Figs. 2, 9 b and 10 with our numbers: tables, a picture and a plot."""
+"""The paper's Figs. 2, 9 b, 10 and 11 with our numbers: tables, a picture and plots."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +18,9 @@ from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 from flowborne.validation.blocked_arms import COLUMNS, blocked_rows, draw_frame
 from flowborne.validation.controller_in_flow import SCENES, course
+from flowborne.validation.flyer import flights
 from flowborne.validation.reference import reference
-from flowborne.view.plots import ChainCost, plot_chain_cost
+from flowborne.view.plots import ChainCost, plot_chain_cost, plot_forces
 
 PAPER_SERIAL = {1: 14.0, 2: 29.0, 3: 43.0, 4: 58.0}
 PAPER_PARALLEL = (14.0, 15.0)
@@ -29,22 +30,26 @@ CHAIN_FRAMES = 20
 """Frames of each chain whose median time is taken, after the first."""
 
 
-def make_figures(out: Path, console: Console | None = None) -> None:
-    """Run the scenes of Figs. 2, 9 b and 10 and write what they gave.
+def figure_names() -> tuple[str, ...]:
+    """Every figure, in the paper's order."""
+    return tuple(FIGURES)
 
-    Writes figure-2.csv, figure-9b.csv, figure-9b.png, figure-10.csv and figure-10.png, and prints
-    the tables.
 
-    out      folder; made when it is not there
+def make_figures(
+    out: Path, names: Sequence[str] | None = None, console: Console | None = None
+) -> None:
+    """Run the scenes of the paper's figures and write what they gave; print the tables.
+
+    out      folder; made when it is not there. A figure writes figure-<name>.csv, and most a .png
+    names    which; all when None
     console  where the tables are printed
     raises   ArithmeticError or BlowUpError when a run blows up, OSError when a file cannot be
              written, ValueError when this machine cannot draw in three dimensions
     """
     shown = console or Console()
     out.mkdir(parents=True, exist_ok=True)
-    convergence_figure(out, shown)
-    arms_figure(out, shown)
-    chain_figure(out, shown)
+    for name in figure_names() if names is None else names:
+        FIGURES[name](out, shown)
 
 
 def convergence_figure(out: Path, console: Console) -> None:
@@ -107,6 +112,24 @@ def chain_figure(out: Path, console: Console) -> None:
     plot_chain_cost(costs, out / "figure-10.png")
 
 
+def flyer_figure(out: Path, console: Console) -> None:
+    """Figs. 11 and 12: upward force on a flyer with and without twisting wings."""
+    found = flights(quick=False)
+    rows = [
+        (n + 1, *(f"{value:.1f}" for pair in both for value in pair))
+        for n, both in enumerate(
+            zip(found["twist"].impulses(), found["base"].impulses(), strict=True)
+        )
+    ]
+    columns = ("stroke", "down N s", "up N s", "down without N s", "up without N s")
+    finish("Fig. 11: upward impulse with twist", columns, rows, out / "figure-11.csv", console)
+    curves = {
+        name: (flight.time, flight.lift)
+        for name, flight in zip(("no control", "twist"), found.values(), strict=True)
+    }
+    plot_forces("upward force of the air (N)", curves, out / "figure-11.png")
+
+
 def frame_seconds(joints: int, workers: int, frames: int = CHAIN_FRAMES) -> float:
     """Median time of a frame of ns-chain-`joints`, s; several workers are processes."""
     executor = "serial" if workers == 1 else "processes"
@@ -131,3 +154,12 @@ def finish(
         writer.writerow(row)
     write_atomically(path, lambda file: file.write(text.getvalue().encode("utf-8")))
     console.print(table)
+
+
+FIGURES: dict[str, Callable[[Path, Console], None]] = {
+    "2": convergence_figure,
+    "9b": arms_figure,
+    "10": chain_figure,
+    "11": flyer_figure,
+}
+"""Name of a figure -> what makes it."""

@@ -95,6 +95,24 @@ def plot_chain_cost(rows: Sequence[ChainCost], path: Path) -> None:
     _save(figure, path)
 
 
+def plot_forces(title: str, curves: dict[str, tuple[Array, Array]], path: Path) -> None:
+    """Plot forces over time.
+
+    curves  name -> times (n,) s and forces (n,) N
+    path    .png, .svg or .pdf; made anew
+    """
+    figure, (axes,) = _figure(1, (8.4, 3.6))
+    handles = []
+    for n, (name, (times, force)) in enumerate(curves.items()):
+        handles += axes.plot(times, force, color=style.CURVES[n], lw=1.3, label=name)
+    low, high = np.percentile(np.concatenate([f for _, f in curves.values()]), [0.5, 99.5])
+    axes.set(xlim=(0.0, None), ylim=(1.1 * low, 1.1 * high))
+    axes.set_xlabel("time (s)", fontsize=9, color=style.MUTED)
+    axes.set_title(title, loc="left", fontsize=9, color=style.MUTED)
+    legend(axes, handles)
+    _save(figure, path)
+
+
 def plot_history(folder: Path, path: Path) -> None:
     """Plot the objective and the joints of a run over time.
 
