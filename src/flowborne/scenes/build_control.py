@@ -30,6 +30,7 @@ from flowborne.coupling.motion import Motion
 from flowborne.scenes import schema_control as tables
 from flowborne.scenes.bodies import joint_unit, posed
 from flowborne.scenes.capture import clip_motion
+from flowborne.scenes.fields import triple
 from flowborne.scenes.python_function import find_function
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes
@@ -125,18 +126,18 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
             return ObjectiveEffort(_dofs_of(model, scene.controlled_joints()))
         return ObjectiveEffort(_dofs_of(model, table.joints), f"effort_{'+'.join(table.joints)}")
     if isinstance(table, tables.ObjectiveWindDragTable):
-        return ObjectiveWindDrag(_bodies(model, table.bodies), _triple(table.direction))
+        return ObjectiveWindDrag(_bodies(model, table.bodies), triple(table.direction))
     if isinstance(table, tables.ObjectiveDragTable):
-        return ObjectiveDrag(_bodies(model, table.bodies), _triple(table.direction))
+        return ObjectiveDrag(_bodies(model, table.bodies), triple(table.direction))
     if isinstance(table, tables.ObjectivePressureTable):
         frame = None if table.frame is None else model.body(table.frame)
         bodies = _bodies(model, table.bodies)
-        return ObjectivePressureDrag(bodies, _triple(table.direction), frame, table.kind)
+        return ObjectivePressureDrag(bodies, triple(table.direction), frame, table.kind)
     if isinstance(table, tables.ObjectiveInputMotionTable):
         dofs = _dofs_of(model, (table.joint,))
         return ObjectiveInputMotion(dofs, _reference(table, scene, model))
     if isinstance(table, tables.ObjectiveVelocityTable):
-        return ObjectiveVelocity(model.body(table.body), _triple(table.target))
+        return ObjectiveVelocity(model.body(table.body), triple(table.target))
     return ObjectiveCallable(find_function(table.function), table.function)
 
 
@@ -173,8 +174,3 @@ def _phases(
     sign = 1 if table.side == "above" else -1
     threshold = joint_unit(model, table.joint) * table.threshold
     return PhaseTrack(motions[index], table.quantity, sign, threshold)
-
-
-def _triple(vector: tuple[float, ...]) -> tuple[float, float, float]:
-    x, y, z = vector
-    return x, y, z

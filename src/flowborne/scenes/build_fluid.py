@@ -18,7 +18,7 @@ from flowborne.fluid.boundary import (
 )
 from flowborne.fluid.grid import Array, Grid
 from flowborne.scenes.check_fluid import band_axis
-from flowborne.scenes.fields import as_interval
+from flowborne.scenes.fields import as_interval, triple
 from flowborne.scenes.inflow import (
     Bands,
     DyeBandsValue,
@@ -136,10 +136,10 @@ def _bands(dye: DyeBands, grid: Grid) -> Bands:
 
 def _source(table: SourceTable) -> Source:
     return Source(
-        _triple(table.lower),
-        _triple(table.upper),
+        triple(table.lower),
+        triple(table.upper),
         table.volume_rate,
-        None if table.velocity is None else _triple(table.velocity),
+        None if table.velocity is None else triple(table.velocity),
         dict(table.dye),
         as_interval(table.start, table.stop),
     )
@@ -148,16 +148,11 @@ def _source(table: SourceTable) -> Source:
 def _boxes(scene: Scene) -> list[Source]:
     return [
         Source(
-            _triple(dye.lower),
-            _triple(dye.upper),
+            triple(dye.lower),
+            triple(dye.upper),
             scalars={dye.name: dye.value},
             times=as_interval(dye.start, dye.stop),
         )
         for dye in scene.dye
         if isinstance(dye, DyeBox)
     ]
-
-
-def _triple(vector: tuple[float, ...]) -> tuple[float, float, float]:
-    x, y, z = vector
-    return x, y, z

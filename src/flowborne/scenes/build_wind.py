@@ -8,6 +8,7 @@ import numpy as np
 
 from flowborne.coupling.stream import WindStream
 from flowborne.fluid.grid import Array
+from flowborne.scenes.fields import triple
 from flowborne.scenes.inflow import Factor, FactorKeyframes, FactorSteady
 from flowborne.scenes.python_function import find_function
 from flowborne.scenes.schema import Scene
@@ -47,12 +48,12 @@ def winds_of(scene: Scene) -> tuple[Wind, ...]:
 
 def _wind(table: WindTable, scene: Scene) -> Wind | None:
     if isinstance(table, WindForceTable):
-        return WindForce(_triple(table.force), table.bodies)
+        return WindForce(triple(table.force), table.bodies)
     if isinstance(table, WindPythonTable):
         return WindFaces(find_function(table.function), table.density, table.bodies)
     if isinstance(table, WindStreamTable):
         return _stream(table, scene)
-    velocity = _triple(table.velocity)
+    velocity = triple(table.velocity)
     if table.exponent == 0.0 and table.times is None:
         return WindFaces(velocity, table.density, table.bodies)
     gusts = Gusts(velocity, table.exponent, table.height, _factor(table))
@@ -61,7 +62,7 @@ def _wind(table: WindTable, scene: Scene) -> Wind | None:
 
 def _stream(table: WindStreamTable, scene: Scene) -> Wind | None:
     if scene.fluid is None or scene.fluid.coupling == "none":
-        return WindFaces(_triple(table.velocity), table.density, table.bodies)
+        return WindFaces(triple(table.velocity), table.density, table.bodies)
     one_way = scene.fluid.coupling == "one-way"
     return WindStream(table.density, table.bodies) if one_way else None
 
@@ -70,8 +71,3 @@ def _factor(table: WindFacesTable) -> Factor:
     if table.times is None or table.factors is None:
         return FactorSteady()
     return FactorKeyframes(Curve(table.times, table.factors))
-
-
-def _triple(vector: tuple[float, ...]) -> tuple[float, float, float]:
-    x, y, z = vector
-    return x, y, z

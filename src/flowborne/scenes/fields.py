@@ -83,3 +83,9 @@ def as_interval(start: float, stop: float | None) -> tuple[float, float]:
 def filled(data: Any, defaults: Mapping[str, Any]) -> Any:
     """`data` with the keys of `defaults` that it lacks; anything but a table as it is."""
     return {**defaults, **data} if isinstance(data, Mapping) else data
+
+
+def triple(vector: tuple[float, ...]) -> tuple[float, float, float]:
+    """A Vector as the three numbers that it is."""
+    x, y, z = vector
+    return x, y, z
