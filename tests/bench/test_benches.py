@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from flowborne.bench import chain, first_run, memory, parts, realtime, workers
+from flowborne.bench import chain, first_run, human, memory, parts, realtime, size, workers
 from flowborne.bench.frames import frame_times
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import PARTS, Simulation
@@ -79,3 +79,19 @@ def test_first_run_keeps_its_kernels_apart(small_scene, tmp_path, monkeypatch):
     assert judged(later, later.value < first_run.COMPILED)
     assert first_run.run_once(str(small_scene), tmp_path) > 0.0
     assert os.listdir(tmp_path / "run")
+
+
+def test_growth_names_time_and_memory_of_every_size():
+    scenes = [load_scene(size.SCENE, {"domain.resolution": str(n)}) for n in (10, 12)]
+    result = size.growth(scenes, frames=1)
+    assert result.verdict == "info"
+    assert np.isfinite(result.value)
+    assert "10 x 10 x 9 cells" in result.lines[0]
+    assert "bytes a cell" in result.lines[1]
+    assert "projection" in result.lines[1]
+
+
+def test_a_human_is_timed_in_every_way():
+    result = human.speed(load_scene("human-gravity-back"), frames=1)
+    assert judged(result, result.value >= 1.0)
+    assert [line.split()[1] for line in result.lines] == ["serial", "threads", "processes"]

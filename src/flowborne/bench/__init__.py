@@ -22,6 +22,7 @@ MODULES = {
     "realtime": "realtime",
     "human": "human",
     "parts": "parts",
+    "size": "size",
     "memory": "memory",
     "first-run": "first_run",
 }

@@ -1,0 +1,65 @@
+"""What a frame in three dimensions costs, and how that grows with the number of cells."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from math import prod
+
+import numpy as np
+
+from flowborne.bench.memory import held
+from flowborne.bench.result import Result
+from flowborne.fluid.jit import parallel_kernels
+from flowborne.scenes.load import load_scene
+from flowborne.scenes.schema import Scene
+from flowborne.simulation import PARTS, Simulation
+
+NAME = "size"
+SCENE = "flyer-base"
+SIDES = (32, 64, 96)
+"""Cells along the domain's longest side."""
+
+FRAMES = 4
+"""How many are timed, after a first one."""
+
+
+def measure() -> Iterator[Result]:
+    """Time and memory of a flyer without control, one worker."""
+    yield growth([load_scene(SCENE, {"domain.resolution": str(n)}) for n in SIDES])
+
+
+def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
+    """Power of the number of cells with which the time of a frame grows, over all scenes."""
+    cells, seconds, lines = [], [], []
+    for scene in scenes:
+        shape, spent = parts_of(scene, frames)
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as executor:
+            (memory,) = executor.submit(held, scene, (2,)).result()
+        cells.append(prod(shape))
+        seconds.append(sum(spent.values()))
+        shares = ", ".join(f"{part} {100.0 * s / seconds[-1]:.0f} %" for part, s in spent.items())
+        lines.append(
+            f"{' x '.join(map(str, shape))} cells: {seconds[-1]:.3g} s a frame, "
+            f"{memory.most / 1e6:.0f} MB ({memory.most / cells[-1]:.0f} bytes a cell); {shares}"
+        )
+    power = float(np.polyfit(np.log(cells), np.log(seconds), 1)[0]) if len(cells) > 1 else np.nan
+    return Result(
+        NAME,
+        f"{scenes[0].name}: power of the number of cells with which the time of a frame grows",
+        power,
+        "",
+        "info",
+        lines,
+    )
+
+
+def parts_of(scene: Scene, frames: int) -> tuple[tuple[int, int, int], dict[str, float]]:
+    """Cells along each axis, and median seconds of each part of a frame on one thread."""
+    with Simulation(scene, 1, "serial") as simulation, parallel_kernels(False):
+        simulation.advance_frame()
+        spent = [simulation.advance_frame().seconds for _ in range(frames)]
+        shape = simulation.world.flow()[0].grid.shape
+    means = {part: float(np.median([seconds[part] for seconds in spent])) for part in PARTS}
+    return shape, {part: s for part, s in means.items() if s > 0.0}
