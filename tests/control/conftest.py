@@ -55,7 +55,7 @@ def move_only(world: World, dt: float, drive: Drive | None = None) -> StepReport
     world.time += dt
     world.steps += 1
     none = np.zeros((model.nbody, 6))
-    return StepReport(dt, Outcome.DONE, np.zeros(model.nv), none, none, none, none)
+    return StepReport(dt, Outcome.DONE, np.zeros(model.nv), none, none, none, none, none)
 
 
 @pytest.fixture

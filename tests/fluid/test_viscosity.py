@@ -181,6 +181,26 @@ def test_couette_flow_between_plates_and_its_wall_force_are_exact() -> None:
     np.testing.assert_allclose(velocity[0][5, between, 0], exact, atol=1e-7)
 
 
+def test_skin_that_slips_over_its_body_drags_as_a_body_that_moves() -> None:
+    """The same flow and the same forces, whether the upper plate moves or its skin alone does; with
+    plates that yield, or not."""
+    sides = Boundaries(PERIODIC, PERIODIC)
+    for yielding in (0.0, 0.5):
+        response = yielding * np.diag(np.tile([1.0, 1.0, 0.0, 0.0, 0.0, 0.0], 3))
+        case = case_of(SQUARE, *PLATES, boundaries=sides, dt=0.3, response=response)
+        twist, speed = np.zeros(18), np.array([2.0, -0.3, 0.0])
+        twist[12:15] = speed
+        walls = case.system.walls
+        slip = (walls.body == 2) * (walls.across @ speed)
+        start = noise(SQUARE)
+        moved, pushed, _ = case.system.solve(start, twist, 1e-13)
+        blown, dragged, converged = case.system.solve(start, np.zeros(18), 1e-13, slip)
+        assert converged
+        for one, other in zip(moved, blown, strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-11)
+        np.testing.assert_allclose(pushed, dragged, atol=1e-11)
+
+
 def driven(case: Case, drive: float, bodies: int) -> tuple[Faces, Array]:
     """Velocity and impulse of the last step of a flow along x that `drive` (Pa/m) makes steady."""
     velocity = case.grid.zeros_faces()

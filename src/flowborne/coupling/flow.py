@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.mouths import Jet, colour, fill_mouths, jet_force, jet_power
 from flowborne.coupling.operators import (
     carried_in,
     energy_carried_in,
@@ -37,15 +38,24 @@ class Carried:
     scalars   name -> (nx, ny, nz)
     lost      (3,) momentum that advection made (or lost, when negative), N s, before it was given
               back along periodic axes
+    crossed   (3,) momentum that the flow carried in through the sides, N s
+    expelled  (3,) momentum that came in through mouths, N s
     """
 
     velocity: Faces
     scalars: dict[str, Array]
     lost: Array
+    crossed: Array
+    expelled: Array
 
 
 def carry_fluid(
-    world: World, before: Geometry, after: Geometry, drift: Array, dt: float
+    world: World,
+    before: Geometry,
+    after: Geometry,
+    jets: tuple[Jet, ...],
+    drift: Array,
+    dt: float,
 ) -> Carried:
     """Advect velocity and scalars by the leak-proof field (section 6, items 2 and 3).
 
@@ -60,6 +70,7 @@ def carry_fluid(
     lost is given back evenly; a creature in a periodic box swims by its strokes alone. The mass of
     cut cells wavers a little as bodies move over the grid: that part moves with the whole.
 
+    jets   of the mouths before the step
     drift  (3,) velocity of the whole, m/s
     """
     fluid, state = world.flow()
@@ -75,6 +86,7 @@ def carry_fluid(
     resident = grid.zeros_faces()
     if fluid.viscosity == 0.0:
         resident = beside_walls(halfway, before.open, crossed, grid)
+    fill_mouths(halfway, resident, jets, grid)
     paths = faces_of([c + a * o for c, a, o in zip(state.carrier, ahead, before.open, strict=True)])
     field = pad_faces(halfway, grid, sides, time)
     carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
@@ -102,6 +114,8 @@ def carry_fluid(
                 periodic,
             )
         came, went = energy_carried_in(halfway, before.open, grid, sides, fluid.density)
+        blown, taken = jet_power(jets, fluid.density)
+        came, went = came + blown, went + taken
         most = energy(halfway, mass_before) + dt * (came - went + SLACK * (came + went))
         without_gain(arrived, plain, mass_before, most)
         for axis in grid.axes:
@@ -118,16 +132,18 @@ def carry_fluid(
         fluid.sources,
         time + dt,
     )
+    colour(scalars, jets, after, grid, dt)
+    expelled = dt * jet_force(jets, fluid.density)
     mass_after = face_mass(after.open, grid, sides, fluid.density)
     was = fluid_momentum(state.velocity, mass_before, grid)
     now = fluid_momentum(arrived, mass_after, grid)
     for axis in grid.axes:
         if sides.periodic()[axis]:
             mass = mass_after[axis].sum()
-            kept = was[axis] + (mass - mass_before[axis].sum()) * drift[axis]
+            kept = was[axis] + expelled[axis] + (mass - mass_before[axis].sum()) * drift[axis]
             arrived[axis][:] += (kept - now[axis]) / mass
     entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
-    return Carried(arrived, scalars, now - was - entered)
+    return Carried(arrived, scalars, now - was - entered - expelled, entered, expelled)
 
 
 def drift_velocity(world: World, cut: Geometry, dt: float) -> Array:

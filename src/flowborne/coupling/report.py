@@ -32,6 +32,8 @@ class Momentum:
     advection        change of the fluid's momentum in advection that no boundary accounts for;
                      along periodic axes it is given back at once
     boundary         impulse of the sides of the domain on the fluid in the pressure solve
+    crossed          momentum that the flow itself carried in through the sides
+    jet              momentum that came into the fluid through mouths
     """
 
     solid: Array = field(default_factory=lambda: np.zeros(3))
@@ -40,6 +42,8 @@ class Momentum:
     exchange_error: float = 0.0
     advection: Array = field(default_factory=lambda: np.zeros(3))
     boundary: Array = field(default_factory=lambda: np.zeros(3))
+    crossed: Array = field(default_factory=lambda: np.zeros(3))
+    jet: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass
@@ -52,10 +56,12 @@ class StepReport:
     viscous_wrench   (nbody, 6) the same of the shear stress
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
     wind_wrench      (nbody, 6) the same of the simple winds
+    jet_wrench       (nbody, 6) the same of the reaction of what mouths expel
     iterations       of the pressure solves
     residual         true relative residual of the last of them
     divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
     momentum         the budget
+    expelled         volume that mouths expelled, less what they took in, m^3
     seconds          where the time went: advection, viscosity, projection, geometry, solids
     contacts         number of active contacts
     limited          (k,) dofs whose torque limit was reached
@@ -68,14 +74,17 @@ class StepReport:
     viscous_wrench: Array
     buoyancy_wrench: Array
     wind_wrench: Array
+    jet_wrench: Array
     iterations: int = 0
     residual: float = 0.0
     divergence: float = 0.0
     momentum: Momentum = field(default_factory=Momentum)
+    expelled: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)
     contacts: int = 0
     limited: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def fluid_wrench(self) -> Array:
         """(nbody, 6) everything that the fluid and the winds do to each body."""
-        return self.pressure_wrench + self.viscous_wrench + self.buoyancy_wrench + self.wind_wrench
+        stresses = self.pressure_wrench + self.viscous_wrench + self.buoyancy_wrench
+        return stresses + self.jet_wrench + self.wind_wrench

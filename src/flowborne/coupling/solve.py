@@ -21,6 +21,7 @@ import numpy as np
 
 from flowborne.coupling.flow import source_rate
 from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.mouths import Jet, add_rates, skin_slip
 from flowborne.coupling.operators import (
     add_flux,
     generalised,
@@ -119,6 +120,7 @@ def solve_together(
     driven: PrescribedSystem,
     pose: Kinematics,
     cut: Geometry,
+    jets: tuple[Jet, ...],
     torque_limit: Array,
     dt: float,
     watch: Stopwatch,
@@ -126,6 +128,7 @@ def solve_together(
     """Viscosity, pressure and bodies at the end of the step (section 6, item 6).
 
     velocity  Faces u*, m/s, after advection and forces
+    jets      of the mouths at the end of the step
     returns   velocity without divergence on the open parts of the faces, the bodies' velocity
               with driven dofs exactly at their targets, and what each gave to the other
     """
@@ -133,14 +136,16 @@ def solve_together(
     weights = face_weights(cut.open, fluid.grid, fluid.boundaries, fluid.density)
     matrix = PressureSystem(weights, fluid.boundaries.periodic())
     pressure = dt * state.pressure
+    rate = source_rate(fluid, world.time + dt, cut.open)
+    add_rates(rate, jets)
     mobility = response(pose, driven.inverse)
     watch.lap("projection")
-    smooth, viscous, smoothed = diffuse(world, velocity, cut, pose, driven, mobility, dt)
+    smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, driven, mobility, dt)
     watch.lap("viscosity")
     iterations = 0
     for _ in range(PASSES):
         start = twists(pose, driven.after(generalised(pose, viscous)))
-        projected = project(world, matrix, smooth, cut, start, mobility, pressure, dt)
+        projected = project(world, matrix, smooth, cut, rate, start, mobility, pressure, dt)
         watch.lap("projection")
         iterations += projected.iterations
         impulse = generalised(pose, viscous + projected.impulse)
@@ -151,7 +156,9 @@ def solve_together(
             break
         if not np.array_equal(changed.inverse, driven.inverse):
             mobility = response(pose, changed.inverse)
-            smooth, viscous, smoothed = diffuse(world, velocity, cut, pose, changed, mobility, dt)
+            smooth, viscous, smoothed = diffuse(
+                world, velocity, cut, jets, pose, changed, mobility, dt
+            )
             watch.lap("viscosity")
         driven, pressure = changed, dt * projected.pressure
     settled = smoothed and projected.converged and changed is None
@@ -163,6 +170,7 @@ def diffuse(
     world: World,
     velocity: Faces,
     cut: Geometry,
+    jets: tuple[Jet, ...],
     pose: Kinematics,
     driven: PrescribedSystem,
     mobility: Array,
@@ -198,7 +206,8 @@ def diffuse(
     )
     walls = walls_of(parts, cut.distance, cut.nearest, grid)
     system = ViscousSystem(parts, walls, mobility, grid, sides, dt)
-    smooth, impulse, converged = system.solve(pushed, twist.ravel(), VISCOUS_TOLERANCE)
+    slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
+    smooth, impulse, converged = system.solve(pushed, twist.ravel(), VISCOUS_TOLERANCE, slip)
     push(smooth, cut.open, state.pressure, grid, sides, -scale)
     return smooth, impulse.reshape(nbody, 6), converged
 
@@ -219,6 +228,7 @@ def project(
     matrix: PressureSystem,
     velocity: Faces,
     cut: Geometry,
+    rate: Array,
     twist: Array,
     mobility: Array,
     pressure: Array,
@@ -227,13 +237,13 @@ def project(
     """Make the flow free of divergence, with the bodies answering (eq. 9).
 
     matrix    K for this cut
+    rate      (nx, ny, nz) volume that sources and mouths bring into each cell, m^3/s
     twist     (nbody, 6) of the bodies before the pressure acts
     mobility  (6 nb, 6 nb) twists that unit wrench impulses give
     pressure  (nx, ny, nz) first guess of p^, Pa s
     """
     fluid, _ = world.flow()
     grid = fluid.grid
-    rate = source_rate(fluid, world.time + dt, cut.open)
     need = -excess(velocity, cut, twist, rate, fluid)
     fastest = max(float(np.abs(u).max()) for u in velocity)
     floor = ROUNDING * grid.face_area * fastest * np.sqrt(need.size)

@@ -7,6 +7,7 @@ import numpy as np
 from flowborne.coupling.flow import carry_fluid, drift_velocity, forced, settle_state
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.motion import Drive
+from flowborne.coupling.mouths import Jet, add_closed_slip, jet_wrench, jets_of
 from flowborne.coupling.operators import (
     buoyancy_wrench,
     face_mass,
@@ -50,13 +51,15 @@ def step_bodies(world: World, dt: float, orders: Drive, watch: Stopwatch) -> Ste
     world.solid.v[:] = solved.v
     advance_clock(world, dt)
     watch.lap("solids")
-    return report(world, solved, np.zeros_like(wind), wind, Momentum(), dt, watch)
+    none = np.zeros_like(wind)
+    return report(world, solved, none, wind, none, Momentum(), dt, watch)
 
 
 def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
     """A step of bodies and fluid: the seven items of section 6."""
     fluid, state = world.flow()
     cut_before = cut_by_bodies(world)
+    blown = jets_at(world, cut_before, world.time)
     watch.lap("geometry")
     drift = drift_velocity(world, cut_before, dt)
     watch.lap("advection")
@@ -67,7 +70,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     cut = cut_before if still else cut_by_bodies(world, pose)
     watch.lap("geometry")
     # 2. and 3. velocity and scalars are carried by the leak-proof field
-    carried = carry_fluid(world, cut_before, cut, drift, dt)
+    carried = carry_fluid(world, cut_before, cut, blown, drift, dt)
     # 4. forces on the fluid
     velocity = forced(carried.velocity, fluid, world.time + dt, dt)
     watch.lap("advection")
@@ -76,24 +79,32 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     buoyancy = buoyancy_wrench(
         pose.centroid, world.setup.solid.volume, world.setup.solid.gravity, fluid.density
     )
-    driven = equations(world, before, pose, wind + buoyancy, orders, dt)
+    reaction = jet_wrench(blown, fluid.density, len(wind))
+    driven = equations(world, before, pose, wind + buoyancy + reaction, orders, dt)
     watch.lap("solids")
     # 6. viscosity, pressure, bodies, joints and contact in one solve
-    solved = solve_together(world, velocity, driven, pose, cut, orders.torque_limit, dt, watch)
+    jets = jets_at(world, cut, world.time + dt, pose)
+    solved = solve_together(
+        world, velocity, driven, pose, cut, jets, orders.torque_limit, dt, watch
+    )
     watch.lap("projection")
     # 7. the new state: it holds the promises of section 6 on the next step's leak-proof field
     assert solved.projected is not None
     world.solid.v[:] = solved.v
     twist = twists(pose, solved.v)
     leak_free = leak_proof(solved.projected.velocity, cut, twist, fluid.grid)
+    add_closed_slip(leak_free, jets, fluid.grid)
     settle_state(world, cut, solved.projected.velocity, carried.velocity, leak_free, dt)
     state.pressure[:] = solved.projected.pressure
     state.scalars = carried.scalars
     advance_clock(world, dt)
     balance = momentum_balance(world, cut, solved)
-    balance.advection = carried.lost
+    balance.advection, balance.crossed = carried.lost, carried.crossed
+    balance.jet = carried.expelled
     watch.lap("advection")
-    return report(world, solved, buoyancy, wind, balance, dt, watch)
+    done = report(world, solved, buoyancy, wind, reaction, balance, dt, watch)
+    done.expelled = dt * sum(jet.rate for jet in blown)
+    return done
 
 
 def command(world: World, dt: float, drive: Drive | None) -> Drive:
@@ -128,6 +139,21 @@ def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
         setup.fluid.grid,
         setup.fluid.boundaries,
     )
+
+
+def jets_at(
+    world: World, cut: Geometry, time: float, pose: Kinematics | None = None
+) -> tuple[Jet, ...]:
+    """What the mouths do at `time` (s) where the bodies are.
+
+    raises  ValueError when a mouth covers no cell
+    """
+    setup = world.setup
+    if not setup.mouths:
+        return ()
+    if pose is None:
+        pose = kinematics(setup.solid, world.solid.q)
+    return jets_of(setup.mouths, cut, pose, world.solid.v, world.flow()[0].grid, time)
 
 
 def move_bodies(world: World, orders: Drive, dt: float) -> tuple[SolidState, Kinematics]:
@@ -192,6 +218,7 @@ def report(
     solved: Solved,
     buoyancy: Array,
     wind: Array,
+    reaction: Array,
     balance: Momentum,
     dt: float,
     watch: Stopwatch,
@@ -211,6 +238,7 @@ def report(
         viscous_wrench=solved.viscous_impulse / dt,
         buoyancy_wrench=buoyancy,
         wind_wrench=wind,
+        jet_wrench=reaction,
         momentum=balance,
         contacts=solved.driven.system.contacts,
         limited=np.flatnonzero(solved.driven.limited),

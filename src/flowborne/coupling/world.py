@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from flowborne.coupling.motion import Motion
+from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.grid import Array, Grid
@@ -53,12 +54,14 @@ class Setup:
     fluid    the fluid, or None (simple wind and gravity only)
     motions  prescribed motions of some dofs
     winds    simple winds (paper eq. 2, or a uniform force)
+    mouths   patches of skin through which fluid is expelled; a fluid that feels the bodies is there
     """
 
     solid: SolidModel
     fluid: Fluid | None = None
     motions: tuple[Motion, ...] = ()
     winds: tuple[Wind, ...] = ()
+    mouths: tuple[Mouth, ...] = ()
 
     @cached_property
     def shapes(self) -> Shapes:

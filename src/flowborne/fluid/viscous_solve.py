@@ -228,27 +228,35 @@ class ViscousSystem:
             product[at] -= self.scale[at] * self.drawn(self.dt * self.yielding @ wrench)
         return out
 
-    def solve(self, velocity: Faces, twist: Array, tolerance: float) -> tuple[Faces, Array, bool]:
+    def solve(
+        self, velocity: Faces, twist: Array, tolerance: float, slip: Array | None = None
+    ) -> tuple[Faces, Array, bool]:
         """Velocity after viscosity, and the impulse that it gave to each body.
 
         velocity   Faces u*, m/s
         twist      (6 nb,) s*: the bodies' twists without this impulse
         tolerance  relative residual
+        slip       (n,) velocity of the skin relative to the body at each wall face, along the
+                   face's axis, m/s; none unless given
         returns    Faces; (6 nb,) wrench impulse about the origin, N s and N m s; whether the
                    residual was reached
         """
         start = np.concatenate([velocity[axis].ravel() for axis in self.grid.axes])
         mass = np.concatenate([system.mass.ravel() for system in self.systems])
+        walls, blown = self.walls, np.zeros_like(start)
+        if slip is not None:
+            blown[walls.index] = slip
         given = np.concatenate([system.given.ravel() for system in self.systems])
         unknown = self.diagonal > 0.0
         rhs = np.where(unknown, mass * start + given, 0.0)
-        known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist))[0]
-        rhs[self.walls.index] += self.drawn(twist + known)
+        known = self.answer.to(self.push(np.where(unknown, 0.0, start) - blown, twist))[0]
+        rhs[walls.index] += self.drawn(twist + known)
+        rhs[walls.index] += np.where(walls.tied, 0.0, walls.weight * blown[walls.index])
         x, converged = self._conjugate_gradients(rhs, np.where(unknown, start, 0.0), tolerance)
         result = np.where(unknown, x, start)
-        change, impulse = self.answer.to(self.push(result, twist))
-        tied = self.walls.tied
-        result[self.walls.index[tied]] = self.at_walls(twist + change)[tied]
+        change, impulse = self.answer.to(self.push(result - blown, twist))
+        tied = walls.index[walls.tied]
+        result[tied] = self.at_walls(twist + change)[walls.tied] + blown[tied]
         return self._split(result, velocity), impulse, converged
 
     def push(self, velocity: Array, twist: Array) -> Array:

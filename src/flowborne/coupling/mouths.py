@@ -1,0 +1,294 @@
+"""Mouths: patches of a body's skin through which fluid is expelled, or taken in.
+
+A mouth of area A that lets the volume rate Q through gives the fluid there the velocity  w = Q/A d
+relative to the body, along its direction d. With the body's velocity v_b at the mouth,
+
+    D u + J v = q                  q: Q, shared out over the cells at the mouth by the skin's area
+    rho Q dt (v_b + w)             momentum that comes into the fluid in a step
+    -rho Q dt w                    impulse on the body, at the middle of the mouth
+
+What both have too much, rho Q v_b, is the momentum of the fluid that a body of constant mass is
+filled with. All of it holds for a mouth that takes fluid in (Q < 0) as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from flowborne.coupling.fractions import Geometry
+from flowborne.fluid.arrays import Integers
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.solids.dynamics import Kinematics
+
+DEPTH = 3.0
+"""Cells under the skin to which faces hold the velocity of the jet, for paths that lead there."""
+
+
+class Strength(Protocol):
+    """How strongly a mouth blows over time."""
+
+    def at(self, time: float) -> float:
+        """Part of the full volume rate at `time` (s)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Mouth:
+    """A patch of a body's skin.
+
+    name         for messages
+    body         the body
+    position     centre of the patch in the body's frame, m
+    direction    (3,) unit vector out of the body, in its frame
+    radius       m
+    volume_rate  expelled at full strength, m^3/s (m^2/s in a slab); negative is taken in
+    strength     over time
+    scalars      values of the carried scalars in what is expelled
+    """
+
+    name: str
+    body: int
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    radius: float
+    volume_rate: float
+    strength: Strength
+    scalars: Mapping[str, float] = field(default_factory=dict)
+
+    def area(self, slab: bool) -> float:
+        """m^2; width in m in a slab."""
+        return 2.0 * self.radius if slab else np.pi * self.radius**2
+
+
+@dataclass(frozen=True)
+class Jet:
+    """What a mouth does at one instant.
+
+    rate      Q, m^3/s
+    centre    (3,) m
+    along     (3,) d
+    velocity  (3,) w, relative to the body, m/s
+    skin      (3,) v_b, velocity of the body at the centre, m/s
+    cells     (k,) flat indices of the cells at the mouth
+    rates     (k,) part of Q that comes into each, m^3/s
+    axis      (n,) faces at or under the mouth: axis,
+    face      (n,) flat index among the faces across that axis,
+    share     (n,) part of the face that belongs to the mouth,
+    closed    (n,) and that the body closes
+    """
+
+    mouth: Mouth
+    rate: float
+    centre: Array
+    along: Array
+    velocity: Array
+    skin: Array
+    cells: Integers
+    rates: Array
+    axis: Integers
+    face: Integers
+    share: Array
+    closed: Array
+
+
+def jets_of(
+    mouths: tuple[Mouth, ...], cut: Geometry, pose: Kinematics, v: Array, grid: Grid, time: float
+) -> tuple[Jet, ...]:
+    """What the mouths do at `time` (s), on bodies with the generalised velocity v (nv,).
+
+    raises  ValueError when a mouth covers no cell
+    """
+    return tuple(jet_of(mouth, cut, pose, v, grid, time) for mouth in mouths)
+
+
+def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, time: float) -> Jet:
+    """See `jets_of`."""
+    turn = pose.body_rotation[mouth.body]
+    centre = pose.body_position[mouth.body] + turn @ np.array(mouth.position)
+    along = turn @ np.array(mouth.direction)
+    rate = mouth.volume_rate * mouth.strength.at(time)
+    rows = np.flatnonzero(cut.columns[::6] == 6 * mouth.body)
+    at = np.stack(np.unravel_index(cut.cells[rows], grid.shape), axis=1)
+    skin = -cut.values.reshape(-1, 6)[rows, :3] @ along
+    skin *= covered(places(at, 0.5, grid), mouth, centre, along, grid) * (skin > 0.0)
+    here = skin > 0.0
+    if not here.any():
+        raise ValueError(
+            f"{mouth.name} covers no cell at {centre.round(6).tolist()} m, {time:g} s. Put its "
+            "position on the body's skin, inside the domain, with the direction out of the body"
+        )
+    own = np.flatnonzero(cut.body == mouth.body)
+    share = share_of(closed_places(own, cut, grid), mouth, centre, along, cut, grid)
+    face = own[share > 0.0]
+    twist = pose.twist_jacobian[mouth.body] @ v
+    return Jet(
+        mouth,
+        rate,
+        centre,
+        along,
+        rate / mouth.area(grid.is_slab) * along,
+        twist[:3] + np.cross(twist[3:], centre),
+        cut.cells[rows[here]],
+        rate * skin[here] / skin.sum(),
+        cut.axis[face],
+        cut.face[face],
+        share[share > 0.0],
+        cut.closed[face],
+    )
+
+
+def places(at: Integers, offset: Array | float, grid: Grid) -> Array:
+    """(n, 3) places in m at indices `at` (n, 3) plus `offset` cells; z = 0 in a slab."""
+    x = np.array(grid.origin) + grid.spacing * (at + offset)
+    if grid.is_slab:
+        x[:, 2] = 0.0
+    return x
+
+
+def covered(x: Array, mouth: Mouth, centre: Array, along: Array, grid: Grid) -> Array:
+    """(n,) part of a cell around each place x (n, 3) that a mouth covers, seen along it."""
+    gap, h = x - centre, grid.spacing
+    height = gap @ along
+    beside = np.linalg.norm(gap - height[:, None] * along, axis=1)
+    near = np.abs(height) < mouth.radius + DEPTH * h
+    part: Array = near * np.clip(0.5 + (mouth.radius - beside) / h, 0.0, 1.0)
+    return part
+
+
+def share_of(
+    x: Array, mouth: Mouth, centre: Array, along: Array, cut: Geometry, grid: Grid
+) -> Array:
+    """(n,) part of a face at each place x (n, 3), in the body or on its skin, that belongs to a
+    mouth: `covered`, and with the skin that is nearest to it on the mouth's side."""
+    share = covered(x, mouth, centre, along, grid)
+    found = np.flatnonzero(share)
+    step = 0.5 * grid.spacing * along
+    outward = distance_at(x[found] + step, cut, grid)
+    share[found] *= outward > distance_at(x[found] - step, cut, grid)
+    return share
+
+
+def closed_places(own: Integers, cut: Geometry, grid: Grid) -> Array:
+    """(n, 3) centres of the faces with the closed parts `own`, m."""
+    x = np.empty((own.size, 3))
+    for axis in grid.axes:
+        across = cut.axis[own] == axis
+        at = np.stack(np.unravel_index(cut.face[own[across]], grid.face_shape(axis)), axis=1)
+        x[across] = places(at, 0.5 * (np.arange(3) != axis), grid)
+    return x
+
+
+def distance_at(x: Array, cut: Geometry, grid: Grid) -> Array:
+    """(n,) distance to the bodies at places x (n, 3), m."""
+    at = ((x - np.array(grid.origin)) / grid.spacing).T
+    return np.asarray(map_coordinates(cut.distance, at, order=1, mode="nearest"))
+
+
+def add_rates(rate: Array, jets: tuple[Jet, ...]) -> None:
+    """Add the volume that comes into each cell, m^3/s, to `rate` (nx, ny, nz)."""
+    for jet in jets:
+        rate.reshape(-1)[jet.cells] += jet.rates
+
+
+def skin_slip(
+    jets: tuple[Jet, ...], point: Array, across: Array, body: Integers, cut: Geometry, grid: Grid
+) -> Array:
+    """(n,) velocity of the skin relative to its body, m/s: that of a jet in a mouth, 0 elsewhere.
+
+    point, across, body  (n, 3) places on the skin in m, (n, 3) unit vector along which the
+                         velocity is asked for, (n,) whose skin it is
+    """
+    slip = np.zeros(len(body))
+    for jet in jets:
+        own = np.flatnonzero(body == jet.mouth.body)
+        share = share_of(point[own], jet.mouth, jet.centre, jet.along, cut, grid)
+        slip[own] += share * (across[own] @ jet.velocity)
+    return slip
+
+
+def add_closed_slip(carrier: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
+    """Let a leak-proof field come out of the closed parts of faces as the jets do, in place."""
+    for jet in jets:
+        for axis in grid.axes:
+            own = jet.axis == axis
+            part = jet.closed[own] * jet.share[own]
+            carrier[axis].reshape(-1)[jet.face[own]] += part * jet.velocity[axis]
+
+
+def fill_mouths(carried: Faces, resident: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
+    """Put the fluid that is to be expelled under the skin of the mouths, in place.
+
+    carried   Faces to be carried, m/s
+    resident  Faces, what cut faces keep besides (see `flow.beside_walls`)
+    """
+    for jet in jets:
+        if jet.rate <= 0.0:
+            continue
+        for axis in grid.axes:
+            own = jet.axis == axis
+            at, part = jet.face[own], jet.closed[own] * jet.share[own]
+            new = jet.skin[axis] + jet.velocity[axis]
+            values, kept = carried[axis].reshape(-1), resident[axis].reshape(-1)
+            values[at] += part * (new - values[at])
+            kept[at] *= 1.0 - part
+
+
+def colour(
+    scalars: dict[str, Array], jets: tuple[Jet, ...], cut: Geometry, grid: Grid, dt: float
+) -> None:
+    """Let dye leave with the jets: into the layer of cells before each mouth, in place."""
+    for jet in jets:
+        names = scalars.keys() & jet.mouth.scalars.keys()
+        if jet.rate <= 0.0 or not names:
+            continue
+        box, x = cells_around(jet, grid)
+        outside = distance_at(x, cut, grid) > 0.0
+        outside &= distance_at(x - grid.spacing * jet.along, cut, grid) <= 0.0
+        part = outside * covered(x, jet.mouth, jet.centre, jet.along, grid)
+        part *= min(1.0, float(np.linalg.norm(jet.velocity)) * dt / grid.spacing)
+        for name in names:
+            values = scalars[name][box]
+            values += part.reshape(values.shape) * (jet.mouth.scalars[name] - values)
+
+
+def cells_around(jet: Jet, grid: Grid) -> tuple[tuple[slice, slice, slice], Array]:
+    """The block of cells that a jet's mouth may cover, and (n, 3) their centres, m."""
+    reach = jet.mouth.radius + (DEPTH + 1.0) * grid.spacing
+    x, y, z = grid.cell_coordinates()
+    near = [
+        slice(*np.searchsorted(x, (middle - reach, middle + reach)))
+        for x, middle in zip((x, y, z), jet.centre, strict=True)
+    ]
+    box = near[0], near[1], near[2]
+    block = np.meshgrid(x[box[0]], y[box[1]], z[box[2]], indexing="ij")
+    return box, np.stack(block, axis=-1).reshape(-1, 3)
+
+
+def jet_force(jets: tuple[Jet, ...], density: float) -> Array:
+    """(3,) momentum per time that comes into the fluid with the jets, N."""
+    force = np.zeros(3)
+    for jet in jets:
+        force += density * jet.rate * (jet.skin + jet.velocity)
+    return force
+
+
+def jet_power(jets: tuple[Jet, ...], density: float) -> tuple[float, float]:
+    """Kinetic energy per time that jets bring into the fluid and take out of it, W."""
+    powers = [
+        0.5 * density * jet.rate * float(((jet.skin + jet.velocity) ** 2).sum()) for jet in jets
+    ]
+    return sum(p for p in powers if p > 0.0), -sum(p for p in powers if p < 0.0)
+
+
+def jet_wrench(jets: tuple[Jet, ...], density: float, nbody: int) -> Array:
+    """(nbody, 6) reaction of the jets on the bodies about the world origin, N and N m."""
+    wrench = np.zeros((nbody, 6))
+    for jet in jets:
+        force = -density * jet.rate * jet.velocity
+        wrench[jet.mouth.body] += np.concatenate([force, np.cross(jet.centre, force)])
+    return wrench
