@@ -39,6 +39,8 @@ class Measures:
       momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
       momentum_{exchanged,advection}_…_Ns       given to the bodies by the pressure; lost or gained
                                                 by the fluid in advection
+      momentum_jet_…_Ns, expelled_m3            brought into the fluid by mouths (m^2 in a slab), in
+                                                scenes that have some
       momentum_exchange_error                   relative
       divergence_1/s, solver_iterations, residual, contacts
 
@@ -54,6 +56,7 @@ class Measures:
     ) -> None:
         self._model = setup.solid
         self._controller = controller
+        self._blows = bool(setup.mouths)
         self._along, self._across = _axes(stream)
         self._joints = _scalar_joints(setup.solid)
         places = (
@@ -95,8 +98,10 @@ class Measures:
         names += ["drag_N", "lift_N", "effort"]
         for body in self._model.body_names[1:]:
             names += [f"{body}_{axis}_m" for axis in "xyz"] + [f"{body}_q{axis}" for axis in "wxyz"]
-        for part in ("solid", "fluid", "exchanged", "advection"):
+        parts = ["solid", "fluid", "exchanged", "advection", *(["jet"] if self._blows else [])]
+        for part in parts:
             names += [f"momentum_{part}_{axis}_Ns" for axis in "xyz"]
+        names += ["expelled_m3"] if self._blows else []
         names += ["momentum_exchange_error", "divergence_1/s"]
         return (*names, "solver_iterations", "residual", "contacts")
 
@@ -108,12 +113,16 @@ class Measures:
         force = last.fluid_wrench()[1:, :3].sum(axis=0)
         values |= {"drag_N": float(force @ self._along), "lift_N": float(force @ self._across)}
         values["effort"] = self._effort(last)
-        for part, impulse in (
-            ("solid", last.momentum.solid),
-            ("fluid", last.momentum.fluid),
-            ("exchanged", sum(step.momentum.exchanged for step in steps)),
-            ("advection", sum(step.momentum.advection for step in steps)),
-        ):
+        impulses = {
+            "solid": last.momentum.solid,
+            "fluid": last.momentum.fluid,
+            "exchanged": sum(step.momentum.exchanged for step in steps),
+            "advection": sum(step.momentum.advection for step in steps),
+        }
+        if self._blows:
+            impulses["jet"] = sum(step.momentum.jet for step in steps)
+            values["expelled_m3"] = sum(step.expelled for step in steps)
+        for part, impulse in impulses.items():
             for axis, component in zip("xyz", np.asarray(impulse), strict=True):
                 values[f"momentum_{part}_{axis}_Ns"] = float(component)
         values["momentum_exchange_error"] = max(step.momentum.exchange_error for step in steps)

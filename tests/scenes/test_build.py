@@ -24,6 +24,7 @@ from flowborne.scenes.build import Built, build
 from flowborne.scenes.build_wind import Gusts
 from flowborne.scenes.inflow import FactorSteady
 from flowborne.scenes.load import load_scene
+from flowborne.simulation import Simulation
 from flowborne.solids.wind import WindFaces, WindForce
 
 Write = Callable[..., Path]
@@ -138,6 +139,63 @@ value = 0.5
     assert (jet.volume_rate, jet.velocity, jet.times) == (0.1, None, (0.0, 2.0))
     assert (smoke.volume_rate, smoke.scalars) == (None, {"smoke": 0.5})
     assert smoke.active(1e9)
+
+
+def test_mouths(write: Write) -> None:
+    made = built(
+        write,
+        """
+[[mouths]]
+body = "hand"
+position = [0.0, -0.2]
+direction = [0.0, -2.0]
+radius = 0.05
+volume_rate = 0.3
+pulse = { period = 1.75, duration = 1.0, start = 0.25 }
+dye = { ink = 0.5 }
+[[mouths]]
+body = "float"
+position = [0.1, 0.0]
+direction = [1.0, 0.0]
+radius = 0.05
+volume_rate = -0.1
+times = [0.0, 1.0]
+factors = [0.0, 1.0]
+""",
+    )
+    pulsed, inhaling = made.world.setup.mouths
+    model = made.world.setup.solid
+    assert model.body_names[pulsed.body] == "hand"
+    assert (pulsed.position, pulsed.direction) == ((0.0, -0.2, 0.0), (0.0, -1.0, 0.0))
+    assert (pulsed.radius, pulsed.volume_rate, pulsed.scalars) == (0.05, 0.3, {"ink": 0.5})
+    times = [0.0, 0.25, 0.5, 0.75, 1.25, 1.5, 2.25, 4.0]
+    strength = [pulsed.strength.at(time) for time in times]
+    half = math.sqrt(0.5)
+    assert_allclose(strength, [0.0, 0.0, half, 1.0, 0.0, 0.0, half, half], atol=1e-12)
+    assert [inhaling.strength.at(time) for time in (-1.0, 0.5, 2.0)] == [0.0, 0.5, 1.0]
+    assert inhaling.volume_rate == -0.1
+    assert made.world.setup.fluid is not None
+    assert made.world.setup.fluid.scalars == ("ink",)
+    pickle.loads(pickle.dumps(made.world.setup.mouths))
+
+
+def test_a_run_tells_what_its_mouths_expel(write: Write) -> None:
+    mouth = """
+[[mouths]]
+body = "float"
+position = [0.1, 0.0]
+direction = [1.0, 0.0]
+radius = 0.05
+volume_rate = 0.3
+"""
+    alone = {"control": "[]", "objectives": "[]", "time.steps_per_frame": "2"}
+    with Simulation(load_scene(write(append=mouth), alone)) as simulation:
+        simulation.advance_frame()
+        measured = simulation.measure()
+    assert_allclose(measured["expelled_m3"], 0.3 / 24.0)
+    assert_allclose(measured["momentum_jet_x_Ns"], 1000.0 * 0.3**2 / 0.1 / 24.0, rtol=0.2)
+    with Simulation(load_scene(write(), alone)) as simulation:
+        assert not {"expelled_m3", "momentum_jet_x_Ns"} & simulation.measure().keys()
 
 
 def test_winds(write: Write) -> None:

@@ -180,6 +180,15 @@ def test_one_fault_gives_one_clear_message(write: Write, fault: str) -> None:
     assert message in problems[0]
 
 
+MOUTH = """
+[[mouths]]
+body = "hand"
+position = [0.0, -0.2]
+direction = [0.0, -1.0]
+radius = 0.05
+volume_rate = 0.1
+"""
+
 APPENDED_FAULT = {
     "keyframes that go back in time": (
         '[[motion]]\nkind = "keyframes"\njoint = "rail"\ntimes = [0, 2, 1]\nvalues = [0, 1, 2]',
@@ -218,6 +227,39 @@ APPENDED_FAULT = {
         "scene swim.toml, [[sources]] 1: the box reaches from 2 to 3 m in x, outside the domain "
         "from -1 to 1 m. Move it.",
     ),
+    "a mouth of a body that is not there": (
+        MOUTH.replace("hand", "head"),
+        "scene swim.toml, [[mouths]] 1: body 'head' is not in model squid.xml; "
+        "did you mean 'hand'?",
+    ),
+    "a mouth of no size": (
+        MOUTH.replace("0.05", "0.0"),
+        "scene swim.toml, [[mouths]] 1, radius: 0.0 is not greater than 0. Give a larger number.",
+    ),
+    "a mouth that points nowhere": (
+        MOUTH.replace("-1.0]", "0.0]"),
+        "scene swim.toml, [[mouths]] 1 has a direction of length 0. Point it out of the body.",
+    ),
+    "a mouth that points out of the plane": (
+        MOUTH.replace("-1.0]", "-1.0, 0.5]"),
+        "scene swim.toml, [[mouths]] 1, direction: [0.0, -1.0, 0.5] leaves the plane of a scene of "
+        "2 dimensions. Make its z component 0.",
+    ),
+    "a mouth beside its body": (
+        MOUTH.replace("-0.2]", "0.9]"),
+        "scene swim.toml, [[mouths]] 1: mouth 1 of body 'hand' covers no cell at [0.0, 0.5, 0.0] "
+        "m, 0 s. Put its position on the body's skin, inside the domain, with the direction out of "
+        "the body.",
+    ),
+    "a mouth with a pulse and keyframes": (
+        MOUTH + "pulse = { period = 1, duration = 1 }\ntimes = [0.0, 1.0]\nfactors = [0.0, 1.0]",
+        "scene swim.toml, [[mouths]] 1 has both a pulse and keyframes. Keep one of them.",
+    ),
+    "a pulse longer than its period": (
+        MOUTH + "pulse = { period = 1.0, duration = 1.5 }",
+        "scene swim.toml, [[mouths]] 1, pulse lasts for 1.5 s of every 1 s. Make the duration no "
+        "longer than the period.",
+    ),
     "a wind on no body": (
         '[[wind]]\nkind = "force"\nforce = [1.0, 0.0]\nbodies = ["arms"]',
         "scene swim.toml, [[wind]] 1: body 'arms' is not in model squid.xml; did you mean 'arm'?",
@@ -250,6 +292,28 @@ def test_one_more_table_gives_one_clear_message(write: Write, fault: str) -> Non
     problems = check_scene(write(append="\n" + text))
     assert len(problems) == 1
     assert message in problems[0]
+
+
+@pytest.mark.parametrize(
+    ("replaced", "message"),
+    [
+        (
+            {'{ kind = "inflow", velocity = [1.0, 0.0] }': '"closed"', '"open"': '"closed"'},
+            "scene swim.toml, [boundaries]: what a mouth expels has nowhere to go, as no side is "
+            "open. Make a side open.",
+        ),
+        (
+            {"density = 1000.0": 'density = 1000.0\ncoupling = "one-way"'},
+            "scene swim.toml, [fluid] coupling: the fluid does not feel bodies with mouths when it "
+            "is 'one-way'. Make it 'two-way', or drop [[mouths]].",
+        ),
+    ],
+)
+def test_a_mouth_needs_a_fluid_that_feels_it_and_gives_way(
+    write: Write, replaced: dict[str, str], message: str
+) -> None:
+    assert check_scene(write(replaced, MOUTH)) == [message]
+    assert check_scene(write(append=MOUTH)) == []
 
 
 def test_a_sound_scene_has_no_problems(write: Write) -> None:

@@ -14,6 +14,7 @@ from flowborne.fluid.state import FluidState
 from flowborne.scenes.bodies import initial_state, load_model, motions_of, posed
 from flowborne.scenes.build_control import controller_of
 from flowborne.scenes.build_fluid import fluid_of
+from flowborne.scenes.build_mouths import mouths_of
 from flowborne.scenes.build_wind import winds_of
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model import SolidModel
@@ -50,7 +51,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     model = load_model(scene) if scene.has_bodies else SolidModel.empty()
     motions = motions_of(scene, model, posed(scene, model).q)
     fluid = fluid_of(scene)
-    setup = Setup(model, fluid, motions, winds_of(scene))
+    setup = Setup(model, fluid, motions, winds_of(scene), mouths_of(scene, model))
     world = World.at_rest(setup)
     world.solid = initial_state(scene, model)
     if world.fluid is not None:

@@ -8,6 +8,7 @@ from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
 from flowborne.scenes.check_clip import check_clip, check_followers
 from flowborne.scenes.check_control import check_control
 from flowborne.scenes.check_fluid import check_dimensions, check_fluid
+from flowborne.scenes.check_mouths import check_mouth_cells, check_mouths
 from flowborne.scenes.draft import Draft
 
 
@@ -27,4 +28,6 @@ def cross_check(draft: Draft) -> list[str]:
     lost = list(check_followers(draft, model))
     if lost:
         return problems + lost
-    return [*problems, *check_bodies(draft, model), *check_control(draft, model)]
+    problems += [*check_bodies(draft, model), *check_mouths(draft, model)]
+    problems += check_control(draft, model)
+    return problems or [*check_mouth_cells(draft, model)]

@@ -25,7 +25,16 @@ from flowborne.scenes.wording import Key, suggestion
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 
-NEEDS_BODIES = ("clip", "initial", "motion", "wind", "control", "objectives", "controller")
+NEEDS_BODIES = (
+    "clip",
+    "initial",
+    "motion",
+    "wind",
+    "mouths",
+    "control",
+    "objectives",
+    "controller",
+)
 
 
 def check_without_bodies(draft: Draft) -> Iterator[str]:

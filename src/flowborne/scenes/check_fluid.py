@@ -10,7 +10,7 @@ from flowborne.scenes.schema_fluid import BoundariesTable, Domain, DyeBands, Inf
 from flowborne.scenes.schema_solids import WindFacesTable, WindForceTable, WindStreamTable
 from flowborne.scenes.wording import Key
 
-NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "dye")
+NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")
 
 
 def check_dimensions(draft: Draft) -> Iterator[str]:
@@ -45,6 +45,9 @@ def _vectors(draft: Draft) -> Iterator[tuple[tuple[Key, ...], tuple[float, ...]]
     for index, source in enumerate(scene.sources):
         if source.velocity is not None:
             yield ("sources", index, "velocity"), source.velocity
+    for index, mouth in enumerate(scene.mouths):
+        yield ("mouths", index, "position"), mouth.position
+        yield ("mouths", index, "direction"), mouth.direction
     for index, wind in enumerate(scene.wind):
         if isinstance(wind, WindFacesTable | WindStreamTable):
             yield ("wind", index, "velocity"), wind.velocity

@@ -16,7 +16,7 @@ Span = tuple[int, float, float]
 
 
 class Factor(Protocol):
-    """How strong an inflow is over time."""
+    """How strong an inflow or a mouth is over time."""
 
     def at(self, time: float) -> float:
         """Part of the full velocity at `time` (s)."""
@@ -54,6 +54,22 @@ class FactorKeyframes:
     def at(self, time: float) -> float:
         """The curve at `time`."""
         return self.curve.value(time)
+
+
+@dataclass(frozen=True)
+class FactorPulse:
+    """Half a sine wave for `duration` s of every `period` s, the first from `start` s on."""
+
+    period: float
+    duration: float
+    start: float = 0.0
+
+    def at(self, time: float) -> float:
+        """Between 0 and 1."""
+        since = math.fmod(time - self.start, self.period)
+        if time < self.start or since >= self.duration:
+            return 0.0
+        return math.sin(math.pi * since / self.duration)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from flowborne.scenes.schema_fluid import (
     SourceTable,
 )
 from flowborne.scenes.schema_human import ClipTable, HumanTable
+from flowborne.scenes.schema_mouths import MouthTable
 from flowborne.scenes.schema_solids import (
     InitialTable,
     MotionTable,
@@ -76,6 +77,7 @@ class Scene(Table):
     initial: InitialTable = InitialTable()
     motion: tuple[MotionTable, ...] = ()
     wind: tuple[WindTable, ...] = ()
+    mouths: tuple[MouthTable, ...] = ()
     control: tuple[ControlTable, ...] = ()
     objectives: tuple[AnyObjective, ...] = ()
     controller: ControllerTable = ControllerTable()
@@ -134,6 +136,7 @@ class Scene(Table):
         """Names of the dyes, each once, in the order of the file."""
         names = [table.name for table in self.dye]
         names += [name for source in self.sources for name in source.dye]
+        names += [name for mouth in self.mouths for name in mouth.dye]
         return tuple(dict.fromkeys(names))
 
     def stream(self) -> tuple[float, ...] | None:
