@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+IMPULSES = ("exchanged", "advection", "boundary", "crossed", "forces")
+"""Parts of the budget that are impulses of a whole frame."""
+
 SLIDE, HINGE = 2, 3
 """Kinds of joints, by MuJoCo's numbers."""
 
@@ -37,11 +40,13 @@ class Measures:
       effort                                    |drive force| dt over the controlled dofs, N m s
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
       momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
-      momentum_{exchanged,advection}_…_Ns       given to the bodies by the pressure; lost or gained
-                                                by the fluid in advection
+      momentum_{exchanged,advection,…}_…_Ns     given to the bodies by the pressure; made by advection
+                                                or lost; given to the fluid by the sides' pressure
+                                                (boundary), by what flows through them (crossed),
+                                                and by forces and friction (forces)
       momentum_jet_…_Ns, expelled_m3            brought into the fluid by mouths (m^2 in a slab), in
                                                 scenes that have some
-      momentum_exchange_error                   relative
+      momentum_{exchange,budget}_error          relative: of the pressure solve; of all of these
       divergence_1/s, solver_iterations, residual, contacts
 
     columns     names, in the order in which they are written
@@ -98,11 +103,10 @@ class Measures:
         names += ["drag_N", "lift_N", "effort"]
         for body in self._model.body_names[1:]:
             names += [f"{body}_{axis}_m" for axis in "xyz"] + [f"{body}_q{axis}" for axis in "wxyz"]
-        parts = ["solid", "fluid", "exchanged", "advection", *(["jet"] if self._blows else [])]
-        for part in parts:
+        for part in ("solid", "fluid", *IMPULSES, *(["jet"] if self._blows else [])):
             names += [f"momentum_{part}_{axis}_Ns" for axis in "xyz"]
         names += ["expelled_m3"] if self._blows else []
-        names += ["momentum_exchange_error", "divergence_1/s"]
+        names += ["momentum_exchange_error", "momentum_budget_error", "divergence_1/s"]
         return (*names, "solver_iterations", "residual", "contacts")
 
     def _of_frame(self, report: FrameReport) -> dict[str, float]:
@@ -113,19 +117,17 @@ class Measures:
         force = last.fluid_wrench()[1:, :3].sum(axis=0)
         values |= {"drag_N": float(force @ self._along), "lift_N": float(force @ self._across)}
         values["effort"] = self._effort(last)
-        impulses = {
-            "solid": last.momentum.solid,
-            "fluid": last.momentum.fluid,
-            "exchanged": sum(step.momentum.exchanged for step in steps),
-            "advection": sum(step.momentum.advection for step in steps),
-        }
+        impulses = {"solid": last.momentum.solid, "fluid": last.momentum.fluid}
+        for part in IMPULSES:
+            impulses[part] = np.sum([getattr(step.momentum, part) for step in steps], axis=0)
         if self._blows:
-            impulses["jet"] = sum(step.momentum.jet for step in steps)
+            impulses["jet"] = np.sum([step.momentum.jet for step in steps], axis=0)
             values["expelled_m3"] = sum(step.expelled for step in steps)
         for part, impulse in impulses.items():
             for axis, component in zip("xyz", np.asarray(impulse), strict=True):
                 values[f"momentum_{part}_{axis}_Ns"] = float(component)
-        values["momentum_exchange_error"] = max(step.momentum.exchange_error for step in steps)
+        for error in ("exchange_error", "budget_error"):
+            values[f"momentum_{error}"] = max(getattr(step.momentum, error) for step in steps)
         values["divergence_1/s"] = max(step.divergence for step in steps)
         values["solver_iterations"] = max(step.iterations for step in steps)
         values["residual"] = max(step.residual for step in steps)

@@ -13,7 +13,9 @@ from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
+from flowborne.scenes.load import load_scene
 from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.simulation import Simulation
 from flowborne.solids.momentum import momentum
 from flowborne.validation.worlds import RING, advance, mjcf, set_velocity, world_of
 
@@ -173,3 +175,18 @@ def test_a_world_in_balance_has_no_exchange_error() -> None:
         report = advance(world, 1.0 / 64)
         assert np.abs(report.momentum.exchanged).max() < 1e-14
         assert report.momentum.exchange_error < 1e-10
+
+
+def test_the_budget_of_a_flow_closes() -> None:
+    """What the fluid gains is what came through the sides, by forces, from bodies and advection."""
+    for settings in ({}, {"fluid.viscosity": "2.0", "fluid.body_force": "[0.1, -0.2]"}):
+        scene = load_scene("ns-block-drag-max", {"domain.resolution": "24", **settings})
+        with Simulation(scene, workers=1) as simulation:
+            for _ in range(6):
+                momentum = simulation.advance_frame().step.momentum
+                assert momentum.budget_error < 1e-10
+            assert np.linalg.norm(momentum.exchanged) > 1.0
+            assert (np.linalg.norm(momentum.forces) > 0.0) == bool(settings)
+            row = simulation.measure()
+    assert row["momentum_budget_error"] < 1e-10
+    assert row["momentum_forces_x_Ns"] == pytest.approx(momentum.forces[0])

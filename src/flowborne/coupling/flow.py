@@ -36,6 +36,7 @@ class Carried:
 
     velocity  Faces u*, m/s
     scalars   name -> (nx, ny, nz)
+    start     (3,) momentum of the fluid at the start of the step, N s
     lost      (3,) momentum that advection made (or lost, when negative), N s, before it was given
               back along periodic axes
     crossed   (3,) momentum that the flow carried in through the sides, N s
@@ -44,6 +45,7 @@ class Carried:
 
     velocity: Faces
     scalars: dict[str, Array]
+    start: Array
     lost: Array
     crossed: Array
     expelled: Array
@@ -143,7 +145,7 @@ def carry_fluid(
             kept = was[axis] + expelled[axis] + (mass - mass_before[axis].sum()) * drift[axis]
             arrived[axis][:] += (kept - now[axis]) / mass
     entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
-    return Carried(arrived, scalars, now - was - entered - expelled, entered, expelled)
+    return Carried(arrived, scalars, was, now - was - entered - expelled, entered, expelled)
 
 
 def drift_velocity(world: World, cut: Geometry, dt: float) -> Array:

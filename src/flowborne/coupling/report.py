@@ -34,6 +34,10 @@ class Momentum:
     boundary         impulse of the sides of the domain on the fluid in the pressure solve
     crossed          momentum that the flow itself carried in through the sides
     jet              momentum that came into the fluid through mouths
+    forces           what body forces, driven regions and friction at walls and bodies gave to it
+    budget_error     |change of the fluid's momentum in the step less all of these| relative to the
+                     impulses given to bodies and faces. Along periodic axes it shows what advection
+                     does not give back
     """
 
     solid: Array = field(default_factory=lambda: np.zeros(3))
@@ -44,6 +48,8 @@ class Momentum:
     boundary: Array = field(default_factory=lambda: np.zeros(3))
     crossed: Array = field(default_factory=lambda: np.zeros(3))
     jet: Array = field(default_factory=lambda: np.zeros(3))
+    forces: Array = field(default_factory=lambda: np.zeros(3))
+    budget_error: float = 0.0
 
 
 @dataclass

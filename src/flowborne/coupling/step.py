@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.flow import carry_fluid, drift_velocity, forced, settle_state
+from flowborne.coupling.flow import Carried, carry_fluid, drift_velocity, forced, settle_state
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.motion import Drive
 from flowborne.coupling.mouths import Jet, add_closed_slip, jet_wrench, jets_of
@@ -98,9 +98,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     state.pressure[:] = solved.projected.pressure
     state.scalars = carried.scalars
     advance_clock(world, dt)
-    balance = momentum_balance(world, cut, solved)
-    balance.advection, balance.crossed = carried.lost, carried.crossed
-    balance.jet = carried.expelled
+    balance = momentum_balance(world, cut, carried, solved)
     watch.lap("advection")
     done = report(world, solved, buoyancy, wind, reaction, balance, dt, watch)
     done.expelled = dt * sum(jet.rate for jet in blown)
@@ -187,29 +185,38 @@ def advance_clock(world: World, dt: float) -> None:
     world.steps += 1
 
 
-def momentum_balance(world: World, cut: Geometry, solved: Solved) -> Momentum:
-    """What bodies, fluid and sides gave each other in the pressure solve."""
+def momentum_balance(world: World, cut: Geometry, carried: Carried, solved: Solved) -> Momentum:
+    """Where the fluid's momentum came from and went to in a step."""
     fluid, _ = world.flow()
     projected, before = solved.projected, solved.before_pressure
     assert projected is not None
     assert before is not None
-    dt = solved.driven.system.dt
-    mass = face_mass(cut.open, fluid.grid, fluid.boundaries, fluid.density)
-    after = fluid_momentum(projected.velocity, mass, fluid.grid)
-    gained = after - fluid_momentum(before, mass, fluid.grid)
+    dt, grid, boundaries = solved.driven.system.dt, fluid.grid, fluid.boundaries
+    mass = face_mass(cut.open, grid, boundaries, fluid.density)
+    after = fluid_momentum(projected.velocity, mass, grid)
+    pressed = fluid_momentum(before, mass, grid)
     moved = sum(
         float(np.vdot(mass[axis], np.abs(projected.velocity[axis] - before[axis])))
-        for axis in fluid.grid.axes
+        for axis in grid.axes
     )
-    sides = dt * side_push(projected.pressure, fluid.grid, fluid.boundaries)
+    sides = dt * side_push(projected.pressure, grid, boundaries)
     exchanged = projected.impulse[:, :3].sum(axis=0)
     scale = float(np.abs(projected.impulse[:, :3]).sum()) + moved
-    missing = float(np.abs(exchanged + gained - sides).max())
+    missing = float(np.abs(exchanged + after - pressed - sides).max())
+    forces = pressed - fluid_momentum(carried.velocity, mass, grid)
+    advection = np.where(boundaries.periodic(), 0.0, carried.lost)
+    given = carried.crossed + carried.expelled + advection + forces + sides - exchanged
+    unknown = float(np.abs(after - carried.start - given).max())
     return Momentum(
         fluid=after,
         exchanged=exchanged,
         exchange_error=missing / scale if scale > 0.0 else 0.0,
+        advection=carried.lost,
         boundary=sides,
+        crossed=carried.crossed,
+        jet=carried.expelled,
+        forces=forces,
+        budget_error=unknown / scale if scale > 0.0 else 0.0,
     )
 
 
