@@ -201,7 +201,10 @@ def assemble(
     before   state before the positions moved. With it, `updated` brings the forces of Coriolis to
              the velocity half-way through the step; without, they are those at v, and A a = b is
              solved by MuJoCo's acceleration
+    raises   ValueError when the model has flesh
     """
+    if model.mj.nflex:
+        raise ValueError("bones alone were asked for, and the model has flesh. Use assemble_flesh.")
     s = scratch(model)
     s.set_time_step(dt)
     s.forward(state.q, state.v, applied)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -63,6 +64,42 @@ def compiled(
             mj = spec.compile()
         except ValueError as error:
             raise ValueError(f"{where} cannot be made a slab: {error}.") from error
+    return mj
+
+
+def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> mujoco.MjModel:
+    """MuJoCo's model of bones and flesh; switched off is what `compiled` switches off.
+
+    raises ValueError for a bad model, and for a flex that is not an elastic solid
+    """
+    spec = spec.copy()
+    _set_options(spec, gravity)
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # dense takes room for (nv, nv) arrays
+    try:
+        with warnings.catch_warnings():  # of missing forces, which elasticity does supply
+            warnings.filterwarnings("ignore", "flex .* is not rigid", UserWarning)
+            mj = spec.compile()
+    except ValueError as error:
+        raise ValueError(f"the model with flesh cannot be read: {error}. Mend it there.") from error
+    for flex in spec.flexes:
+        if flex.dim != 3:
+            raise ValueError(
+                f"flex '{flex.name}' has elements of dimension {flex.dim}. "
+                'Flesh is made of tetrahedra: give it dim="3".'
+            )
+        if flex.edgestiffness or flex.edgedamping or mj.flex_edgeequality[flex.id]:
+            raise ValueError(
+                f"flex '{flex.name}' has springs, dampers or constraints along its edges. "
+                "Give it elasticity instead."
+            )
+        if not flex.young > 0.0:
+            raise ValueError(
+                f"flex '{flex.name}' has Young's modulus {flex.young:g} N/m^2. "
+                "Give it a positive one."
+            )
+    damping = sorted({float(flex.damping) for flex in spec.flexes})
+    if len(damping) > 1:
+        raise ValueError(f"the fleshes have damping times of {damping} s. Give all the same.")
     return mj
 
 

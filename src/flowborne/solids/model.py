@@ -113,6 +113,13 @@ class SolidModel:
         return cls(mjcf.compiled(xml, slab, gravity, density, densities), slab)
 
     @classmethod
+    def with_flesh(
+        cls, spec: mujoco.MjSpec, *, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    ) -> SolidModel:
+        """Model of bones and flesh, for `assemble_flesh`. Raises ValueError when it is bad."""
+        return cls(mjcf.compiled_with_flesh(spec, gravity), slab=False)
+
+    @classmethod
     def empty(cls, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SolidModel:
         """Model without bodies, for a fluid alone."""
         return cls.from_string("<mujoco/>", slab=True, gravity=gravity)

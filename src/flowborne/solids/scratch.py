@@ -25,7 +25,6 @@ class Scratch:
     """MjData and a private MjModel, whose time step may be set without other threads seeing it.
 
     mj, data    MuJoCo's model and data
-    mass        (nv, nv) room for the mass matrix
     q, v, ...   lasting views into `data`
     """
 
@@ -33,7 +32,7 @@ class Scratch:
         self.mj = copy.copy(model.mj)
         self.data = data = mujoco.MjData(self.mj)
         self.dt = float(self.mj.opt.timestep)
-        self.mass = np.zeros((model.nv, model.nv))
+        self._mass: Array | None = None
         self.q, self.v = data.qpos, data.qvel
         self.applied = data.qfrc_applied
         self.smooth, self.bias = data.qfrc_smooth, data.qfrc_bias
@@ -64,11 +63,23 @@ class Scratch:
         self.applied[:] = applied
         mujoco.mj_forward(self.mj, self.data)
 
+    def smooth_forces(self, q: Array, v: Array, applied: Array) -> None:
+        """Everything up to the forces other than those of constraints, without solving for them."""
+        self.q[:] = q
+        self.v[:] = v
+        self.applied[:] = applied
+        mujoco.mj_fwdPosition(self.mj, self.data)
+        mujoco.mj_fwdVelocity(self.mj, self.data)
+        mujoco.mj_fwdActuation(self.mj, self.data)
+        mujoco.mj_fwdAcceleration(self.mj, self.data)
+
     def mass_matrix(self) -> Array:
         """(nv, nv) mass matrix at the present pose; overwritten by the next call."""
-        if self.mass.size:
-            mujoco.mj_fullM(self.mj, self.data, self.mass)
-        return self.mass
+        if self._mass is None:  # gigabytes where there is much flesh, which does not ask for it
+            self._mass = np.zeros((self.mj.nv, self.mj.nv))
+        if self._mass.size:
+            mujoco.mj_fullM(self.mj, self.data, self._mass)
+        return self._mass
 
 
 _local = threading.local()

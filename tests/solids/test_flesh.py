@@ -1,0 +1,269 @@
+"""Flesh: the sparse identity with MuJoCo, prescribed dofs, vertices, inverted elements."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from flowborne.solids.dynamics import assemble
+from flowborne.solids.flesh import Flesh, flesh_of, surface_of
+from flowborne.solids.flesh_dynamics import assemble_flesh
+from flowborne.solids.flesh_solve import prescribe_flesh
+from flowborne.solids.inversion import inversion
+from flowborne.solids.model import SolidModel
+from flowborne.solids.scratch import scratch
+from flowborne.solids.state import SolidState
+from flowborne.solids.tissue import Tissue, add_flesh, volumes
+from flowborne.validation.flesh_bars import bar_mesh
+
+Array = NDArray[np.float64]
+
+DT = 2e-3
+
+ARM = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>
+<body name="upper" pos="0 0 .1" euler="0 20 0"><joint name="shoulder" axis="0 1 0" damping=".1"
+stiffness="3"/><geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/>
+<body name="lower" pos=".2 0 0"><joint name="elbow" axis="0 1 .3" armature=".01"/>
+<geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/></body></body></worldbody>
+<tendon><fixed stiffness="2" damping=".3"><joint joint="shoulder" coef="1"/>
+<joint joint="elbow" coef="-.5"/></fixed></tendon></mujoco>"""
+
+CAGED = """<mujoco><worldbody><body name="upper"><joint name="shoulder" axis="0 1 0"/>
+<geom type="sphere" size=".05" contype="0" conaffinity="0"/>
+<flexcomp name="fin" type="grid" dim="3" count="7 4 3" spacing=".05 .03 .02" pos=".15 0 0" mass=".2"
+radius=".001" dof="{order}" cellcount="3 1 1"><elasticity young="2e4" poisson=".3" damping=".004"/>
+<contact selfcollide="none" contype="0" conaffinity="0"/><pin gridrange="0 0 0 0 1 1"/></flexcomp>
+</body></worldbody></mujoco>"""
+
+
+def arm() -> SolidModel:
+    """Two bones in one piece of flesh; each holds the points near its middle."""
+    spec = mujoco.MjSpec.from_string(ARM)
+    points, elements = bar_mesh((8, 2, 2), (0.4, 0.1, 0.1))
+    near = [(abs(x - 0.1) < 0.03, abs(x - 0.3) < 0.03) for x in points[:, 0]]
+    holders = ["upper" if first else "lower" if last else "" for first, last in near]
+    tissue = Tissue(young=3e4, poisson=0.3, density=1000.0, damping=0.01)
+    add_flesh(spec, "arm", points, elements, tissue, holders)
+    return SolidModel.with_flesh(spec, gravity=(0.0, 0.5, -2.0))
+
+
+def caged(order: str) -> SolidModel:
+    """A fin that a grid of cells carries, on a hinged bone."""
+    spec = mujoco.MjSpec.from_string(CAGED.format(order=order))
+    return SolidModel.with_flesh(spec, gravity=(0.0, 0.5, -2.0))
+
+
+def moving(model: SolidModel, seed: int = 0) -> SolidState:
+    """A bent and moving state, from MuJoCo's own steps."""
+    s = scratch(model)
+    s.set_time_step(DT)
+    s.forward(model.mj.qpos0, np.zeros(model.nv), np.zeros(model.nv))
+    for _ in range(30):
+        mujoco.mj_step(s.mj, s.data)
+    kick = 0.05 * np.random.default_rng(seed).standard_normal(model.nv)
+    return SolidState(s.q.copy(), s.v + kick)
+
+
+@pytest.mark.parametrize("build", ["tetrahedra", "trilinear", "quadratic"])
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_sparse_A_and_b_reproduce_the_acceleration(build: str, at_rest: bool) -> None:
+    model = arm() if build == "tetrahedra" else caged(build)
+    state = model.rest() if at_rest else moving(model)
+    applied = np.random.default_rng(1).standard_normal(model.nv)
+    system = assemble_flesh(model, state, applied, DT)
+    for jacobian in (mujoco.mjtJacobian.mjJAC_DENSE, mujoco.mjtJacobian.mjJAC_SPARSE):
+        mj = model.mj.__copy__()
+        mj.opt.jacobian, mj.opt.timestep = jacobian, DT
+        data = mujoco.MjData(mj)
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = state.q, state.v, applied
+        mujoco.mj_forward(mj, data)
+        expected = data.qvel + DT * data.qacc
+        left = np.abs(system.A @ expected - system.impulse).max()
+        assert left < 1e-10 * np.abs(system.impulse).max()
+        found = prescribe_flesh(system, np.zeros(model.nv, bool), np.zeros(model.nv)).velocity
+        np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
+
+
+def test_A_is_symmetric_and_bones_meet_only_the_flesh_around_them() -> None:
+    model = arm()
+    A = assemble_flesh(model, moving(model), np.zeros(model.nv), DT).A
+    assert abs(A - A.T).max() < 1e-12 * abs(A).max()
+    assert np.linalg.eigvalsh(A.toarray())[0] > 0.0
+    bones = np.flatnonzero(~flesh_of(model).dofs)
+    assert bones.tolist() == [model.dofs_of("shoulder")[0], model.dofs_of("elbow")[0]]
+    assert (A[bones].toarray() != 0.0).mean() < 0.9
+
+
+def test_prescribed_bones_reach_their_velocity_and_the_drives_pay_for_it() -> None:
+    model = arm()
+    state, rng = moving(model), np.random.default_rng(2)
+    system = assemble_flesh(model, state, np.zeros(model.nv), DT)
+    prescribed, hold = ~flesh_of(model).dofs, rng.standard_normal(model.nv)
+    driven = prescribe_flesh(system, prescribed, hold)
+    push = 1e-3 * rng.standard_normal(model.nv)
+    found = driven.after(push)
+    np.testing.assert_array_equal(found[prescribed], hold[prescribed])
+    drive = DT * driven.actuator(found, push)
+    dense = np.linalg.solve(system.A.toarray(), system.impulse + push + drive)
+    np.testing.assert_allclose(found, dense, atol=1e-10 * np.abs(dense).max())
+    several = driven.answer(np.stack([push, -2.0 * push], axis=1))
+    np.testing.assert_allclose(several[:, 1], -2.0 * several[:, 0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("build", ["tetrahedra", "trilinear", "quadratic"])
+def test_vertices_and_their_jacobian(build: str) -> None:
+    model = arm() if build == "tetrahedra" else caged(build)
+    flesh, state = flesh_of(model), moving(model)
+    s = scratch(model)
+    s.smooth_forces(state.q, state.v, np.zeros(model.nv))
+    np.testing.assert_allclose(flesh.vertices(state.q), s.data.flexvert_xpos, atol=1e-14)
+    eps = 1e-6
+    ahead, back = (
+        flesh.vertices(model.integrate(state.q, state.v, sign * eps)) for sign in (1.0, -1.0)
+    )
+    velocity = (flesh.jacobian(state.q) @ state.v).reshape(-1, 3)
+    np.testing.assert_allclose(velocity, (ahead - back) / (2.0 * eps), atol=1e-8)
+
+
+def test_mass_of_flesh_is_lumped_and_that_of_held_points_goes_to_the_bones() -> None:
+    model = arm()
+    bones = SolidModel.from_string(ARM)
+    flesh = flesh_of(model)
+    mass = 1000.0 * volumes(flesh.rest, flesh.elements).sum()
+    assert mass == pytest.approx(1000.0 * 0.4 * 0.1 * 0.1)
+    assert model.body_mass.sum() - bones.body_mass.sum() == pytest.approx(mass)
+    centre = scratch(model)
+    centre.place(model.mj.qpos0)
+    moment = model.body_mass @ centre.data.xipos
+    own = scratch(bones)
+    own.place(bones.mj.qpos0)
+    expected = bones.body_mass @ own.data.xipos + mass * np.array([0.2, 0.0, 0.0])
+    np.testing.assert_allclose(moment, expected, atol=1e-12)
+
+
+def test_total_force_of_flesh_and_stillness_at_rest() -> None:
+    """Flesh at rest pushes nothing; bent flesh in free space keeps its momentum."""
+    spec = mujoco.MjSpec()
+    points, elements = bar_mesh((4, 2, 2), (0.4, 0.1, 0.1))
+    tissue = Tissue(3e4, 0.3, 1000.0, 0.01)
+    add_flesh(spec, "free", points, elements, tissue, [""] * len(points))
+    model = SolidModel.with_flesh(spec, gravity=(0.0, 0.0, 0.0))
+    none, nothing = np.zeros(model.nv, bool), np.zeros(model.nv)
+    still = prescribe_flesh(assemble_flesh(model, model.rest(), nothing, DT), none, nothing)
+    assert np.abs(still.velocity).max() < 1e-12
+    rng = np.random.default_rng(3)
+    state = SolidState(0.005 * rng.standard_normal(model.nq), rng.standard_normal(model.nv))
+    mass = np.repeat(model.body_mass[1:], 3)
+    for centred in (False, True):
+        system = assemble_flesh(model, state, nothing, DT, centred)
+        after = prescribe_flesh(system, none, nothing).velocity
+        change = (mass * (after - state.v)).reshape(-1, 3).sum(axis=0)
+        assert np.abs(change).max() < 1e-10
+
+
+def test_surface_is_closed_and_outward() -> None:
+    points, elements = bar_mesh((3, 2, 2), (0.3, 0.1, 0.2))
+    faces = surface_of(elements)
+    assert len(faces) == 2 * 2 * (3 * 2 + 2 * 2 + 3 * 2)
+    corners = points[faces]
+    enclosed = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    assert enclosed == pytest.approx(0.3 * 0.1 * 0.2)
+
+
+def crushed(flesh: Flesh) -> Array:
+    """Positions with one free point pushed through the element below it."""
+    q = np.array(flesh.model.mj.qpos0)
+    loose = int(np.flatnonzero(flesh.dofs)[-1])
+    q[loose] -= 0.2
+    return q
+
+
+def test_inverted_elements_are_found_and_named() -> None:
+    model = arm()
+    flesh = flesh_of(model)
+    assert inversion(flesh, moving(model).q) is None
+    q = crushed(flesh)
+    found = inversion(flesh, q)
+    assert found is not None
+    ratios = flesh.volume_ratios(flesh.vertices(q))
+    np.testing.assert_array_equal(found.elements, np.flatnonzero(ratios <= 0.0))
+    assert found.ratio == ratios.min() < 0.0
+    assert found.sentence(17).startswith(f"frame 17: {len(found.elements)} of {len(ratios)} ")
+    assert "'arm' at (" in found.sentence(17)
+
+
+def test_bad_flesh_is_refused_with_its_place() -> None:
+    points, elements = bar_mesh((1, 1, 1), (0.1, 0.1, 0.1))
+    tissue, spec = Tissue(1e4, 0.3, 1000.0), mujoco.MjSpec()
+    flipped = elements[:, [0, 2, 1, 3]]
+    with pytest.raises(ValueError, match=r"'f': element \d at \(.*\) m has the volume -0.000"):
+        add_flesh(spec, "f", points, flipped, tissue, [""] * 8)
+    with pytest.raises(ValueError, match="no body 'wirst'"):
+        add_flesh(spec, "f", points, elements, tissue, ["wirst"] + [""] * 7)
+    with pytest.raises(ValueError, match="no flesh"):
+        flesh_of(SolidModel.empty())
+    model = arm()
+    with pytest.raises(ValueError, match="Use assemble_flesh"):
+        assemble(model, model.rest(), np.zeros(model.nv), DT)
+
+
+@pytest.mark.parametrize(
+    ("flex", "said"),
+    [
+        ('dim="2"', "dimension 2"),
+        ('dim="3"', "Young's modulus 0 N"),
+    ],
+)
+def test_a_flex_that_is_no_elastic_solid_is_refused(flex: str, said: str) -> None:
+    count = "3 3 1" if "2" in flex else "3 3 3"
+    text = f'''<mujoco><worldbody><flexcomp name="f" type="grid" {flex} count="{count}"
+    spacing=".1 .1 .1" mass="1"><contact selfcollide="none"/></flexcomp></worldbody></mujoco>'''
+    with pytest.raises(ValueError, match=said):
+        SolidModel.with_flesh(mujoco.MjSpec.from_string(text))
+
+
+def test_fleshes_of_different_damping_are_refused() -> None:
+    spec = mujoco.MjSpec()
+    points, elements = bar_mesh((1, 1, 1), (0.1, 0.1, 0.1))
+    for name, damping in (("a", 0.0), ("b", 0.01)):
+        add_flesh(spec, name, points, elements, Tissue(1e4, 0.3, 1000.0, damping), [""] * 8)
+    with pytest.raises(ValueError, match=r"\[0.0, 0.01\] s"):
+        SolidModel.with_flesh(spec)
+
+
+def test_rows_of_limits_are_refused() -> None:
+    text = ARM.replace('name="elbow"', 'name="elbow" range="5 9"')
+    spec = mujoco.MjSpec.from_string(text)
+    points, elements = bar_mesh((2, 1, 1), (0.4, 0.1, 0.1))
+    add_flesh(spec, "f", points, elements, Tissue(1e4, 0.3, 1000.0), ["lower"] + [""] * 11)
+    model = SolidModel.with_flesh(spec)
+    with pytest.raises(ValueError, match="1 constraint row"):
+        assemble_flesh(model, model.rest(), np.zeros(model.nv), DT)
+
+
+@pytest.mark.parametrize("centred", [False, True])
+def test_order_in_time_of_a_swinging_bar(centred: bool) -> None:
+    """Where a clamped bar is after a third of its swing, against a run of shorter steps."""
+    spec = mujoco.MjSpec()
+    points, elements = bar_mesh((6, 1, 1), (0.4, 0.1, 0.1))
+    holders = ["world" if x < 1e-9 else "" for x in points[:, 0]]
+    add_flesh(spec, "bar", points, elements, Tissue(1e5, 0.3, 1000.0), holders)
+    model = SolidModel.with_flesh(spec)
+    none, nothing = np.zeros(model.nv, bool), np.zeros(model.nv)
+
+    def end(steps: int) -> Array:
+        dt = 0.1 / steps
+        state = model.rest()
+        state.v[2::3] = -0.5 * 9.81 * dt  # velocities belong to the middle of the coming step
+        for _ in range(steps):
+            q = model.integrate(state.q, state.v, dt)
+            system = assemble_flesh(model, SolidState(q, state.v), nothing, dt, centred)
+            state = SolidState(q, prescribe_flesh(system, none, nothing).velocity)
+        return state.q
+
+    exact = end(800)
+    errors = [float(np.linalg.norm(end(n) - exact)) for n in (25, 50, 100)]
+    order = np.log2(errors[0] / errors[2]) / 2.0
+    assert order == pytest.approx(2.0 if centred else 1.0, abs=0.2), errors
