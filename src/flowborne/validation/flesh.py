@@ -1,0 +1,240 @@
+"""Flesh without a fluid: D1, D4 and D5."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
+from flowborne.solids.flesh_solve import prescribe_flesh, symmetric_factor
+from flowborne.solids.state import SolidState
+from flowborne.solids.tissue import Tissue
+from flowborne.validation.case import Case, Finding, GridSeries, at_most, near, order_of
+from flowborne.validation.flesh_bars import (
+    Array,
+    Bar,
+    Vector,
+    equilibrium,
+    quadratic_bar,
+    tetrahedral_bar,
+)
+from flowborne.validation.pendulums import passages
+from flowborne.validation.reference import reference, table
+
+Cells = tuple[int, int]
+NOWHERE: Vector = (0.0, 0.0, 0.0)
+ALONG = "cells along the bar"
+
+FLAG = (0.35, 0.02)
+"""Length and thickness of Turek and Hron's bar, m."""
+
+FLAG_CELLS: tuple[Cells, ...] = ((9, 1), (18, 1), (35, 2), (70, 4))
+FLAG_DOWN: Vector = (0.0, -2.0, 0.0)
+
+
+def flag_tissue(young: float) -> Tissue:
+    """Turek and Hron's St. Venant-Kirchhoff material."""
+    return Tissue(young, 0.4, 1000.0)
+
+
+def round_root(y: Array) -> Array:
+    """Where the bar meets the cylinder of radius 0.05 m, from where its axis does, m."""
+    return np.asarray(np.sqrt(0.05**2 - y**2) - 0.05)
+
+
+def sunk(build: Callable[[Cells], Bar], cells: Sequence[Cells]) -> Array:
+    """(grids, 2) displacements (mm) of the ends of bars under their weight."""
+    found = []
+    for grid in cells:
+        bar = build(grid)
+        q = equilibrium(bar, np.zeros(bar.model.nv))
+        found.append(1e3 * bar.end(q)[:2])
+    return np.array(found)
+
+
+def flags(quick: bool) -> list[Finding]:
+    """D1: CSM1 and CSM2 in cells of 27 nodes, and CSM1 in linear tetrahedra.
+
+    The cells' root is straight where the true one follows the cylinder.
+    """
+    findings = []
+    grids = FLAG_CELLS[:2] if quick else FLAG_CELLS
+    for name, young in (("CSM1", 1.4e6), ("CSM2", 5.6e6)):
+        tissue = flag_tissue(young)
+        build = partial(quadratic_bar, size=FLAG, tissue=tissue, gravity=FLAG_DOWN)
+        findings += _of_end(f"{name} A, quadratic cells", name, sunk(build, grids), grids)
+    build = partial(
+        tetrahedral_bar,
+        size=FLAG,
+        tissue=flag_tissue(1.4e6),
+        gravity=FLAG_DOWN,
+        root=round_root,
+    )
+    fine: tuple[Cells, ...] = ((35, 2), (70, 4)) if quick else ((70, 4), (140, 8), (280, 16))
+    return findings + _of_end("CSM1 A, tetrahedra", "CSM1", sunk(build, fine), fine)
+
+
+def _of_end(said: str, name: str, found: Array, grids: Sequence[Cells]) -> list[Finding]:
+    findings = []
+    for axis, (quantity, exact) in enumerate(reference("D1", f"{name} A [1e-3]").items()):
+        values = found[:, axis]
+        series = _series([g[0] for g in grids], values, exact)
+        label = f"{said}, {quantity} in mm"
+        findings.append(near(label, values[-1], exact, relative=0.02, series=series))
+    return findings
+
+
+SLENDER = (1.0, 1.0 / 40.0)
+"""Length and thickness of the beams of D4 and D5, m."""
+
+
+def beam(cells: Cells, stiffness: float, weight: float) -> Bar:
+    """A beam without Poisson's ratio, of bending stiffness EI (N m^2) and weight (N/m)."""
+    area = SLENDER[1] * SLENDER[0] / cells[0]
+    young = 12.0 * stiffness / (area * SLENDER[1] ** 2)
+    return quadratic_bar(cells, SLENDER, Tissue(young, 0.0, 1.0 / area), (0.0, -weight, 0.0))
+
+
+def elastica(quick: bool) -> list[Finding]:
+    """D4: end of a slender beam of EI = 1 and L = 1 under a load at its tip, or all along."""
+    grids: tuple[Cells, ...] = ((10, 1), (20, 1)) if quick else ((10, 1), (20, 1), (40, 1))
+    loads = {
+        "tip load alpha": table("D4", "tip load: [w/L,u/L,tip deg]"),
+        "uniform load beta": table("D4", "uniform load"),
+    }
+    findings = []
+    for said, exact in loads.items():
+        chosen = [k for k in exact if not quick or k in (1.0, 10.0)]
+        found = np.array([_bent(grid, said.startswith("tip"), chosen) for grid in grids])
+        for i, load in enumerate(chosen):
+            for j, quantity in enumerate(("w/L", "u/L", "angle of the tip in degrees")):
+                values, value = found[:, i, j], exact[load][j]
+                series = _series([g[0] for g in grids], values, value)
+                label = f"{said} = {load:g}, {quantity}"
+                findings.append(near(label, values[-1], value, relative=0.01, series=series))
+    return findings
+
+
+def _bent(cells: Cells, at_tip: bool, loads: Sequence[float]) -> Array:
+    """(loads, 3) sinking and drawing back of the end, m, and its angle, degrees."""
+    found, q = [], None
+    for load in loads:
+        bar = beam(cells, 1.0, 0.0 if at_tip else load)
+        push = bar.load((0.0, -load, 0.0)) if at_tip else np.zeros(bar.model.nv)
+        q = equilibrium(bar, push, q)
+        x, y, _ = bar.end(q)
+        found.append((-y, -x, -np.degrees(bar.turned(q))))
+    return np.array(found)
+
+
+AMPLITUDE = 1e-3
+"""Of the vibration in time of D5, m."""
+
+
+def modes(bar: Bar, count: int) -> tuple[Array, Array]:
+    """Lowest frequencies about rest, (count,) Hz, and their shapes (nv, count)."""
+    model, free = bar.model, np.flatnonzero(~bar.fixed)
+    K, _ = static_forces(model, model.mj.qpos0, np.zeros(model.nv))
+    K = csc_array(K[free][:, free])
+    M = csc_array(assemble_flesh(model, model.rest(), np.zeros(model.nv), 1e-9).A[free][:, free])
+    inverse = LinearOperator(K.shape, matvec=symmetric_factor(K).solve, dtype=np.float64)
+    squares, found = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=np.ones(len(free)))
+    shapes = np.zeros((model.nv, count))
+    shapes[free] = found
+    return np.sqrt(squares) / (2.0 * np.pi), shapes
+
+
+def swing(bar: Bar, q: Array, dt: float, steps: int, centred: bool) -> Array:
+    """(steps + 1,) height of the end above rest, m, after the bar is let go at q (nq,)."""
+    model, nothing = bar.model, np.zeros(bar.model.nv)
+    ahead = assemble_flesh(model, SolidState(q, nothing), nothing, dt, centred)
+    first = prescribe_flesh(ahead, bar.fixed, nothing).velocity
+    state = SolidState(q.copy(), 0.5 * first)  # velocities belong to the middle of the coming step
+    heights = [bar.end(q)[1]]
+    for _ in range(steps):
+        q = model.integrate(state.q, state.v, dt)
+        system = assemble_flesh(model, SolidState(q, state.v), nothing, dt, centred)
+        state = SolidState(q, prescribe_flesh(system, bar.fixed, nothing).velocity)
+        heights.append(bar.end(q)[1])
+    return np.array(heights)
+
+
+def vibration(quick: bool) -> list[Finding]:
+    """D5: three modes of a beam, its first mode in time, and CSM3."""
+    findings = []
+    exact = np.array(reference("D5", "beta L")) ** 2 / (2.0 * np.pi)
+    grids: tuple[Cells, ...] = ((5, 1), (10, 1), (20, 1)) if quick else ((10, 1), (20, 1), (40, 1))
+    found = np.array([modes(beam(grid, 1.0, 0.0), 3)[0] for grid in grids])
+    for mode in range(3):
+        series = _series([g[0] for g in grids], found[:, mode], exact[mode])
+        label = f"f{mode + 1} of a beam, Hz"
+        findings.append(near(label, found[-1, mode], exact[mode], relative=0.02, series=series))
+    findings += in_time((20, 40) if quick else (25, 50, 100), 3 if quick else 10)
+    return findings + flag_in_time(quick)
+
+
+def in_time(steps: Sequence[int], periods: int) -> list[Finding]:
+    """Frequency and amplitude of a beam let go in its first mode, `steps` in a period."""
+    bar = beam((10, 1), 1.0, 0.0)
+    (f1,), shape = modes(bar, 1)
+    rest = bar.model.mj.qpos0
+    reach = abs(bar.end(bar.model.integrate(rest, shape[:, 0], 1.0))[1])
+    q = bar.model.integrate(rest, shape[:, 0], AMPLITUDE / reach)
+    runs, lost, lines = [], [], []
+    for n in steps:
+        dt = 1.0 / (f1 * n)
+        heights = swing(bar, q, dt, int((periods + 0.5) * n), centred=True)
+        times = passages(heights, dt)
+        runs.append(float(1.0 / (2.0 * np.diff(times).mean())))
+        lost.append(_lost(heights, n))
+        damped = _lost(swing(bar, q, dt, int(1.5 * n), centred=False), n)
+        lines.append(f"{n} steps in a period: MuJoCo's own step loses {damped:.3f} in the first")
+    series = _series(steps, runs, f1, label="steps in a period")
+    return [
+        order_of("order in time of f1 by the centred step", series, expected=2.0),
+        near("f1 by the centred step over that of the mode", runs[-1] / f1, 1.0, relative=0.02),
+        at_most(
+            f"amplitude that the centred step loses in {periods} periods",
+            lost[-1],
+            0.01,
+            lines=lines,
+        ),
+    ]
+
+
+def _lost(heights: Array, n: int) -> float:
+    """Share of the amplitude lost from the start to the last whole period of n steps."""
+    return 1.0 - float(np.abs(heights[-n:]).max() / np.abs(heights[0]))
+
+
+def flag_in_time(quick: bool) -> list[Finding]:
+    """CSM3: the bar of CSM1 let go at rest, by its small vibrations and by its large ones."""
+    known = reference("D5", "CSM3 cross-check, Hz")
+    small, large = known["f1 of Euler-Bernoulli with E/(1-nu^2)"], known["large amplitude"]
+    grids = FLAG_CELLS[:2] if quick else FLAG_CELLS[:3]
+    bars = [quadratic_bar(g, FLAG, flag_tissue(1.4e6), FLAG_DOWN) for g in grids]
+    values = [float(modes(bar, 1)[0][0]) for bar in bars]
+    series = _series([g[0] for g in grids], values, small)
+    findings = [near("f1 of CSM3's bar, Hz", values[-1], small, relative=0.02, series=series)]
+    steps = (0.02, 0.01) if quick else (0.02, 0.01, 0.005)
+    runs = []
+    for dt in steps:
+        bar = bars[min(1, len(bars) - 1)]
+        heights = swing(bar, bar.model.rest().q, dt, int((3.0 if quick else 10.0) / dt), True)
+        runs.append(float(1.0 / (2.0 * np.diff(passages(heights - heights.mean(), dt)).mean())))
+    series = _series([1.0 / dt for dt in steps], runs, large, label="steps a second")
+    label = "CSM3 at large amplitude, Hz"
+    return [*findings, near(label, runs[-1], large, relative=0.02, series=series)]
+
+
+def _series(
+    cells: Sequence[float], values: Sequence[float] | Array, exact: float, label: str = ALONG
+) -> GridSeries:
+    return GridSeries(label, cells, list(values), [abs(v - exact) for v in values])
+
+
+CASES = (Case("D1", flags), Case("D4", elastica), Case("D5", vibration))
