@@ -173,10 +173,10 @@ def test_surface_is_closed_and_outward() -> None:
 
 
 def crushed(flesh: Flesh) -> Array:
-    """Positions with one free point pushed through the element below it."""
+    """Positions with one free point pushed askew through the elements beside it."""
     q = np.array(flesh.model.mj.qpos0)
-    loose = int(np.flatnonzero(flesh.dofs)[-1])
-    q[loose] -= 0.2
+    loose = np.flatnonzero(flesh.dofs).reshape(-1, 3)
+    q[loose[len(loose) // 2]] += (0.03, -0.2, 0.02)
     return q
 
 
@@ -189,6 +189,7 @@ def test_inverted_elements_are_found_and_named() -> None:
     assert found is not None
     ratios = flesh.volume_ratios(flesh.vertices(q))
     np.testing.assert_array_equal(found.elements, np.flatnonzero(ratios <= 0.0))
+    assert len(found.elements) > 1
     assert found.ratio == ratios.min() < 0.0
     assert found.sentence(17).startswith(f"frame 17: {len(found.elements)} of {len(ratios)} ")
     assert "'arm' at (" in found.sentence(17)

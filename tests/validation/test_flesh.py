@@ -35,6 +35,17 @@ def test_D5_vibrations() -> None:
         assert finding.passed, f"{finding.quantity}: {finding.value}"
 
 
+def test_D5_frequency_of_the_centred_step_is_that_of_average_acceleration() -> None:
+    """tan(omega' dt / 2) = omega dt / 2, Newmark's beta = 1/4."""
+    order, ratio, _ = case.in_time((20, 40), 2)
+    assert order.series is not None
+    exact = float(order.series.values[-1]) / float(ratio.value)
+    for steps, found in zip((20, 40), order.series.values, strict=True):
+        turn = 2.0 * np.pi / steps
+        expected = exact * 2.0 * np.arctan(0.5 * turn) / turn
+        assert found == pytest.approx(expected, rel=3e-4)
+
+
 def test_D5_tetrahedra_and_quadratic_cells_agree_where_nothing_locks() -> None:
     """A short, thick bar without Poisson's ratio."""
     size, tissue = (1.0, 0.5), case.Tissue(1e5, 0.0, 1000.0)

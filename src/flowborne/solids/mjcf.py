@@ -76,9 +76,7 @@ def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]
     _set_options(spec, gravity)
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # dense takes room for (nv, nv) arrays
     try:
-        with warnings.catch_warnings():  # of missing forces, which elasticity does supply
-            warnings.filterwarnings("ignore", "flex .* is not rigid", UserWarning)
-            mj = spec.compile()
+        mj = compiled_quietly(spec)
     except ValueError as error:
         raise ValueError(f"the model with flesh cannot be read: {error}. Mend it there.") from error
     for flex in spec.flexes:
@@ -101,6 +99,13 @@ def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]
     if len(damping) > 1:
         raise ValueError(f"the fleshes have damping times of {damping} s. Give all the same.")
     return mj
+
+
+def compiled_quietly(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """MuJoCo's model, without its warning of flesh without forces: it overlooks elasticity."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "flex .* is not rigid", UserWarning)
+        return spec.compile()
 
 
 def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> None:

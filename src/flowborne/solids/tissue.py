@@ -14,6 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.solids.mjcf import compiled_quietly
+
 Array = NDArray[np.float64]
 Tetrahedra = NDArray[np.int64]
 
@@ -88,7 +90,7 @@ def _frames(
     spec: mujoco.MjSpec, name: str, holders: Sequence[str]
 ) -> dict[str, tuple[Array, Array]]:
     """Position and rotation at rest of the bodies that hold flesh."""
-    mj = spec.copy().compile()
+    mj = compiled_quietly(spec.copy())
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     frames = {}

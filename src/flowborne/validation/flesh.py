@@ -74,7 +74,7 @@ def flags(quick: bool) -> list[Finding]:
         gravity=FLAG_DOWN,
         root=round_root,
     )
-    fine: tuple[Cells, ...] = ((35, 2), (70, 4)) if quick else ((70, 4), (140, 8), (280, 16))
+    fine: tuple[Cells, ...] = ((35, 2), (70, 4)) if quick else ((105, 6), (210, 12), (420, 24))
     return findings + _of_end("CSM1 A, tetrahedra", "CSM1", sunk(build, fine), fine)
 
 
