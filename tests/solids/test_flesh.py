@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flowborne.solids.dynamics import assemble
+from flowborne.solids.dynamics import ACTIVE, assemble
 from flowborne.solids.flesh import Flesh, flesh_of, surface_of
 from flowborne.solids.flesh_dynamics import assemble_flesh
 from flowborne.solids.flesh_solve import prescribe_flesh
@@ -234,14 +236,62 @@ def test_fleshes_of_different_damping_are_refused() -> None:
         SolidModel.with_flesh(spec)
 
 
-def test_rows_of_limits_are_refused() -> None:
-    text = ARM.replace('name="elbow"', 'name="elbow" range="5 9"')
-    spec = mujoco.MjSpec.from_string(text)
-    points, elements = bar_mesh((2, 1, 1), (0.4, 0.1, 0.1))
-    add_flesh(spec, "f", points, elements, Tissue(1e4, 0.3, 1000.0), ["lower"] + [""] * 11)
-    model = SolidModel.with_flesh(spec)
-    with pytest.raises(ValueError, match="1 constraint row"):
-        assemble_flesh(model, model.rest(), np.zeros(model.nv), DT)
+LIMITED = ARM.replace('name="elbow"', 'name="elbow" range="5 9" frictionloss=".01"').replace(
+    "<worldbody>",
+    '<worldbody><geom type="plane" size="1 1 .1" pos="0 0 -.02" contype="1"/>'
+    '<geom type="sphere" size=".03" pos=".38 0 .005" contype="1"/>',
+)
+
+
+def limited() -> SolidModel:
+    """The arm with a joint limit that is exceeded, dry friction, and contacts of its flesh."""
+    spec = mujoco.MjSpec.from_string(LIMITED)
+    points, elements = bar_mesh((8, 2, 2), (0.4, 0.1, 0.1))
+    points[:, 2] += 0.025
+    holders = ["lower" if 0.2 < x < 0.3 else "" for x in points[:, 0]]
+    add_flesh(spec, "arm", points, elements, Tissue(3e4, 0.3, 1000.0, 0.01), holders)
+    spec.flexes[0].conaffinity = 1
+    return SolidModel.with_flesh(spec, gravity=(0.0, 0.5, -2.0))
+
+
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_limits_friction_and_contacts_of_flesh_are_those_of_mujoco(at_rest: bool) -> None:
+    model = limited()
+    state = model.rest() if at_rest else moving(model)
+    none, nothing = np.zeros(model.nv, bool), np.zeros(model.nv)
+    system = assemble_flesh(model, state, nothing, DT)
+    assert (system.zones == ACTIVE).sum() > 1
+    driven = prescribe_flesh(system, none, nothing)
+    s = scratch(model)
+    s.forward(state.q, state.v, nothing)
+    expected = state.v + DT * s.data.qacc
+    np.testing.assert_allclose(driven.velocity, expected, atol=1e-8 * np.abs(expected).max())
+
+
+def test_rows_are_found_from_any_start_by_one_factor() -> None:
+    model = limited()
+    state, nothing = moving(model), np.zeros(model.nv)
+    right = assemble_flesh(model, state, nothing, DT)
+    bones = ~flesh_of(model).dofs
+    for prescribed in (np.zeros(model.nv, bool), bones):
+        driven = prescribe_flesh(
+            replace(right, zones=np.zeros_like(right.zones)), prescribed, nothing
+        )
+        factor = driven.factor
+        for _ in range(30):
+            changed = driven.updated(driven.velocity)
+            if changed is None:
+                break
+            driven = changed
+        else:
+            raise AssertionError("the rows do not settle")
+        assert driven.factor is factor
+        J, D, push = driven.system.pushed()
+        B = right.A.toarray() + J.T @ (D[:, None] * J)
+        drive = DT * driven.actuator(driven.velocity, nothing)
+        dense = np.linalg.solve(B, right.impulse + push + drive)
+        np.testing.assert_allclose(driven.velocity, dense, atol=1e-10 * np.abs(dense).max())
+        assert (drive != 0.0).sum() == prescribed.sum()
 
 
 @pytest.mark.parametrize("centred", [False, True])

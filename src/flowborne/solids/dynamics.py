@@ -93,6 +93,13 @@ class Rows:
         tie = (np.abs(np.abs(slip) - edge) <= margin) & (self.kind != TWO_SIDED)
         return np.where(tie, present, zones)
 
+    def acting(self, zones: Zones) -> tuple[Array, Array, Array]:
+        """J and D of the active rows, and the force (nv,) of all rows at no acceleration."""
+        on = zones == ACTIVE
+        J, D = self.J[on], self.D[on]
+        push = np.where(zones == PUSHED_UP, 1.0, np.where(zones == PUSHED_DOWN, -1.0, 0.0))
+        return J, D, J.T @ (D * self.aref[on]) + self.J.T @ (push * self.friction)
+
 
 @dataclass(frozen=True)
 class SolidSystem:
@@ -209,7 +216,7 @@ def assemble(
     s.set_time_step(dt)
     s.forward(state.q, state.v, applied)
     A, force = _smooth(model, s, state.v)
-    rows, zones = _rows(model, s)
+    rows, zones = rows_of(model, s)
     centred, impulse = None, A @ state.v + dt * force
     if before is not None:
         centred = halfway(model, s, before, state, dt, A, force + s.bias)
@@ -235,13 +242,20 @@ def _smooth(model: SolidModel, s: Scratch, v: Array) -> tuple[Array, Array]:
     return A, force
 
 
-def _rows(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:
+def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:
+    """Constraint rows and their zones in MuJoCo's own solution; after mj_forward."""
     data, count = s.data, int(s.data.nefc)
     if count == 0:
         return None, np.zeros(0, np.int64)
     kind = data.efc_type
+    if mujoco.mj_isSparse(s.mj):
+        J = np.zeros((count, model.nv))
+        row = np.repeat(np.arange(count), data.efc_J_rownnz)
+        J[row, data.efc_J_colind[: len(row)]] = data.efc_J[: len(row)]
+    else:
+        J = np.array(data.efc_J).reshape(count, model.nv)
     rows = Rows(
-        np.array(data.efc_J).reshape(count, model.nv),
+        J,
         np.array(data.efc_D),
         np.array(data.efc_aref),
         np.array(data.efc_frictionloss),
@@ -257,9 +271,6 @@ def _with_rows(
     """A and impulse with the rows in the given zones."""
     if rows is None:
         return A, impulse
-    on = zones == ACTIVE
-    J, D = rows.J[on], rows.D[on]
+    J, D, force = rows.acting(zones)
     added = J.T @ (D[:, None] * J)
-    push = np.where(zones == PUSHED_UP, 1.0, np.where(zones == PUSHED_DOWN, -1.0, 0.0))
-    force = J.T @ (D * rows.aref[on]) + rows.J.T @ (push * rows.friction)
     return A + added, impulse + added @ v + dt * force

@@ -13,12 +13,13 @@ out the stiffness that compression takes away, and A stays positive definite.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, dia_array
 
+from flowborne.solids.dynamics import Rows, Zones, rows_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
@@ -28,40 +29,61 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FleshSystem:
-    """A v+ = impulse, for bones and flesh without contact.
+    """A v+ = impulse, for bones and flesh; constraint rows apart, so that A stays as it is.
 
-    A        (nv, nv) sparse, symmetric positive definite
-    impulse  (nv,) A v + dt b
+    A        (nv, nv) sparse, symmetric positive definite, without the rows
+    impulse  (nv,) A v + dt b, without the rows
     dt       s
     v        (nv,) velocity before the step
+    rows     constraint rows, and zones (k,), the state of each
     """
 
     A: csc_array
     impulse: Array
     dt: float
     v: Array
+    rows: Rows | None
+    zones: Zones
+
+    def pushed(self) -> tuple[Array, Array, Array]:
+        """J (k, nv) and D (k,) of the active rows, and the impulse (nv,) of all rows at rest:
+        (A + J^T D J) v+ = impulse + it."""
+        if self.rows is None:
+            return np.zeros((0, len(self.v))), np.zeros(0), np.zeros(len(self.v))
+        J, D, force = self.rows.acting(self.zones)
+        return J, D, J.T @ (D * (J @ self.v)) + self.dt * force
+
+    def updated(self, v_plus: Array) -> FleshSystem | None:
+        """System with the contacts and limits that `v_plus` (nv,) implies; None when it has them.
+
+        The repeated solve is Newton's method on a piecewise quadratic function; the caller bounds
+        the number of turns.
+        """
+        if self.rows is None:
+            return None
+        zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
+        return None if np.array_equal(zones, self.zones) else replace(self, zones=zones)
 
 
 def assemble_flesh(
     model: SolidModel, state: SolidState, applied: Array, dt: float, centred: bool = False
 ) -> FleshSystem:
-    """System of bones and flesh at `state`, with gravity, springs and dampers.
+    """System of bones and flesh at `state`, with gravity, springs, dampers, limits and contact.
 
         A = M + dt D + dt^2 K      b = f - dt K v                 forces of the end of the step
         A = M + dt/2 D + dt^2/4 K  b = f                          centred
 
     The first is MuJoCo's (integrator "discrete"): first order, an oscillation of frequency omega
     loses omega dt / 2 of its amplitude in each radian. Centred is Newmark's average acceleration
-    for positions that move by dt v before v changes: second order, without loss.
+    for positions that move by dt v before v changes: second order, without loss. Rows are those of
+    the first in both.
 
     applied  (nv,) generalised force, N or N m
     dt       s
-    raises   ValueError when a contact, a joint limit or an equality has rows
     """
     s = scratch(model)
     s.set_time_step(dt)
     s.smooth_forces(state.q, state.v, applied)
-    _refuse_rows(s)
     K, D = _stiffness(s, dt), _damping(s, dt)
     M = sparse_mass(model, s)
     force = s.smooth.copy()
@@ -71,14 +93,16 @@ def assemble_flesh(
         A = M + dt**2 * K + dt * D
         force += s.data.efm_c
     v = state.v.copy()
-    return FleshSystem(csc_array(A), A @ v + dt * force, dt, v)
+    if s.data.nefc:
+        s.forward(state.q, state.v, applied)
+    rows, zones = rows_of(model, s)
+    return FleshSystem(csc_array(A), A @ v + dt * force, dt, v, rows, zones)
 
 
 def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_array, Array]:
-    """Stiffness K (nv, nv) without mass, N/m or N m, and the forces (nv,) at rest at q (nq,)."""
+    """Stiffness K (nv, nv), N/m or N m, and the forces (nv,) at rest at q (nq,), without rows."""
     s = scratch(model)
     s.smooth_forces(q, np.zeros(model.nv), applied)
-    _refuse_rows(s)
     return csc_array(_stiffness(s, s.dt)), s.smooth.copy()
 
 
@@ -135,12 +159,3 @@ def _diagonal(values: Array) -> dia_array:
 
 def _starts(counts: NDArray[np.int32]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-
-
-def _refuse_rows(s: Scratch) -> None:
-    rows = int(s.data.nefc)
-    if rows:
-        raise ValueError(
-            f"bones or flesh meet {rows} constraint row(s) of contacts, joint limits or "
-            "equalities, which the system of flesh does not hold yet. Remove limits and contacts."
-        )
