@@ -75,8 +75,9 @@ def assemble_flesh(
 
     The first is MuJoCo's (integrator "discrete"): first order, an oscillation of frequency omega
     loses omega dt / 2 of its amplitude in each radian. Centred is Newmark's average acceleration
-    for positions that move by dt v before v changes: second order, without loss. Rows are those of
-    the first in both.
+    for positions that move by dt v before v changes: second order, without loss. Large swings need
+    a little damping in the tissue then, or its fast modes grow. Rows are those of the first in
+    both.
 
     applied  (nv,) generalised force, N or N m
     dt       s
