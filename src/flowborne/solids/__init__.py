@@ -1,4 +1,4 @@
-"""The articulated body: model, assembled A and b, prescribed joints, effort, simple wind.
+"""The articulated body and its flesh: model, assembled A and b, prescribed joints, effort, wind.
 
 Knows no fluid. Paper: sections 2 and 3 (eqs. 1-4), rigid clusters of sections 3.3 and 5.
 """

@@ -35,6 +35,7 @@ class Flesh:
     surface     (k, 3) triangles of vertices, outward
     of_element  (m,) number of the flesh in `names`
     dofs        (nv,) dofs that move points of flesh alone; the others are those of bones
+    moved       (2, k) pairs of a point and a dof that moves it
     """
 
     model: SolidModel
@@ -47,6 +48,7 @@ class Flesh:
     surface: Indices
     of_element: Indices
     dofs: NDArray[np.bool_]
+    moved: Indices
 
     def points(self, q: Array) -> Array:
         """(np, 3) places of the points at positions q (nq,), m."""
@@ -63,7 +65,7 @@ class Flesh:
         places = self.points(q)
         s = scratch(self.model)
         twists = dof_twists(self.model, s)
-        point, dof = np.nonzero(self.model.moves[self.body])
+        point, dof = self.moved
         velocity = twists[dof, :3] + np.cross(twists[dof, 3:], places[point])
         row = (3 * point[:, None] + np.arange(3)).ravel()
         shape = (3 * len(places), self.model.nv)
@@ -99,6 +101,7 @@ def flesh_of(model: SolidModel) -> Flesh:
         np.concatenate([surface_of(e) for e in elements]),
         np.repeat(np.arange(mj.nflex), [len(e) for e in elements]),
         _flesh_dofs(model, body),
+        np.stack(np.nonzero(model.moves[body])),
     )
 
 
