@@ -17,7 +17,7 @@ from flowborne.solids.inversion import inversion
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState
-from flowborne.solids.tissue import Tissue, add_flesh, volumes
+from flowborne.solids.tissue import Law, Tissue, add_flesh, volumes
 from flowborne.validation.flesh_bars import bar_mesh
 
 Array = NDArray[np.float64]
@@ -40,13 +40,13 @@ radius=".001" dof="{order}" cellcount="3 1 1"><elasticity young="2e4" poisson=".
 </body></worldbody></mujoco>"""
 
 
-def arm() -> SolidModel:
+def arm(law: Law = Law.SAINT_VENANT_KIRCHHOFF) -> SolidModel:
     """Two bones in one piece of flesh; each holds the points near its middle."""
     spec = mujoco.MjSpec.from_string(ARM)
     points, elements = bar_mesh((8, 2, 2), (0.4, 0.1, 0.1))
     near = [(abs(x - 0.1) < 0.03, abs(x - 0.3) < 0.03) for x in points[:, 0]]
     holders = ["upper" if first else "lower" if last else "" for first, last in near]
-    tissue = Tissue(young=3e4, poisson=0.3, density=1000.0, damping=0.01)
+    tissue = Tissue(young=3e4, poisson=0.3, density=1000.0, damping=0.01, law=law)
     add_flesh(spec, "arm", points, elements, tissue, holders)
     return SolidModel.with_flesh(spec, gravity=(0.0, 0.5, -2.0))
 
@@ -68,10 +68,11 @@ def moving(model: SolidModel, seed: int = 0) -> SolidState:
     return SolidState(s.q.copy(), s.v + kick)
 
 
-@pytest.mark.parametrize("build", ["tetrahedra", "trilinear", "quadratic"])
+@pytest.mark.parametrize("build", ["tetrahedra", "neo-hookean", "trilinear", "quadratic"])
 @pytest.mark.parametrize("at_rest", [True, False])
 def test_sparse_A_and_b_reproduce_the_acceleration(build: str, at_rest: bool) -> None:
-    model = arm() if build == "tetrahedra" else caged(build)
+    laws = {"tetrahedra": Law.SAINT_VENANT_KIRCHHOFF, "neo-hookean": Law.STABLE_NEO_HOOKEAN}
+    model = arm(laws[build]) if build in laws else caged(build)
     state = model.rest() if at_rest else moving(model)
     applied = np.random.default_rng(1).standard_normal(model.nv)
     system = assemble_flesh(model, state, applied, DT)
@@ -195,6 +196,29 @@ def test_inverted_elements_are_found_and_named() -> None:
     assert found.ratio == ratios.min() < 0.0
     assert found.sentence(17).startswith(f"frame 17: {len(found.elements)} of {len(ratios)} ")
     assert "'arm' at (" in found.sentence(17)
+
+
+@pytest.mark.parametrize("law", list(Law))
+def test_only_neo_hookean_flesh_comes_back_from_a_crumpled_shape(law: Law) -> None:
+    points, elements = bar_mesh((3, 2, 2), (0.3, 0.2, 0.2))
+    holders = ["world" if x < 1e-9 else "" for x in points[:, 0]]
+    spec = mujoco.MjSpec()
+    add_flesh(spec, "f", points, elements, Tissue(1e4, 0.3, 1000.0, 0.02, law), holders)
+    model = SolidModel.with_flesh(spec, gravity=(0.0, 0.0, 0.0))
+    flesh, none, nothing = flesh_of(model), np.zeros(model.nv, bool), np.zeros(model.nv)
+    crumple = 0.06 * np.random.default_rng(0).standard_normal(model.nq)
+    state = SolidState(model.mj.qpos0 + crumple, nothing)
+    crumpled = inversion(flesh, state.q)
+    assert crumpled is not None
+    assert len(crumpled.elements) > 20
+    for _ in range(300):
+        q = model.integrate(state.q, state.v, 0.01)
+        system = assemble_flesh(model, SolidState(q, state.v), nothing, 0.01)
+        state = SolidState(q, prescribe_flesh(system, none, nothing).velocity)
+    left = inversion(flesh, state.q)
+    assert (left is None) == (law is Law.STABLE_NEO_HOOKEAN)
+    if left is None:
+        assert np.abs(state.q - model.mj.qpos0).max() < 0.01
 
 
 def test_bad_flesh_is_refused_with_its_place() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 import mujoco
 import numpy as np
@@ -25,9 +26,20 @@ LEAST_INERTIA = 1e-12
 """MuJoCo refuses moving bodies of less than 1e-15 kg m^2, even those that only slide."""
 
 
+class Law(IntEnum):
+    """How stress follows strain, numbered as MuJoCo's `elastic3d`; small strains see no difference.
+
+    SAINT_VENANT_KIRCHHOFF  gives way when crushed, and may stay inside out
+    STABLE_NEO_HOOKEAN      turns right side out again
+    """
+
+    SAINT_VENANT_KIRCHHOFF = 0
+    STABLE_NEO_HOOKEAN = 1
+
+
 @dataclass(frozen=True)
 class Tissue:
-    """A St. Venant-Kirchhoff material.
+    """An elastic material.
 
     young    N/m^2
     poisson  from 0 to below 0.5
@@ -39,6 +51,7 @@ class Tissue:
     poisson: float
     density: float
     damping: float = 0.0
+    law: Law = Law.SAINT_VENANT_KIRCHHOFF
 
 
 def volumes(points: Array, tetrahedra: Tetrahedra) -> Array:
@@ -139,5 +152,6 @@ def _flex(
     flex.dim, flex.vertbody = 3, list(bodies)
     flex.vert, flex.elem = offsets.ravel().tolist(), tetrahedra.ravel().tolist()
     flex.young, flex.poisson, flex.damping = tissue.young, tissue.poisson, tissue.damping
+    flex.elastic3d = int(tissue.law)
     flex.contype = flex.conaffinity = 0
     flex.selfcollide = mujoco.mjtFlexSelf.mjFLEXSELF_NONE
