@@ -40,7 +40,7 @@ class Measures:
       effort                                    |drive force| dt over the controlled dofs, N m s
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
       momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
-      momentum_{exchanged,advection,…}_…_Ns     given to the bodies by the pressure; made by advection
+      momentum_{exchanged,advection,…}_…_Ns     given to the bodies by pressure; made in advection
                                                 or lost; given to the fluid by the sides' pressure
                                                 (boundary), by what flows through them (crossed),
                                                 and by forces and friction (forces)
