@@ -25,6 +25,7 @@ MODULES = {
     "I6": "inviscid",
     "I7": "inviscid",
     "I8": "inviscid",
+    "V2": "settling",
     "V8": "viscous",
     "D1": "flesh",
     "D4": "flesh",

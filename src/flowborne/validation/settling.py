@@ -1,0 +1,137 @@
+"""A sphere that settles in a box of oil: V2, ten Cate's experiments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flowborne.coupling.world import World
+from flowborne.fluid.boundary import Boundaries, BoundaryClosed, BoundaryNoSlip
+from flowborne.fluid.grid import Array, Grid
+from flowborne.solids.wind import WindForce
+from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
+from flowborne.validation.reference import reference
+from flowborne.validation.worlds import advance, mjcf, whole_steps, world_of
+
+DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
+"""m and kg/m^3 of the sphere, m/s^2."""
+
+HALF, HEIGHT, START = 0.05, 0.16, 0.1275
+"""m: half the box's width, its height, and the height from which the sphere's centre falls."""
+
+GRIDS = {True: (3, 4), False: (4, 6, 8, 10)}
+"""Cells in 10 mm, of which the box is a whole number; 1.5 times as many are across the sphere."""
+
+CFL = 1.0
+"""Cells that the sphere falls in a step at most. A step eight times shorter changes the largest
+velocity of E1 by 0.3 %."""
+
+FREE_FALL = 0.9
+"""Part of its way down after which the sphere feels the bottom."""
+
+
+@dataclass(frozen=True)
+class Oil:
+    """One of the experiments.
+
+    density, viscosity  kg/m^3, Pa s
+    """
+
+    name: str
+    density: float
+    viscosity: float
+
+    @property
+    def peak(self) -> float:
+        """Largest velocity measured, m/s."""
+        share = reference("V2", "max measured / u_inf")[self.name]
+        return float(share * reference("V2", "u_inf (unbounded) m/s")[self.name])
+
+    @property
+    def curve(self) -> tuple[Array, Array]:
+        """Times in s and downward velocities in m/s that were measured."""
+        times, velocities = np.array(reference("V2", "experimental t[s],u[m/s]")[self.name]).T
+        return times, -velocities
+
+
+OILS = (Oil("E1", 970.0, 0.373), Oil("E3", 962.0, 0.113))
+
+
+def quarter(oil: Oil, cells: int) -> World:
+    """A quarter of the box, `cells` in 10 mm, between two planes about which the flow is symmetric.
+
+    A quarter of the sphere's weight less its buoyancy pulls at a quarter of its mass. The whole box
+    gives the same velocities to 5e-7 m/s with 4 cells in 10 mm.
+    """
+    h = 0.01 / cells
+    counts = [round(side / h) for side in (HALF, HALF, HEIGHT)]
+    grid = Grid((counts[0], counts[1], counts[2]), h, (0.0, 0.0, 0.0))
+    plane, wall = BoundaryClosed(), BoundaryNoSlip()
+    ball = (
+        f'<body name="ball" pos="0 0 {START}"><joint name="fall" type="slide" axis="0 0 1"/>'
+        f'<geom type="sphere" size="{0.5 * DIAMETER}"/></body>'
+    )
+    volume = 0.25 * np.pi / 6.0 * DIAMETER**3
+    pull = WindForce((0.0, 0.0, -(DENSITY - oil.density) * volume * GRAVITY), ("ball",))
+    return world_of(
+        grid,
+        mjcf(ball),
+        solid_density=0.25 * DENSITY,
+        density=oil.density,
+        viscosity=oil.viscosity,
+        boundaries=Boundaries(plane, wall, plane, wall, wall, wall),
+        winds=(pull,),
+    )
+
+
+def fall(oil: Oil, cells: int, until: float) -> tuple[Array, Array, Array]:
+    """Times in s, downward velocities in m/s and heights of the centre in m of every step."""
+    world = quarter(oil, cells)
+    steps, dt = whole_steps(until, CFL * 0.01 / cells / oil.peak)
+    rows = [(0.0, 0.0, START)]
+    for _ in range(steps):
+        advance(world, dt)
+        rows.append((world.time, -float(world.solid.v[0]), START + float(world.solid.q[0])))
+    times, velocities, heights = np.array(rows).T
+    return times, velocities, heights
+
+
+def settling(quick: bool) -> list[Finding]:
+    """V2: the largest velocity, and the whole curve from release to the bottom."""
+    findings = []
+    for oil in OILS:
+        times, measured = oil.curve
+        until = 0.4 * times[-1] if quick else times[-1]
+        times, measured = times[times <= until], measured[times <= until]
+        falls = [fall(oil, cells, until) for cells in GRIDS[quick]]
+        peaks = [float(velocity.max()) for _, velocity, _ in falls]
+        across = [100.0 * DIAMETER * cells for cells in GRIDS[quick]]
+        errors = [abs(peak / oil.peak - 1.0) for peak in peaks]
+        series = GridSeries("cells across the sphere", across, peaks, errors)
+        title = f"{oil.name}, largest velocity, m/s"
+        findings.append(near(title, peaks[-1], oil.peak, relative=0.03, falling=series))
+        away, shown = apart(falls[-1], times, measured, oil.peak)
+        title = f"{oil.name}, farthest from the measured curve over its largest velocity"
+        findings.append(at_most(title, away, 0.05, lines=shown))
+    return findings
+
+
+def apart(
+    fallen: tuple[Array, Array, Array], times: Array, measured: Array, peak: float
+) -> tuple[float, list[str]]:
+    """Largest distance from a measured curve over `peak`, and where it is, besides that of the time
+    before the sphere feels the bottom."""
+    moments, velocity, height = fallen
+    away = np.abs(np.interp(times, moments, velocity) - measured) / peak
+    bottom = START - FREE_FALL * (START - 0.5 * DIAMETER)
+    high = np.interp(times, moments, height) > bottom
+    lines = [
+        f"{said}: {away[part].max():.3g} at {times[part][away[part].argmax()]:.3g} s, "
+        f"{np.sqrt(np.mean(away[part] ** 2)):.3g} in the mean"
+        for said, part in (("all the way", high | True), ("first nine tenths of the way", high))
+    ]
+    return float(away.max()), lines
+
+
+CASES = (Case("V2", settling),)
