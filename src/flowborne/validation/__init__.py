@@ -19,6 +19,7 @@ MODULES = {
     "B1": "fixed_bodies",
     "B2": "fixed_bodies",
     "B5": "fixed_bodies",
+    "B7": "fixed_sphere",
     "I1": "added_mass",
     "I2": "added_mass",
     "I4": "inviscid",

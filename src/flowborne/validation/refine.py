@@ -10,7 +10,7 @@ from flowborne.fluid.grid import Array
 
 
 def start_from(coarse: World, fine: World) -> None:
-    """Give `fine` the flow of `coarse`, interpolated; both are slabs."""
+    """Give `fine` the flow of `coarse`, interpolated."""
     (fluid, to), (rough, of) = fine.flow(), coarse.flow()
     for axis in fluid.grid.axes:
         for kept, found in ((to.velocity, of.velocity), (to.carrier, of.carrier)):
@@ -23,7 +23,12 @@ def start_from(coarse: World, fine: World) -> None:
 def interpolated(
     values: Array, known: tuple[Array, Array, Array], wanted: tuple[Array, Array, Array]
 ) -> Array:
-    """Values of a slab (nx, ny, 1) between the coordinates where they are known, bilinear."""
-    table = RegularGridInterpolator(known[:2], values[:, :, 0], bounds_error=False, fill_value=None)
-    x, y = np.meshgrid(wanted[0], wanted[1], indexing="ij")
-    return np.asarray(table((x, y)))[:, :, None]
+    """Values (nx, ny, nz) between the coordinates where they are known: trilinear, in a slab
+    bilinear."""
+    axes = 2 if values.shape[2] == 1 else 3
+    table = RegularGridInterpolator(
+        known[:axes], values if axes == 3 else values[:, :, 0], bounds_error=False, fill_value=None
+    )
+    places = np.meshgrid(*wanted[:axes], indexing="ij")
+    found = np.asarray(table(tuple(places)))
+    return found if axes == 3 else found[:, :, None]
