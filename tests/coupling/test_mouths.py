@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from flowborne.coupling.mouths import Mouth
+from flowborne.coupling.mouths import Mouth, jet_power
 from flowborne.coupling.operators import face_mass, fluid_momentum
 from flowborne.coupling.step import cut_by_bodies, jets_at, step
 from flowborne.coupling.world import World
@@ -128,6 +128,18 @@ def test_body_fluid_and_what_fills_the_body_keep_their_momentum(
         whole = gained + momentum_of(world) - was
         np.testing.assert_allclose(whole, filled + outside, atol=1e-10 * scale)
         assert budget.exchange_error < 1e-10
+
+
+@pytest.mark.parametrize("rate", [RATE, -RATE])
+def test_a_jet_brings_the_energy_of_what_it_expels(rate: float) -> None:
+    """rho Q |v_b + w|^2 / 2, which the bound of advection's energy counts as come in, or gone."""
+    world = mouthed(slab(32), rate=rate, free=True)
+    world.solid.v[:] = [0.3, -0.2, 0.0, 0.0, 0.0, 0.5]
+    at = np.array([0.3, -0.2 + 0.5 * RADIUS, 0.0])
+    flow = at + np.array([rate / (2.0 * HALF), 0.0, 0.0])
+    power = 0.5 * RATE * float(flow @ flow)
+    given = jet_power(jets_at(world, cut_by_bodies(world), 0.0), 1.0)
+    assert given == pytest.approx((power, 0.0) if rate > 0.0 else (0.0, power), rel=1e-12)
 
 
 def test_a_jet_that_starts_pushes_as_the_bodys_own_potential_flow_says() -> None:

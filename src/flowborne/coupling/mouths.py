@@ -7,7 +7,7 @@ relative to the body, along its direction d. With the body's velocity v_b at the
     rho Q dt (v_b + w)             momentum that comes into the fluid in a step
     -rho Q dt w                    impulse on the body, at the middle of the mouth
 
-What both have too much, rho Q v_b, is the momentum of the fluid that a body of constant mass is
+What body and fluid gain together, rho Q dt v_b, is the momentum of what a body of constant mass is
 filled with. All of it holds for a mouth that takes fluid in (Q < 0) as well.
 """
 
