@@ -129,7 +129,7 @@ def clip_motion(
         joints=chosen,
         start=table.start,
         stop=table.stop,
-        loop=table.loop,
+        loop=table.file is None if table.loop is None else table.loop,
         blend=table.blend,
         smooth=table.smooth,
         initial=start,

@@ -35,7 +35,8 @@ class ClipTable(Table):
     up           axis of the file that points up
     skip         frames dropped at the start, which often hold a T-pose
     start, stop  s, the part that is used, counted after the skipped frames
-    loop         whether it starts again when it ends, from where it has come to
+    loop         whether it starts again when it ends, from where it has come to; unless given the
+                 generated walk does and a file does not
     blend        s over which it leaves the starting pose, comes to rest at the end, or passes from
                  one round of a loop to the next
     smooth       Hz below which motion is kept; all of it unless given
@@ -50,7 +51,7 @@ class ClipTable(Table):
     skip: WholeNumber = 0
     start: NotNegative = 0.0
     stop: Positive | None = None
-    loop: bool = False
+    loop: bool | None = None
     blend: NotNegative = 0.0
     smooth: Positive | None = None
     mapping: dict[str, Text] = Field(default_factory=dict)
