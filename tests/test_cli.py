@@ -8,7 +8,10 @@ from types import ModuleType
 import pytest
 
 from flowborne import cli
+from flowborne.io.bvh import write_clip
 from flowborne.progress import ProgressDisplay, RunProgress
+from flowborne.scenes.human.gait import gait_clip
+from flowborne.scenes.human.standard import standard_skeleton
 
 
 @pytest.fixture
@@ -175,6 +178,19 @@ def test_scenes_are_listed_with_their_figures(command):
     rows = out.splitlines()
     assert rows[0].startswith("block-effort-wind")
     assert "Fig. 4" in rows[0]
+
+
+def test_a_clip_goes_in_by_one_option_and_comes_out(command, tmp_path):
+    write_clip(tmp_path / "walk.bvh", gait_clip(standard_skeleton()))
+    code, _, err = command(
+        *("run", "human-gravity-back", "--set", "clip.file=walk.bvh", "--frames", 5),
+        *("--out", "run", "--no-film"),
+    )
+    assert code == 0, err
+    assert {"walk.bvh", "human.xml", "scene.toml"} < {p.name for p in (tmp_path / "run").iterdir()}
+    code, out, _ = command("export", "run", "--out", "out.bvh")
+    assert (code, out) == (0, "written: out.bvh\n")
+    assert (tmp_path / "out.bvh").read_text().count("JOINT") == 22
 
 
 def test_an_interrupted_command_says_how_to_go_on(command, small_scene, monkeypatch, tmp_path):
