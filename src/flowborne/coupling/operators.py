@@ -8,6 +8,8 @@ the twist Jacobian of the kinematics.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numba import njit
 
@@ -177,23 +179,11 @@ def energy_carried_in(
 ) -> tuple[float, float]:
     """Kinetic energy per time that the flow carries in and out through the sides, W."""
     inward, outward = 0.0, 0.0
-    for axis in grid.axes:
-        for end, side in enumerate(boundaries.pair(axis)):
-            if side.kind not in ("open", "inflow"):
-                continue
-            layer, sign = (-1, -1.0) if end else (0, 1.0)
-            normal: Array = np.asarray(velocity[axis].take(layer, axis))
-            square: Array = normal * normal
-            for other in grid.axes:
-                if other != axis:
-                    tangential = np.asarray(velocity[other].take(layer, axis) ** 2)
-                    along = np.moveaxis(tangential, other - 1 if other > axis else other, 0)
-                    mean = 0.5 * (along[:-1] + along[1:])
-                    square = square + np.moveaxis(mean, 0, other - 1 if other > axis else other)
-            flux = sign * density * grid.face_area * normal * opened[axis].take(layer, axis)
-            power = 0.5 * flux * square
-            inward += float(power[power > 0.0].sum())
-            outward -= float(power[power < 0.0].sum())
+    for flux, beside in through_sides(velocity, opened, grid, boundaries, density):
+        square = sum(0.5 * (low * low + high * high) for low, high in beside.values())
+        power = 0.5 * flux * square
+        inward += float(power[power > 0.0].sum())
+        outward -= float(power[power < 0.0].sum())
     return inward, outward
 
 
@@ -202,19 +192,34 @@ def carried_in(
 ) -> Array:
     """(3,) momentum per time that the flow itself carries in through the sides, N."""
     inward = np.zeros(3)
+    for flux, beside in through_sides(velocity, opened, grid, boundaries, density):
+        for axis, (low, high) in beside.items():
+            inward[axis] += float((flux * (0.5 * (low + high))).sum())
+    return inward
+
+
+def through_sides(
+    velocity: Faces, opened: Faces, grid: Grid, boundaries: Boundaries, density: float
+) -> Iterator[tuple[Array, dict[int, tuple[Array, Array]]]]:
+    """What flows through each open or inflow side.
+
+    yields  mass per time that comes in through every face of the side, kg/s, and for each axis the
+            velocity along it at both edges of the face, m/s (across the side the face's own, twice)
+    """
     for axis in grid.axes:
         for end, side in enumerate(boundaries.pair(axis)):
             if side.kind not in ("open", "inflow"):
                 continue
             layer, sign = (-1, -1.0) if end else (0, 1.0)
-            normal = velocity[axis].take(layer, axis) * opened[axis].take(layer, axis)
-            flux = sign * density * grid.face_area * normal
-            inward[axis] += float((flux * velocity[axis].take(layer, axis)).sum())
+            normal: Array = np.asarray(velocity[axis].take(layer, axis))
+            flux = sign * density * grid.face_area * (normal * opened[axis].take(layer, axis))
+            beside = {axis: (normal, normal)}
             for other in grid.axes:
-                if other == axis:
-                    continue
-                tangential = velocity[other].take(layer, axis)
-                along = other - 1 if other > axis else other
-                mean = 0.5 * (np.delete(tangential, -1, along) + np.delete(tangential, 0, along))
-                inward[other] += float((flux * mean).sum())
-    return inward
+                if other != axis:
+                    tangential = velocity[other].take(layer, axis)
+                    along = other - 1 if other > axis else other
+                    beside[other] = (
+                        np.delete(tangential, -1, along),
+                        np.delete(tangential, 0, along),
+                    )
+            yield flux, beside
