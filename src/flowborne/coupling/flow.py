@@ -101,7 +101,9 @@ def carry_fluid(
             arrived[axis], field[axis], everywhere[axis], *carrier, OFFSETS[axis], counts, periodic
         )
     if second_order:
-        plain = faces_of([a.copy() for a in arrived])
+        # eddies of a slab grow, where those of a room break up and would feed on the scheme
+        bounded = not grid.is_slab
+        plain = faces_of([a.copy() for a in arrived]) if bounded else arrived
         impose_sides(arrived, grid, sides, time + dt)
         there = pad_faces(arrived, grid, sides, time + dt)
         for axis in grid.axes:
@@ -115,7 +117,7 @@ def carry_fluid(
                 counts,
                 periodic,
             )
-        if not grid.is_slab:  # eddies of a slab grow, where those of a room break up
+        if bounded:
             came, went = energy_carried_in(halfway, before.open, grid, sides, fluid.density)
             blown, taken = jet_power(jets, fluid.density)
             came, went = came + blown, went + taken
