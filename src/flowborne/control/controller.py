@@ -150,10 +150,8 @@ class Controller:
         if "target" in world.memory:
             left, frame_time = world.memory["schedule"]
             remaining = max(frame_end_time + left * frame_time - world.time, dt)
-            gap, v = (
-                model.difference(state.q, world.memory["target"])[self.dofs],
-                state.v[self.dofs],
-            )
+            gap = model.difference(state.q, world.memory["target"])[self.dofs]
+            v = state.v[self.dofs]
             move, hold = self.servo.velocity(gap, v, float(remaining), dt)
             # a drive that may give way moves with the velocity it has: it steers the step after
             later = float(max(remaining - dt, dt))

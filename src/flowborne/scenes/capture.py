@@ -53,9 +53,7 @@ def capture_of(scene: Scene) -> Capture | None:
         return None
     if table.file is None:
         assert scene.human is not None
-        skeleton = standard_skeleton(scene.human.height)
-        clip = gait_clip(skeleton)
-        return Capture(clip, {joint: joint for joint in clip.names}, skeleton)
+        return _walk(scene.human.height)
     path = scene.folder / table.file
     clip = _read(path, _stamp(path), table.unit, table.up, table.skip)
     if scene.human is None:
@@ -63,6 +61,14 @@ def capture_of(scene: Scene) -> Capture | None:
     mapping = mapping_of(clip, table.mapping)
     check_scale(leg_length(clip, mapping), table.unit)
     return Capture(clip, mapping, skeleton_of(clip, mapping))
+
+
+@lru_cache(maxsize=4)
+def _walk(height: float) -> Capture:
+    """The generated walk of a standard skeleton; made once, though many ask for it."""
+    skeleton = standard_skeleton(height)
+    clip = gait_clip(skeleton)
+    return Capture(clip, {joint: joint for joint in clip.names}, skeleton)
 
 
 def _named(clip: Clip, table: Mapping[str, str]) -> Mapping[str, str]:
