@@ -163,6 +163,8 @@ def _scalar_joints(model: SolidModel) -> list[tuple[str, int, int]]:
     """(column, place in q, dof) of every hinge and slide joint."""
     mj, joints = model.mj, []
     for joint, name in enumerate(model.joint_names):
+        if model.flesh is not None and model.flesh.dofs[mj.jnt_dofadr[joint]]:
+            continue
         column = {HINGE: f"angle_{name}_rad", SLIDE: f"position_{name}_m"}.get(mj.jnt_type[joint])
         if column:
             joints.append((column, int(mj.jnt_qposadr[joint]), int(mj.jnt_dofadr[joint])))

@@ -14,7 +14,7 @@ from flowborne.coupling.operators import (
     add_flux,
     face_mass,
     leak_proof,
-    pressure_wrench,
+    pressure_push,
 )
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -53,7 +53,7 @@ def net_outflow(velocity: Faces, cut: Geometry, twist: Array, grid: Grid) -> Arr
     net = np.empty(grid.shape)
     outflow(net, *velocity, *cut.open)
     net *= grid.face_area
-    add_flux(net, cut.cells, cut.columns, cut.values, twist)
+    add_flux(net, cut, twist.ravel())
     return net
 
 
@@ -69,9 +69,9 @@ def test_flux_and_wrench_are_transposes(cut: Cut, name: str) -> None:
     for _ in range(5):
         pressure, twist = random.normal(size=grid.shape), random.normal(size=(3, 6))
         flux = np.zeros(grid.shape)
-        add_flux(flux, found.cells, found.columns, found.values, twist)
+        add_flux(flux, found, twist.ravel())
         work = float((pressure * flux).sum())
-        wrench = pressure_wrench(found, pressure, 3)
+        wrench = pressure_push(found, pressure, 18).reshape(3, 6)
         assert float((wrench * twist).sum()) == pytest.approx(work, rel=1e-12)
         assert not wrench[0].any()
 
@@ -91,7 +91,7 @@ def test_uniform_pressure_pushes_a_whole_body_nowhere(
     a, b, c = turn if name == "cube" else (0.0, 0.0, turn[2])
     quaternion = np.array([1.0, a, b, c]) / np.sqrt(1.0 + a * a + b * b + c * c)
     found = cut(grid, LONE, q=np.array([x, y, z, *quaternion]))
-    wrench = pressure_wrench(found, np.ones(grid.shape), 2)
+    wrench = pressure_push(found, np.ones(grid.shape), 12)
     assert np.abs(wrench).max() < 1e-12 * np.abs(found.values).sum()
 
 
@@ -99,7 +99,7 @@ def test_uniform_pressure_pushes_a_whole_body_nowhere(
 def test_uniform_pressure_pushes_parts_of_a_body_against_each_other(cut: Cut, name: str) -> None:
     grid = GRIDS[name]
     found = cut(grid, CREATURE, q=np.array([0.03, -0.02, 0.0, 1.0, 0.0, 0.0, 0.3, 0.4]))
-    wrench = pressure_wrench(found, np.ones(grid.shape), 3)
+    wrench = pressure_push(found, np.ones(grid.shape), 18).reshape(3, 6)
     assert np.abs(wrench[1]).max() > 1e-3
     np.testing.assert_allclose(wrench[1], -wrench[2], atol=1e-12 * np.abs(found.values).sum())
 
@@ -112,7 +112,7 @@ def test_a_rigid_motion_of_body_and_fluid_is_seen_as_one(cut: Cut, name: str) ->
     twist = plane(grid, np.array([0.3, -0.7, 0.4, 0.9, -0.5, 1.7]))
     found = cut(grid, CREATURE, q=np.array([0.03, -0.02, 0.0, 1.0, 0.0, 0.0, 0.3, 0.4]))
     field = rigid(grid, twist)
-    carried = leak_proof(field, found, np.stack([twist] * 3), grid)
+    carried = leak_proof(field, found, np.tile(twist, 3), grid)
     for axis in grid.axes:
         np.testing.assert_allclose(carried[axis], field[axis], atol=1e-13)
     clear = np.zeros(grid.shape, bool)
@@ -126,7 +126,7 @@ def test_nothing_passes_a_face_that_is_closed(cut: Cut) -> None:
     found = cut(SLAB, LONE, q=np.array([0.01, 0.02, 0.0, 1.0, 0.0, 0.0, 0.3]))
     fast = tuple(np.full(SLAB.face_shape(axis), 1e6) for axis in range(3))
     twist = np.array([np.zeros(6), [0.3, -0.7, 0.0, 0.0, 0.0, 1.7]])
-    carried = leak_proof(fast, found, twist, SLAB)
+    carried = leak_proof(fast, found, twist.ravel(), SLAB)
     for axis in SLAB.axes:
         closed = found.open[axis] == 0.0
         assert closed.sum() > 20
@@ -139,7 +139,7 @@ def test_growth_of_a_cell_is_what_moves_out_of_it(cut: Cut) -> None:
     found = cut(SLAB, '<body><freejoint/><geom type="sphere" size="0.31"/></body>')
     flux = np.zeros(SLAB.shape)
     twist = np.array([np.zeros(6), [2.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
-    add_flux(flux, found.cells, found.columns, found.values, twist)
+    add_flux(flux, found, twist.ravel())
     x = SLAB.cell_coordinates()[0]
     # outward of the closed part is positive: the cells ahead of the disc are displaced
     assert flux[x < 0.0].sum() == pytest.approx(2.0 * 0.62, rel=0.01)

@@ -310,7 +310,7 @@ def test_rows_are_found_from_any_start_by_one_factor() -> None:
         else:
             raise AssertionError("the rows do not settle")
         assert driven.factor is factor
-        J, D, push = driven.system.pushed()
+        J, D, push = driven.system.acting()
         B = right.A.toarray() + J.T @ (D[:, None] * J)
         drive = DT * driven.actuator(driven.velocity, nothing)
         dense = np.linalg.solve(B, right.impulse + push + drive)

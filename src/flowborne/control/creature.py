@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flowborne.solids.clusters import outboard_dofs, rigidify
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.following import follow
 from flowborne.solids.state import SolidState
 
 if TYPE_CHECKING:
@@ -70,8 +71,8 @@ def give_velocity(world: World, dofs: Integers, velocity: Array, kept: Integers)
 
 
 def moved(model: SolidModel, q: Array, displacement: Array) -> Array:
-    """(nq,) the pose reached from `q` by `displacement` (nv,)."""
-    return model.integrate(q, displacement, 1.0)
+    """(nq,) the pose reached from `q` by `displacement` (nv,) of bones; flesh goes along."""
+    return model.integrate(q, follow(model, q, displacement), 1.0)
 
 
 def within_range(model: SolidModel, q: Array, displacement: Array) -> Array:

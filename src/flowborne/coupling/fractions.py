@@ -9,6 +9,7 @@ from numba import njit
 
 from flowborne.coupling.closed import add_closed, list_closed, share_closed
 from flowborne.coupling.distance import BAND, merge, node_box, sample_body
+from flowborne.coupling.flesh import Skins, face_centres, flesh_rows, skin_at, skins_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
@@ -19,6 +20,9 @@ from flowborne.fluid.grid import Array, Faces, Grid
 class Geometry:
     """The bodies on the grid at one instant.
 
+    Fleshes are numbered on after the bodies. What moves the bodies and the skins, the "motion", is
+    the twist of every body and then the velocity of every vertex of flesh.
+
     distance   (nx+1, ny+1, nz+1) to the nearest body at the nodes, m, at most BAND cells
     nearest    (nx+1, ny+1, nz+1) that body
     open       open fraction of each face
@@ -26,10 +30,16 @@ class Geometry:
     face       (n,) its flat index among the faces across that axis,
     body       (n,) the body,
     closed     (n,) the fraction that this body closes
-    cells      (m,) flat index of cells beside closed parts, one row per cell and body
+    corner     (nf, 3) vertices that move the last nf of them, closed by flesh,
+    weight     (nf, 3) and how much each does
+    cells      (m,) flat index of cells beside closed parts, one row per cell and body; of flesh,
+               one per cell and face
+    owner      (m,) the body
+    area       (m, 3) area vector of the row's closed parts, m^2: force of unit pressure
     row_start  (m+1,) where the row's entries begin
-    columns    (6m,) 6 body + component
-    values     (6m,) wrench about the origin that unit pressure in the cell exerts on the body, m^2
+    columns    entries of the motion: 6 body + component, then 3 vertex + component
+    values     what unit pressure in the cell exerts on each: wrench about the origin, force; m^2
+    skins      the skins at the nodes
     """
 
     distance: Array
@@ -39,10 +49,15 @@ class Geometry:
     face: Integers
     body: Integers
     closed: Array
+    corner: Integers
+    weight: Array
     cells: Integers
+    owner: Integers
+    area: Array
     row_start: Integers
     columns: Integers
     values: Array
+    skins: Skins
 
 
 @njit(nogil=True, cache=True)
@@ -151,6 +166,10 @@ def cut(
     area: float,
     shape: Integers,
     walls: Integers,
+    first_skin: int,
+    skin_box: Integers,
+    skin_start: Integers,
+    skin_distance: Array,
 ) -> tuple[
     Array,
     Integers,
@@ -172,38 +191,46 @@ def cut(
     nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
     ox, oy, oz = np.ones((nx + 1, ny, nz)), np.ones((nx, ny + 1, nz)), np.ones((nx, ny, nz + 1))
     tx, ty, tz = np.zeros(ox.shape), np.zeros(oy.shape), np.zeros(oz.shape)
-    bodies = np.unique(body_of)
+    rigid = np.unique(body_of)
+    bodies = np.append(rigid, first_skin + np.arange(len(skin_start)))
     boxes = np.empty((bodies.size, 3, 2), np.int64)
     phis = []
     shares_x = []
     shares_y = []
     shares_z = []
     for n in range(bodies.size):
-        geoms = np.nonzero(body_of == bodies[n])[0]
-        box = node_box(geoms, position, rotation, reach, origin, h, shape)
-        if flat:
-            box[2, 0], box[2, 1] = 0, 2
-        if np.any(box[:, 1] - box[:, 0] < 2):
-            box[:, :] = 0
+        if n < rigid.size:
+            geoms = np.nonzero(body_of == bodies[n])[0]
+            box = node_box(geoms, position, rotation, reach, origin, h, shape)
+            if flat:
+                box[2, 0], box[2, 1] = 0, 2
+            if np.any(box[:, 1] - box[:, 0] < 2):
+                box[:, :] = 0
+        else:
+            box = skin_box[n - rigid.size]
         boxes[n] = box
         d = box[:, 1] - box[:, 0]
         phi = np.empty((d[0], d[1], d[2]))
-        sample_body(
-            phi,
-            box,
-            geoms,
-            kind,
-            size,
-            position,
-            rotation,
-            tables,
-            table,
-            corner,
-            pitch,
-            origin,
-            h,
-            flat,
-        )
+        if n < rigid.size:
+            sample_body(
+                phi,
+                box,
+                geoms,
+                kind,
+                size,
+                position,
+                rotation,
+                tables,
+                table,
+                corner,
+                pitch,
+                origin,
+                h,
+                flat,
+            )
+        else:
+            start = skin_start[n - rigid.size]
+            phi.reshape(-1)[:] = skin_distance[start : start + phi.size]
         merge(distance, nearest, phi, box, bodies[n])
         phis.append(phi)
         add_closed(tx, phi, box, 0)
@@ -223,7 +250,7 @@ def cut(
         parts += share_closed(shares_y[n], oy, ty, distance, nearest, phis[n], box, 1, walls[1])
         if not flat:
             parts += share_closed(shares_z[n], oz, tz, distance, nearest, phis[n], box, 2, walls[2])
-    for n in range(bodies.size):
+    for n in range(rigid.size):
         rows = list_cells(
             shares_x[n],
             shares_y[n],
@@ -262,7 +289,7 @@ def cut(
             at = list_closed(
                 shares_z[n], boxes[n], 2, b, np.array(oz.shape), at, axis, face, body, closed
             )
-        if rows:
+        if rows and n < rigid.size:
             row = list_cells(
                 shares_x[n],
                 shares_y[n],
@@ -287,10 +314,19 @@ def cut(
 
 
 def geometry(
-    shapes: Shapes, position: Array, rotation: Array, grid: Grid, boundaries: Boundaries
+    shapes: Shapes,
+    position: Array,
+    rotation: Array,
+    skins: Skins,
+    first_skin: int,
+    grid: Grid,
+    boundaries: Boundaries,
 ) -> Geometry:
-    """Cut the grid by bodies whose geometries stand at `position` (ng, 3) and `rotation`
-    (ng, 3, 3), in the order of `shapes`."""
+    """Cut the grid by bodies and flesh.
+
+    position, rotation  (ng, 3), (ng, 3, 3) where the geometries stand, in the order of `shapes`
+    skins, first_skin   of the fleshes, and the number of bodies
+    """
     solid = ("closed", "no-slip", "inflow")
     walls = np.array(
         [[int(side.kind in solid) for side in boundaries.pair(axis)] for axis in range(3)]
@@ -311,21 +347,54 @@ def geometry(
         grid.face_area,
         np.array(grid.shape),
         walls,
+        first_skin,
+        skins.box,
+        skins.start,
+        skins.distance,
     )
     distance, nearest, ox, oy, oz, axis, face, body, closed, cells, columns, values = found
+    opened = (ox, oy, oz)
     row_start = 6 * np.arange(cells.size + 1, dtype=np.int64)
+    owner, area = columns[::6] // 6, values.reshape(-1, 6)[:, :3]
+    first = int(np.searchsorted(body, first_skin)) if len(skins.start) else axis.size
+    corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
+    if first < axis.size:
+        place, at = face_centres(axis[first:], face[first:], grid)
+        corner, weight = skin_at(skins, place, grid)
+        part, *more = flesh_rows(
+            axis[first:],
+            at,
+            closed[first:],
+            corner,
+            weight,
+            6 * first_skin,
+            grid.face_area,
+            *opened,
+        )
+        more_cells, more_start, more_columns, more_values = more
+        across = (more_columns[::3] - 6 * first_skin) % 3
+        more_area = more_values.reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
+        cells, owner = np.append(cells, more_cells), np.append(owner, body[first:][part])
+        area = np.concatenate([area, more_area])
+        row_start = np.append(row_start, row_start[-1] + more_start[1:])
+        columns, values = np.append(columns, more_columns), np.append(values, more_values)
     return Geometry(
         distance,
         nearest,
-        (ox, oy, oz),
+        opened,
         axis,
         face,
         body,
         closed,
+        corner,
+        weight,
         cells,
+        owner,
+        area,
         row_start,
         columns,
         values,
+        skins,
     )
 
 
@@ -344,8 +413,13 @@ def uncut(grid: Grid) -> Geometry:
         none,
         none,
         np.zeros(0),
+        np.zeros((0, 3), np.int64),
+        np.zeros((0, 3)),
         none,
+        none,
+        np.zeros((0, 3)),
         np.zeros(1, np.int64),
         none,
         np.zeros(0),
+        skins_on(grid, None, np.zeros((0, 3))),
     )

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from flowborne.coupling.fractions import Geometry
@@ -42,7 +43,7 @@ class Mouth:
     """A patch of a body's skin.
 
     name         for messages
-    body         the body
+    body         the body; the skin may be that of flesh around it, and moves with the body here
     position     centre of the patch in the body's frame, m
     direction    (3,) unit vector out of the body, in its frame
     radius       m
@@ -69,6 +70,7 @@ class Mouth:
 class Jet:
     """What a mouth does at one instant.
 
+    bodies    number of bodies, from which on fleshes are numbered
     rate      Q, m^3/s
     centre    (3,) m
     along     (3,) d
@@ -83,6 +85,7 @@ class Jet:
     """
 
     mouth: Mouth
+    bodies: int
     rate: float
     centre: Array
     along: Array
@@ -112,9 +115,10 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     centre = pose.body_position[mouth.body] + turn @ np.array(mouth.position)
     along = turn @ np.array(mouth.direction)
     rate = mouth.volume_rate * mouth.strength.at(time)
-    rows = np.flatnonzero(cut.columns[::6] == 6 * mouth.body)
+    bodies = len(pose.body_position)
+    rows = np.flatnonzero(skin_of(mouth, cut.owner, bodies))
     at = np.stack(np.unravel_index(cut.cells[rows], grid.shape), axis=1)
-    skin = -cut.values.reshape(-1, 6)[rows, :3] @ along
+    skin = -cut.area[rows] @ along
     skin *= covered(places(at, 0.5, grid), mouth, centre, along, grid) * (skin > 0.0)
     here = skin > 0.0
     if not here.any():
@@ -122,12 +126,13 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
             f"{mouth.name} covers no cell at {centre.round(6).tolist()} m, {time:g} s. Put its "
             "position on the body's skin, inside the domain, with the direction out of the body"
         )
-    own = np.flatnonzero(cut.body == mouth.body)
+    own = np.flatnonzero(skin_of(mouth, cut.body, bodies))
     share = share_of(closed_places(own, cut, grid), mouth, centre, along, cut, grid)
     face = own[share > 0.0]
     twist = pose.twist_jacobian[mouth.body] @ v
     return Jet(
         mouth,
+        bodies,
         rate,
         centre,
         along,
@@ -140,6 +145,12 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
         share[share > 0.0],
         cut.closed[face],
     )
+
+
+def skin_of(mouth: Mouth, owner: Integers, bodies: int) -> NDArray[np.bool_]:
+    """(n,) whether parts of skin belong to the mouth's body, or to flesh, which may be all around
+    it; fleshes are numbered from `bodies` on."""
+    return np.asarray((owner == mouth.body) | (owner >= bodies))
 
 
 def places(at: Integers, offset: Array | float, grid: Grid) -> Array:
@@ -205,7 +216,7 @@ def skin_slip(
     """
     slip = np.zeros(len(body))
     for jet in jets:
-        own = np.flatnonzero(body == jet.mouth.body)
+        own = np.flatnonzero(skin_of(jet.mouth, body, jet.bodies))
         share = share_of(point[own], jet.mouth, jet.centre, jet.along, cut, grid)
         slip[own] += share * (across[own] @ jet.velocity)
     return slip

@@ -1,9 +1,10 @@
 """Between bodies and grid: the leak-proof field, fluxes, wrenches, momenta.
 
 A body's twist holds the velocity (3) of its point at the world origin and its angular velocity (3).
-J v of the paper, the flux that moving bodies push into a cell, is  values @ twist  over the rows of
-`Geometry`; J^T p is the transpose and a wrench. Twists and generalised velocities are related by
-the twist Jacobian of the kinematics.
+The motion of everything (k,) holds all twists, then the velocity (3) of every vertex of flesh.
+J v of the paper, the flux that moving bodies push into a cell, is  values @ motion  over the rows
+of `Geometry`; J^T p is the transpose, a push (k,): wrenches, then forces on vertices. Motion and
+generalised velocities are related by the Jacobians of the kinematics, T.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ from collections.abc import Iterator
 
 import numpy as np
 from numba import njit
+from scipy.sparse import csr_array, vstack
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.response import Response, dense_response, factored_response
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.prescribed import Driven, PrescribedSystem
 
 
 def twists(kinematics: Kinematics, v: Array) -> Array:
@@ -25,19 +29,48 @@ def twists(kinematics: Kinematics, v: Array) -> Array:
     return kinematics.twist_jacobian @ v
 
 
-def generalised(kinematics: Kinematics, wrenches: Array) -> Array:
-    """(nv,) generalised force of wrenches (nbody, 6)."""
-    return np.einsum("bwv,bw->v", kinematics.twist_jacobian, wrenches)
+def jacobian(kinematics: Kinematics) -> csr_array:
+    """(k, nv) T, from v to the motion of everything."""
+    both = [csr_array(twist_rows(kinematics)), kinematics.vertex_jacobian]
+    return csr_array(vstack(both, format="csr"))
 
 
-def response(kinematics: Kinematics, inverse: Array) -> Array:
-    """(6 nb, 6 nb) twists that unit wrench impulses give: M = T A^-1 T^T, eq. (9) eliminated.
-
-    inverse  (nv, nv) A^-1 with prescribed dofs projected out
-    """
+def twist_rows(kinematics: Kinematics) -> Array:
+    """(6 nbody, nv) from v to all twists."""
     bodies, components, dofs = kinematics.twist_jacobian.shape
-    jacobian = kinematics.twist_jacobian.reshape(bodies * components, dofs)
-    return np.ascontiguousarray(jacobian @ inverse @ jacobian.T)
+    return kinematics.twist_jacobian.reshape(bodies * components, dofs)
+
+
+def motion(kinematics: Kinematics, v: Array) -> Array:
+    """(k,) twist of every body, then velocity of every vertex of flesh."""
+    return np.append(twists(kinematics, v), kinematics.vertex_jacobian @ v)
+
+
+def generalised(kinematics: Kinematics, push: Array) -> Array:
+    """(nv,) generalised force of a push (k,): wrench on every body, then force on every vertex."""
+    bodies = kinematics.twist_jacobian.shape[0]
+    on_bones = np.einsum("bwv,bw->v", kinematics.twist_jacobian, push[: 6 * bodies].reshape(-1, 6))
+    return np.asarray(on_bones + kinematics.vertex_jacobian.T @ push[6 * bodies :])
+
+
+def on_bodies(kinematics: Kinematics, carried: Array, push: Array) -> Array:
+    """(nbody, 6) wrench of a push (k,) on every body with the flesh that it carries.
+
+    carried  (n, nbody) share of each body in a vertex, see `Flesh`
+    """
+    bodies = kinematics.twist_jacobian.shape[0]
+    force, place = push[6 * bodies :].reshape(-1, 3), kinematics.vertices
+    wrench = np.concatenate([force, np.cross(place, force)], axis=1)
+    return push[: 6 * bodies].reshape(-1, 6) + carried.T @ wrench
+
+
+def response(kinematics: Kinematics, driven: Driven) -> Response:
+    """The motion that a unit impulsive push gives: M = T A^-1 T^T, eq. (9) eliminated."""
+    twist = twist_rows(kinematics)
+    if isinstance(driven, PrescribedSystem):
+        return dense_response(twist @ driven.inverse @ twist.T)
+    free = csr_array(jacobian(kinematics)[:, driven.free])
+    return factored_response(free, *driven.factors(), free @ driven.soft(twist))
 
 
 @njit(nogil=True, cache=True)
@@ -48,18 +81,32 @@ def add_body_velocity(
     faces: Integers,
     bodies: Integers,
     closed: Array,
+    corner: Integers,
+    weight: Array,
     twist: Array,
+    flesh: Array,
     origin: Array,
     h: float,
     flat: bool,
 ) -> None:
-    """Add closed fraction x body velocity on the faces across `axis`, at their centres."""
+    """Add closed fraction x body velocity on the faces across `axis`, at their centres.
+
+    corner, weight  (nf, 3) vertices that move the last nf parts
+    twist, flesh    (nbody, 6) of the bodies, (n, 3) velocity of the vertices
+    """
     n1, n2 = out.shape[1], out.shape[2]
     flat_out = out.reshape(-1)
+    rigid = axes.size - len(corner)
     for n in range(axes.size):
         if axes[n] != axis:
             continue
         f = faces[n]
+        if n >= rigid:
+            velocity = 0.0
+            for c in range(3):
+                velocity += weight[n - rigid, c] * flesh[corner[n - rigid, c], axis]
+            flat_out[f] += closed[n] * velocity
+            continue
         i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
         x = origin[0] + h * (i + (0.0 if axis == 0 else 0.5))
         y = origin[1] + h * (j + (0.0 if axis == 1 else 0.5))
@@ -74,11 +121,12 @@ def add_body_velocity(
         flat_out[f] += closed[n] * velocity
 
 
-def leak_proof(velocity: Faces, geometry: Geometry, twist: Array, grid: Grid) -> Faces:
+def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:
     """Field that crosses no body: open part fluid, closed part body (section 6, item 2).
 
-    twist  (nbody, 6)
+    moving  (k,) see `motion`
     """
+    first = moving.size - geometry.skins.vertices.size
     carried = [opened * u for opened, u in zip(geometry.open, velocity, strict=True)]
     origin = np.array(grid.origin)
     for axis in grid.axes:
@@ -89,7 +137,10 @@ def leak_proof(velocity: Faces, geometry: Geometry, twist: Array, grid: Grid) ->
             geometry.face,
             geometry.body,
             geometry.closed,
-            twist,
+            geometry.corner,
+            geometry.weight,
+            moving[:first].reshape(-1, 6),
+            moving[first:].reshape(-1, 3),
             origin,
             grid.spacing,
             grid.is_slab,
@@ -98,35 +149,54 @@ def leak_proof(velocity: Faces, geometry: Geometry, twist: Array, grid: Grid) ->
 
 
 @njit(nogil=True, cache=True)
-def add_flux(out: Array, cells: Integers, columns: Integers, values: Array, twist: Array) -> None:
-    """Add the volume rate that the bodies' motion takes from each cell, J v, m^3/s."""
-    flat_out, flat_twist = out.reshape(-1), twist.reshape(-1)
+def add_rows(
+    out: Array,
+    cells: Integers,
+    row_start: Integers,
+    columns: Integers,
+    values: Array,
+    moving: Array,
+) -> None:
+    """Add rows x motion to the cells of a field."""
+    flat_out = out.reshape(-1)
     for n in range(cells.size):
         flux = 0.0
-        for m in range(6 * n, 6 * n + 6):
-            flux += values[m] * flat_twist[columns[m]]
+        for m in range(row_start[n], row_start[n + 1]):
+            flux += values[m] * moving[columns[m]]
         flat_out[cells[n]] += flux
 
 
+def add_flux(out: Array, geometry: Geometry, moving: Array) -> None:
+    """Add the volume rate that the bodies' motion (k,) takes from each cell, J v, m^3/s."""
+    g = geometry
+    add_rows(out, g.cells, g.row_start, g.columns, g.values, moving)
+
+
 @njit(nogil=True, cache=True)
-def push_bodies(
-    cells: Integers, columns: Integers, values: Array, pressure: Array, nbody: int
+def sum_rows(
+    cells: Integers,
+    row_start: Integers,
+    columns: Integers,
+    values: Array,
+    pressure: Array,
+    size: int,
 ) -> Array:
-    """(nbody, 6) wrench of a pressure field, J^T p, N and N m (impulses for p^ = p dt)."""
-    wrench = np.zeros(6 * nbody)
+    """(size,) transposed rows x field."""
+    push = np.zeros(size)
     flat = pressure.reshape(-1)
     for n in range(cells.size):
         p = flat[cells[n]]
-        for m in range(6 * n, 6 * n + 6):
-            wrench[columns[m]] += values[m] * p
-    return wrench.reshape(nbody, 6)
+        for m in range(row_start[n], row_start[n + 1]):
+            push[columns[m]] += values[m] * p
+    return push
 
 
-def pressure_wrench(geometry: Geometry, pressure: Array, nbody: int) -> Array:
-    """(nbody, 6) wrench about the world origin of a pressure field (nx, ny, nz)."""
-    return push_bodies(
-        geometry.cells, geometry.columns, geometry.values, np.ascontiguousarray(pressure), nbody
-    )
+def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
+    """(size,) J^T p of a pressure field (nx, ny, nz): wrenches about the world origin on bodies and
+    forces on vertices of flesh, N and N m (impulses for p^ = p dt)."""
+    g = geometry
+    field = np.ascontiguousarray(pressure)
+    return sum_rows(g.cells, g.row_start, g.columns, g.values, field, size)
 
 
 def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:

@@ -202,7 +202,7 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
     thinnest = WATERTIGHT[grid.is_slab] * grid.spacing
     order = np.argsort(model.geom_body, kind="stable")
     kinds = {"sphere": 0, "capsule": 1, "cylinder": 2, "box": 3, "ellipsoid": 4, "mesh": 5}
-    chosen = [int(g) for g in order if model.geom_type[g] in kinds]
+    chosen = [int(g) for g in order if model.geom_type[g] in kinds and not model.geom_covered[g]]
     count = len(chosen)
     kind = np.zeros(count, np.int64)
     size, reach = np.ones((count, 3)), np.ones((count, 3))

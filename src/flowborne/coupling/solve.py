@@ -21,29 +21,29 @@ import numpy as np
 
 from flowborne.coupling.flow import source_rate
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.mouths import Jet, add_rates, skin_slip
+from flowborne.coupling.friction import diffuse
+from flowborne.coupling.mouths import Jet, add_rates
 from flowborne.coupling.operators import (
     add_flux,
     generalised,
-    pressure_wrench,
+    motion,
+    pressure_push,
     response,
-    twists,
 )
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.grid import Array, Faces
-from flowborne.fluid.pressure import Coupling, PressureSystem
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.pressure import NO_REACTION, Coupling, PressureSystem
 from flowborne.fluid.projection import face_weights, outflow, push
-from flowborne.fluid.viscosity import assemble_viscosity
-from flowborne.fluid.viscous_solve import ViscousSystem, walls_of
+from flowborne.fluid.response import Response
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.prescribed import PrescribedSystem, within_limits
+from flowborne.solids.prescribed import Driven, within_limits
 
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
 
-VISCOUS_TOLERANCE = 1e-12
-"""Relative residual of the viscous solve."""
+PROBES = 4
+"""Fields of random signs by which the yielding of flesh is estimated."""
 
 ROUNDING = 1e-15
 """Relative size of velocities that count as rounding errors in the divergence."""
@@ -55,7 +55,8 @@ class Projected:
 
     velocity    Faces u+, m/s
     pressure    (nx, ny, nz) p, Pa
-    impulse     (nbody, 6) J^T p^ about the world origin, N s and N m s
+    impulse     (k,) J^T p^: wrenches about the world origin, then forces on vertices of flesh, N s
+                and N m s
     iterations  of the solve, all turns of a step together in the end
     residual    true relative residual
     divergence  largest |net outflow of a cell| / volume, 1/s
@@ -76,13 +77,13 @@ class Solved:
 
     driven            the bodies' system in its last form
     v, actuator       (nv,) velocity and forces of the drives
-    viscous_impulse   (nbody, 6) about the world origin
+    viscous_impulse   (k,) as in `Projected`
     before_pressure   Faces, m/s; None without a fluid
     projected         None without a fluid
     converged         solve within its tolerance, contacts and limits settled
     """
 
-    driven: PrescribedSystem
+    driven: Driven
     v: Array
     actuator: Array
     viscous_impulse: Array
@@ -91,17 +92,15 @@ class Solved:
     converged: bool
 
 
-def correct(
-    driven: PrescribedSystem, v: Array, actuator: Array, limit: Array
-) -> PrescribedSystem | None:
+def correct(driven: Driven, v: Array, actuator: Array, limit: Array) -> Driven | None:
     """The bodies' system with the contacts and drives that the solution implies; None if it has
     them."""
     later = driven.updated(v)
     return within_limits(later or driven, limit, v, actuator) or later
 
 
-def solve_bodies(driven: PrescribedSystem, torque_limit: Array, nbody: int) -> Solved:
-    """Bodies without a fluid."""
+def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
+    """Bodies without a fluid; k is `size`."""
     none = np.zeros(driven.velocity.size)
     for _ in range(PASSES):
         actuator = driven.actuator(driven.velocity, none)
@@ -109,15 +108,13 @@ def solve_bodies(driven: PrescribedSystem, torque_limit: Array, nbody: int) -> S
         if changed is None:
             break
         driven = changed
-    return Solved(
-        driven, driven.velocity, actuator, np.zeros((nbody, 6)), None, None, changed is None
-    )
+    return Solved(driven, driven.velocity, actuator, np.zeros(size), None, None, changed is None)
 
 
 def solve_together(
     world: World,
     velocity: Faces,
-    driven: PrescribedSystem,
+    driven: Driven,
     pose: Kinematics,
     cut: Geometry,
     jets: tuple[Jet, ...],
@@ -134,17 +131,18 @@ def solve_together(
     """
     fluid, state = world.flow()
     weights = face_weights(cut.open, fluid.grid, fluid.boundaries, fluid.density)
-    matrix = PressureSystem(weights, fluid.boundaries.periodic())
+    mobility = response(pose, driven)
+    yielding = give_way(cut, mobility, fluid.grid)
+    matrix = PressureSystem(weights, fluid.boundaries.periodic(), reaction=yielding)
     pressure = dt * state.pressure
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    mobility = response(pose, driven.inverse)
     watch.lap("projection")
-    smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, driven, mobility, dt)
+    smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, driven, dt)
     watch.lap("viscosity")
     iterations = 0
     for _ in range(PASSES):
-        start = twists(pose, driven.after(generalised(pose, viscous)))
+        start = motion(pose, driven.after(generalised(pose, viscous)))
         projected = project(world, matrix, smooth, cut, rate, start, mobility, pressure, dt)
         watch.lap("projection")
         iterations += projected.iterations
@@ -154,11 +152,9 @@ def solve_together(
         changed = correct(driven, v, actuator, torque_limit)
         if changed is None:
             break
-        if not np.array_equal(changed.inverse, driven.inverse):
-            mobility = response(pose, changed.inverse)
-            smooth, viscous, smoothed = diffuse(
-                world, velocity, cut, jets, pose, changed, mobility, dt
-            )
+        if not changed.answers_as(driven):
+            mobility = response(pose, changed)
+            smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, changed, dt)
             watch.lap("viscosity")
         driven, pressure = changed, dt * projected.pressure
     settled = smoothed and projected.converged and changed is None
@@ -166,59 +162,30 @@ def solve_together(
     return Solved(driven, v, actuator, viscous, smooth, projected, settled)
 
 
-def diffuse(
-    world: World,
-    velocity: Faces,
-    cut: Geometry,
-    jets: tuple[Jet, ...],
-    pose: Kinematics,
-    driven: PrescribedSystem,
-    mobility: Array,
-    dt: float,
-) -> tuple[Faces, Array, bool]:
-    """Implicit viscosity with the pressure of the last step, and its impulse on the bodies.
+def give_way(cut: Geometry, mobility: Response, grid: Grid) -> Array:
+    """(nx, ny, nz) volume that flesh makes room for in each cell under unit pressure there.
 
-    The pressure is there so that the boundary layer is that of the flow at the end of the step;
-    it is taken off again before the new pressure is solved for.
-
-    returns  Faces; (nbody, 6) impulse about the world origin; whether the solve converged
+    The diagonal of J A^-1 J^T, estimated from what it does to cells of random signs (Bekas,
+    Kokiopoulou and Saad 2007).
     """
-    fluid, state = world.flow()
-    nbody = pose.twist_jacobian.shape[0]
-    if fluid.viscosity == 0.0:
-        return velocity, np.zeros((nbody, 6)), True
-    grid, sides = fluid.grid, fluid.boundaries
-    pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
-    scale = dt / (fluid.density * grid.spacing)
-    push(pushed, cut.open, state.pressure, grid, sides, scale)
-    earlier = pressure_wrench(cut, dt * state.pressure, nbody)
-    twist = twists(pose, driven.after(generalised(pose, earlier)))
-    parts = assemble_viscosity(
-        cut.distance,
-        cut.open,
-        velocity,
-        grid,
-        sides,
-        fluid.density,
-        fluid.viscosity,
-        dt,
-        world.time + dt,
-    )
-    walls = walls_of(parts, cut.distance, cut.nearest, grid)
-    system = ViscousSystem(parts, walls, mobility, grid, sides, dt)
-    slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
-    smooth, impulse, converged = system.solve(pushed, twist.ravel(), VISCOUS_TOLERANCE, slip)
-    push(smooth, cut.open, state.pressure, grid, sides, -scale)
-    return smooth, impulse.reshape(nbody, 6), converged
+    if mobility.is_dense:
+        return NO_REACTION
+    room, random = np.zeros(grid.shape), np.random.default_rng(0)
+    for _ in range(PROBES):
+        signs = random.choice([-1.0, 1.0], size=grid.shape)
+        moved = np.zeros(grid.shape)
+        add_flux(moved, cut, mobility.times(pressure_push(cut, signs, mobility.size)))
+        room += signs * moved / PROBES
+    return np.maximum(room, 0.0)
 
 
-def excess(velocity: Faces, cut: Geometry, twist: Array, rate: Array, fluid: Fluid) -> Array:
+def excess(velocity: Faces, cut: Geometry, moving: Array, rate: Array, fluid: Fluid) -> Array:
     """(nx, ny, nz) net outflow of each cell, D u + J v - sources, m^3/s."""
     area = fluid.grid.face_area
     net = np.empty(fluid.grid.shape)
     outflow(net, *velocity, *cut.open)
     net *= area
-    add_flux(net, cut.cells, cut.columns, cut.values, twist)
+    add_flux(net, cut, moving)
     net -= rate
     return net
 
@@ -229,8 +196,8 @@ def project(
     velocity: Faces,
     cut: Geometry,
     rate: Array,
-    twist: Array,
-    mobility: Array,
+    moving: Array,
+    mobility: Response,
     pressure: Array,
     dt: float,
 ) -> Projected:
@@ -238,13 +205,13 @@ def project(
 
     matrix    K for this cut
     rate      (nx, ny, nz) volume that sources and mouths bring into each cell, m^3/s
-    twist     (nbody, 6) of the bodies before the pressure acts
-    mobility  (6 nb, 6 nb) twists that unit wrench impulses give
+    moving    (k,) motion of the bodies before the pressure acts
+    mobility  motion that a unit impulse gives
     pressure  (nx, ny, nz) first guess of p^, Pa s
     """
     fluid, _ = world.flow()
     grid = fluid.grid
-    need = -excess(velocity, cut, twist, rate, fluid)
+    need = -excess(velocity, cut, moving, rate, fluid)
     fastest = max(float(np.abs(u).max()) for u in velocity)
     floor = ROUNDING * grid.face_area * fastest * np.sqrt(need.size)
     coupling = Coupling(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
@@ -252,8 +219,8 @@ def project(
     after = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
     scale = 1.0 / (fluid.density * grid.spacing)
     push(after, cut.open, solution.pressure, grid, fluid.boundaries, scale)
-    impulse = pressure_wrench(cut, solution.pressure, twist.shape[0])
-    moved = twist + (mobility @ impulse.ravel()).reshape(twist.shape)
+    impulse = pressure_push(cut, solution.pressure, moving.size)
+    moved = moving + mobility.times(impulse)
     left = excess(after, cut, moved, rate, fluid)
     return Projected(
         after,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flowborne.coupling.flesh import hydrostatic_push, skins_on
 from flowborne.coupling.flow import Carried, carry_fluid, drift_velocity, forced, settle_state
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.motion import Drive
@@ -14,8 +15,9 @@ from flowborne.coupling.operators import (
     fluid_momentum,
     generalised,
     leak_proof,
+    motion,
+    on_bodies,
     side_push,
-    twists,
 )
 from flowborne.coupling.report import Momentum, Outcome, StepReport
 from flowborne.coupling.solve import Solved, solve_bodies, solve_together
@@ -24,8 +26,12 @@ from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
+from flowborne.solids.flesh_dynamics import assemble_flesh
+from flowborne.solids.flesh_solve import prescribe_flesh
+from flowborne.solids.following import follow
+from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum
-from flowborne.solids.prescribed import PrescribedSystem, prescribe
+from flowborne.solids.prescribed import Driven, prescribe
 from flowborne.solids.state import SolidState
 
 
@@ -46,13 +52,14 @@ def step_bodies(world: World, dt: float, orders: Drive, watch: Stopwatch) -> Ste
     """A step without a fluid: simple winds, gravity, joints and contact."""
     before, pose = move_bodies(world, orders, dt)
     wind = winds_on(world, pose)
-    driven = equations(world, before, pose, wind, orders, dt)
-    solved = solve_bodies(driven, orders.torque_limit, len(pose.body_position))
+    push = np.append(wind, np.zeros(pose.vertices.size))
+    driven = equations(world, before, pose, push, orders, dt)
+    solved = solve_bodies(driven, orders.torque_limit, push.size)
     world.solid.v[:] = solved.v
     advance_clock(world, dt)
     watch.lap("solids")
     none = np.zeros_like(wind)
-    return report(world, solved, none, wind, none, Momentum(), dt, watch)
+    return report(world, pose, solved, np.zeros_like(push), wind, none, Momentum(), dt, watch)
 
 
 def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
@@ -76,11 +83,11 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     watch.lap("advection")
     # 5. forces on the bodies, and their own equations of motion
     wind = winds_on(world, pose)
-    buoyancy = buoyancy_wrench(
-        pose.centroid, world.setup.solid.volume, world.setup.solid.gravity, fluid.density
-    )
+    buoyancy = buoyant_push(world.setup.solid, pose, fluid.density)
     reaction = jet_wrench(blown, fluid.density, len(wind))
-    driven = equations(world, before, pose, wind + buoyancy + reaction, orders, dt)
+    push = buoyancy.copy()
+    push[: wind.size] += (wind + reaction).ravel()
+    driven = equations(world, before, pose, push, orders, dt)
     watch.lap("solids")
     # 6. viscosity, pressure, bodies, joints and contact in one solve
     jets = jets_at(world, cut, world.time + dt, pose)
@@ -91,8 +98,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     # 7. the new state: it holds the promises of section 6 on the next step's leak-proof field
     assert solved.projected is not None
     world.solid.v[:] = solved.v
-    twist = twists(pose, solved.v)
-    leak_free = leak_proof(solved.projected.velocity, cut, twist, fluid.grid)
+    leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
     add_closed_slip(leak_free, jets, fluid.grid)
     settle_state(world, cut, solved.projected.velocity, carried.velocity, leak_free, dt)
     state.pressure[:] = solved.projected.pressure
@@ -100,7 +106,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     advance_clock(world, dt)
     balance = momentum_balance(world, cut, carried, solved)
     watch.lap("advection")
-    done = report(world, solved, buoyancy, wind, reaction, balance, dt, watch)
+    done = report(world, pose, solved, buoyancy, wind, reaction, balance, dt, watch)
     done.expelled = dt * sum(jet.rate for jet in blown)
     return done
 
@@ -112,12 +118,12 @@ def command(world: World, dt: float, drive: Drive | None) -> Drive:
     if drive is not None:
         at = np.flatnonzero(drive.prescribed)
         orders.set(at, drive.move[at], drive.hold[at], drive.torque_limit[at])
-    for motion in world.setup.motions:
+    for told in world.setup.motions:
         later = world.time + dt
         goal = world.solid.q.copy()
-        goal[model.places_of(motion.dofs)] = motion.position(later)
-        move = model.difference(world.solid.q, goal)[motion.dofs] / dt
-        orders.set(motion.dofs, move, motion.velocity(later))
+        goal[model.places_of(told.dofs)] = told.position(later)
+        move = model.difference(world.solid.q, goal)[told.dofs] / dt
+        orders.set(told.dofs, move, told.velocity(later))
     orders.set(np.flatnonzero(model.locked), 0.0, 0.0)
     return orders
 
@@ -126,7 +132,8 @@ def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
     """The grid cut by the bodies where they are."""
     setup = world.setup
     assert setup.fluid is not None
-    if setup.shapes.body.size == 0:
+    seen = None if setup.fluid.one_way else setup.solid.flesh
+    if setup.shapes.body.size == 0 and seen is None:
         return uncut(setup.fluid.grid)
     if pose is None:
         pose = kinematics(setup.solid, world.solid.q)
@@ -134,6 +141,8 @@ def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
         setup.shapes,
         pose.geom_position[setup.shapes.source],
         pose.geom_rotation[setup.shapes.source],
+        skins_on(setup.fluid.grid, seen, pose.vertices),
+        setup.solid.nbody,
         setup.fluid.grid,
         setup.fluid.boundaries,
     )
@@ -157,11 +166,14 @@ def jets_at(
 def move_bodies(world: World, orders: Drive, dt: float) -> tuple[SolidState, Kinematics]:
     """Move the bodies to the end of the step, in place; gives the state before and the new pose.
 
-    A drive with a torque limit may give way, so its dof moves with the velocity it has.
+    A drive with a torque limit may give way, so its dof moves with the velocity it has. Where a
+    drive moves bones otherwise than they went, the flesh that they carry moves with them.
     """
     before = world.solid.copy()
     told = orders.prescribed & ~np.isfinite(orders.torque_limit)
-    velocity = np.where(told, orders.move, before.v)
+    otherwise = np.where(told, orders.move - before.v, 0.0)
+    velocity = before.v + follow(world.setup.solid, before.q, otherwise)
+    velocity[told] = orders.move[told]
     world.solid.q[:] = world.setup.solid.integrate(before.q, velocity, dt)
     return before, kinematics(world.setup.solid, world.solid.q)
 
@@ -170,14 +182,27 @@ def equations(
     world: World,
     before: SolidState,
     pose: Kinematics,
-    wrench: Array,
+    push: Array,
     orders: Drive,
     dt: float,
-) -> PrescribedSystem:
-    """The bodies' own equations of motion under a wrench on each, with the drives in force."""
-    force = generalised(pose, wrench)
-    system = assemble(world.setup.solid, world.solid, force, dt, before)
-    return prescribe(system, orders.prescribed, orders.hold)
+) -> Driven:
+    """The bodies' own equations of motion under a push (k,), with the drives in force."""
+    setup = world.setup
+    force = generalised(pose, push)
+    if setup.solid.flesh is None:
+        system = assemble(setup.solid, world.solid, force, dt, before)
+        return prescribe(system, orders.prescribed, orders.hold)
+    flesh = assemble_flesh(setup.solid, world.solid, force, dt, setup.centred_flesh, before)
+    return prescribe_flesh(flesh, orders.prescribed, orders.hold)
+
+
+def buoyant_push(model: SolidModel, pose: Kinematics, density: float) -> Array:
+    """(k,) Archimedes' force on every body, and that on the vertices of flesh, N and N m."""
+    wrench = buoyancy_wrench(pose.centroid, model.volume, model.gravity, density)
+    if model.flesh is None:
+        return wrench.ravel()
+    surface = model.flesh.surface
+    return np.append(wrench, hydrostatic_push(pose.vertices, surface, model.gravity, density))
 
 
 def advance_clock(world: World, dt: float) -> None:
@@ -200,8 +225,12 @@ def momentum_balance(world: World, cut: Geometry, carried: Carried, solved: Solv
         for axis in grid.axes
     )
     sides = dt * side_push(projected.pressure, grid, boundaries)
-    exchanged = projected.impulse[:, :3].sum(axis=0)
-    scale = float(np.abs(projected.impulse[:, :3]).sum()) + moved
+    first = 6 * world.setup.solid.nbody
+    forces = np.concatenate(
+        [projected.impulse[:first].reshape(-1, 6)[:, :3], projected.impulse[first:].reshape(-1, 3)]
+    )
+    exchanged = forces.sum(axis=0)
+    scale = float(np.abs(forces).sum()) + moved
     missing = float(np.abs(exchanged + after - pressed - sides).max())
     forces = pressed - fluid_momentum(carried.velocity, mass, grid)
     advection = np.where(boundaries.periodic(), 0.0, carried.lost)
@@ -222,6 +251,7 @@ def momentum_balance(world: World, cut: Geometry, carried: Carried, solved: Solv
 
 def report(
     world: World,
+    pose: Kinematics,
     solved: Solved,
     buoyancy: Array,
     wind: Array,
@@ -231,7 +261,8 @@ def report(
     watch: Stopwatch,
 ) -> StepReport:
     """What the step did."""
-    projected = solved.projected
+    projected, flesh = solved.projected, world.setup.solid.flesh
+    carried = np.zeros((0, len(wind))) if flesh is None else flesh.carried
     balance.solid = halfway_momentum(world.setup.solid, world.solid, dt)[0]
     finite = bool(np.isfinite(solved.v).all())
     if projected is not None:
@@ -242,8 +273,8 @@ def report(
         outcome=outcome if finite else Outcome.NOT_FINITE,
         actuator=solved.actuator,
         pressure_wrench=np.zeros_like(wind),
-        viscous_wrench=solved.viscous_impulse / dt,
-        buoyancy_wrench=buoyancy,
+        viscous_wrench=on_bodies(pose, carried, solved.viscous_impulse / dt),
+        buoyancy_wrench=on_bodies(pose, carried, buoyancy),
         wind_wrench=wind,
         jet_wrench=reaction,
         momentum=balance,
@@ -252,7 +283,7 @@ def report(
         seconds=watch.seconds,
     )
     if projected is not None:
-        done.pressure_wrench = projected.impulse / dt
+        done.pressure_wrench = on_bodies(pose, carried, projected.impulse / dt)
         done.iterations, done.residual = projected.iterations, projected.residual
         done.divergence = projected.divergence
     return done

@@ -55,6 +55,7 @@ class Setup:
     motions  prescribed motions of some dofs
     winds    simple winds (paper eq. 2, or a uniform force)
     mouths   patches of skin through which fluid is expelled; a fluid that feels the bodies is there
+    centred_flesh  whether flesh vibrates without loss (see `assemble_flesh`)
     """
 
     solid: SolidModel
@@ -62,6 +63,7 @@ class Setup:
     motions: tuple[Motion, ...] = ()
     winds: tuple[Wind, ...] = ()
     mouths: tuple[Mouth, ...] = ()
+    centred_flesh: bool = False
 
     @cached_property
     def shapes(self) -> Shapes:

@@ -19,10 +19,10 @@ Marks = NDArray[np.uint8]
 Places = NDArray[np.int32]
 Labels = NDArray[np.int32]
 
-Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Marks, Places, Places]
-"""Table of levels; which axes are periodic; packed over the levels: weights across each axis,
-inverse of the diagonal, interpolation coefficients (see `levels.leaning`), marks, guests and their
-hosts (see `aggregates`)."""
+Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Real, Marks, Places, Places]
+"""Table of levels; which axes are periodic; packed over the levels: weights across each axis, what
+is added to the diagonal, the inverse of that, interpolation coefficients (see `levels.leaning`),
+marks, guests and their hosts (see `aggregates`)."""
 
 Rows = tuple[Integers, Integers, Integers, NDArray[np.float64]]
 """Rows of G^T: padded flat cell of each, where each begins, columns and values of the entries."""

@@ -18,6 +18,7 @@ from flowborne.fluid.grid import Array
 from flowborne.fluid.jit import kernel
 from flowborne.fluid.levels import at_level, scaled_cells
 from flowborne.fluid.multigrid import v_cycle
+from flowborne.fluid.response import Response
 
 MOST = 32
 """Motions that are taken in, the lightest first; more would cost more than they save."""
@@ -65,21 +66,39 @@ def nearby_mass(rows: Rows, diagonal: Array, size: int) -> Array:
     return gram
 
 
-def body_modes(response: Array, nearby: Array, across: int) -> Array:
+@kernel
+def nearby_mass_along(rows: Rows, diagonal: Array, root: Array) -> Array:
+    """(m, m) R^T G D^-1 G^T R for motions R (k, m), without the (k, k) matrix between them."""
+    cells, row_start, columns, values = rows
+    flat = diagonal.reshape(-1)
+    count = root.shape[1]
+    gram, flux = np.zeros((count, count)), np.empty(count)
+    for n in range(cells.size):
+        flux[:] = 0.0
+        for e in range(row_start[n], row_start[n + 1]):
+            for a in range(count):
+                flux[a] += values[e] * root[columns[e], a]
+        for a in range(count):
+            for b in range(count):
+                gram[a, b] += flux[a] * flux[b] / flat[cells[n]]
+    return gram
+
+
+def body_modes(response: Response, rows: Rows, diagonal: Array, across: int) -> Array:
     """(k, m) R with R R^T equal to M but for motions that the fluid hardly feels.
 
-    response  (k, k) M
-    nearby    (k, k) see `nearby_mass`
+    response  M
+    diagonal  of K; what a motion moves of the nearest fluid is `nearby_mass`
     across    most cells along an axis: how much more than the nearest fluid a body may move
     """
-    moving = np.flatnonzero(np.diag(response) > 0.0)
-    share, axes = np.linalg.eigh(response[np.ix_(moving, moving)])
-    root = axes * np.sqrt(np.maximum(share, 0.0))
-    ratio, turned = np.linalg.eigh(root.T @ nearby[np.ix_(moving, moving)] @ root)
+    root = response.soft
+    if response.is_dense:
+        nearby = root.T @ nearby_mass(rows, diagonal, response.size) @ root
+    else:
+        nearby = nearby_mass_along(rows, diagonal, root)
+    ratio, turned = np.linalg.eigh(nearby)
     chosen = np.flatnonzero(ratio * across > LIGHT)[-MOST:]
-    modes = np.zeros((response.shape[0], chosen.size))
-    modes[moving] = root @ turned[:, chosen]
-    return modes
+    return np.ascontiguousarray(root @ turned[:, chosen])
 
 
 def mode_fields(

@@ -16,6 +16,7 @@ from flowborne.fluid.jit import kernel
 from flowborne.fluid.levels import at_level, scaled, scaled_cells, wrap_ghosts
 from flowborne.fluid.multigrid import v_cycle
 from flowborne.fluid.regions import remove_null
+from flowborne.fluid.response import Answers, respond
 
 Finest = tuple[Array, Array, Array, Array]
 """Padded weights across each axis and diagonal of the finest level."""
@@ -58,16 +59,15 @@ def apply_laplacian(out: Array, p: Array, finest: Finest) -> float:
 
 
 @kernel
-def apply_coupling(out: Array, p: Array, rows: Rows, response: Array) -> float:
+def apply_coupling(out: Array, p: Array, rows: Rows, answers: Answers) -> float:
     """out += G^T M G p; returns p . G^T M G p."""
-    size = response.shape[0]
-    wrench, twist = wrench_of(p, rows, size), np.zeros(size)
+    size = max(answers[0].shape[0], answers[1].size - 1)
+    wrench = wrench_of(p, rows, size)
+    motion = respond(wrench, answers)
     energy = 0.0
     for a in range(size):
-        for b in range(size):
-            twist[a] += response[a, b] * wrench[b]
-        energy += twist[a] * wrench[a]
-    push(out, rows, twist)
+        energy += motion[a] * wrench[a]
+    push(out, rows, motion)
     return energy
 
 
@@ -136,7 +136,7 @@ def solve(
     finest: Finest,
     vectors: Vectors,
     rows: Rows,
-    response: Array,
+    response: Answers,
     label: Labels,
     null: Array,
     fields: Real,
@@ -150,7 +150,7 @@ def solve(
     finest     padded weights and diagonal of K
     vectors    padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
                vectors, x as well at the end
-    rows       of G^T with padded flat cells (see `apply_coupling`); response: M
+    rows       of G^T with padded flat cells (see `apply_coupling`); response: M (see `response`)
     null       see `regions.null_basis`
     fields, answers  of the motions in the preconditioner, at the scale of the hierarchy; see
                `body_modes`

@@ -228,8 +228,9 @@ def coarse_weights(
 
 
 @kernel
-def inverse_diagonal(w: Triple, inverse: Real) -> None:
-    """1 / diagonal of K from padded weights; 0 in cells without an open face and in ghosts."""
+def inverse_diagonal(w: Triple, added: Real, inverse: Real) -> None:
+    """1 / diagonal of K from padded weights and what is added to it; 0 in cells without an open
+    face and in ghosts."""
     w0, w1, w2 = w
     d = 1 if w0.shape[0] > 1 else 0
     inverse[:] = 0.0
@@ -241,7 +242,7 @@ def inverse_diagonal(w: Triple, inverse: Real) -> None:
                 if d:
                     total += w0[m, j, k] + w0[m + 1, j, k]
                 if total > 0.0:
-                    inverse[m, j, k] = 1.0 / total
+                    inverse[m, j, k] = 1.0 / (total + added[m, j, k])
 
 
 @kernel
@@ -283,12 +284,34 @@ def guests_at(guests: Places, table: Integers, level: int) -> Places:
 
 
 @kernel
+def coarse_sums(
+    fine: Real, coarse: Real, marks: Marks, factor: Integers, guests: Places, hosts: Places
+) -> None:
+    """What is added to the diagonal of coarse cells: the sum over the fine cells that have their
+    value."""
+    f0, f1, f2 = factor
+    d = 1 if fine.shape[0] > 1 else 0
+    n0, n1, n2 = fine.shape[0] - 2 * d, fine.shape[1] - 2, fine.shape[2] - 2
+    coarse[:] = 0.0
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                if marks[i + d, j + 1, k + 1] & OWN:
+                    coarse[i // f0 + d, j // f1 + 1, k // f2 + 1] += fine[i + d, j + 1, k + 1]
+    flat, wide, host = fine.reshape(-1), coarse.reshape(-1), hosts.reshape(-1)
+    for g in range(guests.size):
+        wide[host[guests[g]]] += flat[guests[g]]
+
+
+@kernel
 def coarsen(hierarchy: Hierarchy) -> None:
-    """Fill all levels from the weights of the finest."""
-    table, periodic, weights, inverse, lean, marks, guests, hosts = hierarchy
+    """Fill all levels from the weights of the finest, and from what is added to its diagonal."""
+    table, periodic, weights, reaction, inverse, lean, marks, guests, hosts = hierarchy
+    reacts = np.any(at_level(reaction, table, 0))
     for level in range(table.shape[0] - 1):
         w, share = weights_at(weights, table, level), at_level(inverse, table, level)
-        inverse_diagonal(w, share)
+        added = at_level(reaction, table, level)
+        inverse_diagonal(w, added, share)
         if level == table.shape[0] - 2:
             break
         factor = np.empty(3, np.int64)
@@ -312,6 +335,11 @@ def coarsen(hierarchy: Hierarchy) -> None:
         table[level, GUESTS] = seat_guests(
             mark, w, share, factor, periodic, coarse_shape, space, host
         )
+        if reacts:
+            seated = guests_at(guests, table, level)
+            coarse_sums(added, at_level(reaction, table, level + 1), mark, factor, seated, host)
+        else:
+            at_level(reaction, table, level + 1)[:] = 0.0
         for axis in range(3):
             coarse_weights(w[axis], wide[axis], mark, axis, factor, ratio[axis])
         add_guest_weights(

@@ -200,7 +200,7 @@ def v_cycle(hierarchy: Hierarchy, x: Real, b: Real, r: Real) -> None:
 
     x, b, r  packed over the levels; b's finest level is given, all else is overwritten
     """
-    table, periodic, weights, inverse, lean, marks, guests, hosts = hierarchy
+    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
     coarsest = table.shape[0] - 2
     for leg in range(2 * coarsest + 1):
         down = leg <= coarsest

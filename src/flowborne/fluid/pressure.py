@@ -17,12 +17,21 @@ import numpy as np
 
 from flowborne.fluid.aggregates import OWN
 from flowborne.fluid.arrays import Hierarchy, Integers, Labels, Marks, Places, Real, Rows
-from flowborne.fluid.body_modes import body_modes, mode_answers, mode_fields, nearby_mass
+from flowborne.fluid.body_modes import body_modes, mode_answers, mode_fields
 from flowborne.fluid.conjugate_gradients import Finest, solve
 from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.jit import kernel, parallel_kernels
-from flowborne.fluid.levels import LEAN, coarsen, finest_weights, largest, level_table, scaled
+from flowborne.fluid.levels import (
+    LEAN,
+    at_level,
+    coarsen,
+    finest_weights,
+    largest,
+    level_table,
+    scaled,
+)
 from flowborne.fluid.regions import label_regions, null_basis, region_wrenches
+from flowborne.fluid.response import Response, dense_response
 
 
 @dataclass(frozen=True)
@@ -31,16 +40,16 @@ class Coupling:
 
     cells      (m,) flat index of the cell of each row; a cell may have several rows
     row_start  (m+1,) where each row's entries begin
-    columns    (nnz,) column of M, 6 body + component
-    values     (nnz,) wrench component that unit pressure in the cell exerts, m^2 or m^3
-    response   (k, k) M, symmetric positive semidefinite
+    columns    (nnz,) column of M: of a body's wrench, or of a force on flesh
+    values     (nnz,) component that unit pressure in the cell exerts, m^2 or m^3
+    response   M
     """
 
     cells: Integers
     row_start: Integers
     columns: Integers
     values: Array
-    response: Array
+    response: Response
 
 
 UNCOUPLED = Coupling(
@@ -48,7 +57,7 @@ UNCOUPLED = Coupling(
     np.zeros(1, np.int64),
     np.zeros(0, np.int64),
     np.zeros(0),
-    np.zeros((0, 0)),
+    dense_response(np.zeros((0, 0))),
 )
 """No bodies, or none that the fluid can move."""
 
@@ -71,6 +80,7 @@ class PressureSolution:
 
 
 NO_VECTORS = np.zeros((0, 0))
+NO_REACTION = np.zeros((0, 0, 0))
 NO_FIELDS = np.zeros((0, 0, 0, 0), np.float32)
 
 
@@ -92,6 +102,7 @@ class Buffers:
         padded = (n0 + 2 if n0 > 1 else 1, n1 + 2, n2 + 2)
         self.finest = zeros(padded), zeros(padded), zeros(padded), zeros(padded)
         self.weights = packed(total), packed(total), packed(total)
+        self.reaction = packed(total)
         self.inverse = packed(total)
         self.lean = packed(int(self.table[-1, LEAN]))
         self.marks: Marks = np.full(total, OWN, np.uint8)
@@ -124,6 +135,7 @@ def borrow(kind: Kind, owner: object) -> Buffers:
 def prepare(
     hierarchy: Hierarchy,
     faces: tuple[Array, Array, Array],
+    reaction: Array,
     finest: Finest,
     label: Labels,
     parent: Labels,
@@ -131,6 +143,7 @@ def prepare(
 ) -> tuple[int, float]:
     """Fill finest level, hierarchy and region labels from the weights on the faces.
 
+    reaction  (cells) of K + D, which the hierarchy is made for; see `PressureSystem`
     returns  number of regions without an open side, scale of the hierarchy's weights
     """
     *weights, diagonal = finest
@@ -139,6 +152,12 @@ def prepare(
     scale = 1.0 / most if most > 0.0 else 1.0
     for source, target in zip(weights, hierarchy[2], strict=True):
         scaled(source, target[: source.size], scale)
+    added = at_level(hierarchy[3], hierarchy[0], 0)
+    added[:] = 0.0
+    d = 1 if added.shape[0] > 1 else 0
+    if reaction.size:
+        inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
+        inner[:] = scale * reaction.reshape(inner.shape)
     coarsen(hierarchy)
     return label_regions(finest, hierarchy[1], label, parent, count), scale
 
@@ -191,6 +210,8 @@ class PressureSystem:
               its first and last face. A cell is active when one of its weights is above 0.
     periodic  of each axis
     parallel  use all cores; only from one thread of the process at a time
+    reaction  (nx, ny, nz), at least 0: D with K + D closer than K to the matrix that is solved, as
+              flesh gives way to pressure all over its skin; for the preconditioner alone
     raises    ValueError for one cell along x or y in 3D, which the ghost layout has no room for
     """
 
@@ -199,6 +220,7 @@ class PressureSystem:
         weights: Faces,
         periodic: tuple[bool, bool, bool] = (False, False, False),
         parallel: bool = False,
+        reaction: Array = NO_REACTION,
     ) -> None:
         nx, ny, nz = weights[1].shape[0], weights[0].shape[1], weights[0].shape[2]
         self.shape = (nx, ny, nz)
@@ -222,6 +244,7 @@ class PressureSystem:
             b.table,
             self.periodic,
             b.weights,
+            b.reaction,
             b.inverse,
             b.lean,
             b.marks,
@@ -230,7 +253,7 @@ class PressureSystem:
         )
         with parallel_kernels(parallel):
             self.regions, self.scale = prepare(
-                self.hierarchy, faces, b.finest, b.label, b.parent, b.count
+                self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
             )
 
     def solve(
@@ -256,12 +279,12 @@ class PressureSystem:
         rows = padded_rows(
             (coupling.cells, coupling.row_start, coupling.columns, coupling.values), diagonal
         )
-        response = np.ascontiguousarray(coupling.response)
+        response = coupling.response
         null, answers, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
         if self.regions:
-            wrench = region_wrenches(b.label, self.regions, response.shape[0], rows)
+            wrench = region_wrenches(b.label, self.regions, response.size, rows)
             null = null_basis(b.count[: self.regions], wrench, response)
-        modes = body_modes(response, nearby_mass(rows, diagonal, response.shape[0]), max(cells))
+        modes = body_modes(response, rows, diagonal, max(cells))
         modes *= np.sqrt(self.scale)
         with parallel_kernels(self.parallel):
             if modes.size:
@@ -273,7 +296,7 @@ class PressureSystem:
                 b.finest,
                 b.vectors,
                 rows,
-                response,
+                response.arrays,
                 b.label,
                 null,
                 fields,

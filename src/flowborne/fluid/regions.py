@@ -12,6 +12,7 @@ from numba import prange
 from flowborne.fluid.arrays import Labels, Periodic, Rows
 from flowborne.fluid.grid import Array
 from flowborne.fluid.jit import kernel
+from flowborne.fluid.response import Response
 
 NULL = 1e-10
 """A combination of regions whose response is below this times the largest moves no body."""
@@ -185,21 +186,21 @@ def region_wrenches(label: Labels, regions: int, size: int, rows: Rows) -> Array
     return wrench
 
 
-def null_basis(count: Labels, wrench: Array, response: Array) -> Array:
+def null_basis(count: Labels, wrench: Array, response: Response) -> Array:
     """(regions, q) constants per region of an orthonormal basis of the operator's null space.
 
     count     (regions,) cells of each region without an open side
     wrench    (regions, k) G 1_r of each region
-    response  (k, k) symmetric positive semidefinite M
+    response  M
 
     A region that pushes no movable body is a null vector of its own. Among the others, combinations
     c with  c^T F c = 0  for F = (G 1_r)^T M (G 1_s) are: with a plug between two cavities, only the
     constant that both share.
     """
     scale = 1.0 / np.sqrt(count)
-    moved = wrench @ response
+    moved = response.times(wrench)
     strength = np.einsum("rk,rk->r", moved, wrench) * scale**2
-    largest = np.abs(response).max(initial=0.0) * np.square(wrench * scale[:, None]).max(initial=0)
+    largest = response.largest() * np.square(wrench * scale[:, None]).max(initial=0)
     held = strength > NULL * largest
     free = np.flatnonzero(~held)
     basis = np.zeros((count.size, free.size))
@@ -207,7 +208,7 @@ def null_basis(count: Labels, wrench: Array, response: Array) -> Array:
     if not held.any():
         return basis
     scaled = wrench[held] * scale[held, None]
-    energy, vectors = np.linalg.eigh(scaled @ response @ scaled.T)
+    energy, vectors = np.linalg.eigh(response.times(scaled) @ scaled.T)
     null = vectors[:, energy < NULL * energy[-1]]
     joint = np.zeros((count.size, null.shape[1]))
     joint[held] = scale[held, None] * null

@@ -4,7 +4,7 @@ With B the velocity of the wall points and C the couple of the bodies' own rotat
 
     (m/dt + L + W) u - W B s = m u*/dt + given          s = s* + M dt (B^T W (u - B s) - C s)
 
-where L are the links and M the twists that unit wrench impulses give. Tied faces, whose velocity is
+where L are the links and M the motion that a unit impulse gives. Tied faces, whose velocity is
 B s, count among the walls with the weight m/dt. The bodies are eliminated exactly,
 
     s = s* + N dt (B^T W (u - B s*) - C s*)             N = (M^-1 + dt (B^T W B + C))^-1
@@ -15,11 +15,14 @@ Schroeder and Fedkiw 2011 do the same).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Protocol
 
 import numpy as np
 from numba import prange
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
 
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
@@ -75,6 +78,8 @@ class Walls:
     tied    (n,) whether the face moves with the body
     weight  (n,) W, or m/dt of tied faces, kg/s
     body    (n,) the body
+    columns (n, m) entries of the motion that move the point, the twist of its body unless told
+    arm     (n, m) velocity of the point along the face's axis for each of them
     across  (n, 3) unit vector of the axis that the face is across
     point   (n, 3) wall point, or centre of the tied face, m
     gap     (n, 3) from there to the centre of the face, m
@@ -84,13 +89,11 @@ class Walls:
     tied: NDArray[np.bool_]
     weight: Array
     body: Integers
+    columns: Integers
+    arm: Array
     across: Array
     point: Array
     gap: Array
-
-    def arms(self) -> Array:
-        """(n, 6) velocity of the points along their axes for each component of a twist."""
-        return np.concatenate([self.across, np.cross(self.point, self.across)], axis=1)
 
     def couples(self, bodies: int) -> Array:
         """(bodies, 3, 3) C: couple that each body feels for unit spin about each axis, N m s.
@@ -100,7 +103,7 @@ class Walls:
         the middle of its wall points. Symmetric but for the coarseness of the cells, and made so.
         """
         couples = np.zeros((bodies, 3, 3))
-        for body in np.unique(self.body):
+        for body in np.unique(self.body[self.body < bodies]):
             own = self.body == body
             point, across, gap = self.point[own], self.across[own], self.gap[own]
             lever = np.cross(point - point.mean(axis=0), across)
@@ -144,15 +147,34 @@ def walls_across(
     corners = np.stack([at, at + one, at + other, at + one + other])
     which = np.argmin(distance[tuple(np.moveaxis(corners, -1, 0))], axis=0)
     corner = corners[which, np.arange(index.size)]
+    body, point = nearest[tuple(corner.T)], centre - gap
+    across = np.tile(np.eye(3)[axis], (index.size, 1))
     return Walls(
         index=first + index,
         tied=np.arange(index.size) >= system.beside.size,
         weight=np.concatenate([system.wall, system.mass.reshape(-1)[moved]]),
-        body=nearest[tuple(corner.T)],
-        across=np.tile(np.eye(3)[axis], (index.size, 1)),
-        point=centre - gap,
+        body=body,
+        columns=6 * body[:, None] + np.arange(6),
+        arm=np.concatenate([across, np.cross(point, across)], axis=1),
+        across=across,
+        point=point,
         gap=gap,
     )
+
+
+class Answering(Protocol):
+    """How the bodies answer friction that grows with their velocity: N = (M^-1 + D)^-1."""
+
+    yields: bool
+    """Whether friction moves anything."""
+
+    def change(self, push: Array) -> Array:
+        """(k,) change N J0 of the motion for an impulse J0 (k,) on bodies that keep theirs."""
+        ...
+
+    def to(self, push: Array) -> tuple[Array, Array]:
+        """(k,) the same, and (k,) the impulse J that they feel as they give way."""
+        ...
 
 
 class ViscousSystem:
@@ -160,14 +182,17 @@ class ViscousSystem:
 
     systems   of each component (see `assemble_viscosity`)
     walls     of all components (see `walls_of`)
-    response  (6 nb, 6 nb) M, 1/kg
+    size      k, of the motion; bodies, whose twists it begins with
+    answering how they answer a drag D (k, k), kg
     """
 
     def __init__(
         self,
         systems: list[ViscousFaces],
         walls: Walls,
-        response: Array,
+        size: int,
+        bodies: int,
+        answering: Callable[[csr_array], Answering],
         grid: Grid,
         boundaries: Boundaries,
         dt: float,
@@ -179,33 +204,31 @@ class ViscousSystem:
         unknown = self.diagonal > 0.0
         self.scale = np.where(unknown, 1.0 / np.sqrt(np.where(unknown, self.diagonal, 1.0)), 0.0)
         self.most = MOST * max(MOST, *grid.shape)
-        self.arm = walls.arms()
-        self.columns = 6 * walls.body[:, None] + np.arange(6)
-        self.couple, drag = np.zeros_like(response), np.zeros_like(response)
-        for body, couple in enumerate(walls.couples(len(response) // 6)):
-            twist, spin = slice(6 * body, 6 * body + 6), slice(6 * body + 3, 6 * body + 6)
-            own = walls.body == body
-            self.couple[spin, spin] = couple
-            drag[twist, twist] = (walls.weight[own, None] * self.arm[own]).T @ self.arm[own]
-        drag += self.couple
-        self.answer = Answer(response, dt * drag)
-        self.yielding = self.answer.compliance()
+        count, entries = walls.arm.shape
+        row = np.repeat(np.arange(count), entries)
+        arms = csr_array((walls.arm.ravel(), (row, walls.columns.ravel())), shape=(count, size))
+        spin = (6 * np.arange(bodies)[:, None] + np.arange(3, 6))[:, None, :].repeat(3, axis=1)
+        twist = np.swapaxes(spin, 1, 2)
+        couples = walls.couples(bodies).ravel()
+        self.couple = csr_array((couples, (twist.ravel(), spin.ravel())), shape=(size, size))
+        drag = arms.T @ (diags_array(walls.weight) @ arms) + self.couple
+        self.answer = answering(csr_array(dt * drag))
 
     def force(self, velocity: Array, twist: Array, tied: bool = True) -> Array:
-        """(6 nb,) wrench B^T W (u - B s) on every body, N and N m.
+        """(k,) push B^T W (u - B s) on every body, N and N m.
 
-        velocity  over the concatenated faces, m/s;  twist  (6 nb,) s
+        velocity  over the concatenated faces, m/s;  twist  (k,) s
         tied      whether tied faces count
         """
         walls = self.walls
         relative = velocity[walls.index] - self.at_walls(twist)
         pull = walls.weight * relative * (tied | ~walls.tied)
-        wrench = (pull[:, None] * self.arm).ravel()
-        return np.asarray(np.bincount(self.columns.ravel(), wrench, minlength=twist.size), float)
+        wrench = (pull[:, None] * walls.arm).ravel()
+        return np.asarray(np.bincount(walls.columns.ravel(), wrench, minlength=twist.size), float)
 
     def at_walls(self, twist: Array) -> Array:
         """(n,) B s: velocity of the bodies at the wall faces, m/s."""
-        return np.einsum("nm,nm->n", self.arm, twist[self.columns])
+        return np.einsum("nm,nm->n", self.walls.arm, twist[self.walls.columns])
 
     def drawn(self, twist: Array) -> Array:
         """(n,) W B s: force of the bodies' motion on the wall faces, N; none on tied ones."""
@@ -221,11 +244,11 @@ class ViscousSystem:
             part = slice(first, first + system.kind.size)
             apply_component(product[part], given[part], self.scale[part], system.links, self.wraps)
             first += system.kind.size
-        if self.yielding.any():
-            still = np.zeros(len(self.yielding))
+        if self.answer.yields:
+            still = np.zeros(self.couple.shape[0])
             wrench = self.force(self.scale * given[: self.scale.size], still, tied=False)
             at = self.walls.index
-            product[at] -= self.scale[at] * self.drawn(self.dt * self.yielding @ wrench)
+            product[at] -= self.scale[at] * self.drawn(self.answer.change(self.dt * wrench))
         return out
 
     def solve(
@@ -234,12 +257,11 @@ class ViscousSystem:
         """Velocity after viscosity, and the impulse that it gave to each body.
 
         velocity   Faces u*, m/s
-        twist      (6 nb,) s*: the bodies' twists without this impulse
+        twist      (k,) s*: the bodies' motion without this impulse
         tolerance  relative residual
         slip       (n,) velocity of the skin relative to the body at each wall face, along the
                    face's axis, m/s; none unless given
-        returns    Faces; (6 nb,) wrench impulse about the origin, N s and N m s; whether the
-                   residual was reached
+        returns    Faces; (k,) impulse, N s and N m s; whether the residual was reached
         """
         start = np.concatenate([velocity[axis].ravel() for axis in self.grid.axes])
         mass = np.concatenate([system.mass.ravel() for system in self.systems])
@@ -260,7 +282,7 @@ class ViscousSystem:
         return self._split(result, velocity), impulse, converged
 
     def push(self, velocity: Array, twist: Array) -> Array:
-        """(6 nb,) impulse on bodies that keep their twist, dt (B^T W (u - B s) - C s)."""
+        """(k,) impulse on bodies that keep their motion, dt (B^T W (u - B s) - C s)."""
         return np.asarray(self.dt * (self.force(velocity, twist) - self.couple @ twist))
 
     def _conjugate_gradients(self, rhs: Array, x: Array, tolerance: float) -> tuple[Array, bool]:
@@ -301,7 +323,7 @@ def spread(values: Array) -> Array:
 
 
 class Answer:
-    """How bodies answer friction that grows with their velocity, however large M or the drag are.
+    """How rigid bodies answer friction, however large M or the drag are.
 
     With M = R R^T the drag D and  z = (1 + R^T D R)^-1 R^T J0,  an impulse J0 on bodies that keep
     their twist is  J = J0 - D R z  on bodies that change theirs by R z. J is taken from z where the
@@ -319,14 +341,16 @@ class Answer:
         self.held = axes[:, ~moving]
         self.drag = drag
         self.inside = np.linalg.cholesky(np.eye(len(self.root.T)) + self.root.T @ drag @ self.root)
-
-    def compliance(self) -> Array:
-        """(k, k) N = (M^-1 + D)^-1, exactly symmetric."""
         part = np.linalg.solve(self.inside, self.root.T)
-        return np.asarray(part.T @ part)
+        self.compliance: Array = part.T @ part
+        self.yields = bool(self.compliance.any())
+
+    def change(self, push: Array) -> Array:
+        """See `Answering`; by N (k, k), exactly symmetric."""
+        return np.asarray(self.compliance @ push)
 
     def to(self, push: Array) -> tuple[Array, Array]:
-        """(k,) change of the twist, N J0, and (k,) J for J0 = `push`."""
+        """See `Answering`."""
         z = np.linalg.solve(self.inside.T, np.linalg.solve(self.inside, self.root.T @ push))
         change = self.root @ z
         impulse = self.lift @ z + self.held @ (self.held.T @ (push - self.drag @ change))

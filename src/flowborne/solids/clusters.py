@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.solids.following import follow, follow_each
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import mass_matrix
 from flowborne.solids.prescribed import symmetric_inverse
+from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState
 
 Array = NDArray[np.float64]
@@ -30,7 +33,7 @@ def rigidify(
 
     With c the joints and f the other dofs, the impulse changes v_f by M_ff^-1 M_fc v_c: linear and
     angular momentum of a floating creature stay as they are, which they would not if v_c were just
-    set to zero.
+    set to zero. Flesh rides on the bones.
 
     dofs     (k,) joints whose relative velocity is removed
     fixed    (nv,) dofs that keep their velocity whatever it takes (driven or locked ones)
@@ -44,9 +47,29 @@ def rigidify(
     free &= ~model.locked
     if fixed is not None:
         free &= ~fixed
+    if model.flesh is not None:
+        free &= ~model.flesh.dofs
     others = np.flatnonzero(free)
     if others.size:
-        M = mass_matrix(model, state.q)
+        M = carried_mass(model, state.q)
         lost = M[np.ix_(others, dofs)] @ state.v[dofs]
         velocity[others] += symmetric_inverse(M[np.ix_(others, others)]) @ lost
-    return SolidState(state.q.copy(), velocity)
+    if model.flesh is None:
+        return SolidState(state.q.copy(), velocity)
+    return SolidState(state.q.copy(), state.v + follow(model, state.q, velocity - state.v))
+
+
+def carried_mass(model: SolidModel, q: Array) -> Array:
+    """(nbones, nbones) mass matrix of the bones' dofs when flesh rides on them: F^T M F."""
+    if model.flesh is None:
+        return mass_matrix(model, q)
+    _, following = follow_each(model, q)
+    s = scratch(model)
+    s.place(q)
+    mujoco.mj_makeM(s.mj, s.data)
+    moved = np.empty(model.nv)
+    columns = []
+    for column in np.ascontiguousarray(following.T):
+        mujoco.mj_mulM(s.mj, s.data, moved, column)
+        columns.append(following.T @ moved)
+    return np.stack(columns, axis=1)

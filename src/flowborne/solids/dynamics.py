@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
@@ -52,6 +53,8 @@ class Kinematics:
     mass_centre     (nbody, 3) centre of mass, m
     twist_jacobian  (nbody, 6, nv) from v to each body's twist: velocity of the point at the world
                     origin, then angular velocity
+    vertices        (n, 3) of flesh, m
+    vertex_jacobian (3n, nv) from v to their velocities, sparse
     """
 
     body_position: Array
@@ -61,6 +64,8 @@ class Kinematics:
     centroid: Array
     mass_centre: Array
     twist_jacobian: Array
+    vertices: Array
+    vertex_jacobian: csr_array
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,11 @@ class Rows:
         zones = np.where(inside, ACTIVE, np.where(sliding, beyond, OFF))
         tie = (np.abs(np.abs(slip) - edge) <= margin) & (self.kind != TWO_SIDED)
         return np.where(tie, present, zones)
+
+    def pushing(self, zones: Zones) -> int:
+        """Number of contacts with an active row."""
+        active = self.contact[zones == ACTIVE]
+        return int(np.unique(active[active >= 0]).size)
 
     def acting(self, zones: Zones) -> tuple[Array, Array, Array]:
         """J and D of the active rows, and the force (nv,) of all rows at no acceleration."""
@@ -130,10 +140,7 @@ class SolidSystem:
     @property
     def contacts(self) -> int:
         """Number of contacts that push."""
-        if self.rows is None:
-            return 0
-        pushing = self.rows.contact[self.zones == ACTIVE]
-        return int(np.unique(pushing[pushing >= 0]).size)
+        return 0 if self.rows is None else self.rows.pushing(self.zones)
 
     def updated(self, v_plus: Array) -> SolidSystem | None:
         """System with the contacts, limits and Coriolis forces that `v_plus` (nv,) implies.
@@ -174,8 +181,11 @@ def kinematics(model: SolidModel, q: Array) -> Kinematics:
     """Poses and Jacobians at positions (nq,)."""
     s = scratch(model)
     s.place(q)
-    body_position = s.xpos.copy()
-    body_rotation = s.xmat.reshape(-1, 3, 3).copy()
+    bodies, flesh = model.nbody, model.flesh
+    body_position = s.xpos[:bodies].copy()
+    body_rotation = s.xmat[:bodies].reshape(-1, 3, 3).copy()
+    mass_centre = s.data.xipos[:bodies].copy()
+    twists = np.where(model.moves[:, None, :], dof_twists(model, s).T, 0.0)
     centroid = body_position + np.matmul(body_rotation, model.centroid[:, :, None])[:, :, 0]
     return Kinematics(
         body_position,
@@ -183,8 +193,10 @@ def kinematics(model: SolidModel, q: Array) -> Kinematics:
         s.geom_xpos[model.geom_id],
         s.geom_xmat[model.geom_id].reshape(-1, 3, 3),
         centroid,
-        s.data.xipos.copy(),
-        np.where(model.moves[:, None, :], dof_twists(model, s).T, 0.0),
+        mass_centre,
+        twists,
+        np.zeros((0, 3)) if flesh is None else flesh.placed(s),
+        csr_array((0, model.nv)) if flesh is None else flesh.moving(s),
     )
 
 
@@ -219,7 +231,8 @@ def assemble(
     rows, zones = rows_of(model, s)
     centred, impulse = None, A @ state.v + dt * force
     if before is not None:
-        centred = halfway(model, s, before, state, dt, A, force + s.bias)
+        mass = s.mass_matrix().copy()
+        centred = halfway(model, s, before, state, dt, A @ state.v, mass, force + s.bias)
         impulse, _ = centred.impulse(state.v)
     v = state.v.copy()
     full = _with_rows(A, impulse, v, dt, rows, zones)

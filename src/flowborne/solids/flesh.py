@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csr_array, eye_array, kron
+from scipy.sparse import block_diag, coo_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
 
 from flowborne.solids.cage import node_weights
 from flowborne.solids.mjcf import element_name, rest_poses
-from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import dof_twists
-from flowborne.solids.scratch import scratch
+from flowborne.solids.momentum import cross, dof_twists
+from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.tissue import volumes
+
+if TYPE_CHECKING:
+    from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -32,10 +38,12 @@ class Flesh:
                 for flesh that a grid of cells carries
     rest        (n, 3) vertices at rest, m
     elements    (m, 4) tetrahedra of vertices, right-handed
-    surface     (k, 3) triangles of vertices, outward
-    of_element  (m,) number of the flesh in `names`
+    surface     (k, 3) triangles of vertices, outward; none around a bone that is all inside
+    of_surface  (k,) number of the flesh in `names` that each belongs to
+    of_element  (m,) the same of elements
     dofs        (nv,) dofs that move points of flesh alone; the others are those of bones
     moved       (2, k) pairs of a point and a dof that moves it
+    carried     (n, nbody) share of each bone in carrying a vertex, from 0 to 1, together 1
     """
 
     model: SolidModel
@@ -46,31 +54,66 @@ class Flesh:
     rest: Array
     elements: Indices
     surface: Indices
+    of_surface: Indices
     of_element: Indices
     dofs: NDArray[np.bool_]
     moved: Indices
-
-    def points(self, q: Array) -> Array:
-        """(np, 3) places of the points at positions q (nq,), m."""
-        s = scratch(self.model)
-        s.place(q)
-        return _placed(s.xpos, s.xmat.reshape(-1, 3, 3), self.body, self.offset)
+    carried: Array
 
     def vertices(self, q: Array) -> Array:
         """(n, 3) places of the vertices at positions q (nq,), m."""
-        return np.asarray(self.weights @ self.points(q))
+        s = scratch(self.model)
+        s.place(q)
+        return self.placed(s)
 
     def jacobian(self, q: Array) -> csr_array:
         """(3n, nv) sparse, from v to the velocities of the vertices, x y z of each in turn."""
-        places = self.points(q)
         s = scratch(self.model)
+        s.place(q)
+        return self.moving(s)
+
+    def placed(self, s: Scratch) -> Array:
+        """(n, 3) the vertices where `s` has been placed, m."""
+        return np.asarray(self.weights @ self._points(s))
+
+    def moving(self, s: Scratch) -> csr_array:
+        """(3n, nv) `jacobian` where `s` has been placed."""
+        places = self._points(s)
         twists = dof_twists(self.model, s)
         point, dof = self.moved
-        velocity = twists[dof, :3] + np.cross(twists[dof, 3:], places[point])
+        velocity = twists[dof, :3] + cross(twists[dof, 3:], places[point])
         row = (3 * point[:, None] + np.arange(3)).ravel()
         shape = (3 * len(places), self.model.nv)
-        carried = csr_array((velocity.ravel(), (row, np.repeat(dof, 3))), shape=shape)
-        return csr_array(kron(self.weights, eye_array(3), format="csr") @ carried)
+        points = csr_array((velocity.ravel(), (row, np.repeat(dof, 3))), shape=shape)
+        points.eliminate_zeros()
+        return csr_array(self.spread @ points)
+
+    def of_vertices(self, velocity: Array) -> Array:
+        """(nv,) velocity of the free points from that of vertices (n, 3), each point being one."""
+        carried = self.weights.T @ velocity / self.weights.sum(axis=0)[:, None]
+        point, dof = self.moved
+        own = self.dofs[dof]
+        spread = np.zeros(self.model.nv)
+        axis = self.model.mj.jnt_axis[self.model.mj.dof_jntid[dof[own]]]
+        spread[dof[own]] = (axis * carried[point[own]]).sum(axis=1)
+        return spread
+
+    def _points(self, s: Scratch) -> Array:
+        """(np, 3) the points where `s` has been placed."""
+        return _placed(s.xpos, s.xmat.reshape(-1, 3, 3), self.body, self.offset)
+
+    @cached_property
+    def places(self) -> NDArray[np.bool_]:
+        """(nq,) places in q of points of flesh alone."""
+        mj = self.model.mj
+        own = np.zeros(mj.nq, bool)
+        own[mj.jnt_qposadr[mj.dof_jntid[self.dofs]]] = True
+        return own
+
+    @cached_property
+    def spread(self) -> csr_array:
+        """(3n, 3np) `weights` for each of three components."""
+        return csr_array(kron(self.weights, eye_array(3), format="csr"))
 
     def volume_ratios(self, vertices: Array) -> Array:
         """(m,) det F of each element: its volume over that at rest, negative when inside out."""
@@ -90,6 +133,9 @@ def flesh_of(model: SolidModel) -> Flesh:
     position, rotation, _, _ = rest_poses(mj)
     rest = np.asarray(weights @ _placed(position, rotation, body, offset))
     elements = [_elements(mj, f, rest) for f in range(mj.nflex)]
+    free = points_of_flesh(mj)
+    surfaces = [outer_surface(rest, e) for e in elements]
+    every = np.concatenate(elements)
     return Flesh(
         model,
         tuple(element_name(mj, mujoco.mjtObj.mjOBJ_FLEX, f) for f in range(mj.nflex)),
@@ -97,12 +143,26 @@ def flesh_of(model: SolidModel) -> Flesh:
         offset,
         weights,
         rest,
-        np.concatenate(elements),
-        np.concatenate([surface_of(e) for e in elements]),
+        every,
+        np.concatenate(surfaces),
+        np.repeat(np.arange(mj.nflex), [len(t) for t in surfaces]),
         np.repeat(np.arange(mj.nflex), [len(e) for e in elements]),
-        _flesh_dofs(model, body),
-        np.stack(np.nonzero(model.moves[body])),
+        _flesh_dofs(mj, body),
+        _moved(mj, body),
+        np.asarray(weights @ _carried(mj, rest, every, weights, np.where(free[body], -1, body))),
     )
+
+
+def points_of_flesh(mj: mujoco.MjModel) -> NDArray[np.bool_]:
+    """(nbody of MuJoCo,) bodies that are a point of flesh and nothing else."""
+    holding = np.zeros(mj.nbody, bool)
+    holding[mj.flex_vertbodyid[mj.flex_vertbodyid >= 0]] = True
+    holding[mj.flex_nodebodyid[mj.flex_nodebodyid >= 0]] = True
+    sliding = np.zeros(mj.nbody, np.int64)
+    slides = mj.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+    np.add.at(sliding, mj.jnt_bodyid[slides], 1)
+    own = (mj.body_geomnum == 0) & (mj.body_dofnum > 0) & (sliding == mj.body_dofnum)
+    return np.asarray(holding & own)
 
 
 def surface_of(elements: Indices) -> Indices:
@@ -113,6 +173,20 @@ def surface_of(elements: Indices) -> Indices:
         np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
     )
     return np.asarray(faces[np.sort(first[count == 1])])
+
+
+def outer_surface(points: Array, elements: Indices) -> Indices:
+    """(k, 3) outward triangles around tetrahedra (m, 4) of points (n, 3), those of holes left out.
+
+    What flesh encloses, bones for the most part, counts as inside.
+    """
+    triangles = surface_of(elements)
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
+    count = len(points)
+    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    sheet = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    enclosed = np.bincount(sheet, np.linalg.det(points[triangles]))
+    return np.asarray(triangles[enclosed[sheet] > 0.0])
 
 
 def _placed(position: Array, rotation: Array, body: Indices, offset: Array) -> Array:
@@ -141,11 +215,53 @@ def _elements(mj: mujoco.MjModel, flex: int, rest: Array) -> Indices:
     return elements
 
 
-def _flesh_dofs(model: SolidModel, body: Indices) -> NDArray[np.bool_]:
-    """Dofs of bodies that carry a point of flesh, hang on the world and slide along its axes."""
-    mj = model.mj
-    hung = (mj.body_parentid[body] == 0) & (mj.body_dofnum[body] > 0)
-    own = np.zeros(model.nbody, bool)
-    own[body[hung & (mj.body_geomnum[body] == 0)]] = True
-    slides = mj.jnt_type[mj.dof_jntid] == mujoco.mjtJoint.mjJNT_SLIDE
-    return np.asarray(own[model.dof_body] & slides)
+def _flesh_dofs(mj: mujoco.MjModel, body: Indices) -> NDArray[np.bool_]:
+    """Dofs of points of flesh that hang on the world."""
+    hung = points_of_flesh(mj) & (mj.body_parentid == 0)
+    return np.asarray(hung[mj.dof_bodyid])
+
+
+def _moved(mj: mujoco.MjModel, body: Indices) -> Indices:
+    """(2, k) pairs of a point, riding on `body` (np,), and a dof that moves it."""
+    chains: list[list[int]] = [[]]
+    for b in range(1, mj.nbody):
+        first = int(mj.body_dofadr[b])
+        chains.append(
+            chains[mj.body_parentid[b]] + [first + n for n in range(int(mj.body_dofnum[b]))]
+        )
+    pairs = [(point, dof) for point, b in enumerate(body) for dof in chains[b]]
+    return np.array(pairs, np.int64).reshape(-1, 2).T
+
+
+def _carried(
+    mj: mujoco.MjModel, rest: Array, elements: Indices, weights: csr_array, bone: Indices
+) -> Array:
+    """(np, bones) share of each bone in carrying a point: harmonic along the elements' edges.
+
+    bone  (np,) bone that holds the point, -1 for none; points that no bone is joined to are the
+          world's
+    """
+    bones = int((~points_of_flesh(mj)).sum())
+    pairs = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+    edges = np.unique(np.sort(elements[:, pairs].reshape(-1, 2), axis=1), axis=0)
+    strength = 1.0 / np.square(rest[edges[:, 0]] - rest[edges[:, 1]]).sum(axis=1)
+    count = len(rest)
+    links = coo_array((strength, (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
+    links = links + links.T
+    laplacian = csr_array(weights.T @ (diags_array(links.sum(axis=1)) - links) @ weights)
+    held, free = np.flatnonzero(bone >= 0), np.flatnonzero(bone < 0)
+    share = np.zeros((len(bone), bones))
+    share[held, bone[held]] = 1.0
+    if free.size and held.size:
+        _, label = connected_components(laplacian, directed=False)
+        loose = free[~np.isin(label[free], label[held])]
+        share[loose, 0] = 1.0
+        free = np.setdiff1d(free, loose)
+        given = np.setdiff1d(np.arange(len(bone)), free)
+        right = -(laplacian[free][:, given] @ share[given])
+        found = spsolve(laplacian[free][:, free].tocsc(), right)
+        share[free] = np.clip(np.asarray(found).reshape(len(free), bones), 0.0, 1.0)
+        share[free] /= share[free].sum(axis=1, keepdims=True)
+    elif free.size:
+        share[free, 0] = 1.0
+    return share

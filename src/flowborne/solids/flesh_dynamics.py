@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, dia_array
 
-from flowborne.solids.dynamics import Rows, Zones, rows_of
+from flowborne.solids.dynamics import AT_REST, SETTLED, Rows, Zones, rows_of
+from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
@@ -36,6 +37,7 @@ class FleshSystem:
     dt       s
     v        (nv,) velocity before the step
     rows     constraint rows, and zones (k,), the state of each
+    halfway  the forces half-way through the step, and own (nv,), the impulse that they give here
     """
 
     A: csc_array
@@ -44,8 +46,15 @@ class FleshSystem:
     v: Array
     rows: Rows | None
     zones: Zones
+    halfway: Halfway | None
+    own: Array
 
-    def pushed(self) -> tuple[Array, Array, Array]:
+    @property
+    def contacts(self) -> int:
+        """Number of contacts with an active row."""
+        return 0 if self.rows is None else self.rows.pushing(self.zones)
+
+    def acting(self) -> tuple[Array, Array, Array]:
         """J (k, nv) and D (k,) of the active rows, and the impulse (nv,) of all rows at rest:
         (A + J^T D J) v+ = impulse + it."""
         if self.rows is None:
@@ -54,19 +63,36 @@ class FleshSystem:
         return J, D, J.T @ (D * (J @ self.v)) + self.dt * force
 
     def updated(self, v_plus: Array) -> FleshSystem | None:
-        """System with the contacts and limits that `v_plus` (nv,) implies; None when it has them.
+        """System with the contacts, limits and Coriolis forces that `v_plus` (nv,) implies.
 
-        The repeated solve is Newton's method on a piecewise quadratic function; the caller bounds
-        the number of turns.
+        None when it has them. The repeated solve is Newton's method on a piecewise quadratic
+        function, and a fixed point for the forces of Coriolis; the caller bounds the number of
+        turns.
         """
-        if self.rows is None:
+        zones, own, settled = self.zones, self.own, True
+        if self.rows is not None:
+            zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
+            settled = np.array_equal(zones, self.zones)
+        if self.halfway is not None:
+            own, rounding = self.halfway.impulse(v_plus)
+            room = SETTLED * (abs(self.A) @ (np.abs(v_plus) + AT_REST)) + rounding
+            settled = settled and bool((np.abs(own - self.own) <= room).all())
+        if settled:
             return None
-        zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
-        return None if np.array_equal(zones, self.zones) else replace(self, zones=zones)
+        return replace(self, zones=zones, own=own, impulse=self.impulse + own - self.own)
+
+    def pushed(self, force: Array) -> FleshSystem:
+        """System with an additional generalised force (nv,)."""
+        return replace(self, impulse=self.impulse + self.dt * force)
 
 
 def assemble_flesh(
-    model: SolidModel, state: SolidState, applied: Array, dt: float, centred: bool = False
+    model: SolidModel,
+    state: SolidState,
+    applied: Array,
+    dt: float,
+    centred: bool = False,
+    before: SolidState | None = None,
 ) -> FleshSystem:
     """System of bones and flesh at `state`, with gravity, springs, dampers, limits and contact.
 
@@ -81,6 +107,7 @@ def assemble_flesh(
 
     applied  (nv,) generalised force, N or N m
     dt       s
+    before   state before the positions moved; as in `assemble`
     """
     s = scratch(model)
     s.set_time_step(dt)
@@ -94,10 +121,17 @@ def assemble_flesh(
         A = M + dt**2 * K + dt * D
         force += s.data.efm_c
     v = state.v.copy()
+    still = A @ v
+    centre, own = None, still + dt * force
+    if before is not None:
+        centre = halfway(model, s, before, state, dt, still, M, force + s.bias)
+        own, _ = centre.impulse(v)
+    # the half-way pose has overwritten MuJoCo's, and rows need its whole forward pass
+    rows, zones = None, np.zeros(0, np.int64)
     if s.data.nefc:
         s.forward(state.q, state.v, applied)
-    rows, zones = rows_of(model, s)
-    return FleshSystem(csc_array(A), A @ v + dt * force, dt, v, rows, zones)
+        rows, zones = rows_of(model, s)
+    return FleshSystem(csc_array(A), own, dt, v, rows, zones, centre, own)
 
 
 def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_array, Array]:

@@ -13,12 +13,12 @@ factorised and B_FF^-1 is found by the formula of Sherman, Morrison and Woodbury
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
@@ -26,6 +26,7 @@ from flowborne.solids.flesh_dynamics import FleshSystem
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Lower = tuple[NDArray[np.int32], NDArray[np.int32], Array]
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,9 @@ class PrescribedFlesh:
     free        (nf,) the free dofs
     factor      of A_FF
     rows        Y_F (nf, k) and the factor of D^-1 + J Y, for the active rows
+    limited     (nv,) dofs whose drive reached its limit; they are free and pushed by `push`
+    push        (nv,) generalised force of limited drives, already in `system`
+    turns       times that drives were released or taken up
     """
 
     system: FleshSystem
@@ -48,6 +52,9 @@ class PrescribedFlesh:
     free: NDArray[np.int64]
     factor: Any
     rows: tuple[Array, Any]
+    limited: Mask
+    push: Array
+    turns: int = 0
 
     def answer(self, impulse: Array) -> Array:
         """B_FF^-1 of generalised impulses (nv,) or (nv, k), zero on prescribed dofs."""
@@ -62,37 +69,106 @@ class PrescribedFlesh:
     def actuator(self, v_plus: Array, impulse: Array) -> Array:
         """(nv,) generalised force that the drives supplied; zero on dofs without a drive."""
         left = _remaining(self.system, v_plus) + impulse
-        return np.where(self.prescribed, -left / self.system.dt, 0.0)
+        return np.where(self.prescribed, -left / self.system.dt, self.push)
 
     def updated(self, v_plus: Array) -> PrescribedFlesh | None:
         """With the contacts and limits that `v_plus` implies; None when it has them already."""
         system = self.system.updated(v_plus)
         if system is None:
             return None
-        return _solved(system, self.prescribed, self.hold, self.free, self.factor)
+        return _solved(replace(self, system=system))
+
+    def factors(self) -> tuple[Lower, Array, NDArray[np.int64], Array]:
+        """B_FF^-1 = P^T (L D L^T)^-1 P - Y' Y'^T by its parts: L below its diagonal by columns
+        (start, row, value), D, the place of each free dof in L, and Y' (nf, k)."""
+        L, order = self.factor.L, self.factor.perm_c
+        if not np.array_equal(order, self.factor.perm_r):
+            raise ArithmeticError("the matrix of bones and flesh is not positive definite")
+        column = np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))
+        below = L.indices > column
+        start = np.concatenate([[0], np.cumsum(np.bincount(column[below], minlength=L.shape[1]))])
+        lower = start.astype(np.int32), L.indices[below], L.data[below]
+        Y, small = self.rows
+        if small is not None:
+            Y = solve_triangular(np.tril(small[0]), Y.T, lower=True).T
+        return lower, self.factor.U.diagonal(), order.astype(np.int64), Y
+
+    def soft(self, jacobian: Array) -> Array:
+        """(nf, m) Z with Z Z^T the part of B_FF^-1 that moves bones, flesh following at its ease.
+
+        jacobian  (6 nbody, nv) from v to the twists of the bones
+        """
+        bones = np.flatnonzero(np.abs(jacobian[:, self.free]).max(axis=0, initial=0.0) > 0.0)
+        unit = np.zeros((len(self.free), len(bones)))
+        unit[bones, np.arange(len(bones))] = 1.0
+        answers = _solve(self.factor, self.rows, unit) if len(bones) else unit
+        block = answers[bones]
+        share, axes = np.linalg.eigh(0.5 * (block + block.T))
+        return np.asarray(answers @ (axes / np.sqrt(np.maximum(share, np.finfo(float).tiny))))
+
+    def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> PrescribedFlesh:
+        """With other drives that keep their dofs, and others at their limits."""
+        system = self.system.pushed(push - self.push)
+        free, factor = _factored(system, prescribed)
+        return _solved(
+            replace(
+                self,
+                system=system,
+                prescribed=prescribed,
+                free=free,
+                factor=factor,
+                limited=limited,
+                push=push,
+                turns=self.turns + 1,
+            )
+        )
+
+    def answers_as(self, other: object) -> bool:
+        """Whether both give the same answer to any impulse."""
+        if not isinstance(other, PrescribedFlesh) or self.factor is not other.factor:
+            return False
+        return np.array_equal(self.system.zones, other.system.zones)
 
 
 def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> PrescribedFlesh:
     """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly."""
+    free, factor = _factored(system, prescribed)
+    none = np.zeros(len(hold))
+    rows = np.zeros((len(free), 0)), None
+    return _solved(
+        PrescribedFlesh(
+            system,
+            prescribed.copy(),
+            hold.copy(),
+            none,
+            free,
+            factor,
+            rows,
+            np.zeros(len(hold), bool),
+            none,
+        )
+    )
+
+
+def _factored(system: FleshSystem, prescribed: Mask) -> tuple[NDArray[np.int64], Any]:
     free = np.flatnonzero(~prescribed)
-    factor = symmetric_factor(csc_array(system.A[free][:, free]))
-    return _solved(system, prescribed.copy(), hold.copy(), free, factor)
+    return free, symmetric_factor(csc_array(system.A[free][:, free]))
 
 
-def _solved(
-    system: FleshSystem, prescribed: Mask, hold: Array, free: NDArray[np.int64], factor: Any
-) -> PrescribedFlesh:
-    J, D, _ = system.pushed()
+def _solved(driven: PrescribedFlesh) -> PrescribedFlesh:
+    """With the active rows of its system in the factor, and the velocity that they give."""
+    system, free, factor = driven.system, driven.free, driven.factor
+    J, D, _ = system.acting()
     Y = factor.solve(np.ascontiguousarray(J[:, free].T)) if len(D) else np.zeros((len(free), 0))
-    rows = Y, cho_factor(np.diag(1.0 / D) + J[:, free] @ Y) if len(D) else None
-    velocity = np.where(prescribed, hold, 0.0)
+    rows = Y, cho_factor(np.diag(1.0 / D) + J[:, free] @ Y, lower=True) if len(D) else None
+    velocity = np.where(driven.prescribed, driven.hold, 0.0)
     velocity[free] = _solve(factor, rows, _remaining(system, velocity)[free])
-    return PrescribedFlesh(system, prescribed, hold, velocity, free, factor, rows)
+    return replace(driven, velocity=velocity, rows=rows)
 
 
 def _remaining(system: FleshSystem, v_plus: Array) -> Array:
     """(nv,) r - B v+."""
-    J, D, push = system.pushed()
+    J, D, push = system.acting()
     return np.asarray(system.impulse + push - system.A @ v_plus - J.T @ (D * (J @ v_plus)))
 
 

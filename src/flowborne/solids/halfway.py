@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import dof_twists, subtree_halfway_momentum, weight
@@ -32,9 +33,9 @@ class Halfway:
     state  at the end of the motion, with the velocity before the step
     dt     s
     outer  (nv,) generalised forces other than gravity and those of Coriolis
-    A      (nv, nv) matrix of the system without constraint rows
-    mass   (nv, nv) mass matrix
-    given  (nbody, 6) momentum of each body's subtree when the positions were half-way, and what
+    still  (nv,) A v: impulse that keeps the velocity, A without constraint rows
+    mass   (nv, nv) mass matrix, dense or sparse
+    given  (bodies, 6) momentum of each body's subtree when the positions were half-way, and what
            gravity adds to it during the step
     along  (nv, 6) twist that unit velocity of each dof gives what it moves
     """
@@ -43,8 +44,8 @@ class Halfway:
     state: SolidState
     dt: float
     outer: Array
-    A: Array
-    mass: Array
+    still: Array
+    mass: Array | csr_array
     given: Array
     along: Array
 
@@ -58,8 +59,8 @@ class Halfway:
         bias = np.empty(model.nv)
         mujoco.mj_rne(s.mj, s.data, 0, bias)
         change = (self.along * (self.given - later)[model.dof_body]).sum(axis=1)
-        change += self.mass @ v_plus - model.armature * (v_plus - v) + (self.A - self.mass) @ v
-        moved = np.where(model.conserved, change, self.A @ v - dt * bias)
+        change += self.mass @ (v_plus - v) - model.armature * (v_plus - v) + self.still
+        moved = np.where(model.conserved, change, self.still - dt * bias)
         scale = (np.abs(self.along) * (np.abs(self.given) + np.abs(later))[model.dof_body]).sum(
             axis=1
         )
@@ -73,10 +74,12 @@ def halfway(
     before: SolidState,
     state: SolidState,
     dt: float,
-    A: Array,
+    still: Array,
+    mass: Array | csr_array,
     outer: Array,
 ) -> Halfway:
-    """The forces of a step from `before`, after MuJoCo's forward pass at `state`."""
-    mass, along, fall = s.mass_matrix().copy(), dof_twists(model, s), dt * weight(model, s)
+    """The forces of a step from `before`, after MuJoCo's forward pass at `state`; the rest as in
+    `Halfway`."""
+    along, fall = dof_twists(model, s), dt * weight(model, s)
     given = subtree_halfway_momentum(model, s, before, dt) + fall
-    return Halfway(model, state.copy(), dt, outer, A, mass, given, along)
+    return Halfway(model, state.copy(), dt, outer, still, mass, given, along)

@@ -43,7 +43,25 @@ def compiled(
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    where = f"model {source}" if isinstance(source, Path) else "model text"
+    spec, mj = bones_of(source, gravity, density, densities)
+    if slab:
+        where = _named(source)
+        _set_slab_inertias(spec, mj)
+        try:
+            mj = spec.compile()
+        except ValueError as error:
+            raise ValueError(f"{where} cannot be made a slab: {error}.") from error
+    return mj
+
+
+def bones_of(
+    source: str | Path,
+    gravity: tuple[float, float, float],
+    density: float | None,
+    densities: Mapping[str, float],
+) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+    """An MJCF file or text, as `compiled`, before it is made a slab or flesh grows on it."""
+    where = _named(source)
     try:
         if isinstance(source, Path):
             spec = mujoco.MjSpec.from_file(str(source))
@@ -58,13 +76,11 @@ def compiled(
     except ValueError as error:
         raise ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.") from error
     _refuse_unsupported(mj, where)
-    if slab:
-        _set_slab_inertias(spec, mj)
-        try:
-            mj = spec.compile()
-        except ValueError as error:
-            raise ValueError(f"{where} cannot be made a slab: {error}.") from error
-    return mj
+    return spec, mj
+
+
+def _named(source: str | Path) -> str:
+    return f"model {source}" if isinstance(source, Path) else "model text"
 
 
 def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> mujoco.MjModel:
@@ -130,8 +146,8 @@ def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> No
 def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
     if mj.nflex:
         raise ValueError(
-            f"{where} has {mj.nflex} flex element(s), which this version does not simulate. "
-            "Remove them."
+            f"{where} has {mj.nflex} flex element(s). Remove them, and describe the flesh by "
+            "[[flesh]] tables of the scene, or add it with solids.tissue.add_flesh."
         )
     for geom in displacing_geoms(mj):
         name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.solids import displaced, mjcf
+from flowborne.solids.covered import covered, outline_points
+from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.slab import Mesh, Section
 from flowborne.solids.state import SolidState
 
@@ -41,7 +43,8 @@ class SolidModel:
     slab           whether the solids are cross-sections at z = 0
     gravity        (3,) m/s^2
     nq, nv         numbers of positions and velocities
-    nbody, ngeom   numbers of bodies (0 is the world) and of geometries
+    nbody, ngeom   numbers of bodies (0 is the world), without points of flesh, and of geometries
+    flesh          what of the model is flesh, or None
     body_names, joint_names, dof_names, geom_names
                    nameless elements are called by kind and number; the dofs of a free joint have
                    the joint's name with :x :y :z (world axes) :rx :ry :rz (body axes)
@@ -53,10 +56,11 @@ class SolidModel:
     moves          (nbody, nv) whether a dof moves a body
     conserved      (nv,) dofs along which the bodies' momentum changes by outer forces alone
     armature       (nv,) inertia of the joints themselves, kg m^2 or kg
-    body_mass      (nbody,) kg
-    subtree_mass   (nbody,) kg, of the body and all below
+    body_mass      (nbody + points,) kg; points of flesh come after the bodies
+    subtree_mass   (nbody + points,) kg, of the body and all below
     volume         (nbody,) displaced volume, m^3 (area in a slab), each region counted once where
-                   geometries of a body overlap; see displaced.united. 0 for the world body
+                   geometries of a body overlap; see displaced.united. 0 for the world body, and
+                   for bones in flesh
     centroid       (nbody, 3) centroid of that volume in the body's frame, m
     geom_id        (ngeom,) MuJoCo's number
     geom_type      (ngeom,) "sphere", "capsule", "cylinder", "box", "ellipsoid" or "mesh"
@@ -65,17 +69,19 @@ class SolidModel:
     geom_offset    (ngeom, 3) centre in the body's frame, m
     geom_rotation  (ngeom, 3, 3) geometry's frame to the body's
     geom_rgba      (ngeom, 4) colour
+    geom_covered   (ngeom,) whether flesh is all around it at rest, so that no fluid touches it
     """
 
     def __init__(self, mj: mujoco.MjModel, slab: bool) -> None:
         self.mj = mj
         self.slab = slab
         self.gravity: Array = np.array(mj.opt.gravity)
-        self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), int(mj.nbody)
+        self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), _bones(mj)
         self.body_mass: Array = np.array(mj.body_mass)
         self.subtree_mass: Array = np.array(mj.body_subtreemass)
-        self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, mj.nbody)
+        self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, self.nbody)
         self._set_dofs()
+        self.flesh = flesh_of(self) if mj.nflex else None
         self._set_geoms()
         self._set_displaced()
 
@@ -114,10 +120,18 @@ class SolidModel:
 
     @classmethod
     def with_flesh(
-        cls, spec: mujoco.MjSpec, *, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+        cls,
+        spec: mujoco.MjSpec,
+        *,
+        slab: bool = False,
+        gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
     ) -> SolidModel:
-        """Model of bones and flesh, for `assemble_flesh`. Raises ValueError when it is bad."""
-        return cls(mjcf.compiled_with_flesh(spec, gravity), slab=False)
+        """Model of bones and flesh, for `assemble_flesh`.
+
+        slab    flesh is a prism along z, from z = -0.5 to 0.5 m
+        raises  ValueError when it is bad
+        """
+        return cls(mjcf.compiled_with_flesh(spec, gravity), slab)
 
     @classmethod
     def empty(cls, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SolidModel:
@@ -222,6 +236,14 @@ class SolidModel:
         self.geom_offset: Array = np.array(mj.geom_pos[self.geom_id])
         self.geom_rotation: Array = _rotations(mj.geom_quat[self.geom_id])
         self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
+        self.geom_covered: NDArray[np.bool_] = np.zeros(self.ngeom, bool)
+        if self.flesh is not None:
+            _, _, position, rotation = mjcf.rest_poses(mj)
+            outlines = []
+            for geom, g in enumerate(self.geom_id):
+                points = outline_points(self.geom_type[geom], mj.geom_size[g], mjcf.mesh_of(mj, g))
+                outlines.append(position[g] + points @ rotation[g].T)
+            self.geom_covered = covered(outlines, self.flesh.rest, self.flesh.surface)
 
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
@@ -230,7 +252,7 @@ class SolidModel:
         for body in range(self.nbody):
             solids = [
                 self._solid(int(g), position[self.geom_id[g]], rotation[self.geom_id[g]])
-                for g in np.flatnonzero(self.geom_body == body)
+                for g in np.flatnonzero((self.geom_body == body) & ~self.geom_covered)
             ]
             if solids and body > 0:
                 self.volume[body], centre = displaced.united(solids, self.slab)
@@ -251,6 +273,17 @@ class SolidModel:
         return displaced.Solid(
             kind, size, position, rotation, middle - half, middle + half, mesh, volume, centroid
         )
+
+
+def _bones(mj: mujoco.MjModel) -> int:
+    """Number of bodies before the points of flesh. Raises ValueError when some come after."""
+    flesh = np.flatnonzero(points_of_flesh(mj)) if mj.nflex else np.zeros(0, np.int64)
+    bones = int(flesh[0]) if flesh.size else int(mj.nbody)
+    if flesh.size and flesh.size != mj.nbody - bones:
+        later = next(b for b in range(bones, mj.nbody) if b not in flesh)
+        name = mjcf.element_name(mj, mujoco.mjtObj.mjOBJ_BODY, later)
+        raise ValueError(f"body '{name}' comes after points of flesh. Put all flesh after it.")
+    return bones
 
 
 def _names(mj: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ...]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
+
+if TYPE_CHECKING:
+    from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
 
@@ -29,18 +33,20 @@ def dof_twists(model: SolidModel, s: Scratch) -> Array:
 
 
 def weight(model: SolidModel, s: Scratch) -> Array:
-    """(nbody, 6) force of gravity on each body's subtree and its torque about the world origin."""
-    wrench = np.empty((model.nbody, 6))
+    """(bodies, 6) force of gravity on each body's subtree and its torque about the world origin;
+    points of flesh count as bodies."""
+    wrench = np.empty((len(model.subtree_mass), 6))
     wrench[:, :3] = model.subtree_mass[:, None] * model.gravity
     wrench[:, 3:] = cross(s.subtree_com, wrench[:, :3])
     return wrench
 
 
 def subtree_momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
-    """(nbody, 6) momentum of each body's subtree, linear and about the world origin."""
+    """(bodies, 6) momentum of each body's subtree, linear and about the world origin; points of
+    flesh count as bodies."""
     s.place(state.q, state.v)
     mujoco.mj_subtreeVel(s.mj, s.data)
-    momentum = np.empty((model.nbody, 6))
+    momentum = np.empty((len(model.subtree_mass), 6))
     momentum[:, :3] = model.subtree_mass[:, None] * s.subtree_linvel
     momentum[:, 3:] = s.subtree_angmom + cross(s.subtree_com, momentum[:, :3])
     return momentum
@@ -77,7 +83,11 @@ def mass_matrix(model: SolidModel, q: Array) -> Array:
 
 def kinetic_energy(model: SolidModel, state: SolidState) -> float:
     """Kinetic energy, J; joint armature included."""
-    return float(0.5 * state.v @ mass_matrix(model, state.q) @ state.v)
+    s, impulse = scratch(model), np.empty(model.nv)
+    s.place(state.q)
+    mujoco.mj_makeM(s.mj, s.data)
+    mujoco.mj_mulM(s.mj, s.data, impulse, state.v)
+    return float(0.5 * state.v @ impulse)
 
 
 def potential_energy(model: SolidModel, state: SolidState) -> float:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from flowborne.solids.dynamics import SolidSystem
+from flowborne.solids.flesh_solve import PrescribedFlesh
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -67,6 +68,20 @@ class PrescribedSystem:
         solved = _solved(system, self.prescribed, self.hold, self.limited, self.push)
         return replace(solved, turns=self.turns)
 
+    def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> PrescribedSystem:
+        """With other drives that keep their dofs, and others at their limits."""
+        system = self.system.pushed(push - self.push)
+        solved = _solved(system, prescribed, self.hold, limited, push)
+        return replace(solved, turns=self.turns + 1)
+
+    def answers_as(self, other: object) -> bool:
+        """Whether both give the same answer to any impulse."""
+        return isinstance(other, PrescribedSystem) and np.array_equal(self.inverse, other.inverse)
+
+
+Driven = PrescribedSystem | PrescribedFlesh
+"""Bones alone, or bones and flesh, some of whose dofs are prescribed."""
+
 
 def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedSystem:
     """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly.
@@ -77,9 +92,7 @@ def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedS
     return _solved(system, prescribed, hold, none, np.zeros(len(hold)))
 
 
-def within_limits(
-    driven: PrescribedSystem, limit: Array, v_plus: Array, actuator: Array
-) -> PrescribedSystem | None:
+def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) -> Driven | None:
     """The system with the drives that the solution implies; None when it has them already.
 
     A drive either keeps its dof at `hold` with a force within its limit, or pushes with all that
@@ -103,9 +116,7 @@ def within_limits(
     prescribed, limited, push = driven.prescribed.copy(), driven.limited.copy(), driven.push.copy()
     prescribed[wrong], limited[wrong] = past[wrong], over[wrong]
     push[wrong] = np.where(over[wrong], np.sign(actuator[wrong]) * limit[wrong], 0.0)
-    system = driven.system.pushed(push - driven.push)
-    solved = _solved(system, prescribed, driven.hold, limited, push)
-    return replace(solved, turns=driven.turns + 1)
+    return driven.redriven(prescribed, limited, push)
 
 
 def _solved(

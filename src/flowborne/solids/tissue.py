@@ -84,7 +84,9 @@ def add_flesh(
             f"flesh '{name}': element {worst} at ({place}) m has the volume {volume[worst]:g} m^3. "
             "Order its corners right-handed, or leave it out."
         )
-    mass = np.bincount(tetrahedra.ravel(), np.repeat(0.25 * tissue.density * volume, 4))
+    mass = np.bincount(
+        tetrahedra.ravel(), np.repeat(0.25 * tissue.density * volume, 4), len(points)
+    )
     inertia = 0.4 * mass * (0.75 * mass / (np.pi * tissue.density)) ** (2.0 / 3.0)
     frames = _frames(spec, name, holders)
     bodies, offsets = [], np.zeros_like(points)
@@ -95,7 +97,7 @@ def add_flesh(
         bodies.append(holder or _hang(spec, f"{name}:{i}", points[i], mass[i], inertia[i]))
     for holder in sorted(frames.keys() - {WORLD}):
         held = np.array([h == holder for h in holders])
-        _load(spec, f"{name}@{holder}", holder, offsets[held], mass[held], inertia[held])
+        _load(spec, holder, offsets[held], mass[held], inertia[held])
     _flex(spec, name, tissue, bodies, offsets, tetrahedra)
 
 
@@ -124,19 +126,29 @@ def _hang(spec: mujoco.MjSpec, name: str, place: Array, mass: float, inertia: fl
     body.inertia = np.full(3, max(inertia, LEAST_INERTIA))
     body.ipos = np.zeros(3)  # left out, it becomes the body's own place, once more
     for axis, direction in zip("xyz", np.eye(3), strict=True):
-        body.add_joint(name=f"{name}:{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=direction)
+        joint = body.add_joint(name=f"{name}:{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE)
+        joint.axis, joint.limited = direction, mujoco.mjtLimited.mjLIMITED_FALSE
+        # the model's defaults for its own joints are none of flesh's
+        joint.stiffness[:] = joint.damping[:] = joint.armature = joint.frictionloss = 0.0
     return name
 
 
-def _load(
-    spec: mujoco.MjSpec, name: str, holder: str, offsets: Array, mass: Array, inertia: Array
-) -> None:
+def _load(spec: mujoco.MjSpec, holder: str, offsets: Array, mass: Array, inertia: Array) -> None:
     """Give a bone the mass of the points that it holds, at `offsets` (n, 3) in its frame."""
-    body = spec.body(holder).add_body(name=name)
-    body.mass, body.explicitinertial = mass.sum(), True
-    body.ipos = centre = mass @ offsets / mass.sum()
-    arms = offsets - centre
-    about = np.eye(3) * (mass @ (arms**2).sum(axis=1) + inertia.sum()) - (arms.T * mass) @ arms
+    mj = compiled_quietly(spec.copy())
+    b = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, holder)
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, mj.body_iquat[b])
+    axes = turn.reshape(3, 3)
+    masses = np.append(mass, mj.body_mass[b])
+    places = np.concatenate([offsets, mj.body_ipos[b][None]])
+    centre = masses @ places / masses.sum()
+    arms = places - centre
+    about = np.eye(3) * (masses @ (arms**2).sum(axis=1) + inertia.sum()) - (arms.T * masses) @ arms
+    about += axes @ np.diag(mj.body_inertia[b]) @ axes.T
+    body = spec.body(holder)
+    body.mass, body.ipos, body.explicitinertial = masses.sum(), centre, True
+    body.iquat, body.inertia = (1.0, 0.0, 0.0, 0.0), np.zeros(3)
     body.fullinertia = about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 

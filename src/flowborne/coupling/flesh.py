@@ -1,0 +1,156 @@
+"""Flesh on the grid: which faces its skin closes, and which of its vertices move them.
+
+The velocity of a closed part of a face is that of the skin at the point nearest to the face's
+centre, between the three vertices of a triangle; the force that pressure exerts on that part is
+shared among the same vertices by the same weights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from flowborne.coupling.skin import sample_skin, skin_box, skin_weights
+from flowborne.fluid.arrays import Integers
+from flowborne.fluid.grid import Array, Grid
+from flowborne.solids.flesh import Flesh
+
+
+@dataclass(frozen=True)
+class Skins:
+    """The skin of every flesh at the nodes of the grid.
+
+    box       (nf, 3, 2) node ranges around each flesh
+    start     (nf,) where its distances begin in
+    distance  signed distances to each at the nodes of its box, flat, m
+    vertices  (n, 3) m;  triangles  (k, 3)
+    """
+
+    box: Integers
+    start: Integers
+    distance: Array
+    vertices: Array
+    triangles: Integers
+
+
+def skins_on(grid: Grid, flesh: Flesh | None, vertices: Array) -> Skins:
+    """The skins of flesh whose vertices are at `vertices` (n, 3)."""
+    if flesh is None:
+        none, no_corners = np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
+        no_boxes = np.zeros((0, 3, 2), np.int64)
+        return Skins(no_boxes, none, np.zeros(0), vertices, no_corners)
+    origin = np.array(grid.origin)
+    boxes, starts, distances, first = [], [], [], 0
+    for f in range(len(flesh.names)):
+        own = np.flatnonzero(flesh.of_surface == f)
+        triangles = flesh.surface[own]
+        inside = vertices[np.unique(triangles)]
+        box = skin_box(inside, origin, grid.spacing, np.array(grid.shape))
+        if grid.is_slab:
+            box[2] = 0, 2
+        if np.any(box[:, 1] - box[:, 0] < 2):
+            box[:] = 0
+        phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab)
+        boxes.append(box)
+        starts.append(first)
+        distances.append(phi.ravel())
+        first += phi.size
+    return Skins(
+        np.array(boxes),
+        np.array(starts),
+        np.concatenate(distances),
+        vertices,
+        flesh.surface,
+    )
+
+
+def face_centres(axis: Integers, face: Integers, grid: Grid) -> tuple[Array, Integers]:
+    """(n, 3) centres of faces in m, z = 0 in a slab, and (n, 3) their indices along each axis."""
+    x, at = np.empty((axis.size, 3)), np.empty((axis.size, 3), np.int64)
+    for d in grid.axes:
+        across = axis == d
+        at[across] = np.stack(np.unravel_index(face[across], grid.face_shape(d)), axis=1)
+        x[across] = at[across] + 0.5 * (np.arange(3) != d)
+    x = np.array(grid.origin) + grid.spacing * x
+    if grid.is_slab:
+        x[:, 2] = 0.0
+    return x, at
+
+
+def skin_at(skins: Skins, place: Array, grid: Grid) -> tuple[Integers, Array]:
+    """(n, 3) vertices and weights of the point of the skin that is nearest to each place (n, 3)."""
+    return skin_weights(place, skins.vertices, skins.triangles, grid.spacing)
+
+
+@njit(nogil=True, cache=True)
+def has_open_face(cell: Integers, ox: Array, oy: Array, oz: Array) -> bool:
+    i, j, k = cell
+    clear = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
+    if ox.shape[2] > 1:
+        clear += oz[i, j, k] + oz[i, j, k + 1]
+    return bool(clear > 0.0)
+
+
+@njit(nogil=True, cache=True)
+def flesh_rows(
+    axis: Integers,
+    at: Integers,
+    closed: Array,
+    corner: Integers,
+    weight: Array,
+    first_column: int,
+    area: float,
+    ox: Array,
+    oy: Array,
+    oz: Array,
+) -> tuple[Integers, Integers, Integers, Integers, Array]:
+    """Coupling rows of the cells beside closed parts of faces: one row per part and open cell.
+
+    axis, at        (n,), (n, 3) faces
+    closed          (n,) part of each that flesh closes
+    corner, weight  (n, 3) vertices that move it
+    first_column    of the vertices' velocities
+    returns         number of the part of each row; cells, row_start, columns, values as in
+                    `Geometry`
+    """
+    shape = (oy.shape[0], ox.shape[1], ox.shape[2])
+    part, cells = np.empty(2 * axis.size, np.int64), np.empty(2 * axis.size, np.int64)
+    columns = np.empty(6 * axis.size, np.int64)
+    values = np.empty(6 * axis.size)
+    cell = np.empty(3, np.int64)
+    rows = 0
+    for n in range(axis.size):
+        for side in range(2):
+            cell[:] = at[n]
+            cell[axis[n]] -= 1 - side
+            if cell[axis[n]] < 0 or cell[axis[n]] >= shape[axis[n]]:
+                continue
+            if not has_open_face(cell, ox, oy, oz):
+                continue
+            part[rows] = n
+            cells[rows] = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
+            for c in range(3):
+                columns[3 * rows + c] = first_column + 3 * corner[n, c] + axis[n]
+                values[3 * rows + c] = (1.0 - 2.0 * side) * area * closed[n] * weight[n, c]
+            rows += 1
+    start = 3 * np.arange(rows + 1)
+    return part[:rows], cells[:rows], start, columns[: 3 * rows], values[: 3 * rows]
+
+
+def hydrostatic_push(vertices: Array, triangles: Integers, gravity: Array, density: float) -> Array:
+    """(3n,) force of the pressure of fluid at rest, rho g . x, on the vertices of skins, N.
+
+    The pressure is that above the middle of them all: flesh that dives is not squeezed by depth,
+    which true flesh hardly yields to, and a closed skin is borne by the same force.
+    """
+    corners = vertices[triangles]
+    corners -= corners.mean(axis=(0, 1))
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    pressure = density * (corners @ gravity)
+    # of a pressure linear over the triangle: its nodes bear (2 p_i + p_j + p_k) / 12 of the area
+    share = (pressure + pressure.sum(axis=1, keepdims=True)) / 12.0
+    force = np.zeros_like(vertices)
+    np.add.at(force, triangles, -share[:, :, None] * area[:, None, :])
+    return force.ravel()

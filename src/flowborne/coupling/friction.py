@@ -1,0 +1,118 @@
+"""Friction between fluid and bodies: the viscous solve, and how bones and flesh answer it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array
+
+from flowborne.coupling.flesh import skin_at
+from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.mouths import Jet, skin_slip
+from flowborne.coupling.operators import generalised, jacobian, motion, pressure_push, response
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.projection import push
+from flowborne.fluid.viscosity import assemble_viscosity
+from flowborne.fluid.viscous_solve import Answer, Answering, ViscousSystem, Walls, walls_of
+from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.flesh_solve import PrescribedFlesh, symmetric_factor
+from flowborne.solids.prescribed import Driven, PrescribedSystem
+
+TOLERANCE = 1e-12
+"""Relative residual of the viscous solve."""
+
+
+def diffuse(
+    world: World,
+    velocity: Faces,
+    cut: Geometry,
+    jets: tuple[Jet, ...],
+    pose: Kinematics,
+    driven: Driven,
+    dt: float,
+) -> tuple[Faces, Array, bool]:
+    """Implicit viscosity with the pressure of the last step, and its impulse on the bodies.
+
+    The pressure is there so that the boundary layer is that of the flow at the end of the step;
+    it is taken off again before the new pressure is solved for.
+
+    returns  Faces; (k,) impulse; whether the solve converged
+    """
+    fluid, state = world.flow()
+    bodies = pose.twist_jacobian.shape[0]
+    size = 6 * bodies + pose.vertices.size
+    if fluid.viscosity == 0.0:
+        return velocity, np.zeros(size), True
+    grid, sides = fluid.grid, fluid.boundaries
+    pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
+    scale = dt / (fluid.density * grid.spacing)
+    push(pushed, cut.open, state.pressure, grid, sides, scale)
+    earlier = pressure_push(cut, dt * state.pressure, size)
+    moving = motion(pose, driven.after(generalised(pose, earlier)))
+    parts = assemble_viscosity(
+        cut.distance,
+        cut.open,
+        velocity,
+        grid,
+        sides,
+        fluid.density,
+        fluid.viscosity,
+        dt,
+        world.time + dt,
+    )
+    walls = on_flesh(walls_of(parts, cut.distance, cut.nearest, grid), cut, bodies, grid)
+    system = ViscousSystem(
+        parts, walls, size, bodies, lambda drag: answering(pose, driven, drag), grid, sides, dt
+    )
+    slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
+    smooth, impulse, converged = system.solve(pushed, moving, TOLERANCE, slip)
+    push(smooth, cut.open, state.pressure, grid, sides, -scale)
+    return smooth, impulse, converged
+
+
+def on_flesh(walls: Walls, cut: Geometry, bodies: int, grid: Grid) -> Walls:
+    """The walls with those on flesh moved by the vertices around them."""
+    flesh = np.flatnonzero(walls.body >= bodies)
+    if flesh.size == 0:
+        return walls
+    axis = np.argmax(walls.across[flesh], axis=1)
+    corner, weight = skin_at(cut.skins, walls.point[flesh], grid)
+    columns, arm = walls.columns.copy(), walls.arm.copy()
+    columns[flesh], arm[flesh] = 0, 0.0
+    columns[flesh, :3] = 6 * bodies + 3 * corner + axis[:, None]
+    arm[flesh, :3] = weight
+    return replace(walls, columns=columns, arm=arm)
+
+
+def answering(pose: Kinematics, driven: Driven, drag: csr_array) -> Answering:
+    """How bones, or bones and flesh, answer a drag (k, k), kg."""
+    if isinstance(driven, PrescribedSystem):
+        return Answer(response(pose, driven).arrays[0], drag.toarray())
+    return FleshAnswer(pose, driven, drag)
+
+
+class FleshAnswer:
+    """How bones and flesh answer friction: N = T (A + T^T D T)^-1 T^T, factorised anew.
+
+    drag  (k, k) D, kg
+    """
+
+    def __init__(self, pose: Kinematics, driven: PrescribedFlesh, drag: csr_array) -> None:
+        system, free = driven.system, driven.free
+        self.drag, self.jacobian = drag, csr_array(jacobian(pose)[:, free])
+        J, D, _ = system.acting()
+        held = csr_array(J[:, free])
+        A = system.A[free][:, free] + held.T @ (D[:, None] * held)
+        self.factor = symmetric_factor(csc_array(A + self.jacobian.T @ drag @ self.jacobian))
+        self.yields = free.size > 0
+
+    def change(self, push: Array) -> Array:
+        """See `Answering`."""
+        return np.asarray(self.jacobian @ self.factor.solve(self.jacobian.T @ push))
+
+    def to(self, push: Array) -> tuple[Array, Array]:
+        """See `Answering`."""
+        change = self.change(push)
+        return change, push - self.drag @ change

@@ -1,0 +1,285 @@
+"""Distance to a closed surface of triangles, a skin, at the nodes of the grid.
+
+The skin of deforming flesh moves every step, so distances are found afresh and only near to it:
+each triangle visits the nodes around it. What is inside is told by following the grid's lines
+along x and counting, with their sign, the triangles that they cross. Where flesh overlaps itself
+the count is 2, and that is inside as well.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from flowborne.coupling.distance import BAND
+from flowborne.fluid.arrays import Integers
+from flowborne.fluid.grid import Array
+
+REACH = 2.0
+"""Distances are exact up to this many cells from the skin."""
+
+ON_SKIN = 1e-9
+"""A node as many cells from the skin or nearer lies on it, and counts as this far inside."""
+
+Point = tuple[float, float, float]
+
+
+@njit(nogil=True, cache=True)
+def first_node(x: float, count: int) -> int:
+    """First of `count` nodes 0, 1, ... at or beyond x; `count` where there is none."""
+    if not x > 0.0:
+        return 0
+    return int(np.ceil(x)) if x < count else count
+
+
+@njit(nogil=True, cache=True)
+def skin_box(vertices: Array, origin: Array, h: float, shape: Integers) -> Integers:
+    """Node ranges (low, high per axis) around all vertices (n, 3), with the band; may be empty."""
+    box = np.empty((3, 2), np.int64)
+    for axis in range(3):
+        low = (vertices[:, axis].min() - origin[axis]) / h
+        high = (vertices[:, axis].max() - origin[axis]) / h
+        box[axis, 0] = first_node(np.floor(low - BAND), shape[axis] + 1)
+        box[axis, 1] = first_node(np.ceil(high + BAND) + 1.0, shape[axis] + 1)
+    return box
+
+
+@njit(nogil=True, cache=True)
+def closest_on_triangle(p: Point, a: Point, b: Point, c: Point) -> Point:
+    """Weights of a, b, c at the point of their triangle closest to p (Ericson 2005, 5.1.5)."""
+    abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    d1, d2 = abx * x + aby * y + abz * z, acx * x + acy * y + acz * z
+    if d1 <= 0.0 and d2 <= 0.0:
+        return 1.0, 0.0, 0.0
+    x, y, z = p[0] - b[0], p[1] - b[1], p[2] - b[2]
+    d3, d4 = abx * x + aby * y + abz * z, acx * x + acy * y + acz * z
+    if d3 >= 0.0 and d4 <= d3:
+        return 0.0, 1.0, 0.0
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0.0 and d1 >= 0.0 >= d3 and d1 > d3:
+        t = d1 / (d1 - d3)
+        return 1.0 - t, t, 0.0
+    x, y, z = p[0] - c[0], p[1] - c[1], p[2] - c[2]
+    d5, d6 = abx * x + aby * y + abz * z, acx * x + acy * y + acz * z
+    if d6 >= 0.0 and d5 <= d6:
+        return 0.0, 0.0, 1.0
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0.0 and d2 >= 0.0 >= d6 and d2 > d6:
+        t = d2 / (d2 - d6)
+        return 1.0 - t, 0.0, t
+    va = d3 * d6 - d5 * d4
+    along, back = d4 - d3, d5 - d6
+    if va <= 0.0 and along >= 0.0 and back >= 0.0 and along + back > 0.0:
+        t = along / (along + back)
+        return 0.0, 1.0 - t, t
+    total = va + vb + vc
+    return va / total, vb / total, vc / total
+
+
+@njit(nogil=True, cache=True)
+def squared_distance(p: Point, a: Point, b: Point, c: Point, weights: Point) -> float:
+    """Square of the distance from p to the point of the triangle with the given weights."""
+    total = 0.0
+    for m in range(3):
+        away = weights[0] * (a[m] - p[m]) + weights[1] * (b[m] - p[m]) + weights[2] * (c[m] - p[m])
+        total += away * away
+    return total
+
+
+@njit(nogil=True, cache=True)
+def edge_at(p: Point, q: Point, z: float) -> tuple[float, float]:
+    """(x, y) where the edge between p and q passes z; the same numbers from both of its ends."""
+    low, high = (p, q) if p[2] <= z else (q, p)
+    t = (z - low[2]) / (high[2] - low[2])
+    return low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1])
+
+
+@njit(nogil=True, cache=True)
+def add_crossings(
+    entered: Integers, counts: tuple[int, int, int], a: Point, b: Point, c: Point
+) -> None:
+    """Count one triangle where grid lines along x cross it: 1 at the first node beyond it where
+    the line enters, -1 where it leaves.
+
+    Nodes are 0, 1, ... along each axis. Row by row in z the triangle covers the nodes in y between
+    two of its edges, the lower end included and the upper one not. Neighbours find the same ends
+    on the edge that they share, so what they count never overlaps and leaves no gap.
+    """
+    low = first_node(min(a[2], b[2], c[2]), counts[2])
+    high = first_node(max(a[2], b[2], c[2]), counts[2])
+    for k in range(low, high):
+        below_a, below_b, below_c = a[2] <= k, b[2] <= k, c[2] <= k
+        if below_b == below_c:
+            alone, after, before, below = a, b, c, below_a
+        elif below_c == below_a:
+            alone, after, before, below = b, c, a, below_b
+        else:
+            alone, after, before, below = c, a, b, below_c
+        x1, y1 = edge_at(alone, after, k)
+        x2, y2 = edge_at(alone, before, k)
+        j1, j2 = first_node(y1, counts[1]), first_node(y2, counts[1])
+        enters = 1 if below == (j1 < j2) else -1
+        for j in range(min(j1, j2), max(j1, j2)):
+            i = first_node(x1 + (j - y1) / (y2 - y1) * (x2 - x1), counts[0])
+            if i < counts[0]:
+                entered[i, j, k] += enters
+
+
+@njit(nogil=True, cache=True)
+def lower_squares(
+    square: Array,
+    counts: tuple[int, int, int],
+    a: Point,
+    b: Point,
+    c: Point,
+) -> None:
+    """Lower the squared distance to the skin, in cells, to that of one triangle around it."""
+    first_i = first_node(min(a[0], b[0], c[0]) - REACH, counts[0])
+    last_i = first_node(max(a[0], b[0], c[0]) + REACH, counts[0])
+    first_j = first_node(min(a[1], b[1], c[1]) - REACH, counts[1])
+    last_j = first_node(max(a[1], b[1], c[1]) + REACH, counts[1])
+    first_k = first_node(min(a[2], b[2], c[2]) - REACH, counts[2])
+    last_k = first_node(max(a[2], b[2], c[2]) + REACH, counts[2])
+    nx = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
+    ny = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
+    nz = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    if length > 0.0:
+        nx, ny, nz = nx / length, ny / length, nz / length
+    for i in range(first_i, last_i):
+        for j in range(first_j, last_j):
+            above = nx * (i - a[0]) + ny * (j - a[1]) - nz * a[2]
+            for k in range(first_k, last_k):
+                if (above + nz * k) ** 2 >= square[i, j, k]:
+                    continue
+                p = (float(i), float(j), float(k))
+                found = squared_distance(p, a, b, c, closest_on_triangle(p, a, b, c))
+                square[i, j, k] = min(square[i, j, k], found)
+
+
+@njit(nogil=True, cache=True)
+def sample_skin(
+    vertices: Array, triangles: Integers, box: Integers, origin: Array, h: float, flat: bool
+) -> Array:
+    """(box shape) signed distance to a skin at the nodes of its box, m, negative inside.
+
+    Exact within REACH cells of the skin, beyond them BAND cells outside and -BAND cells inside;
+    never 0, for what is on the skin is inside (ON_SKIN).
+
+    vertices   (n, 3) m
+    triangles  (k, 3) vertices of each, counterclockwise from outside; together a closed surface
+    box        (3, 2) node ranges, may cut the skin off
+    flat       a slab: its nodes lie at z = 0, and only triangles that reach there count for the
+               distance, so the ends of a prism may be at any height
+    Where flesh overlaps itself the distance is the one to the nearest sheet, covered ones included.
+    """
+    shape = (box[0, 1] - box[0, 0], box[1, 1] - box[1, 0], box[2, 1] - box[2, 0])
+    counts = (shape[0], shape[1], min(shape[2], 1) if flat else shape[2])
+    places = (vertices - origin) / h - box[:, 0]
+    if flat:
+        places[:, 2] = vertices[:, 2] / h
+    phi = np.full(shape, REACH**2)
+    winding = np.zeros(shape, np.int64)
+    for t in range(triangles.shape[0]):
+        n, m, o = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a = (places[n, 0], places[n, 1], places[n, 2])
+        b = (places[m, 0], places[m, 1], places[m, 2])
+        c = (places[o, 0], places[o, 1], places[o, 2])
+        add_crossings(winding, counts, a, b, c)
+        if not flat or min(a[2], b[2], c[2]) <= 0.0 <= max(a[2], b[2], c[2]):
+            lower_squares(phi, counts, a, b, c)
+    for i in range(counts[0]):
+        for j in range(counts[1]):
+            for k in range(counts[2]):
+                if i > 0:
+                    winding[i, j, k] += winding[i - 1, j, k]
+                distance = np.sqrt(phi[i, j, k]) if phi[i, j, k] < REACH**2 else BAND
+                if winding[i, j, k] >= 1 or distance < ON_SKIN:
+                    distance = -max(distance, ON_SKIN)
+                phi[i, j, k] = distance * h
+    if flat:
+        phi[:, :, 1:] = phi[:, :, :1]
+    return phi
+
+
+@njit(nogil=True, cache=True)
+def triangles_by_cell(
+    x: Array, vertices: Array, triangles: Integers, h: float
+) -> tuple[Integers, Integers, Integers]:
+    """For cells of edge h around places x (m, 3): the triangles within REACH cells of each.
+
+    returns  (m,) number of the place's cell; where its triangles begin in the list; the list
+    """
+    low = np.array([x[:, d].min() for d in range(3)])
+    counts = np.array([np.int64((x[:, d].max() - low[d]) / h) + 1 for d in range(3)])
+    slot = np.full((counts[0], counts[1], counts[2]), -1)
+    number = np.empty(x.shape[0], np.int64)
+    cells = 0
+    for row in range(x.shape[0]):
+        i = int((x[row, 0] - low[0]) / h)
+        j = int((x[row, 1] - low[1]) / h)
+        k = int((x[row, 2] - low[2]) / h)
+        if slot[i, j, k] < 0:
+            slot[i, j, k] = cells
+            cells += 1
+        number[row] = slot[i, j, k]
+    start = np.zeros(cells + 1, np.int64)
+    found = np.empty(0, np.int64)
+    for turn in range(2):  # count, then list
+        for t in range(triangles.shape[0]):
+            first, last = np.empty(3, np.int64), np.empty(3, np.int64)
+            for d in range(3):
+                a, b = vertices[triangles[t, 0], d], vertices[triangles[t, 1], d]
+                c = vertices[triangles[t, 2], d]
+                lower, upper = (min(a, b, c) - low[d]) / h, (max(a, b, c) - low[d]) / h
+                first[d] = max(int(np.floor(lower - REACH)), 0)
+                last[d] = min(int(np.floor(upper + REACH)), counts[d] - 1)
+            for i in range(first[0], last[0] + 1):
+                for j in range(first[1], last[1] + 1):
+                    for k in range(first[2], last[2] + 1):
+                        n = slot[i, j, k]
+                        if n >= 0 and turn == 0:
+                            start[n + 1] += 1
+                        elif n >= 0:
+                            start[n] -= 1
+                            found[start[n]] = t
+        if turn == 0:
+            start = np.cumsum(start)
+            found = np.empty(start[-1], np.int64)
+            start[:-1] = start[1:]  # filled from the end of each
+    return number, start, found
+
+
+@njit(nogil=True, cache=True)
+def skin_weights(
+    x: Array, vertices: Array, triangles: Integers, h: float
+) -> tuple[Integers, Array]:
+    """Vertices and their weights at the point of the skin that is closest to each place.
+
+    x        (m, 3) places, m;  h  length of a cell, m
+    returns  corners (m, 3) and weights (m, 3), which sum to 1; all 0 farther than REACH cells away
+    """
+    corners = np.zeros((x.shape[0], 3), np.int64)
+    weights = np.zeros((x.shape[0], 3))
+    if x.shape[0] == 0:
+        return corners, weights
+    number, start, listed = triangles_by_cell(x, vertices, triangles, h)
+    for row in range(x.shape[0]):
+        p = (x[row, 0], x[row, 1], x[row, 2])
+        nearest = (REACH * h) ** 2
+        for at in range(start[number[row]], start[number[row] + 1]):
+            t = listed[at]
+            n, m, o = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            a = (vertices[n, 0], vertices[n, 1], vertices[n, 2])
+            b = (vertices[m, 0], vertices[m, 1], vertices[m, 2])
+            c = (vertices[o, 0], vertices[o, 1], vertices[o, 2])
+            found = closest_on_triangle(p, a, b, c)
+            square = squared_distance(p, a, b, c, found)
+            if square < nearest:
+                nearest = square
+                for corner in range(3):
+                    corners[row, corner] = triangles[t, corner]
+                    weights[row, corner] = found[corner]
+    return corners, weights
