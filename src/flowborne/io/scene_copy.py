@@ -36,7 +36,7 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
     raises  RunFolderError when the folder has no scene, or another one: it says what differs
     """
     from flowborne.scenes.load import load_scene
-    from flowborne.scenes.save import scene_files
+    from flowborne.scenes.save import scene_files, with_meshes_of
 
     if not folder.scene.exists():
         raise RunFolderError(
@@ -45,7 +45,7 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
         )
     saved = load_scene(folder.scene)
     ours = scene_files(saved)
-    theirs = scene_files(with_frames(wanted, saved.time.frames))
+    theirs = scene_files(with_frames(with_meshes_of(wanted, saved), saved.time.frames))
     if ours == theirs:
         return saved
     name = folder.scene.name

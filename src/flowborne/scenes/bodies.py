@@ -14,6 +14,8 @@ from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import MotionConstantTable, MotionSinusoidTable, MotionTable
 from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes, MotionSinusoid
+from flowborne.solids import mjcf
+from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 
@@ -40,6 +42,8 @@ def load_model(scene: Scene) -> SolidModel:
     if not path.is_file():
         raise SceneError(f"there is no model file {path}. Correct solids.model.")
     try:
+        if scene.flesh:
+            return SolidModel.with_flesh(fleshed(scene), gravity=(x, y, z))
         return SolidModel.from_file(
             path,
             slab=scene.is_slab,
@@ -49,6 +53,25 @@ def load_model(scene: Scene) -> SolidModel:
         )
     except ValueError as error:
         raise SceneError(_sentence(str(error))) from None
+
+
+def bones_of(scene: Scene) -> mujoco.MjSpec:
+    """The model file of a scene before flesh grows on it. Raises ValueError when it is bad."""
+    x, y, z = scene.gravity
+    assert scene.solids is not None
+    assert scene.model_path is not None
+    solids = scene.solids
+    spec, _ = mjcf.bones_of(scene.model_path, (x, y, z), solids.density, solids.densities)
+    return spec
+
+
+def fleshed(scene: Scene) -> mujoco.MjSpec:
+    """The model of a scene with its flesh. Raises ValueError when it cannot be made."""
+    from flowborne.scenes.flesh.grow import grow
+
+    spec = bones_of(scene)
+    grow(spec, scene.flesh, scene.folder)
+    return spec
 
 
 def _sentence(text: str) -> str:
@@ -118,4 +141,6 @@ def initial_state(scene: Scene, model: SolidModel) -> SolidState:
     for motion in motions:
         state.q[model.places_of(motion.dofs)] = motion.position(0.0)
         state.v[motion.dofs] = motion.velocity(0.0)
+    state.q = posed_flesh(model, state.q)
+    state.v = follow(model, state.q, state.v)
     return state

@@ -7,6 +7,7 @@ from flowborne.scenes.bodies import load_model
 from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
 from flowborne.scenes.check_clip import check_clip, check_followers
 from flowborne.scenes.check_control import check_control
+from flowborne.scenes.check_flesh import check_flesh
 from flowborne.scenes.check_fluid import check_dimensions, check_fluid
 from flowborne.scenes.check_mouths import check_mouth_cells, check_mouths
 from flowborne.scenes.draft import Draft
@@ -15,7 +16,7 @@ from flowborne.scenes.draft import Draft
 def cross_check(draft: Draft) -> list[str]:
     """Everything that is wrong with a scene that the schema accepts."""
     problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
-    unusable = list(check_clip(draft))
+    unusable = [*check_clip(draft), *check_flesh(draft)]
     problems += unusable
     scene = draft.scene
     if not scene.has_bodies or unusable or not draft.sound("dimensions", "gravity", "clip"):
@@ -23,7 +24,7 @@ def cross_check(draft: Draft) -> list[str]:
     try:
         model = load_model(scene)
     except SceneError as error:
-        table = "solids" if scene.human is None else "human"
+        table = "human" if scene.human is not None else "flesh" if scene.flesh else "solids"
         return problems + [f"{draft.at(table)}: {problem}" for problem in error.problems]
     lost = list(check_followers(draft, model))
     if lost:

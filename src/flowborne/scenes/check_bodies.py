@@ -18,6 +18,7 @@ from flowborne.scenes.bodies import (
     joint_kind,
     joint_unit,
 )
+from flowborne.scenes.check_flesh import check_flesh_places
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.python_function import find_function
 from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
@@ -27,6 +28,7 @@ from flowborne.solids.model import SolidModel
 
 NEEDS_BODIES = (
     "clip",
+    "flesh",
     "initial",
     "motion",
     "wind",
@@ -174,7 +176,9 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
     domain = draft.scene.domain
     if domain is None or not draft.scene.has_fluid or not draft.sound("domain", "solids"):
         return
-    pose = kinematics(model, initial_state(draft.scene, model).q)
+    start = initial_state(draft.scene, model)
+    yield from check_flesh_places(draft, model, start)
+    pose = kinematics(model, start.q)
     axes = min(len(domain.lower), draft.scene.dimensions)
     reach = model.mj.geom_aabb[model.geom_id]
     outside: set[int] = set()

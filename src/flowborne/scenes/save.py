@@ -6,8 +6,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from flowborne.errors import SceneError
+from flowborne.scenes.bodies import bones_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_flesh import FleshTable
 
 SCENE_FILE = "scene.toml"
 HUMAN_FILE = "human.xml"
@@ -43,11 +45,14 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     """
     files: dict[str, bytes] = {}
     model = scene.model_path
+    if scene.flesh:
+        tables, files = _flesh_files(scene)
+        scene = scene.model_copy(update={"flesh": tables}).in_folder(scene.folder)
     if model is not None:
         assert scene.solids is not None
-        files = _model_files(model)
+        files |= _model_files(model)
         solids = scene.solids.model_copy(update={"model": model.name})
-        scene = scene.model_copy(update={"solids": solids})
+        scene = scene.model_copy(update={"solids": solids}).in_folder(scene.folder)
     if scene.human is not None:
         files[HUMAN_FILE] = human_of(scene).encode()
     if scene.clip is not None and scene.clip.file is not None:
@@ -57,6 +62,36 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
             update={"clip": scene.clip.model_copy(update={"file": path.name})}
         ).in_folder(scene.folder)
     return {SCENE_FILE: scene.to_toml().encode()} | files
+
+
+def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
+    """The same scene with the meshes of its flesh from an earlier run where it names none."""
+    known = {table.name: table.mesh for table in earlier.flesh if table.mesh is not None}
+    tables = tuple(
+        table.model_copy(update={"mesh": str(earlier.folder.resolve() / known[table.name])})
+        if table.mesh is None and table.name in known
+        else table
+        for table in scene.flesh
+    )
+    return scene.model_copy(update={"flesh": tables}).in_folder(scene.folder)
+
+
+def _flesh_files(scene: Scene) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
+    """The flesh's tables and the files that they name: every mesh, and the user's own surfaces."""
+    from flowborne.scenes.flesh.grow import meshed
+    from flowborne.scenes.flesh.mesh_file import mesh_bytes
+
+    spec, files, tables = bones_of(scene), {}, []
+    for table in scene.flesh:
+        mesh, recipe = meshed(spec, table, scene.folder)
+        names = {"mesh": f"flesh-{table.name}.vtu"}
+        files[names["mesh"]] = mesh_bytes(mesh, recipe)
+        if table.surface is not None:
+            path = scene.folder / table.surface
+            names["surface"] = path.name
+            files[path.name] = _read(path)
+        tables.append(table.model_copy(update=names))
+    return tuple(tables), files
 
 
 def _model_files(model: Path) -> dict[str, bytes]:

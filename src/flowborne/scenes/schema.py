@@ -10,6 +10,7 @@ from pydantic import PrivateAttr, model_validator
 
 from flowborne.scenes.fields import Count, Positive, Table, Text, Vector, filled
 from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
+from flowborne.scenes.schema_flesh import FleshTable
 from flowborne.scenes.schema_fluid import (
     BoundariesTable,
     Domain,
@@ -72,6 +73,7 @@ class Scene(Table):
     sources: tuple[SourceTable, ...] = ()
     dye: tuple[DyeTable, ...] = ()
     solids: SolidsTable | None = None
+    flesh: tuple[FleshTable, ...] = ()
     human: HumanTable | None = None
     clip: ClipTable | None = None
     initial: InitialTable = InitialTable()

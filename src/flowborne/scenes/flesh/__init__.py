@@ -1,0 +1,10 @@
+"""Flesh around bones: tetrahedra inside a surface, held where they meet the bones.
+
+bones                what the bones fill at rest, as a signed distance
+contour              the closed surface at some distance from them
+surface_file         the user's own closed surface
+mesher, mesh_run     tetrahedra inside a surface, by fTetWild in a process of its own
+mesh                 flesh: what of the tetrahedra is elastic, and which points a bone holds
+mesh_file            the .vtu file in which a run keeps its flesh
+grow                 the flesh of a scene's tables, added to its model
+"""

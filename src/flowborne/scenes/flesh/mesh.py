@@ -1,0 +1,122 @@
+"""Flesh: what of the tetrahedra is elastic, and which points a bone holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from flowborne.scenes.flesh.bones import Bones, bones_of
+from flowborne.scenes.flesh.contour import contour
+from flowborne.scenes.flesh.mesher import tetrahedra_within
+from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
+from flowborne.solids.slab import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FIDELITY = 0.1
+"""How far a face may be off the surface that it follows, in edges."""
+
+THICKNESSES = 0.25
+"""As FIDELITY, in thicknesses of the skin or of the thinnest bone's half."""
+
+
+@dataclass(frozen=True)
+class FleshMesh:
+    """Elastic tetrahedra around bones, in world axes at rest.
+
+    points      (n, 3) m
+    tetrahedra  (m, 4) points of the elastic elements, right-handed; none is inside a bone
+    holders     n names: the bone that holds the point, "" for none
+    """
+
+    points: Array
+    tetrahedra: Indices
+    holders: tuple[str, ...]
+
+
+def skin_mesh(
+    spec: mujoco.MjSpec, bones: Sequence[str], thickness: float, size: float
+) -> FleshMesh:
+    """Flesh as far as `thickness` m outside the union of some bodies.
+
+    bones   names of the bodies
+    size    length of edges, m; shorter where the surface bends too much for it
+    raises  ValueError for an unknown body, for one without a geom, when the mesher fails and for
+            a bone that holds no point
+    """
+    chosen = bones_of(spec, bones)
+    tolerance = min(FIDELITY * size, THICKNESSES * min(thickness, chosen.thinnest))
+    skin = contour(chosen, thickness, min(_pitch(chosen, size), 0.5 * thickness))
+    return _fleshed(skin, chosen, size, tolerance)
+
+
+def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: float) -> FleshMesh:
+    """Flesh as far as the closed surface in a file, which is in world axes at rest; as `skin_mesh`.
+
+    raises  ValueError as `skin_mesh`, for a file that is no closed surface, and for a bone outside
+            the surface
+    """
+    chosen = bones_of(spec, bones)
+    tolerance = min(FIDELITY * size, THICKNESSES * chosen.thinnest)
+    surface = read_surface(path)
+    check_covers(path, surface, chosen, _pitch(chosen, size), tolerance)
+    return _fleshed(surface, chosen, size, tolerance)
+
+
+def _pitch(bones: Bones, size: float) -> float:
+    """Distance of samples at which neither edges nor the thinnest bone are missed, m."""
+    return min(0.3 * size, 0.6 * bones.thinnest)
+
+
+def _fleshed(outside: Mesh, bones: Bones, size: float, tolerance: float) -> FleshMesh:
+    """Flesh between an outer surface and bones."""
+    inside = contour(bones, 0.0, _pitch(bones, size))
+    points, elements = tetrahedra_within([outside, inside], size, tolerance)
+    flesh = elements[bones.distance(points[elements].mean(axis=1)) > 0.0]
+    used, renumbered = np.unique(flesh, return_inverse=True)
+    points = points[used]
+    holders = _holders(bones, points, tolerance)
+    mesh = FleshMesh(points, renumbered.reshape(-1, 4), holders)
+    _check_held(mesh, bones, size)
+    return mesh
+
+
+def _connected(cells: Indices, count: int) -> Indices:
+    """(count,) number of the part of a mesh that each of its points is in."""
+    pairs = np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel()
+    links = coo_array((np.ones(pairs[0].size), pairs), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
+def _holders(bones: Bones, points: Array, tolerance: float) -> tuple[str, ...]:
+    """The bone that each point is deepest in, "" for points more than `tolerance` m outside all."""
+    distances = bones.distances(points)
+    nearest = distances.argmin(axis=1)
+    held = distances.min(axis=1) <= tolerance
+    return tuple(bones.names[b] if h else "" for b, h in zip(nearest, held, strict=True))
+
+
+def _check_held(mesh: FleshMesh, bones: Bones, size: float) -> None:
+    """Raise ValueError for a bone that holds no point, and for flesh that no bone holds."""
+    idle = [name for name in bones.names if name not in mesh.holders]
+    if idle:
+        raise ValueError(
+            f"bone '{idle[0]}' holds no point of flesh that has edges of {size:g} m. "
+            "Make the size smaller, or leave the bone out."
+        )
+    parts = _connected(mesh.tetrahedra, len(mesh.points))
+    held = np.array([bool(name) for name in mesh.holders])
+    loose = ~np.isin(parts, parts[held])
+    if loose.any():
+        raise ValueError(
+            f"the flesh about {place(mesh.points[loose].mean(axis=0))} touches no bone. "
+            "Join it to the rest, or remove it."
+        )

@@ -1,0 +1,51 @@
+"""Tables of a scene that describe flesh around bones."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from flowborne.scenes.fields import NotNegative, Positive, Table, Text
+
+
+class FleshTable(Table):
+    """[[flesh]]: an elastic body that bones hold, meshed with tetrahedra.
+
+    name       the flesh's own
+    bones      bodies of the model that lie inside and hold it
+    thickness  m: it is a skin as thick as this around the bones
+    surface    instead of a thickness: file of a closed surface (.obj, .stl, .ply) in the axes of
+               the model at rest; the flesh fills it
+    size       m: length of the elements' edges
+    mesh       file (.vtu) of elements that were made of all this before: made anew where it was
+               made otherwise. Without a thickness and a surface it is used as it is
+    young      N/m^2, Young's modulus
+    poisson    Poisson's ratio
+    density    kg/m^3
+    damping    s, Rayleigh's: the damping matrix is this times the stiffness matrix
+    law        "neo-hookean" comes back when it is turned inside out, "st-venant-kirchhoff" does not
+    """
+
+    name: Text
+    bones: Annotated[tuple[Text, ...], Field(min_length=1)]
+    thickness: Positive | None = None
+    surface: Text | None = None
+    size: Positive | None = None
+    mesh: Text | None = None
+    young: Positive
+    poisson: Annotated[float, Field(ge=0.0, lt=0.5)] = 0.4
+    density: Positive = 1000.0
+    damping: NotNegative = 0.01
+    law: Literal["neo-hookean", "st-venant-kirchhoff"] = "neo-hookean"
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.thickness is not None and self.surface is not None:
+            raise ValueError("has both a thickness and a surface. Keep one of them")
+        made = self.thickness is not None or self.surface is not None
+        if not made and self.mesh is None:
+            raise ValueError("has neither a thickness nor a surface. Give one of them")
+        if made and self.size is None:
+            raise ValueError("has no size of elements. Give it, in m")
+        return self
