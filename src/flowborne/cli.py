@@ -153,13 +153,16 @@ def check(
 @app.command()
 def film(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")],
+    bones: Annotated[
+        bool, typer.Option("--bones", help="See through flesh, to the bones in it.")
+    ] = False,
 ) -> None:
     """Draw the picture and the film of a run again."""
     path = RunFolder.existing(folder).path
     from flowborne.view.film import make_preview
 
     try:
-        make_preview(path)
+        make_preview(path, bones=bones)
     except ValueError as error:
         raise InputError(str(error)) from error
     except OSError as error:

@@ -1,15 +1,18 @@
 import json
 
+import mujoco
 import numpy as np
 import pytest
 
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
-from flowborne.io.recorder import Recorder, open_cells, write_model
+from flowborne.io.recorder import Recorder, centres, open_cells, write_model
 from flowborne.io.run_folder import RunFolder
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.tissue import Tissue, add_flesh
+from flowborne.validation.flesh_bars import bar_mesh
 
 DISC = """
 <mujoco>
@@ -37,6 +40,20 @@ TETRAHEDRON = """
   <asset><mesh name="fin" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset>
   <worldbody>
     <body name="fin"><freejoint name="root"/><geom name="fin" type="mesh" mesh="fin"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+BONE = """
+<mujoco>
+  <worldbody>
+    <body name="bone" pos="0.2 0 0">
+      <joint name="hinge" axis="0 1 0"/>
+      <geom name="bone" type="capsule" fromto="0.05 0 0 0.35 0 0" size="0.05"/>
+    </body>
+    <body name="ball" pos="0 -1 0">
+      <freejoint name="free"/><geom name="ball" type="sphere" size="0.1"/>
+    </body>
   </worldbody>
 </mujoco>
 """
@@ -104,3 +121,61 @@ def test_model_json_describes_a_mesh_and_the_grid(tmp_path):
     corners = np.array(geom["vertices"])[np.array(geom["faces"])]
     volume = np.linalg.det(corners).sum() / 6
     assert volume == pytest.approx(1 / 6, rel=1e-5)
+
+
+def limb():
+    """A cube of flesh around a bone, and a cube that nothing carries."""
+    spec = mujoco.MjSpec.from_string(BONE)
+    points, elements = bar_mesh((4, 2, 2), (0.8, 0.4, 0.4))
+    tissue = Tissue(young=1e4, poisson=0.3, density=1000.0)
+    inside = np.abs(points - [0.4, 0.0, 0.0]).max(axis=1) < 0.21
+    held = inside & (np.abs(points[:, 1:]).max(axis=1) < 0.1)
+    add_flesh(spec, "limb", points, elements, tissue, ["bone" if h else "" for h in held])
+    apart = points + np.array([0.0, 2.0, 0.0])
+    add_flesh(spec, "lump", apart, elements, tissue, [""] * len(points))
+    return SolidModel.with_flesh(spec)
+
+
+def test_a_state_holds_the_skin_where_it_is(tmp_path):
+    model = limb()
+    world = World(Setup(model), model.rest())
+    rng = np.random.default_rng(0)
+    world.solid.q += 0.02 * rng.standard_normal(model.nq)
+    recorder = Recorder(RunFolder.create(tmp_path / "run"))
+    recorder.write(0, world, None)
+    write_model(recorder.folder, world.setup, controlled=[], frames_per_second=60.0, wind=[])
+    state = np.load(recorder.folder.state(0))
+    written = json.loads(recorder.folder.model.read_text())
+    skin = state["flesh_vertices"]
+    inner = 3 * 2  # of the 5 x 3 x 3 points of each
+    assert skin.shape == (2 * 45 - inner, 3)
+    assert skin.dtype == np.float32
+    vertices = kinematics(model, world.solid.q).vertices
+    triangles = np.array(written["flesh"]["triangles"])
+    np.testing.assert_allclose(skin[triangles], vertices[model.flesh.surface], atol=1e-6)
+    size = recorder.folder.state(0).stat().st_size
+    assert size == pytest.approx(recorder.bytes_per_frame(world), rel=0.1)
+
+
+def test_model_json_says_whose_flesh_is_where(tmp_path):
+    model = limb()
+    folder = RunFolder.create(tmp_path / "run")
+    write_model(folder, Setup(model), controlled=["hinge"], frames_per_second=60.0, wind=[])
+    written = json.loads(folder.model.read_text())
+    assert written["flesh"]["names"] == ["limb", "lump"]
+    of_triangles = np.array(written["flesh"]["of_triangles"])
+    triangles = np.array(written["flesh"]["triangles"])
+    assert len(of_triangles) == len(triangles)
+    assert not np.intersect1d(triangles[of_triangles == 0], triangles[of_triangles == 1]).size
+    assert [geom["covered"] for geom in written["geoms"]] == [True, False]
+    assert written["flesh"]["bodies"] == [0, 1]
+    assert (written["joints"], written["joint_bodies"]) == (["hinge", "free"], [1, 2])
+
+
+def test_the_force_on_flesh_is_drawn_from_its_middle():
+    model = limb()
+    pose = kinematics(model, model.rest().q)
+    middle = centres(model, pose)
+    np.testing.assert_allclose(middle[0], [0.4, 2.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(middle[1], [0.4, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(middle[2], pose.centroid[2])

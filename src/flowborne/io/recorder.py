@@ -12,7 +12,9 @@ from flowborne.coupling.world import Setup, World
 from flowborne.io.atomic import write_atomically, write_json
 from flowborne.io.run_folder import RunFolder
 from flowborne.solids.dynamics import Kinematics, kinematics
+from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
+from flowborne.solids.tissue import volumes
 
 Array = NDArray[np.float64]
 
@@ -29,7 +31,9 @@ class Recorder:
       q (nq,), v (nv,)                           generalised coordinates
       geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
       fluid_force (nb, 3)                        N, what the fluid and the winds do to each body
-      fluid_centre (nb, 3)                       m, where to draw it: the body's centroid
+      fluid_centre (nb, 3)                       m, where to draw it: the centroid of the body and
+                                                 the flesh that it carries
+      flesh_vertices (k, 3)                      m, the vertices of flesh that lie on its skin
       velocity_x, velocity_y, velocity_z         m/s on the faces (no z in a slab)
       pressure                                   Pa in the cells
       scalar_<name>                              in the cells
@@ -55,6 +59,9 @@ class Recorder:
         """About the size of a state file."""
         solid = world.setup.solid
         numbers, members = 18 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
+        if solid.flesh is not None:
+            numbers += 3 * len(on_skin(solid.flesh))
+            members += 1
         if world.fluid is not None and world.setup.fluid is not None:
             moving = [world.fluid.velocity[axis] for axis in world.setup.fluid.grid.axes]
             kept = [*moving, *world.fluid.scalars.values()]
@@ -64,7 +71,8 @@ class Recorder:
 
     def arrays(self, world: World, report: StepReport | None) -> dict[str, NDArray[Any]]:
         """What is kept of `world`."""
-        pose = kinematics(world.setup.solid, world.solid.q)
+        solid = world.setup.solid
+        pose = kinematics(solid, world.solid.q)
         kept: dict[str, Array] = {
             "q": world.solid.q,
             "v": world.solid.v,
@@ -72,9 +80,11 @@ class Recorder:
             "geom_rotation": pose.geom_rotation,
             "body_position": pose.body_position,
             "body_rotation": pose.body_rotation,
-            "fluid_centre": pose.centroid,
+            "fluid_centre": centres(solid, pose),
             "fluid_force": np.zeros_like(pose.centroid),
         }
+        if solid.flesh is not None:
+            kept["flesh_vertices"] = pose.vertices[on_skin(solid.flesh)]
         if report is not None:
             kept["fluid_force"] = report.fluid_wrench()[:, :3]
         if world.fluid is not None and world.setup.fluid is not None:
@@ -99,6 +109,24 @@ def open_cells(world: World, pose: Kinematics) -> Array:
     return np.clip(0.5 + distance / world.setup.fluid.grid.spacing, 0.0, 1.0)
 
 
+def centres(solid: SolidModel, pose: Kinematics) -> Array:
+    """(nb, 3) centroid of what each body and the flesh that it carries take up, m."""
+    flesh = solid.flesh
+    if flesh is None:
+        return pose.centroid
+    quarters = np.repeat(0.25 * volumes(flesh.rest, flesh.elements), 4)
+    around = np.bincount(flesh.elements.ravel(), quarters, minlength=len(flesh.rest))
+    carried = flesh.carried * around[:, None]
+    volume = (solid.volume + carried.sum(axis=0))[:, None]
+    moment = solid.volume[:, None] * pose.centroid + carried.T @ pose.vertices
+    return np.where(volume > 0.0, moment / np.where(volume > 0.0, volume, 1.0), pose.centroid)
+
+
+def on_skin(flesh: Flesh) -> NDArray[np.int64]:
+    """(k,) vertices of flesh that a triangle of its surface has, ascending."""
+    return np.unique(flesh.surface)
+
+
 def write_model(
     folder: RunFolder,
     setup: Setup,
@@ -113,6 +141,8 @@ def write_model(
     wind        directions and speeds of the streams, m/s, to draw as arrows
     """
     solid, fluid = setup.solid, setup.fluid
+    joint_bodies = solid.mj.jnt_bodyid
+    of_bones = np.flatnonzero(joint_bodies < solid.nbody)
     grid = None
     if fluid is not None:
         grid = {
@@ -125,11 +155,12 @@ def write_model(
         {
             "slab": solid.slab,
             "bodies": list(solid.body_names),
-            "joints": list(solid.joint_names),
-            "joint_bodies": solid.mj.jnt_bodyid.tolist(),
+            "joints": [solid.joint_names[joint] for joint in of_bones],
+            "joint_bodies": joint_bodies[of_bones].tolist(),
             "controlled": controlled,
             "grid": grid,
             "geoms": _geoms(solid),
+            "flesh": None if solid.flesh is None else _flesh(solid.flesh),
             "frames_per_second": frames_per_second,
             "wind": wind,
         },
@@ -145,9 +176,20 @@ def _geoms(solid: SolidModel) -> list[dict[str, Any]]:
             "size": solid.geom_size[geom].tolist(),
             "body": int(solid.geom_body[geom]),
             "rgba": solid.geom_rgba[geom].tolist(),
+            "covered": bool(solid.geom_covered[geom]),
         }
         if kind == "mesh":
             vertices, faces = solid.mesh_of(geom)
             entry |= {"vertices": vertices.tolist(), "faces": faces.tolist()}
         listed.append(entry)
     return listed
+
+
+def _flesh(flesh: Flesh) -> dict[str, Any]:
+    """The skin: triangles of the vertices that a frame has, and the bodies that carry flesh."""
+    return {
+        "names": list(flesh.names),
+        "triangles": np.searchsorted(on_skin(flesh), flesh.surface).tolist(),
+        "of_triangles": flesh.of_surface.tolist(),
+        "bodies": np.flatnonzero(flesh.carried.any(axis=0)).tolist(),
+    }

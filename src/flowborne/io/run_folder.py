@@ -5,7 +5,7 @@ history.csv      a row per frame
 summary.json     what came of the run; its key "flowborne" marks the folder as a run's
 states/          NNNNNN.npz, what is needed to draw a frame; 000000 is the start
 checkpoint.npz   the whole state of the last saved frame
-model.json       the bodies' geometry, to draw them
+model.json       the bodies' geometry and the skin of flesh, to draw them
 preview.png      the last frame
 preview.mp4      the film
 """

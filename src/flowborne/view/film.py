@@ -21,18 +21,21 @@ CODING = ("-preset", "veryfast", "-crf", "19", "-movflags", "+faststart", "-f", 
 """How the film is coded: small, sharp, and playing before it is loaded whole."""
 
 
-def make_preview(folder: Path, progress: Callable[[int, int], None] | None = None) -> None:
+def make_preview(
+    folder: Path, progress: Callable[[int, int], None] | None = None, *, bones: bool = False
+) -> None:
     """Draw preview.png (the last frame) and preview.mp4 (all frames) of a run.
 
     folder    of the run; nothing else is read
     progress  called with (frames drawn, frames in all)
+    bones     see through flesh, to the bones in it
     raises    ValueError when there is no frame, when there is only one (the picture is then drawn
               and the film is not), or when it has three dimensions and nothing can draw them here;
               OSError when the disc refuses
     """
     files = RunFolder(folder)
     run = Run.read(folder)
-    with closing(Picture(run, PICTURE_SCALE)) as picture:
+    with closing(Picture(run, PICTURE_SCALE, bones=bones)) as picture:
         last = picture.draw(len(run) - 1)[:, :, :3]
     write_atomically(files.picture, lambda file: imageio.imwrite(file, last, extension=".png"))
     if len(run) < 2:
@@ -40,15 +43,22 @@ def make_preview(folder: Path, progress: Callable[[int, int], None] | None = Non
             f"{folder} has one frame, which makes a picture and no film; "
             "let the run go on with --resume"
         )
-    write_film(run, files.film, progress)
+    write_film(run, files.film, progress, bones=bones)
 
 
-def write_film(run: Run, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+def write_film(
+    run: Run,
+    path: Path,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    bones: bool = False,
+) -> None:
     """Draw all frames of `run` into an MP4 file (H.264, plays everywhere).
 
+    bones   see through flesh, to the bones in it
     raises  OSError when the file cannot be written; what was there is then still there
     """
-    with closing(Picture(run)) as picture:
+    with closing(Picture(run, bones=bones)) as picture:
         _write(picture, path, progress)
 
 

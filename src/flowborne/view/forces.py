@@ -70,5 +70,6 @@ class Forces:
 
 def _pushed(run: Run) -> tuple[int, ...]:
     """Bodies whose forces are shown: those that are drawn, the world's only when it is alone."""
-    drawn = sorted({geom.body for geom in run.geoms})
+    carrying = () if run.flesh is None else run.flesh.bodies
+    drawn = sorted({*carrying, *(geom.body for geom in run.geoms)})
     return tuple(body for body in drawn if body > 0) or tuple(drawn)

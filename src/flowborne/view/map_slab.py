@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from flowborne.view import style
@@ -15,7 +17,7 @@ from flowborne.view.arrows import arrow
 from flowborne.view.fields import SAMPLES, field_of
 from flowborne.view.forces import SHAFT, Forces
 from flowborne.view.map_image import MapImage
-from flowborne.view.outlines import Outlines
+from flowborne.view.outlines import Outlines, skin_loops
 from flowborne.view.run import Run, State
 
 Array = NDArray[np.float64]
@@ -30,8 +32,11 @@ class MapSlab:
     view  (x0, x1, y0, y1), m
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, bones: bool = False) -> None:
+        """`bones`: show the bones in flesh."""
         self.run = run
+        self._bones = bones
+        self._shown = [n for n, geom in enumerate(run.geoms) if bones or not geom.covered]
         self._field = field_of(run)
         self._outlines = Outlines(run)
         self.view = view_of(run, self._outlines)
@@ -54,14 +59,19 @@ class MapSlab:
         elif self.run.wind.any():
             arrows = wind_arrows(self.view, self.run.wind.sum(axis=0)[:2])
             axes.add_collection(PolyCollection(arrows, facecolors=style.WIND, edgecolors="none"))
-        colours = [style.body_colour(geom.body, self.run.accented) for geom in self.run.geoms]
-        self._bodies = PolyCollection(
-            [], facecolors=colours, edgecolors=style.EDGE, linewidths=1.1, joinstyle="round"
-        )
+        bodies = [self.run.geoms[n].body for n in self._shown]
+        colours = [style.body_colour(body, self.run.accented) for body in bodies]
+        edged: dict[str, Any] = {"edgecolors": style.EDGE, "linewidths": 1.1, "joinstyle": "round"}
+        self._bodies = PolyCollection([], facecolors=colours, **edged)
+        # below bones it is as dark as if they were seen through it, but hides the field's cells
+        share = style.SEEN_THROUGH if self._bones else 1.0
+        flesh = share * style.rgb(style.FLESH) + (1.0 - share) * style.rgb(style.WATER)
+        self._flesh = PathCollection([], facecolors=[tuple(flesh)], **edged)
         self._arrows = PolyCollection(
             [], facecolors=style.FORCE, edgecolors=style.EDGE, linewidths=0.8
         )
-        for collection in (self._bodies, self._arrows):
+        solids = (self._flesh, self._bodies) if self._bones else (self._bodies, self._flesh)
+        for collection in (*solids, self._arrows):
             collection.set_animated(True)
             axes.add_collection(collection)
             moving.append(collection)
@@ -71,7 +81,11 @@ class MapSlab:
         """Make what moves that of the `number`-th state."""
         if self._field is not None:
             self._water.image = self._field.image(state)
-        self._bodies.set_verts(self._outlines.placed(state))
+        outlines = self._outlines.placed(state)
+        self._bodies.set_verts([outlines[n] for n in self._shown])
+        loops = flesh_loops(self.run, state)
+        # one path of all, so that what flesh goes around stays empty
+        self._flesh.set_paths([Path.make_compound_path(*_closed(loops))] if loops else [])
         width = SHAFT * self._pixel
         arrows = self.forces.arrows(state, self._pixel)
         self._arrows.set_verts([arrow(tail, vector, width) for _, tail, vector in arrows])
@@ -85,7 +99,11 @@ def view_of(run: Run, outlines: Outlines) -> tuple[float, float, float, float]:
     if run.grid is not None:
         (x0, y0, _), (x1, y1, _) = run.grid.origin, run.grid.upper
         return x0, x1, y0, y1
-    placed = [outline for state in run.sampled(SAMPLES) for outline in outlines.placed(state)]
+    placed = [
+        outline
+        for state in run.sampled(SAMPLES)
+        for outline in [*outlines.placed(state), *flesh_loops(run, state)]
+    ]
     points = np.concatenate(placed) if placed else np.zeros((1, 2))
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
@@ -93,6 +111,17 @@ def view_of(run: Run, outlines: Outlines) -> tuple[float, float, float, float]:
     half = half + 0.6 * max(half.max(), 1e-6)
     half = np.maximum(half, 0.8 * half.max())
     return middle[0] - half[0], middle[0] + half[0], middle[1] - half[1], middle[1] + half[1]
+
+
+def flesh_loops(run: Run, state: State) -> list[Array]:
+    """Outlines (k, 2) of the flesh of a state, m; none when its numbers are lost."""
+    if run.flesh is None or not np.isfinite(state["flesh_vertices"]).all():
+        return []
+    return skin_loops(state["flesh_vertices"].astype(float), run.flesh.triangles)
+
+
+def _closed(loops: list[Array]) -> list[Path]:
+    return [Path(np.concatenate([loop, loop[:1]]), closed=True) for loop in loops]
 
 
 def wind_arrows(view: tuple[float, float, float, float], wind: Array) -> list[Array]:

@@ -1,4 +1,4 @@
-"""The bodies of a slab as flat shapes: the outline of each geometry's cross-section."""
+"""The bodies and flesh of a slab as flat shapes: the outlines of their cross-sections."""
 
 from __future__ import annotations
 
@@ -61,3 +61,29 @@ def _loop(cut: Section) -> Array:
             loop.append(n)
         longest = max(longest, loop, key=len)
     return np.asarray(segments[longest, 0])
+
+
+def skin_loops(vertices: Array, triangles: NDArray[np.int64]) -> list[Array]:
+    """Closed outlines (k, 2) of what a skin's plane z = 0 cuts, m; flesh is on their left.
+
+    A vertex in the plane counts as just above it, so that every outline closes.
+
+    vertices   (n, 3) m;  triangles  (m, 3) of them, outward, that close
+    """
+    above = vertices[:, 2] >= 0.0
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]]
+    starts, ends = above[edges[..., 0]], above[edges[..., 1]]
+    # each triangle that is cut has one edge of each kind, (upper, lower) vertex
+    falling, rising = edges[starts & ~ends], edges[~starts & ends][:, ::-1]
+    high, low = vertices[falling[:, 0]], vertices[falling[:, 1]]
+    places = low + (low[:, 2:] / (low[:, 2:] - high[:, 2:])) * (high - low)
+    place_of = {tuple(edge): n for n, edge in enumerate(falling.tolist())}
+    following = [place_of[tuple(edge)] for edge in rising.tolist()]
+    loops, left = [], set(range(len(following)))
+    while left:
+        loop = [min(left)]
+        while (n := following[loop[-1]]) != loop[0]:
+            loop.append(n)
+        left -= set(loop)
+        loops.append(places[loop, :2])
+    return loops

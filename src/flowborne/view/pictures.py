@@ -72,9 +72,10 @@ class Picture:
     map     what the picture shows of the run itself
     """
 
-    def __init__(self, run: Run, scale: float = 1.0) -> None:
+    def __init__(self, run: Run, scale: float = 1.0, *, bones: bool = False) -> None:
+        """`bones`: see through flesh, to the bones in it."""
         self.run = run
-        self.map: Map = MapSlab(run) if run.slab else MapSpace(run)
+        self.map: Map = MapSlab(run, bones) if run.slab else MapSpace(run, bones)
         curves = strip_curves(run)
         self.layout = Layout.of(self.map.aspect, len(curves))
         self._metres = self.map.width / self.layout.map.width

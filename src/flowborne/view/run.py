@@ -27,8 +27,9 @@ PLOTTED = ("objective", "angle_", "position_")
 class Geom:
     """One drawn geometry of a body; sizes as MuJoCo has them.
 
-    rgba  colour that the model gives it
-    mesh  vertices (k, 3) in the geometry's frame and faces (m, 3), or None
+    rgba     colour that the model gives it
+    mesh     vertices (k, 3) in the geometry's frame and faces (m, 3), or None
+    covered  whether flesh is all around it
     """
 
     kind: str
@@ -36,6 +37,19 @@ class Geom:
     body: int
     rgba: Array
     mesh: tuple[Array, NDArray[np.int64]] | None
+    covered: bool = False
+
+
+@dataclass(frozen=True)
+class Flesh:
+    """The skin of all flesh; its vertices are the `flesh_vertices` (k, 3) of a state.
+
+    triangles  (m, 3) of vertices, outward
+    bodies     numbers of the bodies that carry flesh
+    """
+
+    triangles: NDArray[np.int64]
+    bodies: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -55,6 +69,7 @@ class Run:
     picture            what the scene wants to see of the fluid
     history            column -> values, a number per frame of the run from the first on
     states             files of states/, in order
+    flesh              what is drawn of flesh; None without
     """
 
     name: str
@@ -70,6 +85,7 @@ class Run:
     picture: Literal["dye", "vorticity", "none"]
     history: dict[str, Array]
     states: tuple[Path, ...]
+    flesh: Flesh | None = None
 
     @classmethod
     def read(cls, path: Path) -> Run:
@@ -98,6 +114,7 @@ class Run:
             picture=scene.get("output", {}).get("picture", "vorticity"),
             history=_history(folder.history),
             states=states,
+            flesh=_flesh(model.get("flesh")),
         )
 
     def __len__(self) -> int:
@@ -153,7 +170,14 @@ def _geom(entry: dict[str, Any]) -> Geom:
     if entry["type"] == "mesh":
         mesh = (np.asarray(entry["vertices"], float), np.asarray(entry["faces"], np.int64))
     size, rgba = np.asarray(entry["size"], float), np.asarray(entry["rgba"], float)
-    return Geom(entry["type"], size, int(entry["body"]), rgba, mesh)
+    covered = bool(entry.get("covered", False))
+    return Geom(entry["type"], size, int(entry["body"]), rgba, mesh, covered)
+
+
+def _flesh(entry: dict[str, Any] | None) -> Flesh | None:
+    if entry is None:
+        return None
+    return Flesh(np.asarray(entry["triangles"], np.int64), tuple(entry["bodies"]))
 
 
 def _history(path: Path) -> dict[str, Array]:

@@ -15,10 +15,14 @@ BODY = "#e3eaf2"
 FIXED = "#748394"
 ACCENT = "#ffb81f"
 WIND = "#2f4a66"
+FLESH = "#f2a184"
 EDGE = "#05090f"
 FORCE = "#6dffb0"
 FLOOR = "#16273b"
 SQUARES = "#2c425b"
+
+SEEN_THROUGH = 0.42
+"""Opacity of flesh that shows its bones."""
 
 DYES = ("#2fd3ee", "#ff72b6", "#b9f24d", "#a992ff")
 CURVES = ("#ffb81f", "#5cc8ff", "#ff72b6", "#b9f24d", "#a992ff", "#ff8a5c")

@@ -92,10 +92,10 @@ def camera_of(run: Run) -> Camera:
     """The camera of a run; what it sees has the same size in all frames.
 
     A fluid is seen whole unless its domain is much larger than the bodies. Bodies that stand fixed
-    are looked at only where none can move.
+    are looked at only where none can move and there is no flesh.
     """
     moving = [n for n, geom in enumerate(run.geoms) if geom.body > 0]
-    places = swept(run, moving or range(len(run.geoms)))
+    places = swept(run, moving if moving or run.flesh else range(len(run.geoms)))
     path = _followed(places, CALM * run.frames_per_second)
     seen = places - path[:, None]
     if run.grid is None:
@@ -111,15 +111,23 @@ def camera_of(run: Run) -> Camera:
 
 
 def swept(run: Run, geoms: Sequence[int]) -> Array:
-    """(frames, n, 3) m, the outermost places of geometries; without any one place, the origin."""
-    if not geoms:
-        return np.zeros((len(run), 1, 3))
-    centres, turns = run.every("geom_position"), run.every("geom_rotation")
-    placed = [
-        centres[:, n, None] + outermost(run.geoms[n]) @ np.swapaxes(turns[:, n], 1, 2)
-        for n in geoms
-    ]
-    return np.concatenate(placed, axis=1)
+    """(frames, n, 3) m, the outermost places of geometries and of all flesh; without any one place,
+    the origin."""
+    placed = [] if run.flesh is None else [_swept_by_flesh(run)]
+    if geoms:
+        centres, turns = run.every("geom_position"), run.every("geom_rotation")
+        placed += [
+            centres[:, n, None] + outermost(run.geoms[n]) @ np.swapaxes(turns[:, n], 1, 2)
+            for n in geoms
+        ]
+    return np.concatenate(placed, axis=1) if placed else np.zeros((len(run), 1, 3))
+
+
+def _swept_by_flesh(run: Run) -> Array:
+    """(frames, k, 3) vertices that are in any frame the farthest in one of 26 directions, m."""
+    vertices = run.every("flesh_vertices")
+    farthest = [np.argmax(places @ _DIRECTIONS.T, axis=0) for places in vertices]
+    return vertices[:, np.unique(farthest)]
 
 
 def outermost(geom: Geom) -> Array:

@@ -38,7 +38,7 @@ DARK = 0.62
 
 def stands(run: Run) -> bool:
     """Whether the bodies stand on z = 0: nothing pulls them elsewhere, and they come down to it."""
-    if run.gravity[:2].any() or run.gravity[2] > 0.0 or not run.geoms:
+    if run.gravity[:2].any() or run.gravity[2] > 0.0 or not (run.geoms or run.flesh):
         return False
     heights = swept(run, range(len(run.geoms)))[..., 2]
     heights = heights[np.isfinite(heights).all(axis=1)]
@@ -70,10 +70,11 @@ class Ground:
             texture=_texture(np.zeros((2, 2), np.uint8)),
         )
 
-    def show(self, focus: Array, bodies: Sequence[Array]) -> None:
-        """Show the floor around `focus` (3,) with the shadow of bodies.
+    def show(self, focus: Array, bodies: Sequence[Array], skin: Array) -> None:
+        """Show the floor around `focus` (3,) with the shadow of bodies and flesh.
 
         bodies  points (n, 3) of each convex part of them, m
+        skin    (m, 3, 3) corners of the triangles of flesh, m
         """
         # the squares stay where they are in the world, and fade around the focus
         whole = self._side * np.round(focus[:2] / self._side)
@@ -81,19 +82,24 @@ class Ground:
         self._floor.position = (*focus[:2], 0.0)
         self._lines.position = (*whole, 0.5 * self._lift)
         self._shadow.position = (*focus[:2], self._lift)
-        self._shadow.texture = _texture(self._cast(focus[:2] - 0.5 * self._extent, bodies))
+        self._shadow.texture = _texture(self._cast(focus[:2] - 0.5 * self._extent, bodies, skin))
 
-    def _cast(self, corner: Array, bodies: Sequence[Array]) -> NDArray[np.uint8]:
-        """(PIXELS, PIXELS) where the bodies keep light from the floor, lowest row first."""
+    def _cast(self, corner: Array, bodies: Sequence[Array], skin: Array) -> NDArray[np.uint8]:
+        """(PIXELS, PIXELS) where bodies and skin keep light from the floor, lowest row first."""
         image = Image.new("L", (PIXELS, PIXELS))
         draw = ImageDraw.Draw(image)
-        for points in bodies:
-            height = np.maximum(points[:, 2:], 0.0)
-            fallen = (points[:, :2] - height * self._slope - corner) / self._extent
-            outline = _hull(PIXELS * fallen)
+        known = skin[np.isfinite(skin).all(axis=(1, 2))]
+        outlines = [_hull(self._fallen(points, corner)) for points in bodies]
+        for outline in [*outlines, *self._fallen(known, corner)]:
             if len(outline) > 2:
                 draw.polygon([tuple(place) for place in outline.tolist()], fill=255)
         return np.asarray(image.filter(ImageFilter.GaussianBlur(BLUR)))
+
+    def _fallen(self, points: Array, corner: Array) -> Array:
+        """(..., 2) where on the image the shadows of points (..., 3) fall."""
+        height = np.maximum(points[..., 2:], 0.0)
+        fallen = points[..., :2] - height * self._slope - corner
+        return np.asarray(PIXELS * fallen / self._extent)
 
     def _shade(self, mesh: pv.PolyData, colour: str, centre: Array) -> None:
         """Give a mesh a colour that fades into the background away from a centre."""

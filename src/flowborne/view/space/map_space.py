@@ -29,8 +29,10 @@ class MapSpace:
     camera  from which it is seen
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, bones: bool = False) -> None:
+        """`bones`: see through flesh, to the bones in it."""
         self.run = run
+        self._bones = bones
         self.camera = camera_of(run)
         self.width, self.aspect = self.camera.width, self.camera.aspect
         self.forces = Forces(run, min(self.camera.width, self.camera.height))
@@ -50,7 +52,9 @@ class MapSpace:
         from flowborne.view.space.stage import Stage
 
         pixel = self.width / pixels
-        self._stage = Stage(plotter, self.run, self.camera, self.forces, self._cloud, pixel)
+        self._stage = Stage(
+            plotter, self.run, self.camera, self.forces, self._cloud, pixel, self._bones
+        )
         return [self._image]
 
     def show(self, number: int, state: State) -> None:

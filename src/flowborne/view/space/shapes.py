@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
@@ -15,6 +17,16 @@ ROUND = 32
 
 SHARP = 35.0
 """Angle between two faces from which on their edge is seen, degrees."""
+
+
+LIT: dict[str, Any] = {
+    "ambient": 0.22,
+    "diffuse": 0.82,
+    "specular": 0.12,
+    "specular_power": 18.0,
+    "interpolation": "phong",
+}
+"""How bodies and flesh take the light."""
 
 
 def mesh_of(geom: Geom) -> pv.PolyData:

@@ -8,28 +8,36 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from flowborne.view.run import Geom, State
+from flowborne.view.run import Flesh, Geom, State
+from flowborne.view.space.flesh import way_out
 
 Array = NDArray[np.float64]
 
 
 class Skin:
-    """The bodies as convex parts bounded by planes.
+    """The bodies as convex parts bounded by planes, and the flesh around them.
 
     meshes  of the geometries, in their own frames
     """
 
-    def __init__(self, geoms: Sequence[Geom], meshes: Sequence[pv.PolyData]) -> None:
+    def __init__(
+        self, geoms: Sequence[Geom], meshes: Sequence[pv.PolyData], flesh: Flesh | None = None
+    ) -> None:
+        self._flesh = flesh
         self._planes = [_planes(mesh) for mesh in meshes]
         self._parts: dict[int, list[int]] = {}
         for n, geom in enumerate(geoms):
             self._parts.setdefault(geom.body, []).append(n)
 
     def reach(self, body: int, place: Array, vector: Array, state: State) -> float:
-        """m along `vector` (3,) from `place` (3,) to the surface of a body; 0 from outside it."""
+        """m along `vector` (3,) from `place` (3,) to the surface of a body or of the flesh around
+        the place; 0 from outside both."""
         along = vector / np.linalg.norm(vector)
         farthest = 0.0
-        for part in self._parts[body]:
+        if self._flesh is not None:
+            corners = state["flesh_vertices"].astype(float)[self._flesh.triangles]
+            farthest = way_out(place, along, corners)
+        for part in self._parts.get(body, ()):
             turn, centre = state["geom_rotation"][part], state["geom_position"][part]
             normals, heights = self._planes[part]
             room = heights - normals @ ((place - centre) @ turn)

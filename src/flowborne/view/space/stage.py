@@ -13,8 +13,9 @@ from flowborne.view.run import Geom, Run, State
 from flowborne.view.space.arrows import Arrows
 from flowborne.view.space.camera import OPENING, TOWARD, UP, Camera
 from flowborne.view.space.clouds import Cloud
+from flowborne.view.space.flesh import FleshSurface
 from flowborne.view.space.ground import Ground, stands
-from flowborne.view.space.shapes import mesh_of
+from flowborne.view.space.shapes import LIT, mesh_of
 from flowborne.view.space.skin import Skin
 from flowborne.view.space.smoke import Smoke
 from flowborne.view.space.wind import WindArrows
@@ -43,6 +44,7 @@ class Stage:
     """Scene of a run in a plotter, which it takes over.
 
     pixel  m, size of a pixel of the film
+    bones  whether flesh is seen through, to the bones in it
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class Stage:
         forces: Forces,
         cloud: Cloud | None,
         pixel: float,
+        bones: bool,
     ) -> None:
         self._plotter, self._camera, self._forces, self._cloud = plotter, camera, forces, cloud
         self._pixel = pixel
@@ -63,7 +66,12 @@ class Stage:
             _add_body(plotter, mesh, geom, run.accented)
             for mesh, geom in zip(meshes, run.geoms, strict=True)
         ]
-        self._skin = Skin(run.geoms, meshes)
+        self._hidden = [geom.covered and not bones for geom in run.geoms]
+        self._flesh = None
+        if run.flesh is not None:
+            first = run.state(0)["flesh_vertices"]
+            self._flesh = FleshSurface(plotter, run.flesh, first, seen_through=bones)
+        self._skin = Skin(run.geoms, meshes, run.flesh)
         self._arrows = Arrows(plotter, max(len(run.bodies), 1), style.FORCE, 0.35)
         self._ground = self._wind = self._smoke = None
         if stands(run):
@@ -79,10 +87,15 @@ class Stage:
         """(height, width, 3) picture of the `number`-th state, lowest row first."""
         focus = self._camera.focus[number]
         centres, turns = state["geom_position"].astype(float), state["geom_rotation"].astype(float)
-        for actor, centre, turn in zip(self._bodies, centres, turns, strict=True):
-            _place(actor, centre, turn)
+        for actor, hidden, *pose in zip(self._bodies, self._hidden, centres, turns, strict=True):
+            _place(actor, *pose, hidden=hidden)
+        corners = np.zeros((0, 3, 3))
+        if self._flesh is not None:
+            vertices = state["flesh_vertices"].astype(float)
+            self._flesh.show(vertices)
+            corners = vertices[self._flesh.triangles]
         if self._ground is not None:
-            self._ground.show(focus, self._placed(centres, turns))
+            self._ground.show(focus, self._placed(centres, turns), corners)
         if self._wind is not None:
             self._wind.show(number, float(state["time"]))
         if self._smoke is not None and self._cloud is not None:
@@ -142,19 +155,15 @@ def _add_body(
         mesh,
         color=style.body_colour(geom.body, accented) if plain else own[:3],
         opacity=float(geom.rgba[3]),
-        ambient=0.22,
-        diffuse=0.82,
-        specular=0.12,
-        specular_power=18.0,
-        interpolation="phong",
+        **LIT,
     )
 
 
-def _place(actor: pv.Actor, centre: Array, turn: Array) -> None:
+def _place(actor: pv.Actor, centre: Array, turn: Array, *, hidden: bool) -> None:
     """Move a body; one whose numbers are lost is not seen."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn, centre
-    actor.visibility = bool(np.isfinite(matrix).all())
+    actor.visibility = not hidden and bool(np.isfinite(matrix).all())
     if actor.visibility:
         actor.user_matrix = matrix
 
