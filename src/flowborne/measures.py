@@ -38,6 +38,9 @@ class Measures:
       drag_N, lift_N                            force of fluid and winds on all bodies along and
                                                 across the stream (a quarter turn to its left)
       effort                                    |drive force| dt over the controlled dofs, N m s
+      work_J                                    that the drives did in the frame
+      flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
+                                                of elements inside out, in scenes with flesh
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
       momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
       momentum_{exchanged,advection,…}_…_Ns     given to the bodies by pressure; made in advection
@@ -81,7 +84,7 @@ class Measures:
         values: dict[str, float] = dict.fromkeys(self.columns, np.nan)
         values |= {"frame": frame, "time_s": world.time}
         values |= {column: float(world.solid.q[place]) for column, place, _ in self._joints}
-        values |= self._poses(world.solid.q)
+        values |= self._poses(world.solid.q) | self._flesh(world.solid.q)
         if report is not None:
             values |= self._of_frame(report)
         return values
@@ -100,7 +103,9 @@ class Measures:
         names = ["frame", "time_s", *(column for column, _, _ in self._joints)]
         names += [column for column, _ in self._targets]
         names += ["objective", *(f"objective_{term}" for term in self._terms)]
-        names += ["drag_N", "lift_N", "effort"]
+        names += ["drag_N", "lift_N", "effort", "work_J"]
+        if self._model.flesh is not None:
+            names += ["flesh_least_detF", "flesh_inside_out"]
         for body in self._model.body_names[1:]:
             names += [f"{body}_{axis}_m" for axis in "xyz"] + [f"{body}_q{axis}" for axis in "wxyz"]
         for part in ("solid", "fluid", *IMPULSES, *(["jet"] if self._blows else [])):
@@ -116,7 +121,7 @@ class Measures:
         values |= {column: float(report.targets[place]) for column, place in self._targets}
         force = last.fluid_wrench()[1:, :3].sum(axis=0)
         values |= {"drag_N": float(force @ self._along), "lift_N": float(force @ self._across)}
-        values["effort"] = self._effort(last)
+        values |= {"effort": self._effort(last), "work_J": sum(step.work for step in steps)}
         impulses = {"solid": last.momentum.solid, "fluid": last.momentum.fluid}
         for part in IMPULSES:
             impulses[part] = np.sum([getattr(step.momentum, part) for step in steps], axis=0)
@@ -138,6 +143,16 @@ class Measures:
         if self._controller is None:
             return 0.0
         return float(np.linalg.norm(last.actuator[self._controller.dofs]) * last.dt)
+
+    def _flesh(self, q: Array) -> dict[str, float]:
+        flesh = self._model.flesh
+        if flesh is None:
+            return {}
+        ratios = flesh.volume_ratios(flesh.vertices(q))
+        return {
+            "flesh_least_detF": float(ratios.min()),
+            "flesh_inside_out": float((ratios <= 0.0).sum()),
+        }
 
     def _poses(self, q: Array) -> dict[str, float]:
         poses = kinematics(self._model, q)

@@ -18,6 +18,7 @@ from threadpoolctl import ThreadpoolController
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
 from flowborne.measures import Measures
+from flowborne.solids.inversion import inversion
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
@@ -30,6 +31,10 @@ Step = Callable[[World, float, "Drive | None"], StepReport]
 
 PARTS = ("advection", "viscosity", "projection", "geometry", "solids", "control")
 """Where the time of a frame goes."""
+
+
+TORN = 0.02
+"""Part of the elements of flesh that may be inside out, on their way back for instance."""
 
 
 class BlowUpError(Exception):
@@ -239,6 +244,10 @@ def trouble(world: World, report: StepReport) -> str | None:
     if turn.size and turn.max() > np.pi:
         name = world.setup.solid.dof_names[int(turn.argmax())]
         return f"{name} turns by {turn.max():.3g} rad in one step, more than half a turn"
+    flesh = world.setup.solid.flesh
+    torn = None if flesh is None else inversion(flesh, solid.q)
+    if torn is not None and len(torn.elements) > TORN * torn.of:
+        return torn.sentence()
     if fluid is None or properties is None:
         return None
     grid = properties.grid

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flowborne.solids.clusters import outboard_dofs, rigidify
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow
+from flowborne.solids.momentum import momentum
 from flowborne.solids.state import SolidState
 
 if TYPE_CHECKING:
@@ -150,3 +151,9 @@ def body_velocity(world: World, body: int) -> Array:
     pose = kinematics(model, state.q)
     twist = pose.twist_jacobian[body] @ state.v
     return twist[:3] + np.cross(twist[3:], pose.body_position[body])
+
+
+def whole_velocity(world: World) -> Array:
+    """(3,) velocity of the centre of mass of all bodies and their flesh, m/s."""
+    model, state = parts(world)
+    return momentum(model, state)[0] / model.body_mass.sum()

@@ -56,3 +56,7 @@ class Measurement:
     def body_velocity(self, body: int) -> Array:
         """(3,) velocity of the origin of the body's frame, m/s."""
         return creature.body_velocity(self.world, body)
+
+    def whole_velocity(self) -> Array:
+        """(3,) velocity of the centre of mass of all bodies, m/s."""
+        return creature.whole_velocity(self.world)

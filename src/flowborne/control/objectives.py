@@ -154,14 +154,23 @@ class ObjectiveInputMotion:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveVelocity:
-    """Squared distance of a body's velocity (at the origin of its frame) from a target, m^2/s^2."""
+    """Squared distance of a velocity from a target, m^2/s^2.
 
-    body: int
+    body  whose velocity it is, at the origin of its frame; None is the centre of mass of all, which
+          outer forces alone can move: what a trial has won in it is the fluid's whole impulse
+    """
+
+    body: int | None
     target: Vector
     name: str = "velocity"
 
     def value(self, measurement: Measurement) -> float:
-        missing = measurement.body_velocity(self.body) - np.asarray(self.target)
+        present = (
+            measurement.whole_velocity()
+            if self.body is None
+            else measurement.body_velocity(self.body)
+        )
+        missing = present - np.asarray(self.target)
         return float(missing @ missing)
 
 

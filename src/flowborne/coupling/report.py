@@ -67,6 +67,7 @@ class StepReport:
     residual         true relative residual of the last of them
     divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
     momentum         the budget
+    work             of the drives, J
     expelled         volume that mouths expelled, less what they took in, m^3
     seconds          where the time went: advection, viscosity, projection, geometry, solids
     contacts         number of active contacts
@@ -85,6 +86,7 @@ class StepReport:
     residual: float = 0.0
     divergence: float = 0.0
     momentum: Momentum = field(default_factory=Momentum)
+    work: float = 0.0
     expelled: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)
     contacts: int = 0

@@ -268,6 +268,7 @@ def report(
     if projected is not None:
         finite = finite and bool(np.isfinite(projected.pressure).all())
     outcome = Outcome.DONE if solved.converged else Outcome.NOT_CONVERGED
+    halfway = 0.5 * (solved.driven.system.v + solved.v)
     done = StepReport(
         dt=dt,
         outcome=outcome if finite else Outcome.NOT_FINITE,
@@ -278,6 +279,7 @@ def report(
         wind_wrench=wind,
         jet_wrench=reaction,
         momentum=balance,
+        work=dt * float(solved.actuator @ halfway),
         contacts=solved.driven.system.contacts,
         limited=np.flatnonzero(solved.driven.limited),
         seconds=watch.seconds,

@@ -137,7 +137,8 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
         dofs = _dofs_of(model, (table.joint,))
         return ObjectiveInputMotion(dofs, _reference(table, scene, model))
     if isinstance(table, tables.ObjectiveVelocityTable):
-        return ObjectiveVelocity(model.body(table.body), triple(table.target))
+        body = None if table.body is None else model.body(table.body)
+        return ObjectiveVelocity(body, triple(table.target))
     return ObjectiveCallable(find_function(table.function), table.function)
 
 

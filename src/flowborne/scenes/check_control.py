@@ -143,7 +143,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
                 f"{where}: joint '{table.joint}' is not controlled. "
                 "Add it to [[control]], or drop the objective."
             )
-    if isinstance(table, ObjectiveVelocityTable):
+    if isinstance(table, ObjectiveVelocityTable) and table.body is not None:
         yield from unknown_body(draft, model, table.body, "objectives", index)
     if isinstance(table, ObjectivePythonTable):
         try:

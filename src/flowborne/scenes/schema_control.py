@@ -169,10 +169,13 @@ class ObjectiveInputMotionTable(ObjectiveTable):
 
 
 class ObjectiveVelocityTable(ObjectiveTable):
-    """Squared distance of a body's velocity from `target`, m/s."""
+    """Squared distance of a velocity from `target`, m/s.
+
+    body  whose velocity; that of the centre of mass of all bodies unless given
+    """
 
     kind: Literal["velocity"]
-    body: Text
+    body: Text | None = None
     target: Vector
 
 

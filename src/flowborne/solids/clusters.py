@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 def outboard_dofs(model: SolidModel, dof: int) -> NDArray[np.int64]:
     """Dofs of all joints on the bodies below the body that `dof` moves, none of that body's own."""
     body = int(model.dof_body[dof])
-    carried = model.moves[:, dof][model.dof_body] & (model.dof_body != body)
-    return np.flatnonzero(carried)
+    bones = np.flatnonzero(model.dof_body < model.nbody)
+    on = model.dof_body[bones]
+    return np.asarray(bones[model.moves[on, dof] & (on != body)])
 
 
 def rigidify(

@@ -35,14 +35,14 @@ class Inversion:
     place: Array
     name: str
 
-    def sentence(self, frame: int) -> str:
-        """For the person who runs it."""
+    def sentence(self) -> str:
+        """For the person who runs it, without a full stop."""
         place = ", ".join(f"{x:.4g}" for x in self.place)
         return (
-            f"frame {frame}: {len(self.elements)} of {self.of} elements of flesh are inside out, "
+            f"{len(self.elements)} of {self.of} elements of flesh are inside out, "
             f"the worst in '{self.name}' at ({place}) m with det F = {self.ratio:.3g} (element "
             f"{self.worst}). Take shorter steps, stiffen the flesh, or give it larger elements "
-            "there."
+            "there"
         )
 
 

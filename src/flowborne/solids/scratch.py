@@ -7,6 +7,7 @@ warm starts are off, so results depend on arguments only.
 from __future__ import annotations
 
 import copy
+import logging
 import threading
 import weakref
 from typing import TYPE_CHECKING
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
+
+# MuJoCo would leave a file of warnings where the user works: of its own solution, a mere start here
+mujoco.set_mju_user_warning(logging.getLogger(__name__).debug)
 
 
 class Scratch:

@@ -113,6 +113,24 @@ def plot_forces(title: str, curves: dict[str, tuple[Array, Array]], path: Path) 
     _save(figure, path)
 
 
+def plot_courses(strips: dict[str, dict[str, tuple[Array, Array]]], path: Path) -> None:
+    """Plot several quantities over time, one below the other.
+
+    strips  title -> name -> times (n,) s and values (n,); the same names in every strip
+    path    .png, .svg or .pdf; made anew
+    """
+    figure, axes = _figure(len(strips), (7.2, 0.6 + 2.0 * len(strips)))
+    for place, (title, curves) in zip(axes, strips.items(), strict=True):
+        place.set_title(title, loc="left", fontsize=9, color=style.MUTED)
+        lines = [
+            place.plot(times, values, lw=1.6, color=colour, label=name)[0]
+            for (name, (times, values)), colour in zip(curves.items(), style.CURVES, strict=False)
+        ]
+    legend(axes[0], lines)
+    axes[-1].set_xlabel("time (s)", fontsize=9, color=style.MUTED)
+    _save(figure, path)
+
+
 def plot_history(folder: Path, path: Path) -> None:
     """Plot the objective and the joints of a run over time.
 

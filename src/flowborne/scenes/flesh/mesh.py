@@ -28,6 +28,10 @@ THICKNESSES = 0.25
 """As FIDELITY, in thicknesses of the skin or of the thinnest bone's half."""
 
 
+JOINT = 0.5
+"""How close to a second bone points are let go, in edges."""
+
+
 @dataclass(frozen=True)
 class FleshMesh:
     """Elastic tetrahedra around bones, in world axes at rest.
@@ -83,7 +87,7 @@ def _fleshed(outside: Mesh, bones: Bones, size: float, tolerance: float) -> Fles
     flesh = elements[bones.distance(points[elements].mean(axis=1)) > 0.0]
     used, renumbered = np.unique(flesh, return_inverse=True)
     points = points[used]
-    holders = _holders(bones, points, tolerance)
+    holders = _holders(bones, points, tolerance, JOINT * size)
     mesh = FleshMesh(points, renumbered.reshape(-1, 4), holders)
     _check_held(mesh, bones, size)
     return mesh
@@ -96,11 +100,17 @@ def _connected(cells: Indices, count: int) -> Indices:
     return np.asarray(connected_components(links, directed=False)[1])
 
 
-def _holders(bones: Bones, points: Array, tolerance: float) -> tuple[str, ...]:
-    """The bone that each point is deepest in, "" for points more than `tolerance` m outside all."""
+def _holders(bones: Bones, points: Array, tolerance: float, joint: float) -> tuple[str, ...]:
+    """The bone that each point is deepest in, "" for points more than `tolerance` m outside all.
+
+    Points less than `joint` m from a second bone are let go: where a joint bends, flesh that both
+    bones held would be torn.
+    """
     distances = bones.distances(points)
     nearest = distances.argmin(axis=1)
     held = distances.min(axis=1) <= tolerance
+    if len(bones.names) > 1:
+        held &= np.partition(distances, 1, axis=1)[:, 1] > joint
     return tuple(bones.names[b] if h else "" for b, h in zip(nearest, held, strict=True))
 
 
