@@ -178,3 +178,13 @@ def test_flesh_goes_along_when_a_bone_jumps() -> None:
     assert flesh is not None
     assert inversion(flesh, world.solid.q) is None
     assert flesh.volume_ratios(flesh.vertices(world.solid.q)).min() > 0.2
+
+
+def test_flesh_in_a_fluid_that_does_not_feel_it_is_left_alone_by_it() -> None:
+    world = World.at_rest(Setup(leg(), Fluid(ROOM, 1000.0, one_way=True)))
+    world.solid.v[world.setup.solid.dofs_of("knee")] = 1.0
+    report = step(world, DT)
+    assert report.outcome is Outcome.DONE
+    assert not report.pressure_wrench.any()
+    assert world.fluid is not None
+    assert not any(u.any() for u in world.fluid.velocity)

@@ -15,6 +15,8 @@ from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 
+NO_VERTICES = np.zeros((0, 3))
+
 
 @dataclass(frozen=True)
 class Geometry:
@@ -398,8 +400,11 @@ def geometry(
     )
 
 
-def uncut(grid: Grid) -> Geometry:
-    """Geometry of a domain without bodies."""
+def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
+    """Geometry of a domain that no body cuts.
+
+    vertices  (n, 3) of flesh that the fluid does not feel, m
+    """
     nx, ny, nz = grid.shape
     opened = [np.ones(grid.face_shape(axis)) for axis in range(3)]
     if grid.is_slab:
@@ -421,5 +426,5 @@ def uncut(grid: Grid) -> Geometry:
         np.zeros(1, np.int64),
         none,
         np.zeros(0),
-        skins_on(grid, None, np.zeros((0, 3))),
+        skins_on(grid, None, vertices),
     )

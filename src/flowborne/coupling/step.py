@@ -133,10 +133,10 @@ def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
     setup = world.setup
     assert setup.fluid is not None
     seen = None if setup.fluid.one_way else setup.solid.flesh
-    if setup.shapes.body.size == 0 and seen is None:
-        return uncut(setup.fluid.grid)
     if pose is None:
         pose = kinematics(setup.solid, world.solid.q)
+    if setup.shapes.body.size == 0 and seen is None:
+        return uncut(setup.fluid.grid, pose.vertices)
     return geometry(
         setup.shapes,
         pose.geom_position[setup.shapes.source],
