@@ -12,8 +12,8 @@ from flowborne.coupling.closed import add_closed, face_closed
 from flowborne.coupling.distance import BAND
 from flowborne.coupling.shapes import sample_mesh
 from flowborne.coupling.skin import (
+    BESIDE,
     ON_SKIN,
-    REACH,
     sample_skin,
     skin_box,
     skin_weights,
@@ -78,9 +78,9 @@ def box_of(skin: Skin, grid: Grid) -> Integers:
 
 
 def sample(skin: Skin, grid: Grid, box: Integers) -> tuple[Array, Array]:
-    """Distances, and whether the skin is within REACH cells."""
+    """Distances, and whether the skin is within BAND cells."""
     phi = sample_skin(*skin, box, np.array(grid.origin), grid.spacing, grid.is_slab)
-    return phi, np.abs(phi) < REACH * grid.spacing
+    return phi, np.abs(phi) < BAND * grid.spacing
 
 
 def on_skin(corners: Integers, weights: Array, values: Array) -> Array:
@@ -108,7 +108,7 @@ def assert_as_all_pairs(skin: Skin, grid: Grid) -> None:
     counts = np.array(grid.shape) + 1.0
     exact = sample_mesh(*skin, np.array(grid.origin), grid.spacing, counts).reshape(phi.shape)
     h = grid.spacing
-    near = np.abs(exact) < REACH * h
+    near = np.abs(exact) < BAND * h
     off = np.abs(exact) > 1e-7 * h
     np.testing.assert_array_equal((phi < 0.0)[off], (exact < 0.0)[off])
     np.testing.assert_array_less(phi[~off], 0.0)
@@ -180,7 +180,7 @@ def test_signs_are_right_deep_inside_and_far_outside() -> None:
     np.testing.assert_array_equal((phi < 0.0)[off], (exact < 0.0)[off])
     assert exact.min() < -20 * grid.spacing
     np.testing.assert_array_equal(np.abs(phi[~nearest]), BAND * grid.spacing)
-    np.testing.assert_array_less(np.abs(phi[nearest]), REACH * grid.spacing)
+    np.testing.assert_array_less(np.abs(phi[nearest]), BAND * grid.spacing)
 
 
 def test_box_holds_the_band_and_stays_in_the_grid() -> None:
@@ -279,8 +279,8 @@ def test_a_prism_in_a_slab_is_its_cross_section(h: float) -> None:
 def test_weights_carry_a_rigid_motion_to_the_closest_points() -> None:
     grid = Grid((24, 24, 24), 0.05, (-0.61, -0.59, -0.605))
     vertices, triangles = skin = sphere(0.4, 3)
-    phi, nearest = sample(skin, grid, everywhere(grid))
-    near = nearest
+    phi, _ = sample(skin, grid, everywhere(grid))
+    near = np.abs(phi) < BESIDE * grid.spacing
     x = nodes(grid, everywhere(grid))[near]
     corners, weights = skin_weights(x, vertices, triangles, grid.spacing)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-14)

@@ -15,8 +15,8 @@ from flowborne.coupling.distance import BAND
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array
 
-REACH = 2.0
-"""Distances are exact up to this many cells from the skin."""
+BESIDE = 2.0
+"""Places are moved by the skin up to this many cells away."""
 
 ON_SKIN = 1e-9
 """A node as many cells from the skin or nearer lies on it, and counts as this far inside."""
@@ -136,12 +136,12 @@ def lower_squares(
     c: Point,
 ) -> None:
     """Lower the squared distance to the skin, in cells, to that of one triangle around it."""
-    first_i = first_node(min(a[0], b[0], c[0]) - REACH, counts[0])
-    last_i = first_node(max(a[0], b[0], c[0]) + REACH, counts[0])
-    first_j = first_node(min(a[1], b[1], c[1]) - REACH, counts[1])
-    last_j = first_node(max(a[1], b[1], c[1]) + REACH, counts[1])
-    first_k = first_node(min(a[2], b[2], c[2]) - REACH, counts[2])
-    last_k = first_node(max(a[2], b[2], c[2]) + REACH, counts[2])
+    first_i = first_node(min(a[0], b[0], c[0]) - BAND, counts[0])
+    last_i = first_node(max(a[0], b[0], c[0]) + BAND, counts[0])
+    first_j = first_node(min(a[1], b[1], c[1]) - BAND, counts[1])
+    last_j = first_node(max(a[1], b[1], c[1]) + BAND, counts[1])
+    first_k = first_node(min(a[2], b[2], c[2]) - BAND, counts[2])
+    last_k = first_node(max(a[2], b[2], c[2]) + BAND, counts[2])
     nx = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
     ny = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
     nz = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -165,7 +165,7 @@ def sample_skin(
 ) -> Array:
     """(box shape) signed distance to a skin at the nodes of its box, m, negative inside.
 
-    Exact within REACH cells of the skin, beyond them BAND cells outside and -BAND cells inside;
+    Exact within BAND cells of the skin, beyond them BAND cells outside and -BAND cells inside;
     never 0, for what is on the skin is inside (ON_SKIN).
 
     vertices   (n, 3) m
@@ -180,7 +180,7 @@ def sample_skin(
     places = (vertices - origin) / h - box[:, 0]
     if flat:
         places[:, 2] = vertices[:, 2] / h
-    phi = np.full(shape, REACH**2)
+    phi = np.full(shape, BAND**2)
     winding = np.zeros(shape, np.int64)
     for t in range(triangles.shape[0]):
         n, m, o = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -195,7 +195,7 @@ def sample_skin(
             for k in range(counts[2]):
                 if i > 0:
                     winding[i, j, k] += winding[i - 1, j, k]
-                distance = np.sqrt(phi[i, j, k]) if phi[i, j, k] < REACH**2 else BAND
+                distance = np.sqrt(phi[i, j, k])
                 if winding[i, j, k] >= 1 or distance < ON_SKIN:
                     distance = -max(distance, ON_SKIN)
                 phi[i, j, k] = distance * h
@@ -208,7 +208,7 @@ def sample_skin(
 def triangles_by_cell(
     x: Array, vertices: Array, triangles: Integers, h: float
 ) -> tuple[Integers, Integers, Integers]:
-    """For cells of edge h around places x (m, 3): the triangles within REACH cells of each.
+    """For cells of edge h around places x (m, 3): the triangles within BESIDE cells of each.
 
     returns  (m,) number of the place's cell; where its triangles begin in the list; the list
     """
@@ -234,8 +234,8 @@ def triangles_by_cell(
                 a, b = vertices[triangles[t, 0], d], vertices[triangles[t, 1], d]
                 c = vertices[triangles[t, 2], d]
                 lower, upper = (min(a, b, c) - low[d]) / h, (max(a, b, c) - low[d]) / h
-                first[d] = max(int(np.floor(lower - REACH)), 0)
-                last[d] = min(int(np.floor(upper + REACH)), counts[d] - 1)
+                first[d] = max(int(np.floor(lower - BESIDE)), 0)
+                last[d] = min(int(np.floor(upper + BESIDE)), counts[d] - 1)
             for i in range(first[0], last[0] + 1):
                 for j in range(first[1], last[1] + 1):
                     for k in range(first[2], last[2] + 1):
@@ -259,7 +259,7 @@ def skin_weights(
     """Vertices and their weights at the point of the skin that is closest to each place.
 
     x        (m, 3) places, m;  h  length of a cell, m
-    returns  corners (m, 3) and weights (m, 3), which sum to 1; all 0 farther than REACH cells away
+    returns  corners (m, 3) and weights (m, 3), which sum to 1; all 0 farther than BESIDE cells away
     """
     corners = np.zeros((x.shape[0], 3), np.int64)
     weights = np.zeros((x.shape[0], 3))
@@ -268,7 +268,7 @@ def skin_weights(
     number, start, listed = triangles_by_cell(x, vertices, triangles, h)
     for row in range(x.shape[0]):
         p = (x[row, 0], x[row, 1], x[row, 2])
-        nearest = (REACH * h) ** 2
+        nearest = (BESIDE * h) ** 2
         for at in range(start[number[row]], start[number[row] + 1]):
             t = listed[at]
             n, m, o = triangles[t, 0], triangles[t, 1], triangles[t, 2]

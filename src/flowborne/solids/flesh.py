@@ -112,8 +112,20 @@ class Flesh:
 
     @cached_property
     def spread(self) -> csr_array:
-        """(3n, 3np) `weights` for each of three components."""
-        return csr_array(kron(self.weights, eye_array(3), format="csr"))
+        """(3n, 3np) `weights` for each of three components.
+
+        In a slab a vertex has the mean velocity of its column along z, and what pushes it pushes
+        the whole column.
+        """
+        weights = self.weights
+        if self.model.slab:
+            _, column = np.unique(self.rest[:, :2].round(9), axis=0, return_inverse=True)
+            one = np.ones(len(column))
+            members = csr_array((one, (np.arange(len(column)), column.ravel())))
+            weights = csr_array(
+                members @ diags_array(1.0 / members.sum(axis=0)) @ members.T @ weights
+            )
+        return csr_array(kron(weights, eye_array(3), format="csr"))
 
     def volume_ratios(self, vertices: Array) -> Array:
         """(m,) det F of each element: its volume over that at rest, negative when inside out."""

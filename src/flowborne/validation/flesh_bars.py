@@ -143,6 +143,53 @@ def quadratic_bar(
     return _bar(spec, gravity, _composite(simpson, cells[1]), simpson)
 
 
+IN_SLAB = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>{beside}
+<flexcomp name="bar" type="grid" dim="3" dof="quadratic" count="{points}" cellcount="{cells}"
+spacing="{spacing}" pos="{middle}" mass="{mass}" radius="{radius}">
+<elasticity young="{young}" poisson="{poisson}" damping="{damping}"/>
+<contact selfcollide="none" contype="0" conaffinity="0"/><pin gridrange="0 0 0 2 {last} 2"/>
+</flexcomp></worldbody></mujoco>"""
+
+SLICE = 0.01
+"""Depth of a slab's bar, m: it is as stiff and as heavy as a metre would be. The fluid of a slab
+pushes the vertices at z = 0 alone, and the middle of a deep bar would give way to it."""
+
+
+def bar_in_slab(
+    cells: tuple[int, int],
+    size: tuple[float, float],
+    end: tuple[float, float],
+    tissue: Tissue,
+    beside: str,
+) -> SolidModel:
+    """A bar along x in a slab that cells of 27 nodes carry, one thick in z, and what it hangs on.
+
+    cells   of its free part, along and across; one more, all of it held, is on its near side
+    size    length and thickness of the free part, m
+    end     middle of its end, m
+    beside  MJCF of the world body's other elements
+    """
+    across = np.array([cells[0] + 1, cells[1], 1])
+    lengths = np.array([size[0] * across[0] / cells[0], size[1], SLICE])
+    mass = tissue.density * size[0] * size[1] * (1.0 - 1.0 / (6.0 * cells[0]))
+    text = IN_SLAB.format(
+        beside=beside,
+        points=_words(2 * across + 1),
+        cells=_words(across),
+        spacing=_words(0.5 * lengths / across),
+        middle=_words(np.array([end[0] - 0.5 * lengths[0], end[1], 0.0])),
+        mass=mass,
+        radius=1e-3 * lengths.min(),
+        young=tissue.young / SLICE,
+        poisson=tissue.poisson,
+        damping=tissue.damping,
+        last=2 * cells[1],
+    )
+    return SolidModel.with_flesh(
+        mujoco.MjSpec.from_string(text), slab=True, gravity=(0.0, 0.0, 0.0)
+    )
+
+
 def equilibrium(bar: Bar, applied: Array, start: Array | None = None) -> Array:
     """(nq,) positions at which the bar is at rest under generalised forces (nv,) and its weight.
 

@@ -1,0 +1,313 @@
+"""Turek and Hron's channel with a flag behind a cylinder: rigid in D2, of flesh in D3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flowborne.coupling.report import StepReport
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
+from flowborne.fluid.grid import Array, Grid
+from flowborne.solids.model import SolidModel
+from flowborne.solids.tissue import Tissue
+from flowborne.validation.case import Case, Finding, GridSeries, near
+from flowborne.validation.fixed_bodies import Parabola, begin
+from flowborne.validation.flesh_bars import bar_in_slab
+from flowborne.validation.reference import reference
+from flowborne.validation.shedding import Shedding, amplitude, crest
+from flowborne.validation.worlds import NOWHERE, advance, mjcf
+
+LENGTH, HEIGHT = 2.5, 0.41
+"""m, of the channel."""
+
+CYLINDER = '<geom type="cylinder" pos="0.2 0.2 0" size="0.05 0.5"/>'
+PLATE = '<geom type="box" pos="0.4 0.2 0" size="0.2 0.01 0.5"/>'
+"""The cylinder, and the rigid flag of D2 from the cylinder's middle to its end A."""
+
+END, SIZE = (0.6, 0.2), (0.35, 0.02)
+"""A, the middle of the flag's end, and how long (from the cylinder on) and thick it is, m."""
+
+DENSITY, VISCOSITY = 1000.0, 1.0
+"""Of the fluid, kg/m^3 and Pa s."""
+
+CELLS = (18, 1)
+"""Cells of flesh along and across the flag: D1 is 0.5 % off with them."""
+
+CALM, CALMER = 1e-4, 1e-3
+"""Damping times of the flesh of FSI2 and FSI3, s: their free vibrations would lose 0.4 % and 10 %
+of the amplitude in a period. With 3e-4 s fast modes of FSI3's flag, of a fifth in volume, go on for
+as long as it flutters, and with less they break it."""
+
+CFL = 1.0
+"""Cells that the fastest inflow crosses in a step."""
+
+GRIDS = {True: (44,), False: (44, 85, 126)}
+FLUTTERING = (44, 85)
+"""Cells across the channel, by quick; and for FSI2 and FSI3.
+
+With 44 and any 41 more both sides of the flag at rest run 0.39 and 0.54 of a cell above planes of
+the grid. Where they cross such planes the lift jumps, as the corner cells of the flag's end change:
+with CFD1's flow by 0.48 N/m on 41 cells and by 0.28 N/m on 82. Half-way between it is right. FSI1's
+flag rises by 0.2 cells on 85, and what its lift is above the published one comes from there.
+"""
+
+BEHIND = 0.1
+"""Cells between A and the plane of the grid before it. The jump grows with them, and just on the
+plane the flag's end is not closed."""
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A row of the benchmark.
+
+    mean     velocity of the inflow over its height, m/s
+    longest  s until it is at rest, or repeats itself, on the first grid
+    tissue   of the flag; None for a rigid one
+    """
+
+    name: str
+    mean: float
+    longest: float
+    tissue: Tissue | None = None
+
+    @property
+    def peak(self) -> float:
+        return 1.5 * self.mean
+
+    @property
+    def case(self) -> str:
+        """Its case in the reference list."""
+        return "D2" if self.tissue is None else "D3"
+
+
+def flag_tissue(shear: float, density: float, damping: float = 0.0) -> Tissue:
+    """St. Venant-Kirchhoff material with a shear modulus in N/m^2 and Poisson's ratio 0.4."""
+    return Tissue(2.8 * shear, 0.4, density, damping)
+
+
+CFD = (Flow("CFD1", 0.2, 8.0), Flow("CFD2", 1.0, 5.0), Flow("CFD3", 2.0, 6.0))
+FSI = (
+    Flow("FSI1", 0.2, 8.0, flag_tissue(0.5e6, 1e3)),
+    Flow("FSI2", 1.0, 10.0, flag_tissue(0.5e6, 1e4, CALM)),
+    Flow("FSI3", 2.0, 6.0, flag_tissue(2.0e6, 1e3, CALMER)),
+)
+
+
+def channel(cells: int, flow: Flow) -> World:
+    """The channel at rest, `cells` across it. All bodies are the world's, number 0.
+
+    A flag that flutters vibrates without loss; one that comes to rest does so by MuJoCo's step.
+    """
+    h = HEIGHT / cells
+    ahead = (BEHIND - END[0] / h) % 1.0
+    wall = BoundaryNoSlip()
+    fluid = Fluid(
+        Grid.slab(round(LENGTH / h + ahead), cells, h, (-ahead * h, 0.0)),
+        DENSITY,
+        VISCOSITY,
+        Boundaries(BoundaryInflow(Parabola(flow.peak)), BoundaryOpen(), wall, wall),
+        tolerance=1e-7,
+    )
+    if flow.tissue is None:
+        solid = SolidModel.from_string(mjcf(CYLINDER, PLATE), slab=True, gravity=NOWHERE)
+    else:
+        solid = bar_in_slab(CELLS, SIZE, END, flow.tissue, CYLINDER)
+    calmed = flow.tissue is not None and flow.tissue.damping > 0.0
+    return World.at_rest(Setup(solid, fluid, centred_flesh=calmed))
+
+
+def time_step(world: World, flow: Flow) -> float:
+    """s, see CFL."""
+    return CFL * world.flow()[0].grid.spacing / flow.peak
+
+
+def force(report: StepReport) -> Array:
+    """(2,) drag and lift of cylinder and flag together, N/m."""
+    return np.asarray((report.pressure_wrench + report.viscous_wrench)[0, :2])
+
+
+def moved(world: World) -> Array:
+    """(2,) how far A has moved, m; none of a rigid flag."""
+    flesh = world.setup.solid.flesh
+    if flesh is None:
+        return np.zeros(2)
+    away = np.abs(flesh.rest - (*END, 0.0)).max(axis=1)
+    a = int(np.argmin(away))
+    return np.asarray(flesh.vertices(world.solid.q)[a] - flesh.rest[a])[:2]
+
+
+def start(world: World, flow: Flow, coarser: World | None) -> None:
+    """Begin from the inflow everywhere, or from flow and flag on a coarser grid."""
+    begin(world, coarser, Parabola(flow.peak))
+    if coarser is not None:
+        world.solid.q[:], world.solid.v[:] = coarser.solid.q, coarser.solid.v
+
+
+def march(world: World, flow: Flow, seconds: float) -> Array:
+    """(steps, 4) drag, lift and place of A, step by step."""
+    dt = time_step(world, flow)
+    rows = []
+    for _ in range(round(seconds / dt)):
+        forces = force(advance(world, dt))
+        rows.append((*forces, *moved(world)))
+    return np.array(rows)
+
+
+SHORTER = 0.5
+"""Part of a flow's longest time that it is given on finer grids, and when quick."""
+
+LAST = 0.1
+"""Part of that time whose mean is taken, and whose changes are told."""
+
+
+def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[str]]:
+    """(grids, 4) drag, lift and place of A of a flow that comes to rest, and how steady it is."""
+    found, lines, coarser = [], [], None
+    for n in grids:
+        world = channel(n, flow)
+        start(world, flow, coarser)
+        seconds = flow.longest * (SHORTER if coarser or quick else 1.0)
+        rows = march(world, flow, seconds)
+        last = rows[-max(2, round(LAST * len(rows))) :]
+        found.append(last.mean(axis=0))
+        drag, lift, *_ = np.ptp(last, axis=0)
+        said = f"drag still changes by {drag:.2g}, lift by {lift:.2g}"
+        lines.append(f"{n:>6g} cells across the channel: {said}")
+        coarser = world
+    return np.array(found), lines
+
+
+def series_of(grids: Sequence[int], values: Array, exact: float) -> GridSeries:
+    """Values from grid to grid with their errors."""
+    errors = [abs(v - exact) for v in values]
+    return GridSeries("cells across the channel", grids, list(values), errors)
+
+
+def judged(
+    flow: Flow,
+    quantity: str,
+    grids: Sequence[int],
+    values: Array,
+    relative: float,
+    lines: Sequence[str] = (),
+) -> Finding:
+    """A figure within a part of the published one."""
+    exact = reference(flow.case, flow.name)[quantity]
+    series = series_of(grids, values, exact)
+    label = f"{flow.name}, {quantity}"
+    return near(label, values[-1], exact, relative=relative, series=series, lines=lines)
+
+
+def between(
+    flow: Flow, quantity: str, grids: Sequence[int], values: Array, lines: Sequence[str] = ()
+) -> Finding:
+    """A figure within the range of published ones."""
+    exact, low, high = reference(flow.case, flow.name)[quantity]
+    value = float(values[-1])
+    series = series_of(grids, values, exact)
+    said, within = f"{low:g} to {high:g}", bool(low <= value <= high)
+    return Finding(f"{flow.name}, {quantity}", value, exact, said, within, series, tuple(lines))
+
+
+PERIODS = 4
+"""Periods that are looked at, the last of a run."""
+
+
+@dataclass(frozen=True)
+class Flutter:
+    """Figures of a motion that repeats itself.
+
+    means, amplitudes  (4,) middle and half of what lies between the extremes of drag (N/m), lift
+                       (N/m) and the two coordinates of A (m), over whole periods
+    frequency          Hz, of a rigid flag's lift, or of A across the channel
+    line               how far it is from repeating itself
+    """
+
+    means: Array
+    amplitudes: Array
+    frequency: float
+    line: str
+
+
+def flutter(rows: Array, dt: float) -> Flutter:
+    """Figures of the last PERIODS periods of drag, lift and place of A (steps, 4).
+
+    Raises ArithmeticError when there are not so many.
+    """
+    drag, lift, _, up = rows.T
+    clock = up if up.any() else lift
+    seen = Shedding(dt, drag, clock, np.zeros(0))
+    steps, period = seen.last(PERIODS)
+    last = rows[steps]
+    middle = [0.5 * (crest(v)[0] - crest(-v)[0]) for v in last.T]
+    swing = [amplitude(v) for v in last.T]
+    count = round(period / dt)
+    first, final = (amplitude(part) for part in (last[:count, 1], last[-count:, 1]))
+    line = f"lift's amplitude {first:.5g} in the first period, {final:.5g} in the last"
+    return Flutter(np.array(middle), np.array(swing), 1.0 / period, line)
+
+
+def periodic(flow: Flow, grids: Sequence[int]) -> list[Flutter]:
+    """A flow that flutters, grid after grid."""
+    found: list[Flutter] = []
+    coarser = None
+    for n in grids:
+        world = channel(n, flow)
+        start(world, flow, coarser)
+        seconds = flow.longest * (SHORTER if coarser else 1.0)
+        seen = flutter(march(world, flow, seconds), time_step(world, flow))
+        line = f"{n:>6g} cells across the channel: {seen.line}"
+        found.append(replace(seen, line=line))
+        coarser = world
+    return found
+
+
+def rigid_flag(quick: bool) -> list[Finding]:
+    """D2: drag and lift of the rigid flag; CFD3's, which sheds vortices, not when quick."""
+    grids, findings = GRIDS[quick], []
+    for flow in CFD[:2]:
+        values, lines = steady(flow, grids, quick)
+        findings.append(judged(flow, "drag", grids, values[:, 0], 0.02, lines))
+        findings.append(judged(flow, "lift", grids, values[:, 1], 0.02))
+    if quick:
+        return findings
+    seen = periodic(CFD[2], grids)
+    lines = [s.line for s in seen]
+    for axis, name in enumerate(("drag", "lift")):
+        means, swings = (np.array([v[axis] for v in values]) for values in _columns(seen))
+        findings.append(judged(CFD[2], f"{name} mean", grids, means, 0.02, lines))
+        findings.append(judged(CFD[2], f"{name} amplitude", grids, swings, 0.05))
+    paces = np.array([s.frequency for s in seen])
+    return [*findings, judged(CFD[2], "frequency", grids, paces, 0.01)]
+
+
+def flag_of_flesh(quick: bool) -> list[Finding]:
+    """D3: FSI1, which comes to rest, and unless quick FSI2 and FSI3, which flutter."""
+    grids, findings = GRIDS[quick], []
+    values, lines = steady(FSI[0], grids, quick)
+    for axis, name in ((2, "ux"), (3, "uy"), (0, "drag"), (1, "lift")):
+        findings.append(between(FSI[0], name, grids, values[:, axis], lines if axis == 2 else ()))
+    grids = FLUTTERING
+    for flow in () if quick else FSI[1:]:
+        seen = periodic(flow, grids)
+        means, swings = (np.array(values) for values in _columns(seen))
+        lines = [s.line for s in seen]
+        for axis, name in enumerate(("drag", "lift", "ux", "uy")):
+            exact = reference("D3", flow.name)[f"{name} mean"]
+            found = ", ".join(f"{v:.4g}" for v in means[:, axis])
+            shown = [f"mean {found} from grid to grid, published {exact:g}"]
+            said = f"{name} amplitude"
+            findings.append(judged(flow, said, grids, swings[:, axis], 0.05, shown + lines))
+        paces = np.array([s.frequency for s in seen])
+        findings.append(judged(flow, "frequency", grids, paces, 0.03))
+    return findings
+
+
+def _columns(seen: Sequence[Flutter]) -> tuple[list[Array], list[Array]]:
+    return [s.means for s in seen], [s.amplitudes for s in seen]
+
+
+CASES = (Case("D2", rigid_flag), Case("D3", flag_of_flesh))
