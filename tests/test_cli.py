@@ -75,7 +75,7 @@ def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp
         (["figures", "--out", "taken.txt"], "taken.txt cannot be written (File exists)"),
         (["figures", "--out", "taken.txt/new"], "taken.txt/new cannot be written"),
         (["fly"], "No such command 'fly'"),
-        (["figures", "3"], "NAME 3: there is no such figure; there are 2, 9b, 10, 11"),
+        (["figures", "3"], "NAME 3: there is no such figure; there are 2, 7, 9b, 10, 11"),
         (["export", "taken", "--out", "walk.bvh"], "taken is not the folder of a run"),
     ],
 )

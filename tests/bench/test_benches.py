@@ -82,7 +82,7 @@ def test_first_run_keeps_its_kernels_apart(small_scene, tmp_path, monkeypatch):
 
 
 def test_growth_names_time_and_memory_of_every_size():
-    scenes = [load_scene(size.SCENE, {"domain.resolution": str(n)}) for n in (10, 12)]
+    scenes = [load_scene("flyer-base", {"domain.resolution": str(n)}) for n in (10, 12)]
     result = size.growth(scenes, frames=1)
     assert result.verdict == "info"
     assert np.isfinite(result.value)

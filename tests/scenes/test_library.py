@@ -13,6 +13,7 @@ from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, library, load_scene, scene_names
 
 NAMES = scene_names()
+UNCONTROLLED = ("flyer-base", "swimmer-jet-only", "swimmer-no-control")
 
 
 def test_the_list_of_scenes_is_what_lies_in_the_library() -> None:
@@ -27,8 +28,8 @@ def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
     assert scene.figure
     assert scene.description
     assert "\n" not in scene.description
-    assert scene.controlled_joints() or name == "flyer-base"
-    assert scene.stream() is not None or name.startswith(("human-gravity", "flyer"))
+    assert scene.controlled_joints() or name in UNCONTROLLED
+    assert scene.stream() is not None or name.startswith(("human-gravity", "flyer", "swimmer"))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,4 +1,4 @@
-"""K11 in short: the upstroke of the flyer, with and without twist, on a coarse grid."""
+"""K11 in short: upstrokes of the flyers, with and without control, on a coarse grid."""
 
 from __future__ import annotations
 
@@ -16,6 +16,14 @@ def test_K11_twisted_wings_are_drawn_up_with_less_drag() -> None:
     ((_, pressed),), ((_, feathered),) = base.impulses(), twist.impulses()
     assert pressed < -60.0
     assert feathered > 0.8 * pressed
+
+
+def test_K11_wings_of_flesh_fold_on_their_way_up() -> None:
+    brief = {**UPSTROKE, "controller.settle_steps": "1"}
+    straight, bent = (fly("flyer-flesh", 0.2, brief, controlled) for controlled in (False, True))
+    ((_, pressed),), ((_, folded),) = straight.impulses(), bent.impulses()
+    assert pressed < -8.0
+    assert folded > 0.5 * pressed
 
 
 def test_impulses_are_those_of_half_strokes() -> None:

@@ -17,17 +17,17 @@ from flowborne.scenes.schema import Scene
 from flowborne.simulation import PARTS, Simulation
 
 NAME = "size"
-SCENE = "flyer-base"
-SIDES = (32, 64, 96)
-"""Cells along the domain's longest side."""
+SCENES = {"flyer-base": (32, 64, 96), "swimmer-jet-only": (72, 120, 168)}
+"""Scene -> cells along the domain's longest side; 120 are the swimmer's own."""
 
 FRAMES = 4
 """How many are timed, after a first one."""
 
 
 def measure() -> Iterator[Result]:
-    """Time and memory of a flyer without control, one worker."""
-    yield growth([load_scene(SCENE, {"domain.resolution": str(n)}) for n in SIDES])
+    """Time and memory of a flyer of bones and a swimmer of flesh without control, one worker."""
+    for scene, sides in SCENES.items():
+        yield growth([load_scene(scene, {"domain.resolution": str(n)}) for n in sides])
 
 
 def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:

@@ -192,35 +192,46 @@ def limit(value: float, field: Array, x: float, y: float, z: float) -> float:
                 high = max(high, field[i + m, j + n, k + p])
     if low <= value <= high:
         return value
-    room = 0.0
+    along = 0.0
     if 0 < i < field.shape[0] - 2:
         for n in range(2):
-            room = max(
-                room,
-                curvature(
-                    field[i - 1, j + n, k],
-                    field[i, j + n, k],
-                    field[i + 1, j + n, k],
-                    field[i + 2, j + n, k],
-                ),
-            )
+            for p in range(layers):
+                along = max(
+                    along,
+                    curvature(
+                        field[i - 1, j + n, k + p],
+                        field[i, j + n, k + p],
+                        field[i + 1, j + n, k + p],
+                        field[i + 2, j + n, k + p],
+                    ),
+                )
     across = 0.0
     if 0 < j < field.shape[1] - 2:
         for m in range(2):
-            across = max(
-                across,
-                curvature(
-                    field[i + m, j - 1, k],
-                    field[i + m, j, k],
-                    field[i + m, j + 1, k],
-                    field[i + m, j + 2, k],
-                ),
-            )
-    room += across
+            for p in range(layers):
+                across = max(
+                    across,
+                    curvature(
+                        field[i + m, j - 1, k + p],
+                        field[i + m, j, k + p],
+                        field[i + m, j + 1, k + p],
+                        field[i + m, j + 2, k + p],
+                    ),
+                )
+    upright = 0.0
     if not flat and 0 < k < field.shape[2] - 2:
-        room += curvature(
-            field[i, j, k - 1], field[i, j, k], field[i, j, k + 1], field[i, j, k + 2]
-        )
+        for m in range(2):
+            for n in range(2):
+                upright = max(
+                    upright,
+                    curvature(
+                        field[i + m, j + n, k - 1],
+                        field[i + m, j + n, k],
+                        field[i + m, j + n, k + 1],
+                        field[i + m, j + n, k + 2],
+                    ),
+                )
+    room = along + across + upright
     return min(max(value, low - 0.25 * room), high + 0.25 * room)
 
 

@@ -41,6 +41,11 @@ BUILT_IN = (
     "human-wind-drag",
     "flyer-base",
     "flyer-twist",
+    "flyer-flesh",
+    "swimmer",
+    "swimmer-jet-only",
+    "swimmer-no-control",
+    "swimmer-held",
 )
 
 

@@ -84,7 +84,7 @@ def _flesh_files(scene: Scene) -> tuple[tuple[FleshTable, ...], dict[str, bytes]
     spec, files, tables = bones_of(scene), {}, []
     for table in scene.flesh:
         mesh, recipe = meshed(spec, table, scene.folder)
-        names = {"mesh": f"flesh-{table.name}.vtu"}
+        names = {"mesh": Path(table.mesh or f"flesh-{table.name}.vtu").name}
         files[names["mesh"]] = mesh_bytes(mesh, recipe)
         if table.surface is not None:
             path = scene.folder / table.surface

@@ -12,6 +12,8 @@ from flowborne.scenes.fields import NotNegative, Positive, Table, Text
 class FleshTable(Table):
     """[[flesh]]: an elastic body that bones hold, meshed with tetrahedra.
 
+    With its bones it should be 1.8 cells of the fluid's grid thick or more: thinner, it leaks.
+
     name       the flesh's own
     bones      bodies of the model that lie inside and hold it
     thickness  m: it is a skin as thick as this around the bones

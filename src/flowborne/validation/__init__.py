@@ -29,6 +29,8 @@ MODULES = {
     "V2": "settling",
     "V8": "viscous",
     "D1": "flesh",
+    "D2": "flag_in_channel",
+    "D3": "flag_in_channel",
     "D4": "flesh",
     "D5": "flesh",
     "A1": "articulated",
@@ -45,7 +47,7 @@ MODULES = {
     "K8": "human",
     "K9": "human",
     "K10": "human_wind",
-    "K11": "flyer",
+    "K11": "swimmer",
     "S5": "swimmers",
 }
 """Case -> module that holds it, in the order of the list; a module is imported when it is run."""

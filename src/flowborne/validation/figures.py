@@ -1,4 +1,4 @@
-"""The paper's Figs. 2, 9 b, 10 and 11 with our numbers: tables, a picture and plots."""
+"""The paper's Figs. 2, 7, 9 b, 10 and 11 with our numbers: tables, a picture and plots."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from flowborne.validation.blocked_arms import COLUMNS, blocked_rows, draw_frame
 from flowborne.validation.controller_in_flow import SCENES, course
 from flowborne.validation.flyer import flights
 from flowborne.validation.reference import reference
-from flowborne.view.plots import ChainCost, plot_chain_cost, plot_forces
+from flowborne.validation.swimmer import swims
+from flowborne.view.plots import ChainCost, plot_chain_cost, plot_courses, plot_forces
 
 PAPER_SERIAL = {1: 14.0, 2: 29.0, 3: 43.0, 4: 58.0}
 PAPER_PARALLEL = (14.0, 15.0)
@@ -77,6 +78,25 @@ def convergence_figure(out: Path, console: Console) -> None:
         out / "figure-2.csv",
         console,
     )
+
+
+def swimmer_figure(out: Path, console: Console) -> None:
+    """Fig. 7: way up, tilt and work of the swimmer, with its jet alone, and with neither."""
+    found = swims(quick=False)
+    columns = ("run", "rises m", "largest tilt degrees", "work of the drives kJ")
+    rows = [
+        (name, f"{run.risen():.2f}", f"{run.tilt.max():.1f}", f"{1e-3 * run.work[-1]:.1f}")
+        for name, run in found.items()
+    ]
+    finish("Fig. 7: three cycles of the swimmer", columns, rows, out / "figure-7.csv", console)
+    strips = {
+        "height of the head (m)": {name: (run.time, run.height) for name, run in found.items()},
+        "tilt (degrees)": {name: (run.time, run.tilt) for name, run in found.items()},
+        "work of the drives (kJ)": {
+            name: (run.time, 1e-3 * run.work) for name, run in found.items()
+        },
+    }
+    plot_courses(strips, out / "figure-7.png")
 
 
 def arms_figure(out: Path, console: Console) -> None:
@@ -158,6 +178,7 @@ def finish(
 
 FIGURES: dict[str, Callable[[Path, Console], None]] = {
     "2": convergence_figure,
+    "7": swimmer_figure,
     "9b": arms_figure,
     "10": chain_figure,
     "11": flyer_figure,

@@ -1,4 +1,4 @@
-"""The flyer of the paper's Figs. 11 and 12: what the twist of its outer wings is worth (K11)."""
+"""The flyers of the paper's Figs. 11 to 13: what control of their outer wings is worth (K11)."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ import numpy as np
 
 from flowborne.fluid.grid import Array
 from flowborne.scenes.load import load_scene
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_control import ControllerTable
+from flowborne.scenes.schema_solids import MotionConstantTable
 from flowborne.simulation import BlowUpError, Simulation
-from flowborne.validation.case import Case, Finding
+from flowborne.validation.case import Finding
 
 CYCLES = {True: 1, False: 5}
 """Strokes that are followed, by quick."""
 
 COARSE = {"domain.resolution": "16", "time.frames_per_second": "20"}
 """Settings of the quick runs."""
+
+COARSE_FLESH = {"domain.resolution": "20", "time.frames_per_second": "20"}
+"""As COARSE. Flesh is not thickened to a coarse grid, so this is finer."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +54,33 @@ class Flight:
         )
 
 
-def fly(scene: str, cycles: float, settings: Mapping[str, str] = MappingProxyType({})) -> Flight:
+def held(scene: Scene) -> Scene:
+    """The scene without control: its controlled joints stay at 0."""
+    motion = tuple(MotionConstantTable(kind="constant", joint=j) for j in scene.controlled_joints())
+    changes = {
+        "motion": scene.motion + motion,
+        "control": (),
+        "objectives": (),
+        "controller": ControllerTable(),
+    }
+    return scene.model_copy(update=changes).in_folder(scene.folder)
+
+
+def fly(
+    scene: str,
+    cycles: float,
+    settings: Mapping[str, str] = MappingProxyType({}),
+    controlled: bool = True,
+) -> Flight:
     """Run a flyer for some strokes.
 
-    settings  in place of the scene's own
-    raises    ArithmeticError when the run blows up
+    settings    in place of the scene's own
+    controlled  False: as `held`
+    raises      ArithmeticError when the run blows up
     """
     loaded = load_scene(scene, settings)
+    if not controlled:
+        loaded = held(loaded)
     period = next(table.period for table in loaded.motion if table.kind == "sinusoid")
     rows = []
     with Simulation(loaded, workers=1) as simulation:
@@ -77,20 +103,19 @@ def flights(quick: bool) -> dict[str, Flight]:
     return {name: fly(f"flyer-{name}", CYCLES[quick], settings) for name in ("base", "twist")}
 
 
-def twist_is_worth_it(quick: bool) -> list[Finding]:
-    """K11, the flyer: upward impulse with control over that without, and down- over upstroke."""
-    found = flights(quick)
-    with_control, without = found["twist"].impulses(), found["base"].impulses()
-    gain = float((with_control.sum(axis=1) - without.sum(axis=1)).mean())
+def worth(name: str, controlled: Flight, without: Flight) -> list[Finding]:
+    """Upward impulse of a flyer with control over that without, and down- over upstroke."""
+    ours, others = controlled.impulses(), without.impulses()
+    gain = float((ours.sum(axis=1) - others.sum(axis=1)).mean())
     lines = [
         f"cycle {n + 1}: down {c[0]:.1f}, up {c[1]:.1f} with control; "
         f"down {b[0]:.1f}, up {b[1]:.1f} without"
-        for n, (c, b) in enumerate(zip(with_control, without, strict=True))
+        for n, (c, b) in enumerate(zip(ours, others, strict=True))
     ]
-    down, up = np.abs(with_control).mean(axis=0)
+    down, up = np.abs(ours).mean(axis=0)
     return [
         Finding(
-            "flyer: upward impulse of a stroke with control less that without, N s",
+            f"{name}: upward impulse of a stroke with control less that without, N s",
             gain,
             "> 0",
             "sign",
@@ -98,7 +123,7 @@ def twist_is_worth_it(quick: bool) -> list[Finding]:
             lines=tuple(lines),
         ),
         Finding(
-            "flyer: drag impulse of the downstroke over that of the upstroke, with control",
+            f"{name}: drag impulse of the downstroke over that of the upstroke, with control",
             float(down / up),
             "> 1",
             "more",
@@ -107,4 +132,14 @@ def twist_is_worth_it(quick: bool) -> list[Finding]:
     ]
 
 
-CASES = (Case("K11", twist_is_worth_it),)
+def control_is_worth_it(quick: bool) -> list[Finding]:
+    """K11, the flyer: wings that twist, then wings of flesh that bend."""
+    found = flights(quick)
+    settings = COARSE_FLESH if quick else {}
+    bend, straight = (
+        fly("flyer-flesh", CYCLES[quick], settings, controlled) for controlled in (True, False)
+    )
+    return [
+        *worth("flyer", found["twist"], found["base"]),
+        *worth("flyer of flesh", bend, straight),
+    ]

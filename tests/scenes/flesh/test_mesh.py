@@ -70,8 +70,10 @@ def test_points_on_bones_are_held_by_them(arm: FleshMesh) -> None:
         if holder:
             assert BONES.index(holder) == distance.argmin()
             assert distance.min() <= 0.1 * 0.12
+            assert distance.max() > 0.5 * 0.12
         else:
-            assert distance.min() > 0.1 * 0.12
+            at_the_joint = distance.max() <= 0.5 * 0.12
+            assert at_the_joint or distance.min() > 0.1 * 0.12
     assert {*arm.holders} == {"", *BONES}
 
 
@@ -101,8 +103,8 @@ def test_shares_in_carrying_flesh_go_over_from_bone_to_bone(arm: FleshMesh) -> N
         assert (weights[holders == name, number] == 1.0).all()
     elbow = 0.4 * np.array([np.cos(np.radians(20.0)), 0.0, -np.sin(np.radians(20.0))])
     along = (arm.points - elbow) @ elbow / 0.4
-    assert weights[along > 0.2, 1].min() > 0.95
-    assert weights[along < -0.2, 1].max() < 0.05
+    assert weights[along > 0.25, 1].min() > 0.95
+    assert weights[along < -0.25, 1].max() < 0.05
     free = weights[(holders == "") & (np.abs(along) < 0.03), 1]
     assert 0.1 < free.mean() < 0.9
 
@@ -145,8 +147,8 @@ def test_idle_bones_and_loose_flesh_are_refused(tmp_path: Path) -> None:
         surface_mesh(path, mujoco.MjSpec.from_string(BALL), ["ball"], 0.5)
     spec = mujoco.MjSpec.from_string(BALL)
     spec.body("ball").add_body(name="seed").add_geom(size=[0.3, 0.0, 0.0])
-    with pytest.raises(ValueError, match=r"bone 'seed' holds no point .* edges of 0\.5 m"):
-        skin_mesh(spec, ["ball", "seed"], 0.3, 0.5)
+    with pytest.raises(ValueError, match=r"bone 'seed' holds no point .* edges of 0\.3 m"):
+        skin_mesh(spec, ["ball", "seed"], 0.3, 0.3)
 
 
 def test_mesher_leaves_nothing_behind(

@@ -10,7 +10,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from flowborne.scenes.flesh.mesh import FleshMesh, skin_mesh, surface_mesh
+from flowborne.scenes.flesh.mesh import (
+    FIDELITY,
+    JOINT,
+    THICKNESSES,
+    FleshMesh,
+    skin_mesh,
+    surface_mesh,
+)
 from flowborne.scenes.flesh.mesh_file import read_mesh, recipe_of
 from flowborne.scenes.schema_flesh import FleshTable
 from flowborne.solids.mjcf import compiled_quietly
@@ -84,6 +91,7 @@ def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
         "shapes": shapes.hexdigest(),
         "thickness": table.thickness,
         "size": table.size,
+        "rules": [FIDELITY, THICKNESSES, JOINT],
     }
     if table.surface is not None:
         path = folder / table.surface

@@ -1,0 +1,137 @@
+"""The swimmer of the paper's Fig. 7: what its legs are worth beside its jet (K11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from flowborne.fluid.grid import Array
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import BlowUpError, Simulation
+from flowborne.solids.dynamics import kinematics
+from flowborne.validation.case import Case, Finding
+from flowborne.validation.flyer import control_is_worth_it
+
+CYCLE = 1.75
+"""s."""
+
+STROKE, OPENING = 0.6, 1.0
+"""s in a cycle: the end of the stroke, and when the legs begin to open again."""
+
+CYCLES = {True: 1, False: 3}
+"""Cycles that are followed, by quick."""
+
+COARSE = {"domain.resolution": "72", "time.steps_per_frame": "1"}
+"""Settings of the quick runs: legs of 1.4 cells, which leak."""
+
+ENOUGH = 1.2
+"""What the paper's swimmer claims to gain by its legs, at least."""
+
+SCENES = ("swimmer", "swimmer-jet-only", "swimmer-no-control")
+
+
+@dataclass(frozen=True)
+class Swim:
+    """How a swimmer got on, a row per frame.
+
+    time    (n,) s
+    height  (n,) m that the head has risen
+    tilt    (n,) degrees of the head's axis from the vertical
+    push    (n,) N, upward force of the water on the whole creature
+    work    (n,) J that the drives have done so far
+    """
+
+    time: Array
+    height: Array
+    tilt: Array
+    push: Array
+    work: Array
+
+    def risen(self) -> float:
+        """m in all."""
+        return float(self.height[-1])
+
+    def pushed(self, start: float, stop: float) -> float:
+        """N, mean upward force between two times of a cycle (s)."""
+        within = (self.time - 1e-6) % CYCLE
+        return float(self.push[(within > start) & (within <= stop)].mean())
+
+
+def swim(scene: str, cycles: float, settings: Mapping[str, str] = MappingProxyType({})) -> Swim:
+    """Run a swimmer for some cycles.
+
+    settings  in place of the scene's own
+    raises    ArithmeticError when the run blows up
+    """
+    rows, work = [], 0.0
+    with Simulation(load_scene(scene, settings)) as simulation:
+        model = simulation.world.setup.solid
+        head = model.body("head")
+        start = kinematics(model, simulation.world.solid.q).body_position[head, 2]
+        try:
+            for _ in range(round(cycles * CYCLE / simulation.frame_time)):
+                steps = simulation.advance_frame().steps
+                pose = kinematics(model, simulation.world.solid.q)
+                work += sum(step.work for step in steps)
+                tilt = np.degrees(np.arccos(np.clip(pose.body_rotation[head, 2, 2], -1.0, 1.0)))
+                push = np.mean([step.pressure_wrench[:, 2].sum() for step in steps])
+                rise = pose.body_position[head, 2] - start
+                rows.append((simulation.time, rise, tilt, push, work))
+        except BlowUpError as error:
+            raise ArithmeticError(f"{scene}: {error}") from error
+    return Swim(*np.array(rows).T)
+
+
+def swims(quick: bool) -> dict[str, Swim]:
+    """The swimmer, with its jet alone, and with neither, over the cycles of the case."""
+    settings = COARSE if quick else {}
+    return {name: swim(name, CYCLES[quick], settings) for name in SCENES}
+
+
+def legs_are_worth_it(quick: bool) -> list[Finding]:
+    """K11, the swimmer: its way over that of the jet alone, and its force in stroke and opening."""
+    found = swims(quick)
+    whole, jet, neither = (found[name] for name in SCENES)
+    lines = [
+        f"{name}: rises {run.risen():.2f} m, tilts by at most {run.tilt.max():.1f} degrees, its "
+        f"drives do {1e-3 * run.work[-1]:.0f} kJ"
+        for name, run in found.items()
+    ]
+    gain = whole.risen() / jet.risen()
+    stroke, opening = whole.pushed(0.0, STROKE), whole.pushed(OPENING, CYCLE)
+    return [
+        Finding(
+            "swimmer: way up with jet and control over that with the jet alone",
+            gain,
+            f">= {ENOUGH:g}",
+            "more",
+            gain >= ENOUGH,
+            lines=tuple(lines),
+        ),
+        Finding(
+            "swimmer: way up with jet and control less that with neither, m",
+            whole.risen() - neither.risen(),
+            "> 0",
+            "sign",
+            whole.risen() > neither.risen(),
+        ),
+        Finding(
+            "swimmer: upward force of the water in the stroke over the downward one as legs open",
+            stroke / abs(opening),
+            "> 1",
+            "more",
+            stroke > abs(opening),
+            lines=(f"stroke {1e-3 * stroke:.1f} kN, opening {1e-3 * opening:.1f} kN",),
+        ),
+    ]
+
+
+def creatures(quick: bool) -> list[Finding]:
+    """K11: the flyer and the swimmer."""
+    return control_is_worth_it(quick) + legs_are_worth_it(quick)
+
+
+CASES = (Case("K11", creatures),)

@@ -1,0 +1,37 @@
+"""K11 in short: what the swimmer's measures say, and its first strokes on a coarse grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import Simulation
+from flowborne.validation.swimmer import CYCLE, OPENING, STROKE, Swim
+
+
+def test_force_is_the_mean_of_a_part_of_every_cycle() -> None:
+    time = np.arange(1, 106) / 30.0
+    within = (time - 1e-6) % CYCLE
+    push = np.where(within <= STROKE, 5.0, np.where(within > OPENING, -2.0, 0.0))
+    run = Swim(time, 0.1 * time, 0.0 * time, push, time)
+    assert run.pushed(0.0, STROKE) == 5.0
+    assert run.pushed(OPENING, CYCLE) == -2.0
+    assert run.risen() == pytest.approx(0.35)
+
+
+def test_the_first_decision_closes_all_legs_alike_and_lifts_the_head() -> None:
+    """In a lower room of the scene's own cells: the legs are far from its top and bottom."""
+    settings = {"domain.upper": "[8.0, 8.0, 6.0]", "domain.lower": "[-8.0, -8.0, -10.0]"}
+    scene = load_scene("swimmer", {**settings, "domain.resolution": "40"})
+    with Simulation(scene) as simulation:
+        report = simulation.advance_frame()
+        before = report.gradient
+        assert before.min() > 0.8 * before.max() > 0.0
+        world = simulation.world
+    legs = world.solid.q[7:12]
+    assert np.degrees(legs).max() < 41.0
+    assert np.degrees(np.ptp(legs)) < 2.0
+    assert world.solid.q[2] > 0.02
+    assert report.step.work > 0.0
+    assert report.step.momentum.budget_error < 1e-10
