@@ -14,6 +14,7 @@ from flowborne.scenes.build import build
 from flowborne.scenes.flesh import grow
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.save import scene_files
+from flowborne.simulation import BlowUpError, Simulation
 from flowborne.solids.inversion import inversion
 
 MODEL = """<mujoco><default><joint damping="3" limited="true" range="-1 1"/>
@@ -154,3 +155,16 @@ def test_a_run_folder_keeps_its_mesh(write: Write, tmp_path: Path, counted: list
     other = load_scene(folder.scene, {"flesh.0.thickness": "0.09"})
     assert counted == ["upper lower"]
     assert scene_files(other)["flesh-arm.vtu"] != files["flesh-arm.vtu"]
+
+
+def test_torn_flesh_stops_a_run_with_its_place(write: Write) -> None:
+    with Simulation(load_scene(write()), workers=1) as simulation:
+        simulation.advance_frame()
+        solid = simulation.world.solid
+        solid.q[8:] += 0.2 * np.random.default_rng(1).standard_normal(solid.q.size - 8)
+        with pytest.raises(
+            BlowUpError,
+            match=r"frame 2, step 1: \d+ of \d+ elements of flesh are inside out.*'arm'",
+        ):
+            simulation.advance_frame()
+        assert simulation.frame == 1
