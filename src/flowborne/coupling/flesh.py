@@ -23,14 +23,14 @@ class Skins:
     """The skin of every flesh at the nodes of the grid.
 
     box       (nf, 3, 2) node ranges around each flesh
-    start     (nf,) where its distances begin in
-    distance  signed distances to each at the nodes of its box, flat, m
+    distance  signed distances to each at the nodes of its box, one flesh after the other, m
+    start     (nf,) where those of each begin
     vertices  (n, 3) m;  triangles  (k, 3)
     """
 
     box: Integers
-    start: Integers
     distance: Array
+    start: Integers
     vertices: Array
     triangles: Integers
 
@@ -40,7 +40,7 @@ def skins_on(grid: Grid, flesh: Flesh | None, vertices: Array) -> Skins:
     if flesh is None:
         none, no_corners = np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
         no_boxes = np.zeros((0, 3, 2), np.int64)
-        return Skins(no_boxes, none, np.zeros(0), vertices, no_corners)
+        return Skins(no_boxes, np.zeros(0), none, vertices, no_corners)
     origin = np.array(grid.origin)
     boxes, starts, distances, first = [], [], [], 0
     for f in range(len(flesh.names)):
@@ -59,8 +59,8 @@ def skins_on(grid: Grid, flesh: Flesh | None, vertices: Array) -> Skins:
         first += phi.size
     return Skins(
         np.array(boxes),
-        np.array(starts),
         np.concatenate(distances),
+        np.array(starts),
         vertices,
         flesh.surface,
     )

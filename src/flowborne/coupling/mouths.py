@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from flowborne.coupling.flesh import face_centres
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -127,7 +128,8 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
             "position on the body's skin, inside the domain, with the direction out of the body"
         )
     own = np.flatnonzero(skin_of(mouth, cut.body, bodies))
-    share = share_of(closed_places(own, cut, grid), mouth, centre, along, cut, grid)
+    place, _ = face_centres(cut.axis[own], cut.face[own], grid)
+    share = share_of(place, mouth, centre, along, cut, grid)
     face = own[share > 0.0]
     twist = pose.twist_jacobian[mouth.body] @ v
     return Jet(
@@ -182,16 +184,6 @@ def share_of(
     outward = distance_at(x[found] + step, cut, grid)
     share[found] *= outward > distance_at(x[found] - step, cut, grid)
     return share
-
-
-def closed_places(own: Integers, cut: Geometry, grid: Grid) -> Array:
-    """(n, 3) centres of the faces with the closed parts `own`, m."""
-    x = np.empty((own.size, 3))
-    for axis in grid.axes:
-        across = cut.axis[own] == axis
-        at = np.stack(np.unravel_index(cut.face[own[across]], grid.face_shape(axis)), axis=1)
-        x[across] = places(at, 0.5 * (np.arange(3) != axis), grid)
-    return x
 
 
 def distance_at(x: Array, cut: Geometry, grid: Grid) -> Array:
