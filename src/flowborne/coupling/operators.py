@@ -43,13 +43,18 @@ def twist_rows(kinematics: Kinematics) -> Array:
 
 def motion(kinematics: Kinematics, v: Array) -> Array:
     """(k,) twist of every body, then velocity of every vertex of flesh."""
-    return np.append(twists(kinematics, v), kinematics.vertex_jacobian @ v)
+    bones = twists(kinematics, v).ravel()
+    if kinematics.vertices.size == 0:
+        return bones
+    return np.append(bones, kinematics.vertex_jacobian @ v)
 
 
 def generalised(kinematics: Kinematics, push: Array) -> Array:
     """(nv,) generalised force of a push (k,): wrench on every body, then force on every vertex."""
     bodies = kinematics.twist_jacobian.shape[0]
     on_bones = np.einsum("bwv,bw->v", kinematics.twist_jacobian, push[: 6 * bodies].reshape(-1, 6))
+    if kinematics.vertices.size == 0:
+        return np.asarray(on_bones)
     return np.asarray(on_bones + kinematics.vertex_jacobian.T @ push[6 * bodies :])
 
 

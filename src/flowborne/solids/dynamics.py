@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -177,6 +178,12 @@ class SolidSystem:
         return replace(self, A=full[0], impulse=full[1], smooth=(A, impulse), zones=zones)
 
 
+@cache
+def no_flesh(nv: int) -> csr_array:
+    """(0, nv) the Jacobian of the vertices of a model that has none."""
+    return csr_array((0, nv))
+
+
 def kinematics(model: SolidModel, q: Array) -> Kinematics:
     """Poses and Jacobians at positions (nq,)."""
     s = scratch(model)
@@ -196,7 +203,7 @@ def kinematics(model: SolidModel, q: Array) -> Kinematics:
         mass_centre,
         twists,
         np.zeros((0, 3)) if flesh is None else flesh.placed(s),
-        csr_array((0, model.nv)) if flesh is None else flesh.moving(s),
+        no_flesh(model.nv) if flesh is None else flesh.moving(s),
     )
 
 
