@@ -7,16 +7,16 @@ import pytest
 
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
-from flowborne.validation.swimmer import CYCLE, OPENING, STROKE, Swim
+from flowborne.validation.swimmer import CYCLE, Swim
 
 
-def test_force_is_the_mean_of_a_part_of_every_cycle() -> None:
+def test_force_is_the_mean_while_legs_close_and_while_they_open() -> None:
     time = np.arange(1, 106) / 30.0
-    within = (time - 1e-6) % CYCLE
-    push = np.where(within <= STROKE, 5.0, np.where(within > OPENING, -2.0, 0.0))
-    run = Swim(time, 0.1 * time, 0.0 * time, push, time)
-    assert run.pushed(0.0, STROKE) == 5.0
-    assert run.pushed(OPENING, CYCLE) == -2.0
+    spread = 20.0 + 20.0 * np.cos(2.0 * np.pi * time / CYCLE)
+    push = np.append(0.0, np.where(np.diff(spread) < 0.0, 5.0, -2.0))
+    run = Swim(time, 0.1 * time, 0.0 * time, push, time, spread)
+    assert run.pushed(-1.0) == 5.0
+    assert run.pushed(1.0) == -2.0
     assert run.risen() == pytest.approx(0.35)
 
 
