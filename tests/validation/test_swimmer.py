@@ -21,7 +21,7 @@ def test_force_is_the_mean_while_legs_close_and_while_they_open() -> None:
 
 
 def test_the_first_decision_closes_all_legs_alike_and_lifts_the_head() -> None:
-    """In a lower room of the scene's own cells: the legs are far from its top and bottom."""
+    """In a lower room, on cells of 0.4 m: the legs are far from its top and bottom."""
     settings = {"domain.upper": "[8.0, 8.0, 6.0]", "domain.lower": "[-8.0, -8.0, -10.0]"}
     scene = load_scene("swimmer", {**settings, "domain.resolution": "40"})
     with Simulation(scene) as simulation:

@@ -18,7 +18,7 @@ from flowborne.simulation import PARTS, Simulation
 
 NAME = "size"
 SCENES = {"flyer-base": (32, 64, 96), "swimmer-jet-only": (72, 120, 168)}
-"""Scene -> cells along the domain's longest side; 120 are the swimmer's own."""
+"""Scene -> cells along the domain's longest side; 168 are the swimmer's own."""
 
 FRAMES = 4
 """How many are timed, after a first one."""
