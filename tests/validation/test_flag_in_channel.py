@@ -15,11 +15,11 @@ from flowborne.validation import flag_in_channel as flags
 from flowborne.validation.flesh_bars import bar_in_slab
 
 
-def test_D2_on_44_cells() -> None:
-    """A flag of two cells: CFD1 in all, and CFD2's drag, whose layers are thinner, to 15 %."""
-    drag, lift, faster, _ = case("D2").run(quick=True)
-    assert drag.verdict == lift.verdict == "pass"
-    assert faster.value == pytest.approx(faster.reference, rel=0.15)
+def test_D2_CFD1_on_44_cells() -> None:
+    """A flag of two cells, to the 2 % that the reference asks for."""
+    values, _ = flags.steady(flags.CFD[0], (44,), quick=True)
+    for name, value in zip(("drag", "lift"), values[0], strict=False):
+        assert flags.judged(flags.CFD[0], name, (44,), np.array([value]), 0.02).passed
 
 
 def test_D3_FSI1_on_44_cells() -> None:
