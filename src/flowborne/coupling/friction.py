@@ -10,7 +10,13 @@ from scipy.sparse import csc_array, csr_array
 from flowborne.coupling.flesh import skin_at
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Jet, skin_slip
-from flowborne.coupling.operators import generalised, jacobian, motion, pressure_push, response
+from flowborne.coupling.operators import (
+    generalised,
+    jacobian,
+    motion,
+    pressure_push,
+    rigid_response,
+)
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import push
@@ -89,7 +95,7 @@ def on_flesh(walls: Walls, cut: Geometry, bodies: int, grid: Grid) -> Walls:
 def answering(pose: Kinematics, driven: Driven, drag: csr_array) -> Answering:
     """How bones, or bones and flesh, answer a drag (k, k), kg."""
     if isinstance(driven, PrescribedSystem):
-        return Answer(response(pose, driven).arrays[0], drag.toarray())
+        return Answer(rigid_response(pose, driven), drag.toarray())
     return FleshAnswer(pose, driven, drag)
 
 

@@ -69,11 +69,17 @@ def on_bodies(kinematics: Kinematics, carried: Array, push: Array) -> Array:
     return push[: 6 * bodies].reshape(-1, 6) + carried.T @ wrench
 
 
+def rigid_response(kinematics: Kinematics, driven: PrescribedSystem) -> Array:
+    """(6 nbody, 6 nbody) T A^-1 T^T of bodies without flesh."""
+    twist = twist_rows(kinematics)
+    return np.asarray(twist @ driven.inverse @ twist.T)
+
+
 def response(kinematics: Kinematics, driven: Driven) -> Response:
     """The motion that a unit impulsive push gives: M = T A^-1 T^T, eq. (9) eliminated."""
-    twist = twist_rows(kinematics)
     if isinstance(driven, PrescribedSystem):
-        return dense_response(twist @ driven.inverse @ twist.T)
+        return dense_response(rigid_response(kinematics, driven))
+    twist = twist_rows(kinematics)
     free = csr_array(jacobian(kinematics)[:, driven.free])
     return factored_response(free, *driven.factors(), free @ driven.soft(twist))
 
