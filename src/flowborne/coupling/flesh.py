@@ -85,8 +85,8 @@ def skin_at(skins: Skins, place: Array, grid: Grid) -> tuple[Integers, Array]:
 
 
 @njit(nogil=True, cache=True)
-def has_open_face(cell: Integers, ox: Array, oy: Array, oz: Array) -> bool:
-    i, j, k = cell
+def has_open_face(i: int, j: int, k: int, ox: Array, oy: Array, oz: Array) -> bool:
+    """Whether cell (i, j, k) has a face that is not wholly closed."""
     clear = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
     if ox.shape[2] > 1:
         clear += oz[i, j, k] + oz[i, j, k + 1]
@@ -127,7 +127,7 @@ def flesh_rows(
             cell[axis[n]] -= 1 - side
             if cell[axis[n]] < 0 or cell[axis[n]] >= shape[axis[n]]:
                 continue
-            if not has_open_face(cell, ox, oy, oz):
+            if not has_open_face(cell[0], cell[1], cell[2], ox, oy, oz):
                 continue
             part[rows] = n
             cells[rows] = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]

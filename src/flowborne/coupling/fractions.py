@@ -9,7 +9,14 @@ from numba import njit
 
 from flowborne.coupling.closed import add_closed, list_closed, share_closed
 from flowborne.coupling.distance import BAND, merge, node_box, sample_body
-from flowborne.coupling.flesh import Skins, face_centres, flesh_rows, skin_at, skins_on
+from flowborne.coupling.flesh import (
+    Skins,
+    face_centres,
+    flesh_rows,
+    has_open_face,
+    skin_at,
+    skins_on,
+)
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
@@ -88,11 +95,9 @@ def cell_wrench(
     x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
     z = 0.0 if flat else origin[2] + h * (k + 0.5)
     touched = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
-    clear = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
     if not flat:
         touched += sz[a, b, c] + sz[a, b, c + 1]
-        clear += oz[i, j, k] + oz[i, j, k + 1]
-    if touched == 0.0 or clear == 0.0:
+    if touched == 0.0 or not has_open_face(i, j, k, ox, oy, oz):
         return 0
     wrench[:] = 0.0
     for side in range(2):

@@ -64,6 +64,8 @@ def on_bodies(kinematics: Kinematics, carried: Array, push: Array) -> Array:
     carried  (n, nbody) share of each body in a vertex, see `Flesh`
     """
     bodies = kinematics.twist_jacobian.shape[0]
+    if kinematics.vertices.size == 0:
+        return push.reshape(bodies, 6)
     force, place = push[6 * bodies :].reshape(-1, 3), kinematics.vertices
     wrench = np.concatenate([force, np.cross(place, force)], axis=1)
     return push[: 6 * bodies].reshape(-1, 6) + carried.T @ wrench

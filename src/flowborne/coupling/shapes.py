@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from flowborne.coupling.triangles import closest_on_triangle, squared_distance
 from flowborne.fluid.grid import Array, Grid
 from flowborne.solids.model import SolidModel
 
@@ -130,38 +131,6 @@ def signed_distance(
 
 
 @njit(nogil=True, cache=True)
-def distance_to_triangle(p: Array, a: Array, b: Array, c: Array) -> float:
-    """Unsigned distance of a point to a triangle (Ericson 2005, section 5.1.5)."""
-    ab, ac, ap = b - a, c - a, p - a
-    d1, d2 = ab.dot(ap), ac.dot(ap)
-    if d1 <= 0.0 and d2 <= 0.0:
-        return float(np.sqrt(ap.dot(ap)))
-    bp = p - b
-    d3, d4 = ab.dot(bp), ac.dot(bp)
-    if d3 >= 0.0 and d4 <= d3:
-        return float(np.sqrt(bp.dot(bp)))
-    vc = d1 * d4 - d3 * d2
-    if vc <= 0.0 <= d1 and d3 <= 0.0:
-        q = a + d1 / (d1 - d3) * ab - p
-        return float(np.sqrt(q.dot(q)))
-    cp = p - c
-    d5, d6 = ab.dot(cp), ac.dot(cp)
-    if d6 >= 0.0 and d5 <= d6:
-        return float(np.sqrt(cp.dot(cp)))
-    vb = d5 * d2 - d1 * d6
-    if vb <= 0.0 <= d2 and d6 <= 0.0:
-        q = a + d2 / (d2 - d6) * ac - p
-        return float(np.sqrt(q.dot(q)))
-    va = d3 * d6 - d5 * d4
-    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        q = b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b) - p
-        return float(np.sqrt(q.dot(q)))
-    total = va + vb + vc
-    q = a + vb / total * ab + vc / total * ac - p
-    return float(np.sqrt(q.dot(q)))
-
-
-@njit(nogil=True, cache=True)
 def sample_mesh(
     vertices: Array, faces: NDArray[np.int64], corner: Array, pitch: float, counts: Array
 ) -> Array:
@@ -179,7 +148,8 @@ def sample_mesh(
                 nearest, angle = 1e30, 0.0
                 for t in range(faces.shape[0]):
                     a, b, c = vertices[faces[t, 0]], vertices[faces[t, 1]], vertices[faces[t, 2]]
-                    nearest = min(nearest, distance_to_triangle(p, a, b, c))
+                    closest = closest_on_triangle(p, a, b, c)
+                    nearest = min(nearest, squared_distance(p, a, b, c, closest))
                     u, v, w = a - p, b - p, c - p
                     lu, lv, lw = np.sqrt(u.dot(u)), np.sqrt(v.dot(v)), np.sqrt(w.dot(w))
                     triple = (
@@ -189,7 +159,8 @@ def sample_mesh(
                     )
                     below = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv
                     angle += 2.0 * np.arctan2(triple, below)
-                samples[(i * n2 + j) * n3 + k] = -nearest if angle > 2.0 * np.pi else nearest
+                away = np.sqrt(nearest)
+                samples[(i * n2 + j) * n3 + k] = -away if angle > 2.0 * np.pi else away
     return samples
 
 

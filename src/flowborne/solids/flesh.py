@@ -17,7 +17,7 @@ from flowborne.solids.cage import node_weights
 from flowborne.solids.mjcf import element_name, rest_poses
 from flowborne.solids.momentum import cross, dof_twists
 from flowborne.solids.scratch import Scratch, scratch
-from flowborne.solids.tissue import volumes
+from flowborne.solids.tissue import right_handed, volumes
 
 if TYPE_CHECKING:
     from flowborne.solids.model import SolidModel
@@ -159,7 +159,7 @@ def flesh_of(model: SolidModel) -> Flesh:
         np.concatenate(surfaces),
         np.repeat(np.arange(mj.nflex), [len(t) for t in surfaces]),
         np.repeat(np.arange(mj.nflex), [len(e) for e in elements]),
-        _flesh_dofs(mj, body),
+        _flesh_dofs(mj),
         _moved(mj, body),
         np.asarray(weights @ _carried(mj, rest, every, weights, np.where(free[body], -1, body))),
     )
@@ -221,13 +221,10 @@ def _elements(mj: mujoco.MjModel, flex: int, rest: Array) -> Indices:
     """The tetrahedra of a flex; MuJoCo's compiler turns them left-handed."""
     first, count = mj.flex_elemdataadr[flex], mj.flex_elemnum[flex]
     corners = mj.flex_elem[first : first + 4 * count].reshape(-1, 4)
-    elements = np.asarray(corners + mj.flex_vertadr[flex], dtype=np.int64)
-    left = volumes(rest, elements) < 0.0
-    elements[left] = elements[left][:, [0, 1, 3, 2]]
-    return elements
+    return right_handed(rest, np.asarray(corners + mj.flex_vertadr[flex], dtype=np.int64))
 
 
-def _flesh_dofs(mj: mujoco.MjModel, body: Indices) -> NDArray[np.bool_]:
+def _flesh_dofs(mj: mujoco.MjModel) -> NDArray[np.bool_]:
     """Dofs of points of flesh that hang on the world."""
     hung = points_of_flesh(mj) & (mj.body_parentid == 0)
     return np.asarray(hung[mj.dof_bodyid])

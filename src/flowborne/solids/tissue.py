@@ -60,6 +60,12 @@ def volumes(points: Array, tetrahedra: Tetrahedra) -> Array:
     return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0)
 
 
+def right_handed(points: Array, tetrahedra: Tetrahedra) -> Tetrahedra:
+    """(m, 4) the same tetrahedra, those of negative volume with two corners exchanged."""
+    left = volumes(points, tetrahedra) < 0.0
+    return np.where(left[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
+
+
 def add_flesh(
     spec: mujoco.MjSpec,
     name: str,

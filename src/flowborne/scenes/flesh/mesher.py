@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flowborne.scenes.flesh import mesh_run
 from flowborne.solids.slab import Mesh
-from flowborne.solids.tissue import volumes
+from flowborne.solids.tissue import right_handed
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -56,6 +56,4 @@ def tetrahedra_within(
             )
         with np.load(made) as mesh:
             points, tetrahedra = mesh["points"], mesh["tetrahedra"].astype(np.int64)
-    left = volumes(points, tetrahedra) < 0.0
-    tetrahedra[left] = tetrahedra[left][:, [0, 1, 3, 2]]
-    return points, tetrahedra
+    return points, right_handed(points, tetrahedra)
