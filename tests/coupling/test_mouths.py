@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import mujoco
 import numpy as np
 import pytest
 
 from flowborne.coupling.mouths import Mouth, jet_power
 from flowborne.coupling.operators import face_mass, fluid_momentum
 from flowborne.coupling.step import cut_by_bodies, jets_at, step
-from flowborne.coupling.world import World
+from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
+from flowborne.solids.model import SolidModel
+from flowborne.solids.tissue import Law, Tissue, add_flesh
+from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.validation.worlds import advance, mjcf, world_of
 
 OPEN = BoundaryOpen()
@@ -223,3 +227,31 @@ def test_a_mouth_that_covers_no_cell_is_told(position: tuple[float, float, float
     world = World.at_rest(replace(world.setup, mouths=(lost,)))
     with pytest.raises(ValueError, match="the mouth covers no cell at"):
         step(world, 0.01)
+
+
+def fleshy(grid: Grid, angle: float) -> World:
+    """A held ball, as large as the others, of flesh around a bone with a mouth at `angle` to x."""
+    points, elements = bar_mesh((6, 6, 6), (2.0, 2.0, 2.0))
+    points -= points.mean(axis=0)
+    outer = np.abs(points).max(axis=1)
+    points *= (RADIUS * outer / np.maximum(np.linalg.norm(points, axis=1), 1e-9))[:, None]
+    spec = mujoco.MjSpec.from_string(mjcf('<body name="bone"><geom size="0.1"/></body>'))
+    tissue = Tissue(1e9, 0.3, 1000.0, law=Law.STABLE_NEO_HOOKEAN)
+    held = ["bone" if inside else "" for inside in outer < 0.5]
+    add_flesh(spec, "ball", points, elements, tissue, held)
+    x, y = np.cos(angle), np.sin(angle)
+    mouth = Mouth("the mouth", 1, (RADIUS * x, RADIUS * y, 0.0), (x, y, 0.0), HALF, RATE, Steady())
+    fluid = Fluid(grid, 1000.0, boundaries=Boundaries(*(OPEN,) * 6))
+    model = SolidModel.with_flesh(spec, gravity=(0.0, 0.0, 0.0))
+    return World.at_rest(Setup(model, fluid, mouths=(mouth,)))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 0.7])
+def test_a_mouth_in_flesh_lets_out_all_of_it_and_nowhere_faster_than_the_jet(angle: float) -> None:
+    """So no cell at its rim gets more than leaves by its open faces."""
+    world = fleshy(cube(24), angle)
+    advance(world, 0.02)
+    assert outflow_of_box(world, 3) == pytest.approx(RATE, rel=1e-4)
+    opened, state = cut_by_bodies(world).open, world.flow()[1]
+    for u, o in zip(state.velocity, opened, strict=True):
+        assert np.abs(u[o > 0.0]).max() < RATE / (np.pi * HALF**2)

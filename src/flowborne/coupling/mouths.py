@@ -118,8 +118,9 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     rate = mouth.volume_rate * mouth.strength.at(time)
     bodies = len(pose.body_position)
     rows = np.flatnonzero(skin_of(mouth, cut.owner, bodies))
-    at = np.stack(np.unravel_index(cut.cells[rows], grid.shape), axis=1)
-    skin = -cut.area[rows] @ along
+    cells, row = np.unique(cut.cells[rows], return_inverse=True)
+    at = np.stack(np.unravel_index(cells, grid.shape), axis=1)
+    skin = np.bincount(row, -cut.area[rows] @ along, len(cells))
     skin *= covered(places(at, 0.5, grid), mouth, centre, along, grid) * (skin > 0.0)
     here = skin > 0.0
     if not here.any():
@@ -140,7 +141,7 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
         along,
         rate / mouth.area(grid.is_slab) * along,
         twist[:3] + np.cross(twist[3:], centre),
-        cut.cells[rows[here]],
+        cells[here],
         rate * skin[here] / skin.sum(),
         cut.axis[face],
         cut.face[face],
