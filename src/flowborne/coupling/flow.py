@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.jet_momentum import give_missing, momentum_due
 from flowborne.coupling.mouths import Jet, colour, fill_mouths, jet_force, jet_power
 from flowborne.coupling.operators import (
     carried_in,
@@ -67,6 +68,7 @@ def carry_fluid(
     as it is and the step is second order in time. The semi-Lagrangian scheme of the paper carries
     u itself. So do particles that cross two cells or more in a step: extrapolation in time is not
     stable there. What cut faces hold beside free-slip bodies is not carried, see `beside_walls`.
+    What mouths let through keeps its momentum, see `jet_momentum`.
 
     Neither scheme keeps momentum. Along periodic axes, where no side can make up for it, what was
     lost is given back evenly; a creature in a periodic box swims by its strokes alone. The mass of
@@ -85,6 +87,8 @@ def carry_fluid(
     else:
         ahead = [np.zeros_like(a) for a in state.acceleration]
     halfway = faces_of([u + a for u, a in zip(state.velocity, ahead, strict=True)])
+    mass_before = face_mass(before.open, grid, sides, fluid.density)
+    due = momentum_due(halfway, before.open, mass_before, jets, grid, fluid.density, dt)
     resident = grid.zeros_faces()
     if fluid.viscosity == 0.0:
         resident = beside_walls(halfway, before.open, crossed, grid)
@@ -94,7 +98,6 @@ def carry_fluid(
     carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
     counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
     everywhere = [np.ones(u.shape, np.uint8) for u in field]
-    mass_before = face_mass(before.open, grid, sides, fluid.density)
     arrived = grid.zeros_faces()
     for axis in grid.axes:
         carry(
@@ -127,6 +130,8 @@ def carry_fluid(
             arrived[axis][:] -= ahead[axis]
     for axis in grid.axes:
         arrived[axis][:] += resident[axis]
+    mass_after = face_mass(after.open, grid, sides, fluid.density)
+    give_missing(due, arrived, faces_of(ahead), mass_after, after, grid)
     scalars = carry_scalars(
         state.scalars,
         carrier,
@@ -139,7 +144,6 @@ def carry_fluid(
     )
     colour(scalars, jets, after, grid, dt)
     expelled = dt * jet_force(jets, fluid.density)
-    mass_after = face_mass(after.open, grid, sides, fluid.density)
     was = fluid_momentum(state.velocity, mass_before, grid)
     now = fluid_momentum(arrived, mass_after, grid)
     for axis in grid.axes:

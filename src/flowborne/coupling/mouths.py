@@ -120,7 +120,8 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     rows = np.flatnonzero(skin_of(mouth, cut.owner, bodies))
     cells, row = np.unique(cut.cells[rows], return_inverse=True)
     at = np.stack(np.unravel_index(cells, grid.shape), axis=1)
-    skin = np.bincount(row, -cut.area[rows] @ along, len(cells))
+    skin = np.zeros(len(cells))
+    np.add.at(skin, row, -cut.area[rows] @ along)
     skin *= covered(places(at, 0.5, grid), mouth, centre, along, grid) * (skin > 0.0)
     here = skin > 0.0
     if not here.any():
