@@ -17,7 +17,7 @@ from flowborne.validation.worlds import mjcf, world_of
 
 RADIUS, HALF, RATE, DURATION = 0.2, 0.1, 0.1, 1.0
 SQUARE = Grid.slab(48, 48, 2.0 / 48.0, (-1.0, -1.0))
-CUBE = Grid((24, 24, 24), 1.2 / 24.0, (-0.6, -0.6, -0.6))
+CUBE = Grid((20, 20, 20), 1.0 / 20.0, (-0.5, -0.5, -0.5))
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def with_mouths(grid: Grid, *angles: float, rate: float = RATE, at: float = 0.0)
 def impulses(world: World) -> tuple[Array, Array, Array]:
     """(3,) each over one pulse: on the body by pressure and by the jets; made by advection."""
     area = 2.0 * HALF if world.flow()[0].grid.is_slab else np.pi * HALF**2
-    steps = int(np.ceil(2.0 * DURATION * RATE / area / world.flow()[0].grid.spacing))
+    steps = int(np.ceil(1.5 * DURATION * RATE / area / world.flow()[0].grid.spacing))
     pressed, blown, made = np.zeros(3), np.zeros(3), np.zeros(3)
     for _ in range(steps):
         report = step(world, DURATION / steps)
@@ -62,9 +62,12 @@ def test_a_held_body_that_drinks_is_not_pushed_in_the_end() -> None:
     assert np.abs(pressed + blown).max() < 0.1 * abs(blown[0])
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.7])
 @pytest.mark.parametrize("rate", [RATE, -RATE])
-@pytest.mark.parametrize("grid", [SQUARE, CUBE], ids=["square", "cube"])
+@pytest.mark.parametrize(
+    ("grid", "angle"),
+    [(SQUARE, 0.0), (SQUARE, 0.7), (CUBE, 0.7)],
+    ids=["square", "square-askew", "cube"],
+)
 def test_the_flow_gets_the_momentum_of_a_pulse(grid: Grid, rate: float, angle: float) -> None:
     """From a mouth two cells in radius; interpolation alone loses a third to nine tenths of it."""
     _, blown, made = impulses(with_mouths(grid, angle, rate=rate))
