@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from flowborne.coupling.motion import Drive
 from flowborne.coupling.operators import add_flux, leak_proof, motion, pressure_push
@@ -188,3 +189,25 @@ def test_flesh_in_a_fluid_that_does_not_feel_it_is_left_alone_by_it() -> None:
     assert not report.pressure_wrench.any()
     assert world.fluid is not None
     assert not any(u.any() for u in world.fluid.velocity)
+
+
+@pytest.mark.parametrize("thickness", [0.2, 1.0])
+def test_a_thin_plate_of_flesh_lets_nothing_through_at_any_angle(thickness: float) -> None:
+    """Every face between cells on two sides of the plate's mid-plane is closed."""
+    h = ROOM.spacing
+    points, elements = bar_mesh((8, 8, 1), (0.6, 0.6, thickness * h))
+    points[:, 0] -= 0.3
+    x = np.stack(np.meshgrid(*ROOM.cell_coordinates(), indexing="ij"), axis=-1)
+    for angles in np.random.default_rng(3).uniform(0.0, 2.0 * np.pi, (12, 3)):
+        turn = Rotation.from_euler("xyz", angles).as_matrix()
+        spec = mujoco.MjSpec()
+        add_flesh(spec, "plate", points @ turn.T, elements, Tissue(1e5, 0.3, 1000.0), [""] * 162)
+        plate = World.at_rest(Setup(SolidModel.with_flesh(spec), Fluid(ROOM, 1000.0)))
+        opened = cut_by_bodies(plate).open
+        place = x @ turn
+        for axis in range(3):
+            low, high = np.delete(place, -1, axis), np.delete(place, 0, axis)
+            between = low[..., 2] * high[..., 2] < 0.0
+            between &= (np.abs(0.5 * (low + high)[..., :2]) < 0.3 - 0.75 * h).all(axis=-1)
+            inner = np.delete(np.delete(opened[axis], -1, axis), 0, axis)
+            assert not inner[between].any(), f"turned by {np.degrees(angles).round()}"

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from flowborne.coupling.shapes import WATERTIGHT
 from flowborne.coupling.skin import sample_skin, skin_box, skin_weights
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array, Grid
@@ -23,7 +24,8 @@ class Skins:
     """The skin of every flesh at the nodes of the grid.
 
     box       (nf, 3, 2) node ranges around each flesh
-    distance  signed distances to each at the nodes of its box, one flesh after the other, m
+    distance  signed distances to each at the nodes of its box, one flesh after the other, m;
+              flesh too thin to be watertight (`shapes.WATERTIGHT`) is seen as thick as that
     start     (nf,) where those of each begin
     vertices  (n, 3) m;  triangles  (k, 3)
     """
@@ -42,6 +44,7 @@ def skins_on(grid: Grid, flesh: Flesh | None, vertices: Array) -> Skins:
         no_boxes = np.zeros((0, 3, 2), np.int64)
         return Skins(no_boxes, np.zeros(0), none, vertices, no_corners)
     origin = np.array(grid.origin)
+    thinnest = 2.0 * WATERTIGHT[grid.is_slab] * grid.spacing
     boxes, starts, distances, first = [], [], [], 0
     for f in range(len(flesh.names)):
         own = np.flatnonzero(flesh.of_surface == f)
@@ -55,7 +58,7 @@ def skins_on(grid: Grid, flesh: Flesh | None, vertices: Array) -> Skins:
         phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab)
         boxes.append(box)
         starts.append(first)
-        distances.append(phi.ravel())
+        distances.append(phi.ravel() - max(0.0, 0.5 * (thinnest - flesh.thickness[f])))
         first += phi.size
     return Skins(
         np.array(boxes),

@@ -17,6 +17,7 @@ from flowborne.solids.cage import node_weights
 from flowborne.solids.mjcf import element_name, rest_poses
 from flowborne.solids.momentum import cross, dof_twists
 from flowborne.solids.scratch import Scratch, scratch
+from flowborne.solids.thickness import thinnest
 from flowborne.solids.tissue import right_handed, volumes
 
 if TYPE_CHECKING:
@@ -126,6 +127,13 @@ class Flesh:
                 members @ diags_array(1.0 / members.sum(axis=0)) @ members.T @ weights
             )
         return csr_array(kron(weights, eye_array(3), format="csr"))
+
+    @cached_property
+    def thickness(self) -> tuple[float, ...]:
+        """Of each flesh at rest but for its rims, m."""
+        every = range(len(self.names))
+        skins = [self.surface[self.of_surface == f] for f in every]
+        return tuple(thinnest(self.rest, skin, self.model.slab) for skin in skins)
 
     def volume_ratios(self, vertices: Array) -> Array:
         """(m,) det F of each element: its volume over that at rest, negative when inside out."""

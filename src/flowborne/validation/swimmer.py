@@ -22,7 +22,7 @@ CYCLES = {True: 1, False: 3}
 """Cycles that are followed, by quick."""
 
 COARSE = {"domain.resolution": "72", "time.steps_per_frame": "1"}
-"""Settings of the quick runs: legs of 1.4 cells, which leak."""
+"""Settings of the quick runs: legs of 1.4 cells."""
 
 STILL = 0.2
 """Degrees by which legs at rest may turn in a frame."""
