@@ -109,6 +109,7 @@ class Trial:
     def run(self) -> float:
         """Objective after the hypothetical steps. Raises TrialError when it is not finite."""
         world = self.world.copy()
+        world.setup = world.setup.hypothetical
         _, state = creature.parts(world)
         state.q[:] = self.pose
         hypothesis = self.hypothesis

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,10 @@ from flowborne.fluid.state import FluidState
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 from flowborne.solids.wind import Wind
+
+
+HYPOTHETICAL = 1e-5
+"""Relative residual of the pressure in a hypothetical step: gradients are right to 1e-3."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,13 @@ class Setup:
     winds: tuple[Wind, ...] = ()
     mouths: tuple[Mouth, ...] = ()
     centred_flesh: bool = False
+
+    @cached_property
+    def hypothetical(self) -> Setup:
+        """The same for hypothetical steps: their pressure is solved as far as a gradient needs."""
+        if self.fluid is None or self.fluid.tolerance >= HYPOTHETICAL:
+            return self
+        return replace(self, fluid=replace(self.fluid, tolerance=HYPOTHETICAL))
 
     @cached_property
     def shapes(self) -> Shapes:
