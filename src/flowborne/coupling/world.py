@@ -17,7 +17,6 @@ from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 from flowborne.solids.wind import Wind
 
-
 HYPOTHETICAL = 1e-5
 """Relative residual of the pressure in a hypothetical step: gradients are right to 1e-3."""
 
