@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
+from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
@@ -17,6 +20,15 @@ H = 1.0 / CELLS
 SQUARE = Grid.slab(CELLS, CELLS, H, (0.0, 0.0))
 PLATE = '<geom type="box" size="{thin} {long} 0.1"/>'
 DISC = '<geom type="sphere" size="0.12"/>'
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Always at full strength."""
+
+    def at(self, time: float) -> float:
+        """1."""
+        return 1.0
 
 
 def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = None) -> World:
@@ -80,3 +92,19 @@ def test_dye_that_is_everywhere_stays_everywhere(geom: str, turn: float) -> None
         step(world, 1.0 / 64)
         values = state.scalars["dye"][:, :, 0][outside(world)]
         assert np.abs(values - 1.0).max() < 1e-6, world.steps
+
+
+def test_the_dye_of_a_jet_in_space_is_as_much_as_was_blown_and_never_more_than_that_dense() -> None:
+    """In eddies of a few cells overshoots would feed on themselves."""
+    grid = Grid((20, 20, 20), 1.0 / 20.0, (-0.5, -0.5, -0.5))
+    sides = Boundaries(*(BoundaryOpen(),) * 6)
+    ball = mjcf('<body><geom type="sphere" size="0.2"/></body>')
+    plain = world_of(grid, ball, boundaries=sides, scalars=("dye",))
+    place, along = (0.2, 0.0, 0.0), (1.0, 0.0, 0.0)
+    mouth = Mouth("a mouth", 1, place, along, 0.1, 0.1, Steady(), {"dye": 1.0})
+    world = World.at_rest(replace(plain.setup, mouths=(mouth,)))
+    for _ in range(12):
+        step(world, 0.01)
+    dye = world.flow()[1].scalars["dye"]
+    assert 0.0 <= dye.min() < dye.max() <= 1.0
+    assert dye.sum() * grid.cell_volume == pytest.approx(0.1 * world.time, rel=0.15)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.fluid.advection import CENTRE, OFFSETS, carry, cells_per_step, correct
+from flowborne.fluid.advection import CENTRE, OFFSETS, SMOOTH, carry, cells_per_step, correct
 from flowborne.fluid.boundary import Boundaries, BoundaryPeriodic
 from flowborne.fluid.ghosts import pad_cells, pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -46,7 +46,7 @@ def steps(
         carry(out, field, everywhere, *carrier, CENTRE, counts, periodic)
         if scheme == "MacCormack":
             carried, out = pad_cells(out, grid, sides), np.empty_like(values)
-            correct(out, carried, field, everywhere, *carrier, CENTRE, counts, periodic)
+            correct(out, carried, field, everywhere, *carrier, CENTRE, counts, periodic, SMOOTH)
         values = out
     return values
 

@@ -16,7 +16,7 @@ from flowborne.coupling.operators import (
     fluid_momentum,
 )
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.advection import OFFSETS, carry, cells_per_step, correct
+from flowborne.fluid.advection import OFFSETS, SMOOTH, carry, cells_per_step, correct
 from flowborne.fluid.continuation import LAYERS, continue_into
 from flowborne.fluid.energy import energy, without_gain
 from flowborne.fluid.ghosts import impose_sides, pad, pad_faces
@@ -119,6 +119,7 @@ def carry_fluid(
                 OFFSETS[axis],
                 counts,
                 periodic,
+                SMOOTH,
             )
         if bounded:
             came, went = energy_carried_in(halfway, before.open, grid, sides, fluid.density)

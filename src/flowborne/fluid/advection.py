@@ -21,6 +21,10 @@ Mask = NDArray[np.uint8]
 inlined = njit(forceinline=True, nogil=True, cache=True)
 """For what is called at every face: inlined by LLVM, which compiles far sooner than by Numba."""
 
+SMOOTH = 0.25
+"""Room of a velocity to exceed its samples, in second differences on each axis: twice what a
+parabola does between the samples on both sides of its vertex."""
+
 FEW = 1e-3
 """Least weight of valid samples for which they alone are used."""
 
@@ -174,11 +178,10 @@ def curvature(a: float, b: float, c: float, d: float) -> float:
 
 
 @kernel
-def limit(value: float, field: Array, x: float, y: float, z: float) -> float:
+def limit(value: float, field: Array, x: float, y: float, z: float, room: float) -> float:
     """`value` held between the samples around (x, y, z), with room for a smooth extremum.
 
-    A parabola exceeds the samples on both sides of its vertex by at most an eighth of its second
-    difference on each axis; twice that is allowed.
+    room  allowed beyond them, in second differences on each axis
     """
     i, j, k, layers = int(x), int(y), 0, 1
     flat = field_is_flat(field)
@@ -192,6 +195,8 @@ def limit(value: float, field: Array, x: float, y: float, z: float) -> float:
                 high = max(high, field[i + m, j + n, k + p])
     if low <= value <= high:
         return value
+    if room == 0.0:
+        return min(max(value, low), high)
     along = 0.0
     if 0 < i < field.shape[0] - 2:
         for n in range(2):
@@ -231,8 +236,8 @@ def limit(value: float, field: Array, x: float, y: float, z: float) -> float:
                         field[i + m, j + n, k + 2],
                     ),
                 )
-    room = along + across + upright
-    return min(max(value, low - 0.25 * room), high + 0.25 * room)
+    beyond = room * (along + across + upright)
+    return min(max(value, low - beyond), high + beyond)
 
 
 @inlined
@@ -253,8 +258,11 @@ def correct(
     offset: Array,
     counts: NDArray[np.int64],
     periodic: Mask,
+    room: float,
 ) -> None:
     """MacCormack correction of `carried` (padded, by `carry`); written to `out`.
+
+    room  see `limit`
 
     NumPy:  out = limit(carried + (field - interpolate(carried, x + dt c)) / 2)
     """
@@ -284,6 +292,7 @@ def correct(
                             xd + sx,
                             yd + sy,
                             zd + sz,
+                            room,
                         )
                 out[i, j, k] = value
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.advection import (
     CENTRE,
     FEW,
+    SMOOTH,
     carry,
     correct,
     departure,
@@ -158,6 +159,8 @@ def carry_scalars(
     outside_bodies(before, inside)
     valid = pad(inside, grid.axes)
     known = valid.astype(np.float64)
+    # in three dimensions a flow stretches dye into threads, whose overshoot would grow without end
+    room = SMOOTH if grid.is_slab else 0.0
     later = {}
     for name, values in scalars.items():
         field = pad_cells(values, grid, boundaries)
@@ -167,7 +170,7 @@ def carry_scalars(
         out = np.empty_like(values)
         padded = pad_cells(carried, grid, boundaries)
         enter_sides(padded, name, grid, boundaries, time)
-        correct(out, padded, field, valid, *carrier, CENTRE, counts, periodic)
+        correct(out, padded, field, valid, *carrier, CENTRE, counts, periodic, room)
         carry_beside_bodies(
             out,
             field,
