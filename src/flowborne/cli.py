@@ -224,7 +224,7 @@ def figures(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
 ) -> None:
-    """Our numbers for Figures 2, 9b, 10 and 11 of the paper, as tables and pictures."""
+    """Our numbers for Figures 2, 7, 9b, 10 and 11 of the paper, as tables and pictures."""
     from flowborne.simulation import BlowUpError
     from flowborne.validation.figures import figure_names, make_figures
 
