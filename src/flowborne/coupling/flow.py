@@ -79,13 +79,8 @@ def carry_fluid(
     """
     fluid, state = world.flow()
     grid, sides, time = fluid.grid, fluid.boundaries, world.time
-    second_order = fluid.advection == "maccormack"
     crossed = courant(state.velocity, dt, grid)
-    if second_order:
-        share = [np.clip(2.0 - c, 0.0, 1.0) for c in crossed]
-        ahead = [0.5 * dt * s * a for s, a in zip(share, state.acceleration, strict=True)]
-    else:
-        ahead = [np.zeros_like(a) for a in state.acceleration]
+    ahead = half_a_step(state.acceleration, crossed, fluid, dt)
     halfway = faces_of([u + a for u, a in zip(state.velocity, ahead, strict=True)])
     mass_before = face_mass(before.open, grid, sides, fluid.density)
     due = momentum_due(halfway, before.open, mass_before, jets, grid, fluid.density, dt)
@@ -94,45 +89,18 @@ def carry_fluid(
         resident = beside_walls(halfway, before.open, crossed, grid)
     fill_mouths(halfway, resident, jets, grid)
     paths = faces_of([c + a * o for c, a, o in zip(state.carrier, ahead, before.open, strict=True)])
-    field = pad_faces(halfway, grid, sides, time)
     carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
-    counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
-    everywhere = [np.ones(u.shape, np.uint8) for u in field]
-    arrived = grid.zeros_faces()
+    most = np.inf
+    # eddies of a slab grow, where those of a room break up and would feed on the scheme
+    if not grid.is_slab:
+        gain = energy_gain(halfway, before.open, jets, fluid)
+        most = energy(halfway, mass_before) + dt * gain
+    arrived = advected(halfway, carrier, mass_before, most, fluid, time, dt)
     for axis in grid.axes:
-        carry(
-            arrived[axis], field[axis], everywhere[axis], *carrier, OFFSETS[axis], counts, periodic
-        )
-    if second_order:
-        # eddies of a slab grow, where those of a room break up and would feed on the scheme
-        bounded = not grid.is_slab
-        plain = faces_of([a.copy() for a in arrived]) if bounded else arrived
-        impose_sides(arrived, grid, sides, time + dt)
-        there = pad_faces(arrived, grid, sides, time + dt)
-        for axis in grid.axes:
-            correct(
-                arrived[axis],
-                there[axis],
-                field[axis],
-                everywhere[axis],
-                *carrier,
-                OFFSETS[axis],
-                counts,
-                periodic,
-                SMOOTH,
-            )
-        if bounded:
-            came, went = energy_carried_in(halfway, before.open, grid, sides, fluid.density)
-            blown, taken = jet_power(jets, fluid.density)
-            came, went = came + blown, went + taken
-            most = energy(halfway, mass_before) + dt * (came - went + SLACK * (came + went))
-            without_gain(arrived, plain, mass_before, most)
-        for axis in grid.axes:
-            arrived[axis][:] -= ahead[axis]
-    for axis in grid.axes:
+        arrived[axis][:] -= ahead[axis]
         arrived[axis][:] += resident[axis]
     mass_after = face_mass(after.open, grid, sides, fluid.density)
-    give_missing(due, arrived, faces_of(ahead), mass_after, after, grid)
+    give_missing(due, arrived, ahead, mass_after, after, grid)
     scalars = carry_scalars(
         state.scalars,
         carrier,
@@ -154,6 +122,68 @@ def carry_fluid(
             arrived[axis][:] += (kept - now[axis]) / mass
     entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
     return Carried(arrived, scalars, was, now - was - entered - expelled, entered, expelled)
+
+
+def half_a_step(acceleration: Faces, crossed: Faces, fluid: Fluid, dt: float) -> Faces:
+    """dt/2 A, none where two cells or more are crossed in a step and in the paper's scheme, m/s."""
+    if fluid.advection == "semi-lagrangian":
+        return fluid.grid.zeros_faces()
+    share = [np.clip(2.0 - c, 0.0, 1.0) for c in crossed]
+    return faces_of([0.5 * dt * s * a for s, a in zip(share, acceleration, strict=True)])
+
+
+def energy_gain(velocity: Faces, opened: Faces, jets: tuple[Jet, ...], fluid: Fluid) -> float:
+    """Energy per time that comes in through sides and mouths, and what may be wrong with it, W."""
+    came, went = energy_carried_in(velocity, opened, fluid.grid, fluid.boundaries, fluid.density)
+    blown, taken = jet_power(jets, fluid.density)
+    came, went = came + blown, went + taken
+    return came - went + SLACK * (came + went)
+
+
+def advected(
+    velocity: Faces,
+    carrier: Faces,
+    mass: Faces,
+    most: float,
+    fluid: Fluid,
+    time: float,
+    dt: float,
+) -> Faces:
+    """A velocity carried for a step that starts at `time` (s).
+
+    carrier  padded Faces, cells per step
+    mass     of each face, kg
+    most     J, energy that MacCormack's scheme is held to
+    """
+    grid, sides = fluid.grid, fluid.boundaries
+    counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
+    field = pad_faces(velocity, grid, sides, time)
+    everywhere = [np.ones(u.shape, np.uint8) for u in field]
+    arrived = grid.zeros_faces()
+    for axis in grid.axes:
+        carry(
+            arrived[axis], field[axis], everywhere[axis], *carrier, OFFSETS[axis], counts, periodic
+        )
+    if fluid.advection == "semi-lagrangian":
+        return arrived
+    plain = arrived if most == np.inf else faces_of([a.copy() for a in arrived])
+    impose_sides(arrived, grid, sides, time + dt)
+    there = pad_faces(arrived, grid, sides, time + dt)
+    for axis in grid.axes:
+        correct(
+            arrived[axis],
+            there[axis],
+            field[axis],
+            everywhere[axis],
+            *carrier,
+            OFFSETS[axis],
+            counts,
+            periodic,
+            SMOOTH,
+        )
+    if most < np.inf:
+        without_gain(arrived, plain, mass, most)
+    return arrived
 
 
 def drift_velocity(world: World, cut: Geometry, dt: float) -> Array:
