@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
+from flowborne.scenes.inflow import FactorSteady
 from flowborne.scenes.tracks import MotionSinusoid
 from flowborne.validation.worlds import mjcf, world_of
 
@@ -20,15 +21,6 @@ H = 1.0 / CELLS
 SQUARE = Grid.slab(CELLS, CELLS, H, (0.0, 0.0))
 PLATE = '<geom type="box" size="{thin} {long} 0.1"/>'
 DISC = '<geom type="sphere" size="0.12"/>'
-
-
-@dataclass(frozen=True)
-class Steady:
-    """Always at full strength."""
-
-    def at(self, time: float) -> float:
-        """1."""
-        return 1.0
 
 
 def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = None) -> World:
@@ -101,7 +93,7 @@ def test_the_dye_of_a_jet_in_space_is_as_much_as_was_blown_and_never_more_than_t
     ball = mjcf('<body><geom type="sphere" size="0.2"/></body>')
     plain = world_of(grid, ball, boundaries=sides, scalars=("dye",))
     place, along = (0.2, 0.0, 0.0), (1.0, 0.0, 0.0)
-    mouth = Mouth("a mouth", 1, place, along, 0.1, 0.1, Steady(), {"dye": 1.0})
+    mouth = Mouth("a mouth", 1, place, along, 0.1, 0.1, FactorSteady(), {"dye": 1.0})
     world = World.at_rest(replace(plain.setup, mouths=(mouth,)))
     for _ in range(12):
         step(world, 0.01)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,19 +13,12 @@ from flowborne.coupling.step import cut_by_bodies, jets_at, step
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
+from flowborne.scenes.inflow import FactorPulse
 from flowborne.validation.worlds import mjcf, world_of
 
 RADIUS, HALF, RATE, DURATION = 0.2, 0.1, 0.1, 1.0
 SQUARE = Grid.slab(48, 48, 2.0 / 48.0, (-1.0, -1.0))
 CUBE = Grid((20, 20, 20), 1.0 / 20.0, (-0.5, -0.5, -0.5))
-
-
-@dataclass(frozen=True)
-class Pulse:
-    """One sin^2 over DURATION."""
-
-    def at(self, time: float) -> float:
-        return float(np.sin(np.pi * time / DURATION) ** 2) if time < DURATION else 0.0
 
 
 def with_mouths(grid: Grid, *angles: float, rate: float = RATE, at: float = 0.0) -> World:
@@ -37,7 +30,11 @@ def with_mouths(grid: Grid, *angles: float, rate: float = RATE, at: float = 0.0)
     for angle in angles:
         x, y = np.cos(angle), np.sin(angle)
         place = (RADIUS * x, RADIUS * y, 0.0)
-        mouths.append(Mouth("a mouth", 1, place, (x, y, 0.0), HALF, rate, Pulse()))
+        mouths.append(
+            Mouth(
+                "a mouth", 1, place, (x, y, 0.0), HALF, rate, FactorPulse(2.0 * DURATION, DURATION)
+            )
+        )
     return World.at_rest(replace(world.setup, mouths=tuple(mouths)))
 
 

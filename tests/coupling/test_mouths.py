@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -14,6 +14,7 @@ from flowborne.coupling.step import cut_by_bodies, jets_at, step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
+from flowborne.scenes.inflow import FactorSteady
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import Law, Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
@@ -22,15 +23,6 @@ from flowborne.validation.worlds import advance, mjcf, world_of
 OPEN = BoundaryOpen()
 RADIUS, HALF, RATE = 0.2, 0.1, 0.1
 """m: of the disc or ball, and of its mouth; m^2/s or m^3/s."""
-
-
-@dataclass(frozen=True)
-class Steady:
-    """Always at full strength."""
-
-    def at(self, time: float) -> float:
-        """1."""
-        return 1.0
 
 
 def slab(cells: int, size: float = 2.0) -> Grid:
@@ -67,7 +59,7 @@ def mouthed(
     )
     x, y = np.cos(angle), np.sin(angle)
     place = (RADIUS * x, RADIUS * y, 0.0)
-    mouth = Mouth("the mouth", 1, place, (x, y, 0.0), half, rate, Steady(), {"dye": 1.0})
+    mouth = Mouth("the mouth", 1, place, (x, y, 0.0), half, rate, FactorSteady(), {"dye": 1.0})
     return World.at_rest(replace(world.setup, mouths=(mouth,)))
 
 
@@ -207,7 +199,7 @@ def test_dye_leaves_from_the_mouth(grid: Grid) -> None:
 def test_nothing_is_blown_out_of_the_far_side_of_a_thin_plate() -> None:
     plate = '<body><geom type="box" size="0.05 0.4 1"/></body>'
     world = world_of(slab(32), mjcf(plate), boundaries=Boundaries(OPEN, OPEN, OPEN, OPEN))
-    mouth = Mouth("the mouth", 1, (0.05, 0.0, 0.0), (1.0, 0.0, 0.0), 0.1, RATE, Steady())
+    mouth = Mouth("the mouth", 1, (0.05, 0.0, 0.0), (1.0, 0.0, 0.0), 0.1, RATE, FactorSteady())
     world = World.at_rest(replace(world.setup, mouths=(mouth,)))
     (jet,) = jets_at(world, cut_by_bodies(world), 0.0)
     grid = world.flow()[0].grid
@@ -240,7 +232,9 @@ def fleshy(grid: Grid, angle: float) -> World:
     held = ["bone" if inside else "" for inside in outer < 0.5]
     add_flesh(spec, "ball", points, elements, tissue, held)
     x, y = np.cos(angle), np.sin(angle)
-    mouth = Mouth("the mouth", 1, (RADIUS * x, RADIUS * y, 0.0), (x, y, 0.0), HALF, RATE, Steady())
+    mouth = Mouth(
+        "the mouth", 1, (RADIUS * x, RADIUS * y, 0.0), (x, y, 0.0), HALF, RATE, FactorSteady()
+    )
     fluid = Fluid(grid, 1000.0, boundaries=Boundaries(*(OPEN,) * 6))
     model = SolidModel.with_flesh(spec, gravity=(0.0, 0.0, 0.0))
     return World.at_rest(Setup(model, fluid, mouths=(mouth,)))
