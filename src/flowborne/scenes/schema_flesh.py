@@ -12,7 +12,8 @@ from flowborne.scenes.fields import NotNegative, Positive, Table, Text
 class FleshTable(Table):
     """[[flesh]]: an elastic body that bones hold, meshed with tetrahedra.
 
-    With its bones it should be 1.8 cells of the fluid's grid thick or more: thinner, it leaks.
+    Where it is thinner with its bones than 1.75 cells of the fluid's grid, the fluid sees all of it
+    thicker by what is missing there, so that it does not leak.
 
     name       the flesh's own
     bones      bodies of the model that lie inside and hold it
