@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.mouths import Jet, covered, distance_at, jet_force
+from flowborne.coupling.mouths import Jet, block, covered, distance_at, jet_force
 from flowborne.fluid.grid import Array, Faces, Grid
 
 MARGIN = 2.0
@@ -112,19 +112,17 @@ def flow_out(velocity: Faces, opened: Faces, held: Due, component: int, grid: Gr
     total = 0.0
     for axis in grid.axes:
         for end, sign in enumerate((-1.0, 1.0)):
-            at = list(held.faces(component))
+            carried, through = list(held.faces(component)), list(held.faces(component))
             edge = held.cells[axis][end]
             if axis == component:
-                at[axis] = slice(edge - 1 + end, edge + 1 + end)
-                value = mean(velocity[axis][tuple(at)], axis)
-                flux = mean((opened[axis] * velocity[axis])[tuple(at)], axis)
+                carried[axis] = through[axis] = slice(edge - 1 + end, edge + 1 + end)
             else:
-                at[axis] = slice(edge - 1, edge + 1)
-                value = mean(velocity[component][tuple(at)], axis)
                 low, high = held.cells[component]
-                at[axis], at[component] = slice(edge, edge + 1), slice(low - 1, high + 1)
-                flux = mean((opened[axis] * velocity[axis])[tuple(at)], component)
-            total += sign * float(np.vdot(flux, value))
+                carried[axis] = slice(edge - 1, edge + 1)
+                through[axis], through[component] = slice(edge, edge + 1), slice(low - 1, high + 1)
+            value = mean(velocity[component][tuple(carried)], axis)
+            flux = opened[axis][tuple(through)] * velocity[axis][tuple(through)]
+            total += sign * float(np.vdot(mean(flux, component), value))
     return grid.face_area * total
 
 
@@ -145,8 +143,7 @@ def give_missing(
     for held in due:
         for axis in grid.axes:
             at = held.faces(axis)
-            coordinates = (c[s] for c, s in zip(grid.face_coordinates(axis), at, strict=True))
-            places = np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1).reshape(-1, 3)
+            places = block(grid.face_coordinates(axis), at)
             near = distance_at(places, cut, grid) < BEFORE * grid.spacing
             share = np.zeros(len(places))
             for jet in held.jets:

@@ -270,8 +270,13 @@ def cells_around(jet: Jet, grid: Grid) -> tuple[tuple[slice, slice, slice], Arra
         for x, middle in zip((x, y, z), jet.centre, strict=True)
     ]
     box = near[0], near[1], near[2]
-    block = np.meshgrid(x[box[0]], y[box[1]], z[box[2]], indexing="ij")
-    return box, np.stack(block, axis=-1).reshape(-1, 3)
+    return box, block((x, y, z), box)
+
+
+def block(coordinates: tuple[Array, Array, Array], ranges: tuple[slice, ...]) -> Array:
+    """(n, 3) all places with coordinates (along x, y and z) in ranges of them, m."""
+    along = (c[chosen] for c, chosen in zip(coordinates, ranges, strict=True))
+    return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def jet_force(jets: tuple[Jet, ...], density: float) -> Array:

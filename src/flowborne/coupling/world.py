@@ -73,7 +73,9 @@ class Setup:
         """The same for hypothetical steps: their pressure is solved as far as a gradient needs."""
         if self.fluid is None or self.fluid.tolerance >= HYPOTHETICAL:
             return self
-        return replace(self, fluid=replace(self.fluid, tolerance=HYPOTHETICAL))
+        looser = replace(self, fluid=replace(self.fluid, tolerance=HYPOTHETICAL))
+        vars(looser)["shapes"] = self.shapes  # the same bodies on the same grid, sampled once
+        return looser
 
     @cached_property
     def shapes(self) -> Shapes:
