@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from flowborne.errors import SceneError
 from flowborne.io.clip import Clip
@@ -136,6 +135,8 @@ def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
             f"smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the most for a clip "
             f"of {1.0 / frame_time:.4g} frames a second. Leave it out or lower it."
         )
+    from scipy.signal import butter, sosfiltfilt  # a fifth of a second that most scenes save
+
     filters = butter(2, one_pass, fs=1.0 / frame_time, output="sos")
     edge = min(len(rows) - 1, int(np.ceil(1.0 / (one_pass * frame_time))))
     return np.asarray(sosfiltfilt(filters, rows, axis=0, padlen=edge))

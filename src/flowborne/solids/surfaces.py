@@ -6,7 +6,6 @@ import weakref
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from flowborne.solids.model import SolidModel
@@ -94,6 +93,8 @@ def _skin(model: SolidModel, geom: int) -> tuple[Array, Array]:
     if kind == "box":
         return _box(size)
     if kind == "mesh":
+        import trimesh  # a tenth of a second that only meshes need
+
         vertices, faces = model.mesh_of(geom)
         longest = float(np.ptp(vertices, axis=0).max()) / FINENESS
         vertices, faces = trimesh.remesh.subdivide_to_size(vertices, faces, longest, max_iter=20)
