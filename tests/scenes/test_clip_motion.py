@@ -18,7 +18,7 @@ from flowborne.errors import SceneError
 from flowborne.io.bvh import read_bvh
 from flowborne.quaternions import about, angle, inverse, product
 from flowborne.scenes.clip_following import motion_of_clip
-from flowborne.scenes.clip_motion import MotionClip
+from flowborne.scenes.clip_motion import KEPT, MotionClip
 from flowborne.solids.model import SolidModel
 
 from .clip_models import BODIES, MAPPING, NAMES, REST, circling, model, wandering
@@ -293,3 +293,16 @@ def test_real_clip_keeps_its_feet_on_the_ground() -> None:
         heights.append(data.body("LeftToe").xpos[2])
     assert 0.0 < min(heights) < 0.05
     assert max(heights) < 0.3
+
+
+def test_what_a_motion_remembers_is_what_it_would_find_again() -> None:
+    prescribed = motion(loop=True, blend=0.5)
+    times = np.linspace(0.0, 5.0, 2 * KEPT)
+    fresh = [(p.position(t), p.velocity(t)) for t in times for p in [motion(loop=True, blend=0.5)]]
+    for _ in range(2):
+        for time, (position, velocity) in zip(times, fresh, strict=True):
+            np.testing.assert_array_equal(prescribed.position(time), position)
+            np.testing.assert_array_equal(prescribed.velocity(time), velocity)
+            assert prescribed.position(time) is prescribed.position(time)
+    assert not prescribed.position(times[0]).flags.writeable
+    assert len(pickle.dumps(prescribed)) == len(pickle.dumps(motion(loop=True, blend=0.5)))

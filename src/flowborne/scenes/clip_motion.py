@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Rows = tuple[Array, Array]
 """A row of joint positions (see Columns), unit quaternions, and its derivative."""
+
+KEPT = 64
+"""Most times whose positions and velocities a motion remembers."""
 
 
 @dataclass(eq=False)
@@ -47,18 +51,35 @@ class MotionClip:
     initial: Array
     stride: Stride | None
     overlap: float
+    _known: dict[float, Rows] = field(default_factory=dict, init=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_known": {}}
 
     def position(self, time: float) -> Array:
-        """(m,) entries of q of the joints in MuJoCo's order at `time` (s)."""
-        return np.asarray(self._at(time)[0][self.columns.q])
+        """(m,) entries of q of the joints in MuJoCo's order at `time` (s); not to be written to."""
+        return self._told(time)[0]
 
     def velocity(self, time: float) -> Array:
-        """(k,) entries of v of the joints: rad/s, a ball's in its body's axes; m/s in the world."""
-        row, rate = self._at(time)
-        balls = 4 * self.columns.balls
-        spin = product(inverse(self.columns.quaternions(row)), self.columns.quaternions(rate))
-        flat = np.concatenate([2.0 * spin[:, 1:].ravel(), rate[balls:]])
-        return np.asarray(flat[self.columns.v])
+        """(k,) entries of v of the joints: rad/s, a ball's in its body's axes; m/s in the world.
+        Not to be written to."""
+        return self._told(time)[1]
+
+    def _told(self, time: float) -> Rows:
+        """Position and velocity; all trials of a decision ask for them at the same few times."""
+        known = self._known.get(time)
+        if known is None:
+            row, rate = self._at(time)
+            balls = 4 * self.columns.balls
+            spin = product(inverse(self.columns.quaternions(row)), self.columns.quaternions(rate))
+            flat = np.concatenate([2.0 * spin[:, 1:].ravel(), rate[balls:]])
+            known = row[self.columns.q], flat[self.columns.v]
+            for values in known:
+                values.flags.writeable = False
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            self._known[time] = known
+        return known
 
     def _at(self, time: float) -> Rows:
         row, rate = self._running(max(time, 0.0))
