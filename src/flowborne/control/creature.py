@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-
-BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 
 
 def parts(world: World) -> tuple[SolidModel, SolidState]:
@@ -47,11 +44,10 @@ def given(setup: Setup, model: SolidModel) -> Mask:
 def outboard(world: World, dofs: Integers) -> Integers:
     """Free dofs outboard of any of `dofs`, in ascending order, without `dofs` themselves."""
     model, _ = parts(world)
-    mask = np.zeros(model.nv, bool)
-    for dof in dofs:
-        mask[outboard_dofs(model, int(dof))] = True
-    mask[dofs] = False
-    return np.flatnonzero(mask & ~given(world.setup, model)).astype(np.int64)
+    below = outboard_dofs(model, dofs)
+    own = given(world.setup, model)
+    own[dofs] = True
+    return below[~own[below]]
 
 
 def give_velocity(world: World, dofs: Integers, velocity: Array, kept: Integers) -> None:
@@ -82,18 +78,16 @@ def within_range(model: SolidModel, q: Array, displacement: Array) -> Array:
     Hinges and slides stop at their ends; the rotation vector of a ball joint is shortened. A joint
     that contact or a track has brought beyond its range may go back, and not farther out.
     """
-    scalar = model.dof_position >= 0
-    here = q[model.dof_position[scalar]]
-    low, high = model.dof_range[scalar].T
-    allowed = displacement.copy()
-    allowed[scalar] = np.clip(
-        displacement[scalar], np.minimum(low - here, 0.0), np.maximum(high - here, 0.0)
-    )
-    mj = model.mj
-    for joint in np.flatnonzero((mj.jnt_type == BALL) & (mj.jnt_limited != 0)):
-        at, dof = mj.jnt_qposadr[joint], mj.jnt_dofadr[joint]
+    allowed, scalar = displacement.copy(), model.scalar_dofs
+    if scalar.size:
+        here = q[model.dof_position[scalar]]
+        low, high = model.dof_range[scalar].T
+        allowed[scalar] = np.clip(
+            displacement[scalar], np.minimum(low - here, 0.0), np.maximum(high - here, 0.0)
+        )
+    for at, dof, limit in model.limited_balls:
         turn = displacement[dof : dof + 3]
-        allowed[dof : dof + 3] = _within_cone(q[at : at + 4], turn, mj.jnt_range[joint, 1])
+        allowed[dof : dof + 3] = _within_cone(q[at : at + 4], turn, limit)
     return allowed
 
 

@@ -16,12 +16,9 @@ from flowborne.solids.state import SolidState
 Array = NDArray[np.float64]
 
 
-def outboard_dofs(model: SolidModel, dof: int) -> NDArray[np.int64]:
-    """Dofs of all joints on the bodies below the body that `dof` moves, none of that body's own."""
-    body = int(model.dof_body[dof])
-    bones = np.flatnonzero(model.dof_body < model.nbody)
-    on = model.dof_body[bones]
-    return np.asarray(bones[model.moves[on, dof] & (on != body)])
+def outboard_dofs(model: SolidModel, dofs: int | NDArray[np.int64]) -> NDArray[np.int64]:
+    """Dofs of all joints on the bodies below one that any of `dofs` moves, none of its own."""
+    return model.outboard[np.atleast_1d(dofs)].any(axis=0).nonzero()[0]
 
 
 def rigidify(
@@ -50,7 +47,7 @@ def rigidify(
         free &= ~fixed
     if model.flesh is not None:
         free &= ~model.flesh.dofs
-    others = np.flatnonzero(free)
+    others = free.nonzero()[0]
     if others.size:
         M = carried_mass(model, state.q)
         lost = M[np.ix_(others, dofs)] @ state.v[dofs]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
@@ -155,9 +156,32 @@ class SolidModel:
         mujoco.mj_differentiatePos(self.mj, displacement, 1.0, start, end)
         return displacement
 
+    @cached_property
+    def outboard(self) -> NDArray[np.bool_]:
+        """(m, m) whether a dof (column) is of a body below the one that another (row) moves, for
+        the dofs of bones, which are the first m."""
+        on = self.dof_body[self.dof_body < self.nbody]
+        return np.ascontiguousarray(self.moves[on, : len(on)].T & (on[:, None] != on))
+
+    @cached_property
+    def scalar_dofs(self) -> NDArray[np.int64]:
+        """(k,) dofs of hinges and slides, ascending."""
+        return np.flatnonzero(self.dof_position >= 0)
+
+    @cached_property
+    def limited_balls(self) -> tuple[tuple[int, int, float], ...]:
+        """First place in q, first dof and largest angle (rad) of each ball joint with a limit."""
+        mj = self.mj
+        return tuple(
+            (int(mj.jnt_qposadr[j]), int(mj.jnt_dofadr[j]), float(mj.jnt_range[j, 1]))
+            for j in np.flatnonzero((mj.jnt_type == BALL) & (mj.jnt_limited != 0))
+        )
+
     def places_of(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
         """(m,) places in q of the joints that `dofs` belong to, ascending."""
-        return np.flatnonzero(np.isin(self._joint_of_place, self.mj.dof_jntid[dofs]))
+        named = np.zeros(self.mj.njnt, bool)
+        named[self._joint_of_dof[dofs]] = True
+        return named[self._joint_of_place].nonzero()[0]
 
     def dofs_of(self, joint: str) -> NDArray[np.int64]:
         """Dofs of a joint. Raises ValueError for an unknown name."""
@@ -201,6 +225,7 @@ class SolidModel:
         self.joint_names = _names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)
         widths = [WIDTHS[int(kind)] for kind in mj.jnt_type]
         self._joint_of_place = np.repeat(np.arange(mj.njnt), widths)
+        self._joint_of_dof = np.array(mj.dof_jntid, dtype=np.int64)
         names: list[str] = []
         self.dof_position: NDArray[np.int64] = np.full(self.nv, -1)
         self.dof_range: Array = np.tile([-np.inf, np.inf], (self.nv, 1))
