@@ -48,14 +48,19 @@ class Drive:
         """Drive that leaves every dof free."""
         return cls(np.zeros(nv, bool), np.zeros(nv), np.zeros(nv), np.full(nv, np.inf))
 
+    def copy(self) -> Drive:
+        return Drive(
+            self.prescribed.copy(), self.move.copy(), self.hold.copy(), self.torque_limit.copy()
+        )
+
     def set(
         self,
-        dofs: NDArray[np.int64],
+        dofs: NDArray[np.int64] | NDArray[np.bool_],
         move: Array | float,
         hold: Array | float,
         torque_limit: Array | float = np.inf,
     ) -> None:
-        """Drive `dofs` with these velocities."""
+        """Drive `dofs`, indices (k,) or a mask (nv,), with these velocities."""
         self.prescribed[dofs] = True
         self.move[dofs] = move
         self.hold[dofs] = hold

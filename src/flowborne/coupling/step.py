@@ -114,17 +114,14 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
 def command(world: World, dt: float, drive: Drive | None) -> Drive:
     """The drive with prescribed motions and a slab's locked dofs added."""
     model = world.setup.solid
-    orders = Drive.none(model.nv)
-    if drive is not None:
-        at = np.flatnonzero(drive.prescribed)
-        orders.set(at, drive.move[at], drive.hold[at], drive.torque_limit[at])
+    orders = Drive.none(model.nv) if drive is None else drive.copy()
     for told in world.setup.motions:
         later = world.time + dt
         goal = world.solid.q.copy()
         goal[model.places_of(told.dofs)] = told.position(later)
         move = model.difference(world.solid.q, goal)[told.dofs] / dt
         orders.set(told.dofs, move, told.velocity(later))
-    orders.set(np.flatnonzero(model.locked), 0.0, 0.0)
+    orders.set(model.locked, 0.0, 0.0)
     return orders
 
 
@@ -188,7 +185,7 @@ def equations(
 ) -> Driven:
     """The bodies' own equations of motion under a push (k,), with the drives in force."""
     setup = world.setup
-    force = generalised(pose, push)
+    force = generalised(pose, push) if push.any() else np.zeros(setup.solid.nv)
     if setup.solid.flesh is None:
         system = assemble(setup.solid, world.solid, force, dt, before)
         return prescribe(system, orders.prescribed, orders.hold)
@@ -262,7 +259,6 @@ def report(
 ) -> StepReport:
     """What the step did."""
     projected, flesh = solved.projected, world.setup.solid.flesh
-    carried = np.zeros((0, len(wind))) if flesh is None else flesh.carried
     balance.solid = halfway_momentum(world.setup.solid, world.solid, dt)[0]
     finite = bool(np.isfinite(solved.v).all())
     if projected is not None:
@@ -273,19 +269,22 @@ def report(
         dt=dt,
         outcome=outcome if finite else Outcome.NOT_FINITE,
         actuator=solved.actuator,
-        pressure_wrench=np.zeros_like(wind),
-        viscous_wrench=on_bodies(pose, carried, solved.viscous_impulse / dt),
-        buoyancy_wrench=on_bodies(pose, carried, buoyancy),
+        pressure_wrench=np.zeros(wind.shape),
+        viscous_wrench=np.zeros(wind.shape),
+        buoyancy_wrench=np.zeros(wind.shape),
         wind_wrench=wind,
         jet_wrench=reaction,
         momentum=balance,
         work=dt * float(solved.actuator @ halfway),
         contacts=solved.driven.system.contacts,
-        limited=np.flatnonzero(solved.driven.limited),
+        limited=solved.driven.limited.nonzero()[0],
         seconds=watch.seconds,
     )
     if projected is not None:
+        carried = np.zeros((0, len(wind))) if flesh is None else flesh.carried
         done.pressure_wrench = on_bodies(pose, carried, projected.impulse / dt)
+        done.viscous_wrench = on_bodies(pose, carried, solved.viscous_impulse / dt)
+        done.buoyancy_wrench = on_bodies(pose, carried, buoyancy)
         done.iterations, done.residual = projected.iterations, projected.residual
         done.divergence = projected.divergence
     return done

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import mujoco
 import numpy as np
@@ -50,10 +50,11 @@ class Kinematics:
     body_rotation   (nbody, 3, 3) body's frame to the world's
     geom_position   (ngeom, 3) m
     geom_rotation   (ngeom, 3, 3) geometry's frame to the world's
-    centroid        (nbody, 3) centroid of the displaced volume, m
+    own_centroid    (nbody, 3) centroid of the displaced volume in the body's frame, m
     mass_centre     (nbody, 3) centre of mass, m
-    twist_jacobian  (nbody, 6, nv) from v to each body's twist: velocity of the point at the world
-                    origin, then angular velocity
+    dof_twists      (nv, 6) twist that unit velocity of each dof gives what it moves: velocity of
+                    the point at the world origin, then angular velocity
+    moves           (nbody, nv) whether a dof moves a body
     vertices        (n, 3) of flesh, m
     vertex_jacobian (3n, nv) from v to their velocities, sparse
     """
@@ -62,11 +63,23 @@ class Kinematics:
     body_rotation: Array
     geom_position: Array
     geom_rotation: Array
-    centroid: Array
+    own_centroid: Array
     mass_centre: Array
-    twist_jacobian: Array
+    dof_twists: Array
+    moves: NDArray[np.bool_]
     vertices: Array
     vertex_jacobian: csr_array
+
+    @cached_property
+    def centroid(self) -> Array:
+        """(nbody, 3) centroid of the displaced volume, m."""
+        turned = np.matmul(self.body_rotation, self.own_centroid[:, :, None])
+        return self.body_position + turned[:, :, 0]
+
+    @cached_property
+    def twist_jacobian(self) -> Array:
+        """(nbody, 6, nv) from v to each body's twist."""
+        return np.where(self.moves[:, None, :], self.dof_twists.T, 0.0)
 
 
 @dataclass(frozen=True)
@@ -189,19 +202,15 @@ def kinematics(model: SolidModel, q: Array) -> Kinematics:
     s = scratch(model)
     s.place(q)
     bodies, flesh = model.nbody, model.flesh
-    body_position = s.xpos[:bodies].copy()
-    body_rotation = s.xmat[:bodies].reshape(-1, 3, 3).copy()
-    mass_centre = s.data.xipos[:bodies].copy()
-    twists = np.where(model.moves[:, None, :], dof_twists(model, s).T, 0.0)
-    centroid = body_position + np.matmul(body_rotation, model.centroid[:, :, None])[:, :, 0]
     return Kinematics(
-        body_position,
-        body_rotation,
+        s.xpos[:bodies].copy(),
+        s.xmat[:bodies].reshape(-1, 3, 3).copy(),
         s.geom_xpos[model.geom_id],
         s.geom_xmat[model.geom_id].reshape(-1, 3, 3),
-        centroid,
-        mass_centre,
-        twists,
+        model.centroid,
+        s.xipos[:bodies].copy(),
+        dof_twists(model, s),
+        model.moves,
         np.zeros((0, 3)) if flesh is None else flesh.placed(s),
         no_flesh(model.nv) if flesh is None else flesh.moving(s),
     )
@@ -234,23 +243,24 @@ def assemble(
     s = scratch(model)
     s.set_time_step(dt)
     s.forward(state.q, state.v, applied)
-    A, force = _smooth(model, s, state.v)
+    mass = s.mass_matrix().copy()
+    A, force = _smooth(model, s, mass, state.v)
     rows, zones = rows_of(model, s)
-    centred, impulse = None, A @ state.v + dt * force
+    v, still = state.v.copy(), A @ state.v
+    centred, impulse = None, still + dt * force
     if before is not None:
-        mass = s.mass_matrix().copy()
-        centred = halfway(model, s, before, state, dt, A @ state.v, mass, force + s.bias)
-        impulse, _ = centred.impulse(state.v)
-    v = state.v.copy()
+        centred = halfway(model, s, before, state, dt, still, mass, force + s.bias)
+        impulse, _ = centred.impulse(v)
     full = _with_rows(A, impulse, v, dt, rows, zones)
     return SolidSystem(full[0], full[1], dt, v, (A, impulse), rows, zones, centred, impulse, v)
 
 
-def _smooth(model: SolidModel, s: Scratch, v: Array) -> tuple[Array, Array]:
-    """A and b without constraint rows; after mj_forward."""
+def _smooth(model: SolidModel, s: Scratch, mass: Array, v: Array) -> tuple[Array, Array]:
+    """A and b without constraint rows; after mj_forward, with its mass matrix (nv, nv)."""
     data = s.data
-    A, force = s.mass_matrix().copy(), s.smooth.copy()
+    A, force = mass, s.smooth.copy()
     if data.efm_active:
+        A = mass.copy()
         A.flat[:: model.nv + 1] += data.efm_diag
         force -= data.efm_ck * v
         for t in data.efm_tid[: data.nefmT]:

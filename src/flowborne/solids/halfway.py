@@ -7,10 +7,11 @@ equation of motion is written as the change of momentum itself, which then holds
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -48,24 +49,75 @@ class Halfway:
     mass: Array | csr_array
     given: Array
     along: Array
+    _found: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def impulse(self, v_plus: Array) -> tuple[Array, Array]:
         """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,), and (nv,) how much of it
-        may be rounding errors."""
+        may be rounding errors; the last answer is kept, and is not to be written to."""
+        key = v_plus.tobytes()
+        if key not in self._found:
+            self._found.clear()
+            self._found[key] = self._impulse(v_plus)
+        return self._found[key]
+
+    def _impulse(self, v_plus: Array) -> tuple[Array, Array]:
         model, dt, v = self.model, self.dt, self.state.v
         s = scratch(model)
         later = subtree_halfway_momentum(model, s, SolidState(self.state.q, v_plus), dt)
         s.place(self.state.q, 0.5 * (v + v_plus))
         bias = np.empty(model.nv)
         mujoco.mj_rne(s.mj, s.data, 0, bias)
-        change = (self.along * (self.given - later)[model.dof_body]).sum(axis=1)
-        change += self.mass @ (v_plus - v) - model.armature * (v_plus - v) + self.still
-        moved = np.where(model.conserved, change, self.still - dt * bias)
-        scale = (np.abs(self.along) * (np.abs(self.given) + np.abs(later))[model.dof_body]).sum(
-            axis=1
+        gained = self.mass @ (v_plus - v) - model.armature * (v_plus - v)
+        return momentum_impulse(
+            self.along,
+            self.given,
+            later,
+            model.dof_body,
+            model.conserved,
+            gained,
+            self.still,
+            bias,
+            self.outer,
+            dt,
         )
-        own = ROUNDING * (scale + dt * np.abs(self.outer))
-        return moved + dt * self.outer, own + OF_THE_WHOLE * float(scale.max(initial=0.0))
+
+
+@njit(nogil=True, cache=True)
+def momentum_impulse(
+    along: Array,
+    given: Array,
+    later: Array,
+    body: NDArray[np.int64],
+    conserved: NDArray[np.bool_],
+    gained: Array,
+    still: Array,
+    bias: Array,
+    outer: Array,
+    dt: float,
+) -> tuple[Array, Array]:
+    """(nv,) r of A v+ = r, and (nv,) how much of it may be rounding errors.
+
+        r = A v + (M - armature) (v+ - v) + S.(P - P+) + dt f      along conserved dofs
+        r = A v - dt c + dt f                                      along the others
+
+    along                      (nv, 6) twists S
+    given, later, body         (bodies, 6) P and P+, and (nv,) their rows for each dof
+    gained, still, bias, outer  (nv,) (M - armature) (v+ - v), A v, c, f
+    """
+    impulse, rounding, largest = np.empty(len(along)), np.empty(len(along)), 0.0
+    for n in range(len(along)):
+        change, scale = 0.0, 0.0
+        for i in range(6):
+            before, after = given[body[n], i], later[body[n], i]
+            change += along[n, i] * (before - after)
+            scale += abs(along[n, i]) * (abs(before) + abs(after))
+        moved = change + gained[n] if conserved[n] else -dt * bias[n]
+        impulse[n] = still[n] + moved + dt * outer[n]
+        rounding[n] = ROUNDING * (scale + dt * abs(outer[n]))
+        largest = max(largest, scale)
+    for n in range(len(along)):
+        rounding[n] += OF_THE_WHOLE * largest
+    return impulse, rounding
 
 
 def halfway(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from flowborne.solids.scratch import Scratch, scratch
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
     from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+KEPT = 4
+"""Half-way momenta that a thread remembers of a model."""
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -28,17 +33,32 @@ def cross(a: Array, b: Array) -> Array:
 
 def dof_twists(model: SolidModel, s: Scratch) -> Array:
     """(nv, 6) twist about the world origin that unit velocity of each dof gives what it moves."""
-    turn, at = s.cdof[:, :3], s.subtree_com[model.dof_root]
-    return np.concatenate([s.cdof[:, 3:] + cross(at, turn), turn], axis=1)
+    return twists_about_origin(s.cdof, s.subtree_com, model.dof_root)
+
+
+@njit(nogil=True, cache=True)
+def twists_about_origin(cdof: Array, centre: Array, root: Integers) -> Array:
+    """(nv, 6) twists (v + c x omega, omega) about the world origin.
+
+    cdof    (nv, 6) of unit velocity of each dof: omega, and v of the point at c
+    centre  (bodies, 3) c, m
+    root    (nv,) row of `centre` that belongs to each dof
+    """
+    twists = np.empty((len(cdof), 6))
+    for n in range(len(cdof)):
+        c = centre[root[n]]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            twists[n, i] = cdof[n, 3 + i] + (c[j] * cdof[n, k] - c[k] * cdof[n, j])
+            twists[n, 3 + i] = cdof[n, i]
+    return twists
 
 
 def weight(model: SolidModel, s: Scratch) -> Array:
     """(bodies, 6) force of gravity on each body's subtree and its torque about the world origin;
     points of flesh count as bodies."""
-    wrench = np.empty((len(model.subtree_mass), 6))
-    wrench[:, :3] = model.subtree_mass[:, None] * model.gravity
-    wrench[:, 3:] = cross(s.subtree_com, wrench[:, :3])
-    return wrench
+    fall = np.full(s.subtree_com.shape, model.gravity)
+    return momentum_about_origin(model.subtree_mass, s.subtree_com, fall, np.zeros(fall.shape))
 
 
 def subtree_momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
@@ -46,16 +66,47 @@ def subtree_momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
     flesh count as bodies."""
     s.place(state.q, state.v)
     mujoco.mj_subtreeVel(s.mj, s.data)
-    momentum = np.empty((len(model.subtree_mass), 6))
-    momentum[:, :3] = model.subtree_mass[:, None] * s.subtree_linvel
-    momentum[:, 3:] = s.subtree_angmom + cross(s.subtree_com, momentum[:, :3])
+    return momentum_about_origin(
+        model.subtree_mass, s.subtree_com, s.subtree_linvel, s.subtree_angmom
+    )
+
+
+@njit(nogil=True, cache=True)
+def momentum_about_origin(mass: Array, centre: Array, velocity: Array, spin: Array) -> Array:
+    """(n, 6) linear momentum m v, and angular momentum L + c x m v about the world origin.
+
+    mass, centre, velocity  (n,) kg, (n, 3) m, (n, 3) m/s: m, c, v of centres of mass
+    spin                    (n, 3) N m s: L about the centres of mass
+    """
+    momentum = np.empty((len(mass), 6))
+    for n in range(len(mass)):
+        for i in range(3):
+            momentum[n, i] = mass[n] * velocity[n, i]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            moment = centre[n, j] * momentum[n, k] - centre[n, k] * momentum[n, j]
+            momentum[n, 3 + i] = spin[n, i] + moment
     return momentum
 
 
 def subtree_halfway_momentum(model: SolidModel, s: Scratch, state: SolidState, dt: float) -> Array:
-    """As `subtree_momentum`, when the positions have moved on for half a step."""
-    q = model.integrate(state.q, state.v, 0.5 * dt)
-    return subtree_momentum(model, s, SolidState(q, state.v))
+    """As `subtree_momentum`, when the positions have moved on for half a step. Read only.
+
+    The last few are remembered: all trials of a decision start from one state, and a step's report
+    asks for what its solve has found.
+    """
+    key = state.q.tobytes(), state.v.tobytes(), dt
+    known = s.momenta.get(key)
+    if known is None:
+        q = model.integrate(state.q, state.v, 0.5 * dt)
+        known = subtree_momentum(model, s, SolidState(q, state.v))
+        known.flags.writeable = False
+        if len(s.momenta) >= KEPT:
+            s.momenta.pop(next(iter(s.momenta)))
+    else:
+        del s.momenta[key]
+    s.momenta[key] = known  # the last one used goes last, the first one is dropped first
+    return known
 
 
 def momentum(model: SolidModel, state: SolidState) -> Array:

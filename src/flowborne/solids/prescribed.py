@@ -8,7 +8,7 @@ Partial inverse dynamics: with P the prescribed dofs and F the free ones,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,14 +65,12 @@ class PrescribedSystem:
         system = self.system.updated(v_plus)
         if system is None:
             return None
-        solved = _solved(system, self.prescribed, self.hold, self.limited, self.push)
-        return replace(solved, turns=self.turns)
+        return _solved(system, self.prescribed, self.hold, self.limited, self.push, self.turns)
 
     def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> PrescribedSystem:
         """With other drives that keep their dofs, and others at their limits."""
         system = self.system.pushed(push - self.push)
-        solved = _solved(system, prescribed, self.hold, limited, push)
-        return replace(solved, turns=self.turns + 1)
+        return _solved(system, prescribed, self.hold, limited, push, self.turns + 1)
 
     def answers_as(self, other: object) -> bool:
         """Whether both give the same answer to any impulse."""
@@ -106,9 +104,11 @@ def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) 
     actuator  (nv,) force that its drives supply, as `driven.actuator` gives it
     """
     over = driven.prescribed & (np.abs(actuator) > limit * (1.0 + OVER))
-    room = OVER * (np.abs(v_plus) + np.abs(driven.hold))
-    past = driven.limited & (np.sign(driven.push) * (v_plus - driven.hold) > room)
-    wrong = np.flatnonzero(over | past)
+    past = driven.limited
+    if past.any():
+        room = OVER * (np.abs(v_plus) + np.abs(driven.hold))
+        past = past & (np.sign(driven.push) * (v_plus - driven.hold) > room)
+    wrong = (over | past).nonzero()[0]
     if wrong.size == 0:
         return None
     if driven.turns >= AT_ONCE:
@@ -120,18 +120,18 @@ def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) 
 
 
 def _solved(
-    system: SolidSystem, prescribed: Mask, hold: Array, limited: Mask, push: Array
+    system: SolidSystem, prescribed: Mask, hold: Array, limited: Mask, push: Array, turns: int = 0
 ) -> PrescribedSystem:
-    free = np.flatnonzero(~prescribed)
+    free = (~prescribed).nonzero()[0]
     velocity = np.where(prescribed, hold, 0.0)
-    inverse = np.zeros_like(system.A)
+    inverse = np.zeros(system.A.shape)
     if free.size:
         across = np.ix_(free, free)
         block = symmetric_inverse(system.A[across])
         inverse[across] = block
         velocity[free] = block @ (system.impulse[free] - system.A[free] @ velocity)
     return PrescribedSystem(
-        system, prescribed.copy(), hold.copy(), inverse, velocity, limited, push
+        system, prescribed.copy(), hold.copy(), inverse, velocity, limited, push, turns
     )
 
 

@@ -1,7 +1,8 @@
 """MuJoCo's working memory: one per thread and model, never part of the state.
 
 Nothing in it carries over: every use sets positions, velocities and applied forces anew, and
-warm starts are off, so results depend on arguments only.
+warm starts are off, so results depend on arguments only. What is remembered of momenta is found by
+these arguments, to the last bit.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ class Scratch:
 
     mj, data    MuJoCo's model and data
     q, v, ...   lasting views into `data`
+    momenta     the last few half-way momenta by their state, see solids.momentum
     """
 
     def __init__(self, model: SolidModel) -> None:
@@ -37,13 +39,14 @@ class Scratch:
         self.data = data = mujoco.MjData(self.mj)
         self.dt = float(self.mj.opt.timestep)
         self._mass: Array | None = None
+        self.momenta: dict[tuple[bytes, bytes, float], Array] = {}
         self.q, self.v = data.qpos, data.qvel
         self.applied = data.qfrc_applied
         self.smooth, self.bias = data.qfrc_smooth, data.qfrc_bias
         self.cdof = data.cdof
         self.subtree_com = data.subtree_com
         self.subtree_linvel, self.subtree_angmom = data.subtree_linvel, data.subtree_angmom
-        self.xpos, self.xmat = data.xpos, data.xmat
+        self.xpos, self.xmat, self.xipos = data.xpos, data.xmat, data.xipos
         self.geom_xpos, self.geom_xmat = data.geom_xpos, data.geom_xmat
 
     def set_time_step(self, dt: float) -> None:

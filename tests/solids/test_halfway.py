@@ -1,0 +1,47 @@
+"""The compiled impulse of the forces half-way through a step, against NumPy's statement of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from flowborne.solids.dynamics import assemble
+from flowborne.solids.halfway import OF_THE_WHOLE, ROUNDING, momentum_impulse
+from flowborne.solids.model import SolidModel
+from flowborne.solids.state import SolidState
+
+from .test_momentum import CHAIN, tumbled
+
+MODEL = SolidModel.from_string(CHAIN)
+
+
+@pytest.mark.parametrize("dofs", [0, 8])
+def test_momentum_impulse(dofs: int) -> None:
+    random, dt = np.random.default_rng(dofs), 0.2
+    along, given, later = random.normal(size=(dofs, 6)), *random.normal(size=(2, 5, 6))
+    body, conserved = random.integers(5, size=dofs), random.uniform(size=dofs) < 0.5
+    gained, still, bias, outer = random.normal(size=(4, dofs))
+    change = gained + (along * (given - later)[body]).sum(axis=1)
+    expected = still + np.where(conserved, change, -dt * bias) + dt * outer
+    scale = (np.abs(along) * (np.abs(given) + np.abs(later))[body]).sum(axis=1)
+    room = ROUNDING * (scale + dt * np.abs(outer)) + OF_THE_WHOLE * scale.max(initial=0.0)
+    impulse, rounding = momentum_impulse(
+        along, given, later, body, conserved, gained, still, bias, outer, dt
+    )
+    assert_allclose(impulse, expected, rtol=1e-13, atol=1e-13)
+    assert_allclose(rounding, room, rtol=1e-13)
+
+
+def test_the_impulse_depends_on_the_velocity_alone() -> None:
+    """What is remembered of the last one changes nothing."""
+    before, dt = tumbled(3), 0.01
+    moved = SolidState(MODEL.integrate(before.q, before.v, dt), before.v)
+    halfway = assemble(MODEL, moved, np.zeros(MODEL.nv), dt, before).halfway
+    assert halfway is not None
+    one, other = tumbled(4).v, tumbled(5).v
+    first = [part.copy() for part in halfway.impulse(one)]
+    assert not np.array_equal(halfway.impulse(other)[0], first[0])
+    for _ in range(2):
+        for now, then in zip(halfway.impulse(one), first, strict=True):
+            assert_array_equal(now, then)

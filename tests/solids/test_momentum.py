@@ -1,0 +1,82 @@
+"""The compiled sums of momenta and twists, against NumPy's statement of the same."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.testing import assert_allclose, assert_array_equal
+
+from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import (
+    KEPT,
+    momentum_about_origin,
+    subtree_halfway_momentum,
+    subtree_momentum,
+    twists_about_origin,
+    weight,
+)
+from flowborne.solids.scratch import scratch
+from flowborne.solids.state import SolidState
+
+CHAIN = """
+<mujoco>
+  <worldbody>
+    <body name="trunk" pos=".1 .2 .3">
+      <freejoint/>
+      <geom type="box" size=".5 .2 .1" density="1000"/>
+      <body name="arm" pos=".5 0 0">
+        <joint type="ball"/>
+        <geom type="capsule" fromto="0 0 0 .4 .1 0" size=".05" density="1000"/>
+        <body name="hand" pos=".4 .1 0">
+          <joint type="hinge" axis="0 1 0"/>
+          <geom type="sphere" size=".1" density="1000"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+MODEL = SolidModel.from_string(CHAIN)
+
+
+def tumbled(seed: int) -> SolidState:
+    random, rest = np.random.default_rng(seed), MODEL.rest()
+    q = MODEL.integrate(rest.q, random.normal(size=MODEL.nv), 1.0)
+    return SolidState(q, random.normal(size=MODEL.nv))
+
+
+def test_twists_about_origin() -> None:
+    random = np.random.default_rng(0)
+    cdof, centre, root = random.normal(size=(9, 6)), random.normal(size=(4, 3)), np.arange(9) % 4
+    turn = cdof[:, :3]
+    expected = np.concatenate([cdof[:, 3:] + np.cross(centre[root], turn), turn], axis=1)
+    assert_allclose(twists_about_origin(cdof, centre, root), expected, rtol=1e-13, atol=1e-14)
+
+
+def test_momentum_about_origin() -> None:
+    random = np.random.default_rng(1)
+    mass, centre, velocity, spin = random.uniform(size=7), *random.normal(size=(3, 7, 3))
+    linear = mass[:, None] * velocity
+    expected = np.concatenate([linear, spin + np.cross(centre, linear)], axis=1)
+    found = momentum_about_origin(mass, centre, velocity, spin)
+    assert_allclose(found, expected, rtol=1e-13, atol=1e-14)
+
+
+def test_weight_acts_at_the_centre_of_each_subtree() -> None:
+    s = scratch(MODEL)
+    s.place(tumbled(2).q)
+    force = MODEL.subtree_mass[:, None] * MODEL.gravity
+    expected = np.concatenate([force, np.cross(s.subtree_com, force)], axis=1)
+    assert_allclose(weight(MODEL, s), expected, rtol=1e-13, atol=1e-13)
+
+
+def test_halfway_momenta_are_remembered_by_state_and_step() -> None:
+    s, dt = scratch(MODEL), 0.01
+    for seed in (*range(2 * KEPT), 0, 1):
+        state = tumbled(seed)
+        for step in (dt, 2.0 * dt, dt):
+            found = subtree_halfway_momentum(MODEL, s, state, step)
+            q = MODEL.integrate(state.q, state.v, 0.5 * step)
+            assert_array_equal(found, subtree_momentum(MODEL, s, SolidState(q, state.v)))
+            assert not found.flags.writeable
+        assert len(s.momenta) <= KEPT
+    assert subtree_halfway_momentum(MODEL, s, state, dt) is found
