@@ -119,26 +119,29 @@ def pushed(
     position, rotation, twist  (nbody, 3), (nbody, 3, 3), (nbody, 6) of the bodies
     wind                       (n, 3) m/s at each patch, or (1, 3) for all
     """
-    wrench = np.zeros((len(position), 6))
-    meets, own = np.empty(6), np.zeros(6)
+    wrench, force, torque = np.zeros((len(position), 6)), np.empty(3), np.empty(3)
     first = 0
     while first < len(body):
         b, R, x = body[first], rotation[body[first]], position[body[first]]
         v = twist[b, :3] + np.cross(twist[b, 3:], x)
-        meets[3:] = -R.T @ twist[b, 3:]
-        own[:] = 0.0
+        spin = -R.T @ twist[b, 3:]
+        p, q, r = spin[0], spin[1], spin[2]
+        X = Y = Z = K = M = N = 0.0  # in registers, where a small array would not be
         n = first
         while n < len(body) and body[n] == b:
             if n == first or len(wind) > 1:
-                meets[:3] = R.T @ (wind[n if len(wind) > 1 else 0] - v)
-            inflow = 0.0
-            for i in range(6):
-                inflow += screw[n, i] * meets[i]
-            for i in range(6):
-                own[i] += area[n] * abs(inflow) * inflow * screw[n, i]
+                flow = R.T @ (wind[n if len(wind) > 1 else 0] - v)
+                u, s, w = flow[0], flow[1], flow[2]
+            G = screw[n]
+            inflow = G[0] * u + G[1] * s + G[2] * w + G[3] * p + G[4] * q + G[5] * r
+            passed = area[n] * abs(inflow) * inflow
+            X, Y, Z = X + passed * G[0], Y + passed * G[1], Z + passed * G[2]
+            K, M, N = K + passed * G[3], M + passed * G[4], N + passed * G[5]
             n += 1
-        wrench[b, :3] = R @ own[:3]
-        wrench[b, 3:] = R @ own[3:] + np.cross(x, wrench[b, :3])
+        force[0], force[1], force[2] = X, Y, Z
+        torque[0], torque[1], torque[2] = K, M, N
+        wrench[b, :3] = R @ force
+        wrench[b, 3:] = R @ torque + np.cross(x, wrench[b, :3])
         first = n
     return wrench
 
