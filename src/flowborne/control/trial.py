@@ -96,6 +96,7 @@ class Trial:
     dofs          (n,) the controlled dofs
     pose          (nq,) from which the displacement starts, in the flow of `world`
     displacement  (n,) rad or m
+    rigid         (k,) dofs outboard of the controlled ones; found when None
     """
 
     world: World
@@ -105,6 +106,7 @@ class Trial:
     dofs: Integers
     pose: Array
     displacement: Array
+    rigid: Integers | None = None
 
     def run(self) -> float:
         """Objective after the hypothetical steps. Raises TrialError when it is not finite."""
@@ -131,7 +133,7 @@ class Trial:
         different dofs, and the one with no displacement, differ in nothing but the displacement.
         """
         _, state = creature.parts(world)
-        rigid = creature.outboard(world, self.dofs)
+        rigid = creature.outboard(world, self.dofs) if self.rigid is None else self.rigid
         hypothesis = self.hypothesis
         move = self.displacement / hypothesis.duration
         if hypothesis.velocities == "present":
@@ -224,6 +226,7 @@ class Trials:
         world = without_scalars(self.world)
         moves = np.zeros((len(displacements), self.dofs.size))
         moves[:, self.places] = displacements
+        rigid = creature.outboard(world, self.dofs)
         trials = [
             Trial(
                 world,
@@ -233,6 +236,7 @@ class Trials:
                 self.dofs,
                 self.pose,
                 displacement,
+                rigid,
             )
             for displacement in moves
         ]
