@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import (
     KEPT,
-    momentum_about_origin,
+    about_origin,
     subtree_halfway_momentum,
     subtree_momentum,
     twists_about_origin,
@@ -44,21 +44,18 @@ def tumbled(seed: int) -> SolidState:
     return SolidState(q, random.normal(size=MODEL.nv))
 
 
+def test_about_origin() -> None:
+    vector, moment, centre = np.random.default_rng(1).normal(size=(3, 7, 3))
+    expected = np.concatenate([vector, moment + np.cross(centre, vector)], axis=1)
+    assert_allclose(about_origin(vector, moment, centre), expected, rtol=1e-13, atol=1e-14)
+
+
 def test_twists_about_origin() -> None:
     random = np.random.default_rng(0)
-    cdof, centre, root = random.normal(size=(9, 6)), random.normal(size=(4, 3)), np.arange(9) % 4
+    cdof, centre = random.normal(size=(9, 6)), random.normal(size=(9, 3))
     turn = cdof[:, :3]
-    expected = np.concatenate([cdof[:, 3:] + np.cross(centre[root], turn), turn], axis=1)
-    assert_allclose(twists_about_origin(cdof, centre, root), expected, rtol=1e-13, atol=1e-14)
-
-
-def test_momentum_about_origin() -> None:
-    random = np.random.default_rng(1)
-    mass, centre, velocity, spin = random.uniform(size=7), *random.normal(size=(3, 7, 3))
-    linear = mass[:, None] * velocity
-    expected = np.concatenate([linear, spin + np.cross(centre, linear)], axis=1)
-    found = momentum_about_origin(mass, centre, velocity, spin)
-    assert_allclose(found, expected, rtol=1e-13, atol=1e-14)
+    expected = np.concatenate([cdof[:, 3:] + np.cross(centre, turn), turn], axis=1)
+    assert_allclose(twists_about_origin(cdof, centre), expected, rtol=1e-13, atol=1e-14)
 
 
 def test_weight_acts_at_the_centre_of_each_subtree() -> None:

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 
 from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import dof_twists
+from flowborne.solids.momentum import twists_about_origin
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
 
@@ -52,8 +52,9 @@ class Kinematics:
     geom_rotation   (ngeom, 3, 3) geometry's frame to the world's
     own_centroid    (nbody, 3) centroid of the displaced volume in the body's frame, m
     mass_centre     (nbody, 3) centre of mass, m
-    dof_twists      (nv, 6) twist that unit velocity of each dof gives what it moves: velocity of
-                    the point at the world origin, then angular velocity
+    cdof            (nv, 6) angular velocity that unit velocity of each dof gives what it moves,
+                    and velocity of the point at its `dof_centre`
+    dof_centre      (nv, 3) m
     moves           (nbody, nv) whether a dof moves a body
     vertices        (n, 3) of flesh, m
     vertex_jacobian (3n, nv) from v to their velocities, sparse
@@ -65,7 +66,8 @@ class Kinematics:
     geom_rotation: Array
     own_centroid: Array
     mass_centre: Array
-    dof_twists: Array
+    cdof: Array
+    dof_centre: Array
     moves: NDArray[np.bool_]
     vertices: Array
     vertex_jacobian: csr_array
@@ -78,8 +80,10 @@ class Kinematics:
 
     @cached_property
     def twist_jacobian(self) -> Array:
-        """(nbody, 6, nv) from v to each body's twist."""
-        return np.where(self.moves[:, None, :], self.dof_twists.T, 0.0)
+        """(nbody, 6, nv) from v to each body's twist: velocity of the point at the world origin,
+        then angular velocity."""
+        twists = np.ascontiguousarray(twists_about_origin(self.cdof, self.dof_centre).T)
+        return np.where(self.moves[:, None, :], twists, 0.0)
 
 
 @dataclass(frozen=True)
@@ -209,7 +213,8 @@ def kinematics(model: SolidModel, q: Array) -> Kinematics:
         s.geom_xmat[model.geom_id].reshape(-1, 3, 3),
         model.centroid,
         s.xipos[:bodies].copy(),
-        dof_twists(model, s),
+        s.cdof.copy(),
+        s.subtree_com[model.dof_root],
         model.moves,
         np.zeros((0, 3)) if flesh is None else flesh.placed(s),
         no_flesh(model.nv) if flesh is None else flesh.moving(s),

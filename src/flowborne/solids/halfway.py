@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import dof_twists, subtree_halfway_momentum, weight
+from flowborne.solids.momentum import subtree_halfway_momentum, weight
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
 
@@ -38,7 +38,9 @@ class Halfway:
     mass   (nv, nv) mass matrix, dense or sparse
     given  (bodies, 6) momentum of each body's subtree when the positions were half-way, and what
            gravity adds to it during the step
-    along  (nv, 6) twist that unit velocity of each dof gives what it moves
+    cdof   (nv, 6) angular velocity that unit velocity of each dof gives what it moves, and velocity
+           of the point at its centre
+    centre (nv, 3) m
     """
 
     model: SolidModel
@@ -48,7 +50,8 @@ class Halfway:
     still: Array
     mass: Array | csr_array
     given: Array
-    along: Array
+    cdof: Array
+    centre: Array
     _found: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def impulse(self, v_plus: Array) -> tuple[Array, Array]:
@@ -69,7 +72,8 @@ class Halfway:
         mujoco.mj_rne(s.mj, s.data, 0, bias)
         gained = self.mass @ (v_plus - v) - model.armature * (v_plus - v)
         return momentum_impulse(
-            self.along,
+            self.cdof,
+            self.centre,
             self.given,
             later,
             model.dof_body,
@@ -84,7 +88,8 @@ class Halfway:
 
 @njit(nogil=True, cache=True)
 def momentum_impulse(
-    along: Array,
+    cdof: Array,
+    centre: Array,
     given: Array,
     later: Array,
     body: NDArray[np.int64],
@@ -100,22 +105,28 @@ def momentum_impulse(
         r = A v + (M - armature) (v+ - v) + S.(P - P+) + dt f      along conserved dofs
         r = A v - dt c + dt f                                      along the others
 
-    along                      (nv, 6) twists S
-    given, later, body         (bodies, 6) P and P+, and (nv,) their rows for each dof
+    cdof, centre                (nv, 6), (nv, 3) of the twists S about the world origin
+    given, later, body          (bodies, 6) P and P+, and (nv,) their rows for each dof
     gained, still, bias, outer  (nv,) (M - armature) (v+ - v), A v, c, f
     """
-    impulse, rounding, largest = np.empty(len(along)), np.empty(len(along)), 0.0
-    for n in range(len(along)):
+    dofs = len(cdof)
+    impulse, rounding, largest = np.empty(dofs), np.empty(dofs), 0.0
+    twist = np.empty(6)
+    for n in range(dofs):
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            across = centre[n, j] * cdof[n, k] - centre[n, k] * cdof[n, j]
+            twist[i], twist[3 + i] = cdof[n, 3 + i] + across, cdof[n, i]
         change, scale = 0.0, 0.0
         for i in range(6):
             before, after = given[body[n], i], later[body[n], i]
-            change += along[n, i] * (before - after)
-            scale += abs(along[n, i]) * (abs(before) + abs(after))
+            change += twist[i] * (before - after)
+            scale += abs(twist[i]) * (abs(before) + abs(after))
         moved = change + gained[n] if conserved[n] else -dt * bias[n]
         impulse[n] = still[n] + moved + dt * outer[n]
         rounding[n] = ROUNDING * (scale + dt * abs(outer[n]))
         largest = max(largest, scale)
-    for n in range(len(along)):
+    for n in range(dofs):
         rounding[n] += OF_THE_WHOLE * largest
     return impulse, rounding
 
@@ -132,6 +143,6 @@ def halfway(
 ) -> Halfway:
     """The forces of a step from `before`, after MuJoCo's forward pass at `state`; the rest as in
     `Halfway`."""
-    along, fall = dof_twists(model, s), dt * weight(model, s)
+    cdof, centre, fall = s.cdof.copy(), s.subtree_com[model.dof_root], dt * weight(model, s)
     given = subtree_halfway_momentum(model, s, before, dt) + fall
-    return Halfway(model, state.copy(), dt, outer, still, mass, given, along)
+    return Halfway(model, state.copy(), dt, outer, still, mass, given, cdof, centre)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 KEPT = 4
 """Half-way momenta that a thread remembers of a model."""
@@ -31,34 +30,43 @@ def cross(a: Array, b: Array) -> Array:
     return product
 
 
-def dof_twists(model: SolidModel, s: Scratch) -> Array:
-    """(nv, 6) twist about the world origin that unit velocity of each dof gives what it moves."""
-    return twists_about_origin(s.cdof, s.subtree_com, model.dof_root)
-
-
 @njit(nogil=True, cache=True)
-def twists_about_origin(cdof: Array, centre: Array, root: Integers) -> Array:
-    """(nv, 6) twists (v + c x omega, omega) about the world origin.
+def about_origin(vector: Array, moment: Array, centre: Array) -> Array:
+    """(n, 6) vectors f, and their moments m + c x f about the world origin.
 
-    cdof    (nv, 6) of unit velocity of each dof: omega, and v of the point at c
-    centre  (bodies, 3) c, m
-    root    (nv,) row of `centre` that belongs to each dof
+    vector, moment, centre  (n, 3) f, m about c, and c
     """
-    twists = np.empty((len(cdof), 6))
-    for n in range(len(cdof)):
-        c = centre[root[n]]
+    screw = np.empty((len(vector), 6))
+    for n in range(len(vector)):
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            twists[n, i] = cdof[n, 3 + i] + (c[j] * cdof[n, k] - c[k] * cdof[n, j])
-            twists[n, 3 + i] = cdof[n, i]
-    return twists
+            screw[n, i] = vector[n, i]
+            across = centre[n, j] * vector[n, k] - centre[n, k] * vector[n, j]
+            screw[n, 3 + i] = moment[n, i] + across
+    return screw
+
+
+def twists_about_origin(cdof: Array, centre: Array) -> Array:
+    """(nv, 6) velocity of the point at the world origin, and angular velocity, of unit velocity of
+    each dof.
+
+    cdof    (nv, 6) angular velocity, and velocity of the point at `centre`
+    centre  (nv, 3) m
+    """
+    turn, speed = np.ascontiguousarray(cdof[:, :3]), np.ascontiguousarray(cdof[:, 3:])
+    return np.concatenate([about_origin(turn, speed, centre)[:, 3:], turn], axis=1)
+
+
+def dof_twists(model: SolidModel, s: Scratch) -> Array:
+    """(nv, 6) twist about the world origin that unit velocity of each dof gives what it moves."""
+    return twists_about_origin(s.cdof, s.subtree_com[model.dof_root])
 
 
 def weight(model: SolidModel, s: Scratch) -> Array:
     """(bodies, 6) force of gravity on each body's subtree and its torque about the world origin;
     points of flesh count as bodies."""
-    fall = np.full(s.subtree_com.shape, model.gravity)
-    return momentum_about_origin(model.subtree_mass, s.subtree_com, fall, np.zeros(fall.shape))
+    force = model.subtree_mass[:, None] * model.gravity
+    return about_origin(force, np.zeros(force.shape), s.subtree_com)
 
 
 def subtree_momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
@@ -66,27 +74,8 @@ def subtree_momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
     flesh count as bodies."""
     s.place(state.q, state.v)
     mujoco.mj_subtreeVel(s.mj, s.data)
-    return momentum_about_origin(
-        model.subtree_mass, s.subtree_com, s.subtree_linvel, s.subtree_angmom
-    )
-
-
-@njit(nogil=True, cache=True)
-def momentum_about_origin(mass: Array, centre: Array, velocity: Array, spin: Array) -> Array:
-    """(n, 6) linear momentum m v, and angular momentum L + c x m v about the world origin.
-
-    mass, centre, velocity  (n,) kg, (n, 3) m, (n, 3) m/s: m, c, v of centres of mass
-    spin                    (n, 3) N m s: L about the centres of mass
-    """
-    momentum = np.empty((len(mass), 6))
-    for n in range(len(mass)):
-        for i in range(3):
-            momentum[n, i] = mass[n] * velocity[n, i]
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            moment = centre[n, j] * momentum[n, k] - centre[n, k] * momentum[n, j]
-            momentum[n, 3 + i] = spin[n, i] + moment
-    return momentum
+    linear = model.subtree_mass[:, None] * s.subtree_linvel
+    return about_origin(linear, s.subtree_angmom, s.subtree_com)
 
 
 def subtree_halfway_momentum(model: SolidModel, s: Scratch, state: SolidState, dt: float) -> Array:
