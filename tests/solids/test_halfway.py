@@ -10,6 +10,7 @@ from flowborne.solids.dynamics import assemble
 from flowborne.solids.halfway import OF_THE_WHOLE, ROUNDING, momentum_impulse
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import twists_about_origin
+from flowborne.solids.prescribed import prescribe
 from flowborne.solids.state import SolidState
 
 from .test_momentum import CHAIN, tumbled
@@ -48,3 +49,20 @@ def test_the_impulse_depends_on_the_velocity_alone() -> None:
     for _ in range(2):
         for now, then in zip(halfway.impulse(one), first, strict=True):
             assert_array_equal(now, then)
+
+
+def test_a_good_guess_settles_driven_joints_at_once() -> None:
+    """With every joint driven the velocity after the step is known before it."""
+    before, hold, dt = tumbled(6), tumbled(7).v, 0.01
+    moved = SolidState(MODEL.integrate(before.q, before.v, dt), before.v)
+    none, all_driven = np.zeros(MODEL.nv), np.ones(MODEL.nv, bool)
+    guessed = prescribe(assemble(MODEL, moved, none, dt, before, hold), all_driven, hold)
+    assert guessed.updated(hold) is None
+    plain = prescribe(assemble(MODEL, moved, none, dt, before), all_driven, hold)
+    settled = plain.updated(hold)
+    assert settled is not None
+    assert settled.updated(hold) is None
+    expected = settled.actuator(hold, none)
+    assert_allclose(
+        guessed.actuator(hold, none), expected, rtol=0, atol=1e-12 * abs(expected).max()
+    )

@@ -187,7 +187,8 @@ def equations(
     setup = world.setup
     force = generalised(pose, push) if push.any() else np.zeros(setup.solid.nv)
     if setup.solid.flesh is None:
-        system = assemble(setup.solid, world.solid, force, dt, before)
+        guess = np.where(orders.prescribed, orders.hold, world.solid.v)
+        system = assemble(setup.solid, world.solid, force, dt, before, guess)
         return prescribe(system, orders.prescribed, orders.hold)
     flesh = assemble_flesh(setup.solid, world.solid, force, dt, setup.centred_flesh, before)
     return prescribe_flesh(flesh, orders.prescribed, orders.hold)

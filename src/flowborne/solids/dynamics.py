@@ -227,6 +227,7 @@ def assemble(
     applied: Array,
     dt: float,
     before: SolidState | None = None,
+    guess: Array | None = None,
 ) -> SolidSystem:
     """System of the bodies alone at `state`, with gravity, springs, limits and contact.
 
@@ -241,6 +242,8 @@ def assemble(
     before   state before the positions moved. With it, `updated` brings the forces of Coriolis to
              the velocity half-way through the step; without, they are those at v, and A a = b is
              solved by MuJoCo's acceleration
+    guess    (nv,) velocity after the step for which the forces of Coriolis are found at first; v
+             when None
     raises   ValueError when the model has flesh
     """
     if model.mj.nflex:
@@ -255,7 +258,7 @@ def assemble(
     centred, impulse = None, still + dt * force
     if before is not None:
         centred = halfway(model, s, before, state, dt, still, mass, force + s.bias)
-        impulse, _ = centred.impulse(v)
+        impulse, _ = centred.impulse(v if guess is None else guess)
     full = _with_rows(A, impulse, v, dt, rows, zones)
     return SolidSystem(full[0], full[1], dt, v, (A, impulse), rows, zones, centred, impulse, v)
 
