@@ -50,16 +50,19 @@ def step(world: World, dt: float, drive: Drive | None = None) -> StepReport:
 
 def step_bodies(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
     """A step without a fluid: simple winds, gravity, joints and contact."""
-    before, pose = move_bodies(world, orders, dt)
-    wind = winds_on(world, pose)
-    push = np.append(wind, np.zeros(pose.vertices.size))
-    driven = equations(world, before, pose, push, orders, dt)
-    solved = solve_bodies(driven, orders.torque_limit, push.size)
+    model, before = world.setup.solid, move_positions(world, orders, dt)
+    wind, force = np.zeros((model.nbody, 6)), np.zeros(model.nv)
+    if world.setup.winds:
+        pose = kinematics(model, world.solid.q)
+        wind = winds_on(world, pose)
+        force = generalised(pose, np.append(wind, np.zeros(pose.vertices.size)))
+    driven = equations_under(world, before, force, orders, dt)
+    solved = solve_bodies(driven, orders.torque_limit, wind.size)
     world.solid.v[:] = solved.v
     advance_clock(world, dt)
     watch.lap("solids")
-    none = np.zeros_like(wind)
-    return report(world, pose, solved, np.zeros_like(push), wind, none, Momentum(), dt, watch)
+    none = np.zeros(wind.shape)
+    return report(world, None, solved, none.ravel(), wind, none, Momentum(), dt, watch)
 
 
 def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
@@ -161,7 +164,13 @@ def jets_at(
 
 
 def move_bodies(world: World, orders: Drive, dt: float) -> tuple[SolidState, Kinematics]:
-    """Move the bodies to the end of the step, in place; gives the state before and the new pose.
+    """Move the bodies to the end of the step, in place; gives the state before and the new pose."""
+    before = move_positions(world, orders, dt)
+    return before, kinematics(world.setup.solid, world.solid.q)
+
+
+def move_positions(world: World, orders: Drive, dt: float) -> SolidState:
+    """Move the positions to the end of the step, in place; gives the state before.
 
     A drive with a torque limit may give way, so its dof moves with the velocity it has. Where a
     drive moves bones otherwise than they went, the flesh that they carry moves with them.
@@ -172,7 +181,7 @@ def move_bodies(world: World, orders: Drive, dt: float) -> tuple[SolidState, Kin
     velocity = before.v + follow(world.setup.solid, before.q, otherwise)
     velocity[told] = orders.move[told]
     world.solid.q[:] = world.setup.solid.integrate(before.q, velocity, dt)
-    return before, kinematics(world.setup.solid, world.solid.q)
+    return before
 
 
 def equations(
@@ -184,8 +193,14 @@ def equations(
     dt: float,
 ) -> Driven:
     """The bodies' own equations of motion under a push (k,), with the drives in force."""
+    return equations_under(world, before, generalised(pose, push), orders, dt)
+
+
+def equations_under(
+    world: World, before: SolidState, force: Array, orders: Drive, dt: float
+) -> Driven:
+    """As `equations`, under a generalised force (nv,)."""
     setup = world.setup
-    force = generalised(pose, push) if push.any() else np.zeros(setup.solid.nv)
     if setup.solid.flesh is None:
         guess = np.where(orders.prescribed, orders.hold, world.solid.v)
         system = assemble(setup.solid, world.solid, force, dt, before, guess)
@@ -249,7 +264,7 @@ def momentum_balance(world: World, cut: Geometry, carried: Carried, solved: Solv
 
 def report(
     world: World,
-    pose: Kinematics,
+    pose: Kinematics | None,
     solved: Solved,
     buoyancy: Array,
     wind: Array,
@@ -258,7 +273,7 @@ def report(
     dt: float,
     watch: Stopwatch,
 ) -> StepReport:
-    """What the step did."""
+    """What the step did; its pose is needed where there is a fluid."""
     projected, flesh = solved.projected, world.setup.solid.flesh
     balance.solid = halfway_momentum(world.setup.solid, world.solid, dt)[0]
     finite = bool(np.isfinite(solved.v).all())
@@ -282,6 +297,7 @@ def report(
         seconds=watch.seconds,
     )
     if projected is not None:
+        assert pose is not None
         carried = np.zeros((0, len(wind))) if flesh is None else flesh.carried
         done.pressure_wrench = on_bodies(pose, carried, projected.impulse / dt)
         done.viscous_wrench = on_bodies(pose, carried, solved.viscous_impulse / dt)
