@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -214,6 +215,11 @@ class Trials:
         """m, number of dofs that are displaced."""
         return int(self.places.size)
 
+    @cached_property
+    def rigid(self) -> Integers:
+        """(k,) dofs outboard of the controlled ones."""
+        return creature.outboard(self.world, self.dofs)
+
     def within_range(self, displacement: Array) -> Array:
         """(m,) the part of a displacement (m,) that the joints' ranges allow."""
         model, _ = creature.parts(self.world)
@@ -226,7 +232,6 @@ class Trials:
         world = without_scalars(self.world)
         moves = np.zeros((len(displacements), self.dofs.size))
         moves[:, self.places] = displacements
-        rigid = creature.outboard(world, self.dofs)
         trials = [
             Trial(
                 world,
@@ -236,7 +241,7 @@ class Trials:
                 self.dofs,
                 self.pose,
                 displacement,
-                rigid,
+                self.rigid,
             )
             for displacement in moves
         ]
