@@ -1,9 +1,14 @@
 import numpy as np
 import pytest
 
+from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import Setup, World
+from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.fluid.grid import Grid
 from flowborne.measures import Measures, quaternion
+from flowborne.simulation import FrameReport
 from flowborne.solids.model import SolidModel
+from flowborne.validation.worlds import mjcf, world_of
 
 MODEL = """
 <mujoco>
@@ -36,6 +41,30 @@ def test_joints_and_bodies_are_told_with_their_units():
     assert values["arm_qz"] == pytest.approx(np.sqrt(0.5))
     assert np.isnan(values["drag_N"])
     assert not [column for column in measures.columns if column.startswith("target_")]
+
+
+def test_fastest_is_the_largest_speed_of_any_step_across_an_open_face():
+    """A disc in a stream that slows down: its sides are passed faster than the stream flows."""
+
+    def slowing(x, y, z, time):
+        return (2.0 if time < 0.015 else 1.0) + 0 * x, 0 * x, 0 * x
+
+    sides = Boundaries(x_min=BoundaryInflow(slowing), x_max=BoundaryOpen())
+    grid = Grid.slab(32, 32, 1 / 32, (-0.5, -0.5))
+    world = world_of(grid, mjcf('<geom type="sphere" size="0.1"/>'), boundaries=sides)
+    measures = Measures(world.setup, None, None)
+    steps, largest = [], []
+    for _ in range(2):
+        steps.append(step(world, 0.01))
+        opened = cut_by_bodies(world).open
+        largest.append(
+            max(np.abs(world.fluid.velocity[a])[opened[a] > 0.0].max() for a in grid.axes)
+        )
+    none = np.zeros(0)
+    frame = FrameReport(1, world.time, tuple(steps), np.nan, {}, none, none, False, {})
+    assert largest[0] > 1.5 * largest[1] > 1.5
+    assert measures.values(world, 1, frame)["fastest_m/s"] == largest[0]
+    assert np.isnan(measures.values(world, 0, None)["fastest_m/s"])
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,8 @@ class Measures:
                                                 scenes that have some
       momentum_{exchange,budget}_error          relative: of the pressure solve; of all of these
       divergence_1/s, solver_iterations, residual, contacts
+      fastest_m/s                               largest speed of the fluid across an open part of a
+                                                face in any step of the frame
 
     columns     names, in the order in which they are written
     controlled  those of the positions of the controlled joints
@@ -112,7 +114,7 @@ class Measures:
             names += [f"momentum_{part}_{axis}_Ns" for axis in "xyz"]
         names += ["expelled_m3"] if self._blows else []
         names += ["momentum_exchange_error", "momentum_budget_error", "divergence_1/s"]
-        return (*names, "solver_iterations", "residual", "contacts")
+        return (*names, "solver_iterations", "residual", "contacts", "fastest_m/s")
 
     def _of_frame(self, report: FrameReport) -> dict[str, float]:
         steps, last = report.steps, report.step
@@ -137,6 +139,7 @@ class Measures:
         values["solver_iterations"] = max(step.iterations for step in steps)
         values["residual"] = max(step.residual for step in steps)
         values["contacts"] = max(step.contacts for step in steps)
+        values["fastest_m/s"] = max(step.fastest for step in steps)
         return values
 
     def _effort(self, last: StepReport) -> float:

@@ -66,6 +66,7 @@ class StepReport:
     iterations       of the pressure solves
     residual         true relative residual of the last of them
     divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
+    fastest          largest speed of the fluid across an open face after the solve, m/s
     momentum         the budget
     work             of the drives, J
     expelled         volume that mouths expelled, less what they took in, m^3
@@ -85,6 +86,7 @@ class StepReport:
     iterations: int = 0
     residual: float = 0.0
     divergence: float = 0.0
+    fastest: float = 0.0
     momentum: Momentum = field(default_factory=Momentum)
     work: float = 0.0
     expelled: float = 0.0

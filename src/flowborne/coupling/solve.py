@@ -60,6 +60,7 @@ class Projected:
     iterations  of the solve, all turns of a step together in the end
     residual    true relative residual
     divergence  largest |net outflow of a cell| / volume, 1/s
+    fastest     largest |u+| on an open face, m/s
     """
 
     velocity: Faces
@@ -69,6 +70,7 @@ class Projected:
     residual: float
     converged: bool
     divergence: float
+    fastest: float
 
 
 @dataclass(frozen=True)
@@ -230,4 +232,10 @@ def project(
         solution.residual,
         solution.converged,
         float(np.abs(left).max()) / grid.cell_volume,
+        max(largest_speed(after[axis], cut.open[axis]) for axis in grid.axes),
     )
+
+
+def largest_speed(velocity: Array, opened: Array) -> float:
+    """Largest |velocity|, m/s, on the faces across an axis that are not wholly closed."""
+    return float(np.abs(velocity).max(where=opened > 0.0, initial=0.0))

@@ -303,5 +303,5 @@ def report(
         done.viscous_wrench = on_bodies(pose, carried, solved.viscous_impulse / dt)
         done.buoyancy_wrench = on_bodies(pose, carried, buoyancy)
         done.iterations, done.residual = projected.iterations, projected.residual
-        done.divergence = projected.divergence
+        done.divergence, done.fastest = projected.divergence, projected.fastest
     return done
