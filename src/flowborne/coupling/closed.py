@@ -7,15 +7,16 @@ is shared among them by what each closes alone.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array
 
 CREASE = 0.02
-"""Open part below which a face between two bodies is closed. Bodies that overlap at a joint press
-a cell between them that they never press in truth: what it has to lose would leave through such a
-face, at a thousand times their speed."""
+"""Open part below which a face in a crease is closed. Bodies that overlap at a joint, or reach into
+a side of the domain, press a cell that they never press in truth: what it has to lose would leave
+through such a face, at a thousand times their speed."""
 
 
 @njit(nogil=True, cache=True)
@@ -79,21 +80,45 @@ def add_closed(total: Array, phi: Array, box: Integers, axis: int) -> None:
 
 
 @njit(nogil=True, cache=True)
-def in_a_crease(nearest: Integers, axis: int, i: int, j: int, k: int) -> bool:
-    """Whether the corners of the two cells beside face (i, j, k) are near to different bodies."""
-    first = nearest[i, j, k]
-    for a in range(3 if axis == 0 else 2):
-        for b in range(3 if axis == 1 else 2):
-            for c in range(3 if axis == 2 else 2):
-                x = i + a - (1 if axis == 0 else 0)
-                y = j + b - (1 if axis == 1 else 0)
-                z = k + c - (1 if axis == 2 else 0)
-                x = min(max(x, 0), nearest.shape[0] - 1)
-                y = min(max(y, 0), nearest.shape[1] - 1)
-                z = min(max(z, 0), nearest.shape[2] - 1)
-                if nearest[x, y, z] != first:
-                    return True
-    return False
+def beside_sides(shape: Integers, walls: Integers) -> Integers:
+    """(nx, ny, nz) how many solid sides bound each cell.
+
+    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
+    """
+    beside = np.zeros((shape[0], shape[1], shape[2]), np.int64)
+    beside[0] += walls[0, 0]
+    beside[-1] += walls[0, 1]
+    beside[:, 0] += walls[1, 0]
+    beside[:, -1] += walls[1, 1]
+    if shape[2] > 1:
+        beside[:, :, 0] += walls[2, 0]
+        beside[:, :, -1] += walls[2, 1]
+    return beside
+
+
+@njit(nogil=True, cache=True)
+def count_beside(beside: Integers, phi: Array, box: Integers, count: int) -> None:
+    """Add `count` to the cells of which one body covers a corner."""
+    for i in range(box[0, 0], box[0, 1] - 1):
+        for j in range(box[1, 0], box[1, 1] - 1):
+            for k in range(box[2, 0], box[2, 1] - 1):
+                a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
+                deepest = min(
+                    min(phi[a, b, c], phi[a, b, c + 1]),
+                    min(phi[a, b + 1, c], phi[a, b + 1, c + 1]),
+                    min(phi[a + 1, b, c], phi[a + 1, b, c + 1]),
+                    min(phi[a + 1, b + 1, c], phi[a + 1, b + 1, c + 1]),
+                )
+                if deepest < 0.0:
+                    beside[i, j, k] += count
+
+
+@njit(nogil=True, cache=True)
+def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int) -> bool:
+    """Whether two bodies, or a body and a side, bound one of the cells at face (i, j, k)."""
+    n = i if axis == 0 else (j if axis == 1 else k)
+    x, y, z = i - int(axis == 0), j - int(axis == 1), k - int(axis == 2)
+    return bool((n < beside.shape[axis] and beside[i, j, k] > 1) or (n > 0 and beside[x, y, z] > 1))
 
 
 @njit(nogil=True, cache=True)
@@ -102,7 +127,7 @@ def share_closed(
     opened: Array,
     total: Array,
     distance: Array,
-    nearest: Integers,
+    beside: Integers,
     phi: Array,
     box: Integers,
     axis: int,
@@ -110,6 +135,7 @@ def share_closed(
 ) -> int:
     """This body's part of each closed face in its box, and the open fractions; counts parts.
 
+    beside (nx, ny, nz) how many bodies and solid sides bound each cell
     walls  (2,) 1 where the lower or upper side across `axis` is solid or an inflow: the side, not
            the body, decides what crosses there
     """
@@ -127,7 +153,7 @@ def share_closed(
                     continue
                 union = face_closed(distance, axis, i, j, k)
                 if union > 1.0 - CREASE and (
-                    union > 1.0 - 1e-9 or in_a_crease(nearest, axis, i, j, k)
+                    union > 1.0 - 1e-9 or in_a_crease(beside, axis, i, j, k)
                 ):
                     union = 1.0
                 opened[i, j, k] = 1.0 - union

@@ -88,12 +88,21 @@ def skin_at(skins: Skins, place: Array, grid: Grid) -> tuple[Integers, Array]:
 
 
 @njit(nogil=True, cache=True)
-def has_open_face(i: int, j: int, k: int, ox: Array, oy: Array, oz: Array) -> bool:
-    """Whether cell (i, j, k) has a face that is not wholly closed."""
-    clear = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
-    if ox.shape[2] > 1:
-        clear += oz[i, j, k] + oz[i, j, k + 1]
-    return bool(clear > 0.0)
+def has_open_face(i: int, j: int, k: int, ox: Array, oy: Array, oz: Array, walls: Integers) -> bool:
+    """Whether cell (i, j, k) has a face that is not wholly closed, and not on a solid side.
+
+    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
+    """
+    cell = i, j, k
+    for axis in range(2 if ox.shape[2] == 1 else 3):
+        opened = ox if axis == 0 else (oy if axis == 1 else oz)
+        last = opened.shape[axis] - 2
+        x, y, z = i + int(axis == 0), j + int(axis == 1), k + int(axis == 2)
+        if opened[i, j, k] > 0.0 and not (cell[axis] == 0 and walls[axis, 0]):
+            return True
+        if opened[x, y, z] > 0.0 and not (cell[axis] == last and walls[axis, 1]):
+            return True
+    return False
 
 
 @njit(nogil=True, cache=True)
@@ -108,6 +117,7 @@ def flesh_rows(
     ox: Array,
     oy: Array,
     oz: Array,
+    walls: Integers,
 ) -> tuple[Integers, Integers, Integers, Integers, Array]:
     """Coupling rows of the cells beside closed parts of faces: one row per part and open cell.
 
@@ -115,6 +125,7 @@ def flesh_rows(
     closed          (n,) part of each that flesh closes
     corner, weight  (n, 3) vertices that move it
     first_column    of the vertices' velocities
+    walls           (3, 2) as in `has_open_face`
     returns         number of the part of each row; cells, row_start, columns, values as in
                     `Geometry`
     """
@@ -130,7 +141,7 @@ def flesh_rows(
             cell[axis[n]] -= 1 - side
             if cell[axis[n]] < 0 or cell[axis[n]] >= shape[axis[n]]:
                 continue
-            if not has_open_face(cell[0], cell[1], cell[2], ox, oy, oz):
+            if not has_open_face(cell[0], cell[1], cell[2], ox, oy, oz, walls):
                 continue
             part[rows] = n
             cells[rows] = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]

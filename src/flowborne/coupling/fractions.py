@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from flowborne.coupling.closed import add_closed, list_closed, share_closed
+from flowborne.coupling.closed import (
+    add_closed,
+    beside_sides,
+    count_beside,
+    list_closed,
+    share_closed,
+)
 from flowborne.coupling.distance import BAND, merge, node_box, sample_body
 from flowborne.coupling.flesh import (
     Skins,
@@ -21,6 +27,9 @@ from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
+
+ITS_FOLDS = 2
+"""How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
 
 NO_VERTICES = np.zeros((0, 3))
 
@@ -81,6 +90,7 @@ def cell_wrench(
     ox: Array,
     oy: Array,
     oz: Array,
+    walls: Integers,
     box: Integers,
     origin: Array,
     h: float,
@@ -97,7 +107,7 @@ def cell_wrench(
     touched = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
     if not flat:
         touched += sz[a, b, c] + sz[a, b, c + 1]
-    if touched == 0.0 or not has_open_face(i, j, k, ox, oy, oz):
+    if touched == 0.0 or not has_open_face(i, j, k, ox, oy, oz, walls):
         return 0
     wrench[:] = 0.0
     for side in range(2):
@@ -126,6 +136,7 @@ def list_cells(
     ox: Array,
     oy: Array,
     oz: Array,
+    walls: Integers,
     box: Integers,
     body: int,
     origin: Array,
@@ -146,7 +157,10 @@ def list_cells(
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
             for k in range(box[2, 0], box[2, 1] - 1):
-                if cell_wrench(wrench, i, j, k, sx, sy, sz, ox, oy, oz, box, origin, h, area, flat):
+                found = cell_wrench(
+                    wrench, i, j, k, sx, sy, sz, ox, oy, oz, walls, box, origin, h, area, flat
+                )
+                if found:
                     if cells.size:
                         cells[at] = (i * n[1] + j) * n[2] + k
                         for m in range(6):
@@ -201,6 +215,7 @@ def cut(
     rigid = np.unique(body_of)
     bodies = np.append(rigid, first_skin + np.arange(len(skin_start)))
     boxes = np.empty((bodies.size, 3, 2), np.int64)
+    beside = beside_sides(shape, walls)
     phis = []
     shares_x = []
     shares_y = []
@@ -239,6 +254,7 @@ def cut(
             start = skin_start[n - rigid.size]
             phi.reshape(-1)[:] = skin_distance[start : start + phi.size]
         merge(distance, nearest, phi, box, bodies[n])
+        count_beside(beside, phi, box, 1 if n < rigid.size else ITS_FOLDS)
         phis.append(phi)
         add_closed(tx, phi, box, 0)
         add_closed(ty, phi, box, 1)
@@ -253,10 +269,11 @@ def cut(
         shares_x.append(np.zeros((d[0] + 1, d[1], d[2])))
         shares_y.append(np.zeros((d[0], d[1] + 1, d[2])))
         shares_z.append(np.zeros((d[0], d[1], d[2] + 1)))
-        parts += share_closed(shares_x[n], ox, tx, distance, nearest, phis[n], box, 0, walls[0])
-        parts += share_closed(shares_y[n], oy, ty, distance, nearest, phis[n], box, 1, walls[1])
+        phi = phis[n]
+        parts += share_closed(shares_x[n], ox, tx, distance, beside, phi, box, 0, walls[0])
+        parts += share_closed(shares_y[n], oy, ty, distance, beside, phi, box, 1, walls[1])
         if not flat:
-            parts += share_closed(shares_z[n], oz, tz, distance, nearest, phis[n], box, 2, walls[2])
+            parts += share_closed(shares_z[n], oz, tz, distance, beside, phi, box, 2, walls[2])
     for n in range(rigid.size):
         rows = list_cells(
             shares_x[n],
@@ -265,6 +282,7 @@ def cut(
             ox,
             oy,
             oz,
+            walls,
             boxes[n],
             bodies[n],
             origin,
@@ -304,6 +322,7 @@ def cut(
                 ox,
                 oy,
                 oz,
+                walls,
                 boxes[n],
                 b,
                 origin,
@@ -377,6 +396,7 @@ def geometry(
             6 * first_skin,
             grid.face_area,
             *opened,
+            walls,
         )
         more_cells, more_start, more_columns, more_values = more
         across = (more_columns[::3] - 6 * first_skin) % 3
