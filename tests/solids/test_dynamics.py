@@ -107,6 +107,34 @@ def test_updated_finds_mujocos_active_set(xml: str, slab: bool, start: int) -> N
         )
 
 
+BARE = """<mujoco><worldbody><geom type="plane" size="9 9 .1" condim="{floor}" friction="0"/>
+<body pos="0 0 .049"><freejoint/><geom type="box" size=".2 .1 .05" condim="{box}" friction="0 0 0"/>
+</body><body pos="1 0 .049"><freejoint/><geom type="box" size=".2 .1 .05" friction=".5"/></body>
+</worldbody></mujoco>"""
+"""Two boxes on a floor, one of them without friction."""
+
+
+@pytest.mark.parametrize("condim", [3, 4, 6])
+def test_contact_without_friction_is_that_of_condim_1(condim: int) -> None:
+    """One row a contact, the same as MuJoCo's own for condim 1; other contacts keep theirs."""
+    systems = []
+    for box in (condim, 1):
+        xml = BARE.format(floor=box, box=box).replace('friction="0"', 'friction="0 0 0"')
+        model = SolidModel.from_string(xml, gravity=(0.0, 0.0, -9.81))
+        state = tumbled(model, 3, speed=0.1, far=0.0)
+        systems.append(assemble(model, state, np.zeros(model.nv), 0.01))
+    (bare, plain), dofs = (system.rows for system in systems), slice(0, 6)
+    assert bare is not None
+    assert plain is not None
+    own = [np.flatnonzero(np.abs(rows.J[:, dofs]).max(axis=1) > 0.0) for rows in (bare, plain)]
+    assert len(own[0]) == len(own[1]) == 4
+    for name in ("J", "D", "aref", "friction", "kind"):
+        np.testing.assert_allclose(
+            getattr(bare, name)[own[0]], getattr(plain, name)[own[1]], rtol=1e-9, atol=1e-12
+        )
+    assert len(bare.D) - len(own[0]) >= len(plain.D) - len(own[1]) == 16
+
+
 def test_pushed_adds_a_force_and_keeps_the_rows() -> None:
     model = SolidModel.from_string(CROWD)
     state = tumbled(model, 5)

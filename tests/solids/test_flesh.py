@@ -267,14 +267,20 @@ LIMITED = ARM.replace('name="elbow"', 'name="elbow" range="5 9" frictionloss=".0
 )
 
 
-def limited() -> SolidModel:
-    """The arm with a joint limit that is exceeded, dry friction, and contacts of its flesh."""
+def limited(slippery: bool = False) -> SolidModel:
+    """The arm with a joint limit that is exceeded, dry friction, and contacts of its flesh.
+
+    slippery  contacts have no friction
+    """
     spec = mujoco.MjSpec.from_string(LIMITED)
     points, elements = bar_mesh((8, 2, 2), (0.4, 0.1, 0.1))
     points[:, 2] += 0.025
     holders = ["lower" if 0.2 < x < 0.3 else "" for x in points[:, 0]]
     add_flesh(spec, "arm", points, elements, Tissue(3e4, 0.3, 1000.0, 0.01), holders)
     spec.flexes[0].conaffinity = 1
+    if slippery:
+        for touching in (*spec.geoms, *spec.flexes):
+            touching.friction, touching.condim = np.zeros(3), 3
     return SolidModel.with_flesh(spec, gravity=(0.0, 0.5, -2.0))
 
 
@@ -316,6 +322,25 @@ def test_rows_are_found_from_any_start_by_one_factor() -> None:
         dense = np.linalg.solve(B, right.impulse + push + drive)
         np.testing.assert_allclose(driven.velocity, dense, atol=1e-10 * np.abs(dense).max())
         assert (drive != 0.0).sum() == prescribed.sum()
+
+
+def test_contacts_of_flesh_without_friction_settle() -> None:
+    """One row for each, found from no contact at all."""
+    model = limited(slippery=True)
+    state, nothing = moving(model), np.zeros(model.nv)
+    right = assemble_flesh(model, state, nothing, DT)
+    assert right.rows is not None
+    touching = right.rows.contact[right.rows.contact >= 0]
+    assert touching.size == np.unique(touching).size > 1
+    driven = prescribe_flesh(
+        replace(right, zones=np.zeros_like(right.zones)), np.zeros(model.nv, bool), nothing
+    )
+    for _ in range(8):
+        changed = driven.updated(driven.velocity)
+        if changed is None:
+            return
+        driven = changed
+    raise AssertionError("the rows do not settle")
 
 
 @pytest.mark.parametrize("centred", [False, True])

@@ -281,7 +281,10 @@ def _smooth(model: SolidModel, s: Scratch, mass: Array, v: Array) -> tuple[Array
 
 
 def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:
-    """Constraint rows and their zones in MuJoCo's own solution; after mj_forward."""
+    """Constraint rows and their zones in MuJoCo's own solution; after mj_forward.
+
+    Contacts without friction have one row, whatever their condim.
+    """
     data, count = s.data, int(s.data.nefc)
     if count == 0:
         return None, np.zeros(0, np.int64)
@@ -300,7 +303,43 @@ def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:
         KIND_OF_ROW[kind],
         np.where(kind >= FIRST_CONTACT, data.efc_id, -1),
     )
-    return rows, data.efc_state.astype(np.int64)
+    return merge_frictionless(rows, data.efc_state.astype(np.int64), s)
+
+
+def merge_frictionless(rows: Rows, zones: Zones, s: Scratch) -> tuple[Rows, Zones]:
+    """One row along the normal in place of the pyramid of every contact without friction.
+
+    The edges of such a pyramid are the normal, but for a friction of mjMINMU = 1e-5 that MuJoCo
+    leaves, and 1 / (2 mu^2) times as stiff: rounding decides which of them are active, and they
+    take turns without end. Their mean is the normal's row, of stiffness 2 mu^2 D, as MuJoCo makes
+    it for condim 1.
+    """
+    contacts = s.data.contact
+    used = np.arange(contacts.friction.shape[1]) < contacts.dim[:, None] - 1
+    friction = np.where(used, contacts.friction, 0.0).max(axis=1)
+    bare = (contacts.dim > 1) & (friction <= mujoco.mjMINMU)
+    edge = (rows.contact >= 0) & np.isin(rows.contact, np.flatnonzero(bare))
+    if not edge.any():
+        return rows, zones
+    # the number of its new row for every old one
+    follows = edge & np.append(False, edge[:-1] & (rows.contact[1:] == rows.contact[:-1]))
+    first = np.flatnonzero(~follows)
+    group = np.cumsum(~follows) - 1
+    count = np.bincount(group)
+    mean = csr_array((1.0 / count[group], (group, np.arange(len(group)))))
+    D = rows.D[first].copy()
+    D[edge[first]] *= 2.0 * contacts.mu[rows.contact[first[edge[first]]]] ** 2
+    active = np.zeros(len(first), bool)
+    np.logical_or.at(active, group, zones == ACTIVE)
+    merged = Rows(
+        mean @ rows.J,
+        D,
+        mean @ rows.aref,
+        rows.friction[first],
+        rows.kind[first],
+        rows.contact[first],
+    )
+    return merged, np.where(edge[first], np.where(active, ACTIVE, OFF), zones[first])
 
 
 def _with_rows(

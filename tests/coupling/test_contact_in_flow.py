@@ -1,0 +1,52 @@
+"""Contact in a fluid: the contacts of a step are found in few passes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.coupling import solve
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Grid
+from flowborne.validation.worlds import advance, world_of
+
+BOX = """<mujoco><worldbody>
+  <geom type="plane" size="4 4 1" pos="0 -0.4 0" zaxis="0 1 0" condim="{condim}" friction="0 0 0"/>
+  <body pos="0 -0.355 0"><freejoint/>
+    <geom type="box" size="0.1 0.05 0.1" condim="{condim}" friction="0 0 0" density="2000"/>
+  </body>
+</worldbody></mujoco>"""
+
+GRIDS = {
+    "slab": Grid.slab(16, 16, 1.0 / 16, (-0.5, -0.4)),
+    "room": Grid((12, 12, 12), 1.0 / 12, (-0.5, -0.4, -0.5)),
+    "no fluid": None,
+}
+
+
+def sliding(grid: Grid | None, condim: int) -> World:
+    """A box that slides over a floor without friction, under gravity."""
+    world = world_of(grid, BOX.format(condim=condim), gravity=(0.0, -9.81, 0.0), density=1000.0)
+    world.solid.v[0] = 0.5
+    return world
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_contact_without_friction_settles(grid: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four edges of a pyramid that are one: they do not take turns."""
+    passes: list[int] = []
+    correct = solve.correct
+
+    def counted(*given: object) -> object:
+        passes[-1] += 1
+        return correct(*given)
+
+    monkeypatch.setattr(solve, "correct", counted)
+    bare, plain = sliding(GRIDS[grid], 3), sliding(GRIDS[grid], 1)
+    for _ in range(20):
+        passes.append(0)
+        assert advance(bare, 0.01).contacts > 0
+        assert passes[-1] <= 3
+        passes.append(0)
+        advance(plain, 0.01)
+    np.testing.assert_allclose(bare.solid.v, plain.solid.v, atol=1e-6)
