@@ -84,7 +84,19 @@ def spin(world, report):
 
 
 def diverge(world, report):
-    report.outcome, report.residual, report.iterations = Outcome.NOT_CONVERGED, 0.5, 200
+    report.outcome, report.residual, report.iterations = Outcome.PRESSURE_NOT_CONVERGED, 0.5, 200
+
+
+def stay_viscous(world, report):
+    report.outcome, report.residual, report.iterations = Outcome.VISCOSITY_NOT_CONVERGED, 0.5, 200
+
+
+def rattle(world, report):
+    report.outcome, report.unsettled = Outcome.NOT_SETTLED, np.array([0])
+
+
+def creep(world, report):
+    report.outcome = Outcome.NOT_SETTLED
 
 
 def lose_an_inverse(world, report):
@@ -96,7 +108,14 @@ def lose_an_inverse(world, report):
     [
         (lose_a_number, "a joint's position or velocity is not a finite number"),
         (spin, r"hinge turns by 4 rad in one step, more than half a turn"),
-        (diverge, r"did not reach its tolerance \(relative residual 0.5 after 200 iterations\)"),
+        (
+            diverge,
+            r"the pressure solve did not reach its tolerance "
+            r"\(relative residual 0.5 after 200 iterations\)$",
+        ),
+        (stay_viscous, r"the viscous solve did not reach its tolerance$"),
+        (rattle, r"contacts, torque limits or Coriolis forces did not settle \(at hinge\)$"),
+        (creep, r"contacts, torque limits or Coriolis forces did not settle$"),
         (lose_an_inverse, "3-th leading minor not positive definite"),
     ],
 )

@@ -37,6 +37,10 @@ TORN = 0.02
 """Part of the elements of flesh that may be inside out, on their way back for instance."""
 
 
+LISTED = 4
+"""Most dofs that a message names."""
+
+
 class BlowUpError(Exception):
     """The simulation cannot go on.
 
@@ -234,9 +238,13 @@ class Simulation:
 
 def trouble(world: World, report: StepReport) -> str | None:
     """Why the world cannot be stepped on after the step of `report`, or None."""
+    if report.outcome is Outcome.PRESSURE_NOT_CONVERGED:
+        detail = f"relative residual {report.residual:.2g} after {report.iterations} iterations"
+        return f"{report.outcome.value} ({detail})"
+    if report.outcome is Outcome.NOT_SETTLED and report.unsettled.size:
+        return f"{report.outcome.value} (at {_listed(world, report.unsettled)})"
     if report.outcome is not Outcome.DONE:
-        detail = f" (relative residual {report.residual:.2g} after {report.iterations} iterations)"
-        return report.outcome.value + detail * (report.outcome is Outcome.NOT_CONVERGED)
+        return report.outcome.value
     solid, fluid, properties = world.solid, world.fluid, world.setup.fluid
     if not (np.isfinite(solid.q).all() and np.isfinite(solid.v).all()):
         return "a joint's position or velocity is not a finite number"
@@ -260,6 +268,13 @@ def trouble(world: World, report: StepReport) -> str | None:
             f"({longest:.3g} m)"
         )
     return None
+
+
+def _listed(world: World, dofs: NDArray[np.int64]) -> str:
+    """Names of the first few of some dofs."""
+    names = [world.setup.solid.dof_names[dof] for dof in dofs[:LISTED]]
+    more = len(dofs) - len(names)
+    return ", ".join(names) + (f" and {more} more" if more else "")
 
 
 def turning_dofs(model: SolidModel) -> NDArray[np.bool_]:

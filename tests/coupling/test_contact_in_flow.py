@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from flowborne.coupling import solve
+from flowborne.coupling.motion import Drive
+from flowborne.coupling.report import Outcome
+from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.validation.worlds import advance, world_of
@@ -50,3 +55,27 @@ def test_contact_without_friction_settles(grid: str, monkeypatch: pytest.MonkeyP
         passes.append(0)
         advance(plain, 0.01)
     np.testing.assert_allclose(bare.solid.v, plain.solid.v, atol=1e-6)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_what_does_not_settle_is_told_apart_from_a_solve(
+    grid: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One pass is too few for a drive that gives way: its dof is named, and no solve is blamed."""
+    world = sliding(GRIDS[grid], 1)
+    drive = Drive.none(world.setup.solid.nv)
+    drive.set(np.array([0]), 5.0, 5.0, 1.0)
+    assert step(world.copy(), 0.01, drive).outcome is Outcome.DONE
+    monkeypatch.setattr(solve, "PASSES", 1)
+    report = step(world, 0.01, drive)
+    assert report.outcome is Outcome.NOT_SETTLED
+    assert 0 in report.unsettled
+
+
+def test_each_solve_that_misses_its_tolerance_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = sliding(GRIDS["slab"], 1)
+    diffuse, project = solve.diffuse, solve.project
+    monkeypatch.setattr(solve, "diffuse", lambda *given: (*diffuse(*given)[:2], False))
+    assert step(world.copy(), 0.01).outcome is Outcome.VISCOSITY_NOT_CONVERGED
+    monkeypatch.setattr(solve, "project", lambda *given: replace(project(*given), converged=False))
+    assert step(world.copy(), 0.01).outcome is Outcome.PRESSURE_NOT_CONVERGED

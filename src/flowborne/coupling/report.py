@@ -15,7 +15,9 @@ class Outcome(Enum):
     """How a step ended, as a sentence."""
 
     DONE = "the step is done"
-    NOT_CONVERGED = "the pressure solve did not reach its tolerance"
+    PRESSURE_NOT_CONVERGED = "the pressure solve did not reach its tolerance"
+    VISCOSITY_NOT_CONVERGED = "the viscous solve did not reach its tolerance"
+    NOT_SETTLED = "contacts, torque limits or Coriolis forces did not settle"
     NOT_FINITE = "a velocity or a pressure is not a finite number"
 
 
@@ -73,6 +75,8 @@ class StepReport:
     seconds          where the time went: advection, viscosity, projection, geometry, solids
     contacts         number of active contacts
     limited          (k,) dofs whose torque limit was reached
+    unsettled        (k,) dofs whose contacts, joint limits or drives still changed when the step
+                     gave up; none when Coriolis forces alone did
     """
 
     dt: float
@@ -93,6 +97,7 @@ class StepReport:
     seconds: dict[str, float] = field(default_factory=dict)
     contacts: int = 0
     limited: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    unsettled: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def fluid_wrench(self) -> Array:
         """(nbody, 6) everything that the fluid and the winds do to each body."""

@@ -30,8 +30,10 @@ from flowborne.coupling.operators import (
     pressure_push,
     response,
 )
+from flowborne.coupling.report import Outcome
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.pressure import NO_REACTION, Coupling, PressureSystem
 from flowborne.fluid.projection import face_weights, outflow, push
@@ -82,7 +84,9 @@ class Solved:
     viscous_impulse   (k,) as in `Projected`
     before_pressure   Faces, m/s; None without a fluid
     projected         None without a fluid
-    converged         solve within its tolerance, contacts and limits settled
+    outcome           DONE, or which solve missed its tolerance, or that contacts, limits or
+                      Coriolis forces did not settle
+    unsettled         (k,) dofs as in `StepReport`
     """
 
     driven: Driven
@@ -91,7 +95,8 @@ class Solved:
     viscous_impulse: Array
     before_pressure: Faces | None
     projected: Projected | None
-    converged: bool
+    outcome: Outcome
+    unsettled: Integers
 
 
 def correct(driven: Driven, v: Array, actuator: Array, limit: Array) -> Driven | None:
@@ -101,16 +106,30 @@ def correct(driven: Driven, v: Array, actuator: Array, limit: Array) -> Driven |
     return within_limits(later or driven, limit, v, actuator) or later
 
 
+def unsettled(driven: Driven, changed: Driven | None, v: Array) -> Integers:
+    """(k,) dofs whose contacts, joint limits or drives `v` (nv,) asks to change."""
+    if changed is None:
+        return np.zeros(0, np.int64)
+    system = driven.system
+    wrong = (driven.prescribed != changed.prescribed) | (driven.limited != changed.limited)
+    if system.rows is not None:
+        zones = system.rows.zones((v - system.v) / system.dt, system.zones)
+        wrong |= np.any(system.rows.J[zones != system.zones] != 0.0, axis=0)
+    return np.flatnonzero(wrong)
+
+
 def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
     """Bodies without a fluid; k is `size`."""
     none = np.zeros(driven.velocity.size)
     for _ in range(PASSES):
         actuator = driven.actuator(driven.velocity, none)
         changed = correct(driven, driven.velocity, actuator, torque_limit)
+        left = unsettled(driven, changed, driven.velocity)
         if changed is None:
             break
         driven = changed
-    return Solved(driven, driven.velocity, actuator, np.zeros(size), None, None, changed is None)
+    outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
+    return Solved(driven, driven.velocity, actuator, np.zeros(size), None, None, outcome, left)
 
 
 def solve_together(
@@ -152,6 +171,7 @@ def solve_together(
         v = driven.after(impulse)
         actuator = driven.actuator(v, impulse)
         changed = correct(driven, v, actuator, torque_limit)
+        left = unsettled(driven, changed, v)
         if changed is None:
             break
         if not changed.answers_as(driven):
@@ -159,9 +179,13 @@ def solve_together(
             smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, changed, dt)
             watch.lap("viscosity")
         driven, pressure = changed, dt * projected.pressure
-    settled = smoothed and projected.converged and changed is None
+    outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
+    if not smoothed:
+        outcome = Outcome.VISCOSITY_NOT_CONVERGED
+    if not projected.converged:
+        outcome = Outcome.PRESSURE_NOT_CONVERGED
     projected = replace(projected, iterations=iterations)
-    return Solved(driven, v, actuator, viscous, smooth, projected, settled)
+    return Solved(driven, v, actuator, viscous, smooth, projected, outcome, left)
 
 
 def give_way(cut: Geometry, mobility: Response, grid: Grid) -> Array:

@@ -279,11 +279,10 @@ def report(
     finite = bool(np.isfinite(solved.v).all())
     if projected is not None:
         finite = finite and bool(np.isfinite(projected.pressure).all())
-    outcome = Outcome.DONE if solved.converged else Outcome.NOT_CONVERGED
     halfway = 0.5 * (solved.driven.system.v + solved.v)
     done = StepReport(
         dt=dt,
-        outcome=outcome if finite else Outcome.NOT_FINITE,
+        outcome=solved.outcome if finite else Outcome.NOT_FINITE,
         actuator=solved.actuator,
         pressure_wrench=np.zeros(wind.shape),
         viscous_wrench=np.zeros(wind.shape),
@@ -294,6 +293,7 @@ def report(
         work=dt * float(solved.actuator @ halfway),
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
+        unsettled=solved.unsettled,
         seconds=watch.seconds,
     )
     if projected is not None:
