@@ -63,6 +63,22 @@ UNCOUPLED = Coupling(
 
 
 @dataclass(frozen=True)
+class Coupled:
+    """What a coupling adds to the system of one geometry, the same for every right-hand side.
+
+    rows     of G^T in active cells, with padded flat indices
+    null     see `regions.null_basis`
+    fields   (m, padded shape) and
+    answers  (m, k) of the motions in the preconditioner; see `body_modes`
+    """
+
+    rows: Rows
+    null: Array
+    fields: Real
+    answers: Array
+
+
+@dataclass(frozen=True)
 class PressureSolution:
     """What a solve gave.
 
@@ -238,6 +254,7 @@ class PressureSystem:
         faces = (x, y, z)
         if self.slab:
             faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
+        self._coupled: tuple[Coupling, Coupled] | None = None
         self.buffers = borrow((inner, wraps), self)
         b = self.buffers
         self.hierarchy = (
@@ -276,31 +293,19 @@ class PressureSystem:
         first = np.zeros(self.shape) if guess is None else np.ascontiguousarray(guess, np.float64)
         load(x, first.reshape(cells), diagonal)
         load(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
-        rows = padded_rows(
-            (coupling.cells, coupling.row_start, coupling.columns, coupling.values), diagonal
-        )
-        response = coupling.response
-        null, answers, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
-        if self.regions:
-            wrench = region_wrenches(b.label, self.regions, response.size, rows)
-            null = null_basis(b.count[: self.regions], wrench, response)
-        modes = body_modes(response, rows, diagonal, max(cells))
-        modes *= np.sqrt(self.scale)
+        coupled = self.coupled(coupling)
         with parallel_kernels(self.parallel):
-            if modes.size:
-                fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
-                answers = mode_answers(modes, gram)
             iterations, residual, converged = solve(
                 self.hierarchy,
                 b.cycle,
                 b.finest,
                 b.vectors,
-                rows,
-                response.arrays,
+                coupled.rows,
+                coupling.response.arrays,
                 b.label,
-                null,
-                fields,
-                answers,
+                coupled.null,
+                coupled.fields,
+                coupled.answers,
                 tolerance,
                 absolute,
             )
@@ -308,3 +313,27 @@ class PressureSystem:
         inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
         pressure = x[inside].copy().reshape(self.shape)
         return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
+
+    def coupled(self, coupling: Coupling) -> Coupled:
+        """What the coupling adds; made when it is another than that of the last solve."""
+        if self._coupled is None or self._coupled[0] is not coupling:
+            self._coupled = coupling, self._couple(coupling)
+        return self._coupled[1]
+
+    def _couple(self, coupling: Coupling) -> Coupled:
+        b, response = self.buffers, coupling.response
+        diagonal = b.finest[3]
+        rows = padded_rows(
+            (coupling.cells, coupling.row_start, coupling.columns, coupling.values), diagonal
+        )
+        null, answers, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
+        if self.regions:
+            wrench = region_wrenches(b.label, self.regions, response.size, rows)
+            null = null_basis(b.count[: self.regions], wrench, response)
+        modes = body_modes(response, rows, diagonal, max(self.shape))
+        modes *= np.sqrt(self.scale)
+        if modes.size:
+            with parallel_kernels(self.parallel):
+                fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
+            answers = mode_answers(modes, gram)
+        return Coupled(rows, null, fields, answers)
