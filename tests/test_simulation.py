@@ -132,7 +132,7 @@ def test_a_blow_up_names_frame_and_cause_and_leaves_the_last_good_frame(small_sc
 
 
 def test_workers_are_as_many_as_trials_but_no_more_than_processors(monkeypatch):
-    monkeypatch.setattr("flowborne.simulation._processors", lambda: 4)
+    monkeypatch.setattr("flowborne.simulation.cores", lambda: 4)
     assert [default_workers(joints, True) for joints in (0, 1, 2, 3)] == [1, 2, 4, 4]
     assert default_workers(3, False) == 1
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from threadpoolctl import ThreadpoolController
 
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
+from flowborne.fluid.jit import cores, kernel_threads
 from flowborne.measures import Measures
 from flowborne.solids.inversion import inversion
 
@@ -166,12 +166,12 @@ class Simulation:
         self._moment = _Moment(world, frame, None)
 
     def advance_frame(self) -> FrameReport:
-        """Decide, then take the steps of one frame.
+        """Decide, then take the steps of one frame, on all cores unless a context allows less.
 
         raises  BlowUpError when a step fails. Whatever is raised, the frame has not begun
         """
         world = self.world.copy()
-        with _one_blas_thread():
+        with _one_blas_thread(), kernel_threads():
             report = self._advance(world, self.frame + 1)
         self._moment = _Moment(world, report.frame, report)
         return report
@@ -289,14 +289,7 @@ def default_workers(joints: int, fluid: bool) -> int:
 
     Without a fluid one: a trial then takes less time than handing it to a thread.
     """
-    return max(1, min(2 * joints, _processors())) if fluid else 1
-
-
-def _processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return max(1, min(2 * joints, cores())) if fluid else 1
 
 
 @lru_cache(maxsize=1)

@@ -14,6 +14,8 @@ import pytest
 
 from flowborne.control import executors
 from flowborne.control.executors import Foreign, Processes, Serial, Threads, mapper
+from flowborne.fluid import jit
+from flowborne.fluid.jit import allowed_threads, kernel_threads
 
 
 class LikeDask:
@@ -65,7 +67,7 @@ def test_packed_tasks_hold_a_mark_in_place_of_the_shared_object() -> None:
     packed = executors.pack((np.sum, {"deep": [shared]}), shared)
     assert len(packed) < 500
     executors.receive_shared(pickle.dumps(shared))
-    assert executors.run_packed(executors.pack((np.sum, [shared]), shared)) == [shared.sum()]
+    assert executors.run_packed(executors.pack((np.sum, [shared]), shared), 1) == [shared.sum()]
 
 
 @pytest.mark.parametrize("chosen", [Serial(), Threads(2), Foreign(ThreadPoolExecutor(1))])
@@ -96,3 +98,21 @@ def test_names_and_bad_names() -> None:
         mapper(3)
     with pytest.raises(ValueError, match="workers is 0"):
         Threads(0)
+
+
+def test_evaluations_that_run_at_once_share_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "cores", lambda: 8)
+    pool = Threads(2)
+    assert pool.map(threads_of, range(2)) == [1, 1]  # outside of any context
+    with kernel_threads():
+        assert pool.map(threads_of, range(1)) == [8]
+        assert pool.map(threads_of, range(2)) == [4, 4]
+        assert pool.map(threads_of, range(5)) == [4] * 5
+        assert Threads(16).map(threads_of, range(16)) == [1] * 16
+        with kernel_threads(2):
+            assert pool.map(threads_of, range(2)) == [1, 1]
+    pool.close()
+
+
+def threads_of(task: int) -> int:
+    return allowed_threads()

@@ -1,9 +1,20 @@
 """Kernels and their parallel twins."""
 
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from numba import prange
 
-from flowborne.fluid.jit import kernel, parallel_kernels
+from flowborne.fluid import jit
+from flowborne.fluid.jit import LARGE, Pause, allowed_threads, kernel, kernel_threads
+
+
+@pytest.fixture(autouse=True)
+def _no_pause(monkeypatch):
+    monkeypatch.setattr(jit, "_pause", Pause())
 
 
 @kernel
@@ -27,15 +38,71 @@ def shift(x):
         x[n] += 1.0
 
 
-def test_kernels_of_kernels_run_their_twins_inside_the_context_only():
-    expected = 4.0 * np.arange(5.0)
-    for wanted in (False, True):
-        x = np.arange(5.0)
-        with parallel_kernels(wanted):
+def test_kernels_of_kernels_run_their_twins_inside_the_context_only(monkeypatch):
+    monkeypatch.setattr(jit, "cores", lambda: 2)
+    expected = 4.0 * np.arange(LARGE)
+    for most in (1, 2):
+        x = np.arange(float(LARGE))
+        with kernel_threads(most):
             quadruple(x)
         np.testing.assert_array_equal(x, expected)
     assert quadruple.parallel is not quadruple.serial
     assert quadruple.parallel.py_func.__globals__["double"] is double.parallel
+
+
+@pytest.mark.parametrize("size", [LARGE, LARGE - 1])
+def test_threads_are_started_for_large_arrays_alone(monkeypatch, size):
+    asked = []
+    monkeypatch.setattr(
+        jit, "numba_threads", lambda count: asked.append(count) or nullcontext(True)
+    )
+    monkeypatch.setattr(jit, "cores", lambda: 3)
+    with kernel_threads():
+        double(np.zeros(size))
+        shift(np.zeros(size))
+    double(np.zeros(size))
+    assert asked == [3] * (size == LARGE)
+
+
+def test_a_context_allows_no_more_than_the_one_around(monkeypatch):
+    monkeypatch.setattr(jit, "cores", lambda: 8)
+    assert allowed_threads() == 1
+    with kernel_threads(3):
+        with kernel_threads():
+            assert allowed_threads() == 3
+        with kernel_threads(2):
+            assert allowed_threads() == 2
+        assert allowed_threads() == 3
+    assert allowed_threads() == 1
+
+
+def test_several_threads_may_run_twins_at_once(monkeypatch):
+    monkeypatch.setattr(jit, "cores", lambda: 2)
+    monkeypatch.setattr(jit, "GAIN", 0.0)
+
+    def worked(n):
+        x = np.full(LARGE, float(n))
+        with kernel_threads():
+            for _ in range(20):
+                quadruple(x)
+        return x[0] / 4.0**20, np.ptp(x)
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(worked, range(4))) == [(float(n), 0.0) for n in range(4)]
+
+
+@pytest.mark.parametrize(("worked", "pauses"), [(0.55, True), (0.65, False)])
+def test_threads_that_were_waited_for_too_long_are_left_out_for_a_while(
+    monkeypatch, worked, pauses
+):
+    now, pause = SimpleNamespace(monotonic=3.0, thread_time=1.0), Pause()
+    monkeypatch.setattr(jit.time, "monotonic", lambda: now.monotonic)
+    monkeypatch.setattr(jit.time, "thread_time", lambda: now.thread_time)
+    with pause.unless_worth(2):
+        now.monotonic, now.thread_time = now.monotonic + 1.0, now.thread_time + worked
+    assert pause.is_over() is not pauses
+    now.monotonic += jit.PAUSE
+    assert pause.is_over()
 
 
 def test_kernel_without_a_parallel_loop_has_no_twin():
@@ -43,11 +110,6 @@ def test_kernel_without_a_parallel_loop_has_no_twin():
 
 
 def test_context_is_left_after_an_error():
-    try:
-        with parallel_kernels():
-            raise RuntimeError("stop")
-    except RuntimeError:
-        pass
-    x = np.ones(3)
-    shift(x)
-    np.testing.assert_array_equal(x, 2.0)
+    with pytest.raises(RuntimeError), kernel_threads():
+        raise RuntimeError("stop")
+    assert allowed_threads() == 1

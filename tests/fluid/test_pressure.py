@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flowborne.fluid import jit
+from flowborne.fluid.jit import kernel_threads
 from flowborne.fluid.pressure import UNCOUPLED, Coupling, PressureSystem
 from flowborne.fluid.response import dense_response
 
@@ -279,16 +281,20 @@ def test_nothing_to_solve_gives_zero():
     assert not found.pressure.any()
 
 
-def test_threads_do_not_change_a_bit():
-    shape = (20, 13, 18)
-    weights = random_weights(shape, ("closed", "periodic", "open"))
+def test_threads_do_not_change_a_bit(monkeypatch):
+    shape = (60, 43, 48)
+    weights = random_weights(shape, ("closed", "periodic", "open"), blocked=0.1)
     coupling = random_coupling(shape, 2)
     rhs = np.random.default_rng(4).standard_normal(shape)
     periodic = (False, True, False)
     serial = PressureSystem(weights, periodic).solve(rhs, None, coupling)
-    parallel = PressureSystem(weights, periodic, parallel=True).solve(rhs, None, coupling)
     assert serial.converged
-    np.testing.assert_array_equal(serial.pressure, parallel.pressure)
+    monkeypatch.setattr(jit, "cores", lambda: 3)
+    monkeypatch.setattr(jit, "GAIN", 0.0)
+    for threads in (2, 3):
+        with kernel_threads(threads):
+            parallel = PressureSystem(weights, periodic).solve(rhs, None, coupling)
+        np.testing.assert_array_equal(serial.pressure, parallel.pressure)
 
 
 def test_systems_of_one_shape_do_not_disturb_each_other():

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.jit import parallel_kernels
+from flowborne.fluid.jit import kernel_threads
 from flowborne.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ def frame_times(simulations: Sequence[Simulation], frames: int = FRAMES) -> Arra
     The simulations take turns, so that what else the machine does meets all of them alike.
     """
     times = np.empty((len(simulations), frames))
-    with parallel_kernels(False):
+    with kernel_threads(1):
         for simulation in simulations:
             simulation.advance_frame()
         for frame in range(frames):

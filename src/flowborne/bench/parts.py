@@ -8,7 +8,7 @@ import numpy as np
 
 from flowborne.bench.frames import FRAMES
 from flowborne.bench.result import Result
-from flowborne.fluid.jit import parallel_kernels
+from flowborne.fluid.jit import kernel_threads
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.simulation import PARTS, Simulation
@@ -25,7 +25,7 @@ def measure() -> Iterator[Result]:
 
 def shares(scene: Scene, frames: int = FRAMES) -> Result:
     """Mean seconds of every part of a frame; the trials are all of "control"."""
-    with Simulation(scene, 1, "serial") as simulation, parallel_kernels(False):
+    with Simulation(scene, 1, "serial") as simulation, kernel_threads(1):
         simulation.advance_frame()
         spent = [simulation.advance_frame().seconds for _ in range(frames)]
     total = float(np.mean([seconds["total"] for seconds in spent]))

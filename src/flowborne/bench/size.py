@@ -11,7 +11,7 @@ import numpy as np
 
 from flowborne.bench.memory import held
 from flowborne.bench.result import Result
-from flowborne.fluid.jit import parallel_kernels
+from flowborne.fluid.jit import kernel_threads
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.simulation import PARTS, Simulation
@@ -57,7 +57,7 @@ def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
 
 def parts_of(scene: Scene, frames: int) -> tuple[tuple[int, int, int], dict[str, float]]:
     """Cells along each axis, and median seconds of each part of a frame on one thread."""
-    with Simulation(scene, 1, "serial") as simulation, parallel_kernels(False):
+    with Simulation(scene, 1, "serial") as simulation, kernel_threads(1):
         simulation.advance_frame()
         spent = [simulation.advance_frame().seconds for _ in range(frames)]
         shape = simulation.world.flow()[0].grid.shape

@@ -1,7 +1,8 @@
 """Where the evaluations of a decision run: here, in threads, in processes, or anywhere else.
 
 Each evaluation depends on nothing but its own task and the answers come back in the order of the
-tasks, so that a decision is the same, bit for bit, whatever runs it. flowborne has no scheduler of
+tasks, so that a decision is the same, bit for bit, whatever runs it. Evaluations that run at once
+share the threads that the caller's kernels may run on. flowborne has no scheduler of
 its own: all there is are the interfaces of `concurrent.futures`.
 """
 
@@ -10,12 +11,13 @@ from __future__ import annotations
 import io
 import math
 import multiprocessing
-import os
 import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from itertools import chain
 from typing import Any, Protocol, TypeVar
+
+from flowborne.fluid.jit import allowed_threads, cores, kernel_threads
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -36,13 +38,6 @@ class Mapper(Protocol):
     def close(self) -> None:
         """Let the workers go; a later `map` starts new ones."""
         ...
-
-
-def cores() -> int:
-    """Number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def worker_count(workers: int | None) -> int:
@@ -92,6 +87,10 @@ class Pool:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(state["workers"])  # type: ignore[misc]
 
+    def share(self, tasks: int) -> int:
+        """Threads for the kernels of each of so many tasks."""
+        return max(1, allowed_threads() // max(1, min(self.workers, tasks)))
+
     def close(self) -> None:
         """Let the workers go; a later `map` starts new ones."""
         if self._executor is not None:
@@ -109,7 +108,9 @@ class Threads(Pool):
             return [function(task) for task in tasks]
         if self._executor is None:
             self._executor = ThreadPoolExecutor(self.workers, thread_name_prefix="evaluation")
-        return collect([self._executor.submit(function, task) for task in tasks])
+        threads = self.share(len(tasks))
+        submit = self._executor.submit
+        return collect([submit(run_on, threads, function, task) for task in tasks])
 
 
 class Processes(Pool):
@@ -140,8 +141,8 @@ class Processes(Pool):
             )
         size = math.ceil(len(tasks) / self.workers)
         parts = [tasks[n : n + size] for n in range(0, len(tasks), max(size, 1))]
-        submit = self._executor.submit
-        answers = collect([submit(run_packed, pack((function, p), shared)) for p in parts])
+        submit, threads = self._executor.submit, self.share(len(parts))
+        answers = collect([submit(run_packed, pack((function, p), shared), threads) for p in parts])
         return list(chain.from_iterable(answers))
 
 
@@ -226,7 +227,13 @@ def receive_shared(pickled: bytes) -> None:
     _received["shared"] = pickle.loads(pickled)
 
 
-def run_packed(packed: bytes) -> list[Any]:
+def run_packed(packed: bytes, threads: int) -> list[Any]:
     """Apply the packed function to each of the packed tasks in a worker process."""
     function, tasks = _Unpacker(io.BytesIO(packed)).load()
-    return [function(task) for task in tasks]
+    return [run_on(threads, function, task) for task in tasks]
+
+
+def run_on(threads: int, function: Callable[[Task], Answer], task: Task) -> Answer:
+    """Apply the function to a task, its kernels on at most so many threads."""
+    with kernel_threads(threads):
+        return function(task)

@@ -2,20 +2,36 @@
 
 `@kernel` compiles a module-level function with Numba. Called plainly it runs on one thread with
 the interpreter lock released, and `prange` means `range`; several worlds may step at once. Inside
-`with parallel_kernels():` the calling thread runs the twins instead, in which `prange` spreads its
-iterations over the machine. Only one thread of a process may do so at a time: Numba's own threads
-cannot be shared. Kernels compute the same numbers either way as long as an iteration of `prange`
-writes only what is its own; sums over all iterations are made per iteration and added in order.
+`with kernel_threads():` the calling thread runs the twins instead wherever an array is LARGE, in
+which `prange` spreads its iterations over threads. Small grids never start a thread, and never
+wait for twins to be compiled. Kernels compute the same numbers on any number of threads as long as
+an iteration of `prange` writes only what is its own; sums over all iterations are made per
+iteration and added in order.
+
+Numba's threads come from TBB where that is installed: there the calling thread does what no other
+has begun, so that a busy machine slows a solve no more than it slows one thread. Elsewhere they
+come from OpenMP, and sleep while they wait: spinning ones take the core from the thread that they
+wait for, and a solve of 0.5 s beside another busy process took 9 s. Where the calling thread has
+waited for the others longer than they can have saved it, the next calls do without them.
 """
 
 from __future__ import annotations
 
+import ctypes
+import os
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # read when Numba loads OpenMP
+
+import numba
+import numpy as np
 from numba import njit
 
 P = ParamSpec("P")
@@ -33,7 +49,115 @@ ONLY_PRANGE = {
 }
 """Nothing but the loops that say so runs in parallel: array expressions keep their order."""
 
+LARGE = 100_000
+"""Fewest elements of a kernel's largest array for which threads are started."""
+
+GAIN = 1.2
+"""Least factor by which threads must shorten a call to be used in the next ones."""
+
+PAUSE = 10.0
+"""Times as long as a call in which they did not, they are left out."""
+
 _thread = threading.local()
+_workqueue = threading.Lock()
+"""Held by the one thread that may use Numba's own layer, which aborts the process on a second."""
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def allowed_threads() -> int:
+    """Most threads that the calling thread's kernels may run on."""
+    return int(getattr(_thread, "most", 1))
+
+
+@contextmanager
+def kernel_threads(most: int | None = None) -> Iterator[None]:
+    """Within, the calling thread's kernels run on at most so many threads.
+
+    most  at least 1, and no more than there are cores, as many as which None means. A context
+          within another allows no more than that one
+    """
+    before = getattr(_thread, "most", None)
+    wanted = cores() if most is None else min(most, cores())
+    _thread.most = wanted if before is None else min(wanted, before)
+    try:
+        yield
+    finally:
+        if before is None:
+            del _thread.most
+        else:
+            _thread.most = before
+
+
+def is_large(arguments: tuple[Any, ...]) -> bool:
+    """Whether one of the arrays, or of those in tuples, has at least LARGE elements."""
+    for given in arguments:
+        if isinstance(given, np.ndarray):
+            if given.size >= LARGE:
+                return True
+        elif isinstance(given, tuple) and is_large(given):
+            return True
+    return False
+
+
+@cache
+def numba_layer() -> str:
+    """Name of the library that Numba's threads come from, started at the first call.
+
+    Numba does not look for TBB where pip puts it, beside the environment's other libraries.
+    """
+    with suppress(OSError):
+        ctypes.CDLL(os.path.join(sys.prefix, "lib", "libtbb.so.12"))
+    numba.set_num_threads(numba.get_num_threads())
+    return str(numba.threading_layer())
+
+
+class Pause:
+    """When threads may be tried again, on the clock of time.monotonic()."""
+
+    def __init__(self) -> None:
+        self.end = 0.0
+
+    def is_over(self) -> bool:
+        return time.monotonic() >= self.end
+
+    @contextmanager
+    def unless_worth(self, count: int) -> Iterator[None]:
+        """Begin a pause where what runs within has not gained from `count` threads.
+
+        The calling thread has an equal share of the work, and waits for the others to end theirs.
+        """
+        began, worked = time.monotonic(), time.thread_time()
+        yield
+        took, worked = time.monotonic() - began, time.thread_time() - worked
+        if count * worked < GAIN * took:
+            self.end = time.monotonic() + PAUSE * took
+
+
+_pause = Pause()
+
+
+@contextmanager
+def numba_threads(count: int) -> Iterator[bool]:
+    """Within, Numba spreads `prange` over `count` threads; yields False where it cannot now.
+
+    Its layers TBB and OpenMP serve several threads of the process at once, its own only one.
+    """
+    shared = numba_layer() != "workqueue"
+    before = numba.get_num_threads()
+    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    free = shared or _workqueue.acquire(blocking=False)
+    try:
+        yield free
+    finally:
+        numba.set_num_threads(before)
+        if free and not shared:
+            _workqueue.release()
 
 
 class Kernel(Generic[P, R]):
@@ -51,8 +175,13 @@ class Kernel(Generic[P, R]):
         self._twin: Any = None
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        chosen = self.parallel if getattr(_thread, "parallel", False) else self.serial
-        result: R = chosen(*args, **kwargs)
+        result: R
+        threads = allowed_threads()
+        if threads > 1 and _pause.is_over() and is_large(args) and self.parallel is not self.serial:
+            with numba_threads(threads) as free, _pause.unless_worth(threads):
+                result = (self.parallel if free else self.serial)(*args, **kwargs)
+        else:
+            result = self.serial(*args, **kwargs)
         return result
 
     @property
@@ -92,14 +221,3 @@ class Kernel(Generic[P, R]):
 def kernel(function: Callable[P, R]) -> Kernel[P, R]:
     """Decorator of module-level functions on plain arrays; see the module."""
     return Kernel(function)
-
-
-@contextmanager
-def parallel_kernels(wanted: bool = True) -> Iterator[None]:
-    """Within, the calling thread's kernels run on all of the machine's cores when `wanted`."""
-    before = getattr(_thread, "parallel", False)
-    _thread.parallel = wanted
-    try:
-        yield
-    finally:
-        _thread.parallel = before

@@ -20,10 +20,20 @@ from numba import prange
 from flowborne.fluid.aggregates import OWN
 from flowborne.fluid.arrays import Hierarchy, Marks, Places, Real, Triple
 from flowborne.fluid.jit import kernel
-from flowborne.fluid.levels import at_level, guests_at, leaning_at, weights_at, wrap_ghosts
+from flowborne.fluid.levels import (
+    OFFSET,
+    at_level,
+    guests_at,
+    leaning_at,
+    weights_at,
+    wrap_ghosts,
+)
 
 COARSEST_SWEEPS = 8
 """Symmetric sweeps on the coarsest level, of at most 4 cells along an axis."""
+
+SERIAL = 40_000
+"""Cells of a level, ghosts included, below which threads would cost more than they save."""
 
 
 @kernel
@@ -195,45 +205,61 @@ def restrict(b: Real, r: Real, marks: Marks, lean: Triple, guests: Places, hosts
 
 
 @kernel
+def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool) -> None:
+    """The cycle's work on one level, on its way down (from x = 0, then b of the next level) or up
+    (from x of the next level)."""
+    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
+    coarsest = table.shape[0] - 2
+    w, a = weights_at(weights, table, level), at_level(inverse, table, level)
+    xl, bl = at_level(x, table, level), at_level(b, table, level)
+    if down:
+        first_smooth(xl, bl, a)
+        sweeps = 1 if level < coarsest else 4 * COARSEST_SWEEPS - 1
+    else:
+        interpolate(
+            xl,
+            at_level(x, table, level + 1),
+            at_level(marks, table, level),
+            leaning_at(lean, table, level),
+            guests_at(guests, table, level),
+            at_level(hosts, table, level),
+        )
+        sweeps = 2
+    for n in range(sweeps):
+        wrap_ghosts(xl, periodic)
+        mirrored = n > 2 * COARSEST_SWEEPS - 2
+        smooth(xl, bl, w, a, n % 2 if mirrored else 1 - n % 2)
+    wrap_ghosts(xl, periodic)
+    if down and level < coarsest:
+        rl = at_level(r, table, level)
+        defect(rl, xl, bl, w, a)
+        wrap_ghosts(rl, periodic)
+        restrict(
+            at_level(b, table, level + 1),
+            rl,
+            at_level(marks, table, level),
+            leaning_at(lean, table, level),
+            guests_at(guests, table, level),
+            at_level(hosts, table, level),
+        )
+
+
+serial_leg = leg.serial
+"""For levels too small for threads, in the cycle's parallel twin as well."""
+
+
+@kernel
 def v_cycle(hierarchy: Hierarchy, x: Real, b: Real, r: Real) -> None:
     """x = V b on the finest level, V symmetric positive definite, close to the inverse of K.
 
     x, b, r  packed over the levels; b's finest level is given, all else is overwritten
     """
-    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
+    table = hierarchy[0]
     coarsest = table.shape[0] - 2
-    for leg in range(2 * coarsest + 1):
-        down = leg <= coarsest
-        level = leg if down else 2 * coarsest - leg
-        w, a = weights_at(weights, table, level), at_level(inverse, table, level)
-        xl, bl = at_level(x, table, level), at_level(b, table, level)
-        if down:
-            first_smooth(xl, bl, a)
-            sweeps = 1 if level < coarsest else 4 * COARSEST_SWEEPS - 1
+    for n in range(2 * coarsest + 1):
+        down = n <= coarsest
+        level = n if down else 2 * coarsest - n
+        if table[level + 1, OFFSET] - table[level, OFFSET] < SERIAL:
+            serial_leg(hierarchy, x, b, r, level, down)
         else:
-            interpolate(
-                xl,
-                at_level(x, table, level + 1),
-                at_level(marks, table, level),
-                leaning_at(lean, table, level),
-                guests_at(guests, table, level),
-                at_level(hosts, table, level),
-            )
-            sweeps = 2
-        for n in range(sweeps):
-            wrap_ghosts(xl, periodic)
-            mirrored = n > 2 * COARSEST_SWEEPS - 2
-            smooth(xl, bl, w, a, n % 2 if mirrored else 1 - n % 2)
-        wrap_ghosts(xl, periodic)
-        if leg < coarsest:
-            rl = at_level(r, table, level)
-            defect(rl, xl, bl, w, a)
-            wrap_ghosts(rl, periodic)
-            restrict(
-                at_level(b, table, level + 1),
-                rl,
-                at_level(marks, table, level),
-                leaning_at(lean, table, level),
-                guests_at(guests, table, level),
-                at_level(hosts, table, level),
-            )
+            leg(hierarchy, x, b, r, level, down)

@@ -20,7 +20,7 @@ from flowborne.fluid.arrays import Hierarchy, Integers, Labels, Marks, Places, R
 from flowborne.fluid.body_modes import body_modes, mode_answers, mode_fields
 from flowborne.fluid.conjugate_gradients import Finest, solve
 from flowborne.fluid.grid import Array, Faces
-from flowborne.fluid.jit import kernel, parallel_kernels
+from flowborne.fluid.jit import kernel
 from flowborne.fluid.levels import (
     LEAN,
     at_level,
@@ -225,7 +225,6 @@ class PressureSystem:
               at the distance that the weight was made with; a periodic axis has the same weights on
               its first and last face. A cell is active when one of its weights is above 0.
     periodic  of each axis
-    parallel  use all cores; only from one thread of the process at a time
     reaction  (nx, ny, nz), at least 0: D with K + D closer than K to the matrix that is solved, as
               flesh gives way to pressure all over its skin; for the preconditioner alone
     raises    ValueError for one cell along x or y in 3D, which the ghost layout has no room for
@@ -235,7 +234,6 @@ class PressureSystem:
         self,
         weights: Faces,
         periodic: tuple[bool, bool, bool] = (False, False, False),
-        parallel: bool = False,
         reaction: Array = NO_REACTION,
     ) -> None:
         nx, ny, nz = weights[1].shape[0], weights[0].shape[1], weights[0].shape[2]
@@ -249,7 +247,6 @@ class PressureSystem:
         inner = (1, nx, ny) if self.slab else self.shape
         wraps = (False, periodic[0], periodic[1]) if self.slab else periodic
         self.periodic = np.array(wraps, np.uint8)
-        self.parallel = parallel
         x, y, z = (np.ascontiguousarray(w, np.float64) for w in weights)
         faces = (x, y, z)
         if self.slab:
@@ -268,10 +265,9 @@ class PressureSystem:
             b.guests,
             b.hosts,
         )
-        with parallel_kernels(parallel):
-            self.regions, self.scale = prepare(
-                self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
-            )
+        self.regions, self.scale = prepare(
+            self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
+        )
 
     def solve(
         self,
@@ -294,21 +290,20 @@ class PressureSystem:
         load(x, first.reshape(cells), diagonal)
         load(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
         coupled = self.coupled(coupling)
-        with parallel_kernels(self.parallel):
-            iterations, residual, converged = solve(
-                self.hierarchy,
-                b.cycle,
-                b.finest,
-                b.vectors,
-                coupled.rows,
-                coupling.response.arrays,
-                b.label,
-                coupled.null,
-                coupled.fields,
-                coupled.answers,
-                tolerance,
-                absolute,
-            )
+        iterations, residual, converged = solve(
+            self.hierarchy,
+            b.cycle,
+            b.finest,
+            b.vectors,
+            coupled.rows,
+            coupling.response.arrays,
+            b.label,
+            coupled.null,
+            coupled.fields,
+            coupled.answers,
+            tolerance,
+            absolute,
+        )
         start = (1 if inner[0] > 1 else 0, 1, 1)
         inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
         pressure = x[inside].copy().reshape(self.shape)
@@ -333,7 +328,6 @@ class PressureSystem:
         modes = body_modes(response, rows, diagonal, max(self.shape))
         modes *= np.sqrt(self.scale)
         if modes.size:
-            with parallel_kernels(self.parallel):
-                fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
+            fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
             answers = mode_answers(modes, gram)
         return Coupled(rows, null, fields, answers)

@@ -79,12 +79,12 @@ def run_cases(
     """
     from threadpoolctl import threadpool_limits
 
-    from flowborne.fluid.jit import parallel_kernels
+    from flowborne.fluid.jit import kernel_threads
 
     results = []
     for name in case_ids() if ids is None else ids:
         wanted = case(name)
-        with parallel_kernels(), threadpool_limits(limits=1, user_api="blas"):
+        with kernel_threads(), threadpool_limits(limits=1, user_api="blas"):
             found = wanted.run(quick)
         for result in found:
             if on_result is not None:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from flowborne.bench.frames import frame_times
-from flowborne.control.executors import cores
+from flowborne.fluid.jit import cores
 from flowborne.io.atomic import write_atomically
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation

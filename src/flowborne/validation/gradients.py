@@ -10,7 +10,7 @@ from time import perf_counter, process_time
 import numpy as np
 
 from flowborne.control.controller import Controller
-from flowborne.control.executors import Serial, cores
+from flowborne.control.executors import Serial
 from flowborne.control.gradients import GradientCentral, GradientOneSided
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, ObjectiveWindDrag
@@ -18,7 +18,7 @@ from flowborne.control.trial import Hypothesis
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.jit import parallel_kernels
+from flowborne.fluid.jit import cores, kernel_threads
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 from flowborne.solids.wind import WindFaces, WindForce
@@ -160,7 +160,7 @@ def decision_seconds(
     """
     spent: list[list[float]] = [[] for _ in CHAINS]
     settings = {"domain.resolution": str(resolution)}
-    with parallel_kernels(False), ExitStack() as stack:
+    with kernel_threads(1), ExitStack() as stack:
         simulations = [
             stack.enter_context(Simulation(load_scene(f"ns-chain-{n}", settings), workers))
             for n in CHAINS
