@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from flowborne.fluid.body_modes import with_answers
+from flowborne.fluid.conjugate_gradients import apply_laplacian
 from flowborne.fluid.levels import at_level, guests_at, leaning_at, weights_at
 from flowborne.fluid.multigrid import defect, interpolate, restrict, smooth, v_cycle
 from flowborne.fluid.pressure import PressureSystem
@@ -94,3 +96,35 @@ def test_cycle_is_symmetric_and_positive(shape, periodic):
         matrix[:, n] = x.reshape(-1)[active]
     assert np.abs(matrix - matrix.T).max() <= 1e-5 * np.abs(matrix).max()
     assert np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min() > 0.0
+
+
+@pytest.mark.parametrize("shape", [(6, 7, 10), (1, 12, 9)])
+@pytest.mark.parametrize("count", [0, 3])
+def test_the_preconditioner_takes_off_what_bodies_answer(shape, count):
+    rng = np.random.default_rng(2)
+    padded = tuple(n + 2 if n > 1 else 1 for n in shape)
+    cells = tuple(slice(1, -1) if n > 1 else slice(None) for n in shape)
+    z, r, amount = rng.standard_normal(padded), rng.standard_normal(padded), rng.random(count)
+    fields = rng.standard_normal((count, *padded))
+    out, expected = np.zeros(padded), np.zeros(padded)
+    expected[cells] = (0.5 * z - np.tensordot(amount, fields, 1))[cells]
+    product = with_answers(out, z, r, 0.5, amount, fields)
+    np.testing.assert_allclose(out, expected, atol=1e-14)
+    assert product == pytest.approx(np.vdot(expected, r))
+
+
+@pytest.mark.parametrize("shape", [(6, 7, 10), (1, 12, 9)])
+def test_the_laplacian_is_what_numpy_says(shape):
+    rng = np.random.default_rng(3)
+    padded = tuple(n + 2 if n > 1 else 1 for n in shape)
+    cells = tuple(slice(1, -1) if n > 1 else slice(None) for n in shape)
+    p, *w = (rng.standard_normal(padded) for _ in range(4))
+    out, expected = np.zeros(padded), np.zeros(padded)
+    diagonal = np.zeros(padded)
+    for axis in [axis for axis in range(3) if shape[axis] > 1]:
+        for step, weight in ((1, w[axis]), (-1, np.roll(w[axis], -1, axis))):
+            expected += weight * (p - np.roll(p, step, axis))
+            diagonal += weight
+    energy = apply_laplacian(out, p, (w[0], w[1], w[2], diagonal))
+    np.testing.assert_allclose(out[cells], expected[cells], atol=1e-13)
+    assert energy == pytest.approx(np.vdot(p[cells], expected[cells]))

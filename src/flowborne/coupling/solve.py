@@ -279,7 +279,7 @@ def largest_divergence(
 
 def rounding_floor(velocity: Faces, grid: Grid) -> float:
     """Norm over all cells of what rounding leaves of the net outflow, m^3/s."""
-    fastest = max(float(np.abs(u).max()) for u in velocity)
+    fastest = max(max(float(u.max()), -float(u.min())) for u in velocity)
     return float(ROUNDING * grid.face_area * fastest * np.sqrt(np.prod(grid.shape)))
 
 

@@ -26,6 +26,10 @@ MOST = 32
 LIGHT = 0.5
 """A motion is left out when the fluid that it moves cannot have more than this times its mass."""
 
+LIGHT_IN_FLESH = 100.0
+"""The same where the V-cycle knows how flesh gives way: iterations that a motion of less would save
+cost less than it does."""
+
 
 @kernel
 def wrench_of(p: Real, rows: Rows, size: int) -> Array:
@@ -53,13 +57,13 @@ def push(p: Real, rows: Rows, twist: Array) -> None:
 
 
 @kernel
-def nearby_mass(rows: Rows, diagonal: Array, size: int) -> Array:
-    """(size, size) G D^-1 G^T with the diagonal D of K: added mass of the nearest fluid only."""
+def nearby_mass(rows: Rows, inverse: Real, size: int) -> Array:
+    """(size, size) G D^-1 G^T for a padded D^-1: added mass of the nearest fluid only."""
     cells, row_start, columns, values = rows
-    flat = diagonal.reshape(-1)
+    flat = inverse.reshape(-1)
     gram = np.zeros((size, size))
     for n in range(cells.size):
-        share = 1.0 / flat[cells[n]]
+        share = flat[cells[n]]
         for e in range(row_start[n], row_start[n + 1]):
             for f in range(row_start[n], row_start[n + 1]):
                 gram[columns[e], columns[f]] += share * values[e] * values[f]
@@ -67,10 +71,10 @@ def nearby_mass(rows: Rows, diagonal: Array, size: int) -> Array:
 
 
 @kernel
-def nearby_mass_along(rows: Rows, diagonal: Array, root: Array) -> Array:
+def nearby_mass_along(rows: Rows, inverse: Real, root: Array) -> Array:
     """(m, m) R^T G D^-1 G^T R for motions R (k, m), without the (k, k) matrix between them."""
     cells, row_start, columns, values = rows
-    flat = diagonal.reshape(-1)
+    flat = inverse.reshape(-1)
     count = root.shape[1]
     gram, flux = np.zeros((count, count)), np.empty(count)
     for n in range(cells.size):
@@ -80,24 +84,30 @@ def nearby_mass_along(rows: Rows, diagonal: Array, root: Array) -> Array:
                 flux[a] += values[e] * root[columns[e], a]
         for a in range(count):
             for b in range(count):
-                gram[a, b] += flux[a] * flux[b] / flat[cells[n]]
+                gram[a, b] += flux[a] * flux[b] * flat[cells[n]]
     return gram
 
 
-def body_modes(response: Response, rows: Rows, diagonal: Array, across: int) -> Array:
-    """(k, m) R with R R^T equal to M but for motions that the fluid hardly feels.
+def body_modes(
+    response: Response, rows: Rows, inverse: Real, scale: float, across: int, held: bool
+) -> Array:
+    """(k, m) R with R R^T equal to scale x M but for motions that the fluid hardly feels.
 
     response  M
-    diagonal  of K; what a motion moves of the nearest fluid is `nearby_mass`
+    inverse   padded: of the diagonal that the V-cycle is made for, which knows how flesh gives way;
+              what a motion moves of the nearest fluid is `nearby_mass` with it
+    scale     of the hierarchy's weights
     across    most cells along an axis: how much more than the nearest fluid a body may move
+    held      whether a region's pressure has no hold but bodies, which no V-cycle knows
     """
-    root = response.soft
+    root = np.sqrt(scale) * response.soft
     if response.is_dense:
-        nearby = root.T @ nearby_mass(rows, diagonal, response.size) @ root
+        nearby = root.T @ nearby_mass(rows, inverse, response.size) @ root
     else:
-        nearby = nearby_mass_along(rows, diagonal, root)
+        nearby = nearby_mass_along(rows, inverse, root)
     ratio, turned = np.linalg.eigh(nearby)
-    chosen = np.flatnonzero(ratio * across > LIGHT)[-MOST:]
+    light = LIGHT if response.is_dense or held else LIGHT_IN_FLESH
+    chosen = np.flatnonzero(ratio * across > light)[-MOST:]
     return np.ascontiguousarray(root @ turned[:, chosen])
 
 
@@ -131,21 +141,43 @@ def mode_answers(modes: Array, gram: Array) -> Array:
 
 
 @kernel
-def let_bodies_answer(z: Array, rows: Rows, fields: Real, answers: Array) -> None:
-    """z -= Y (1 + B^T Y)^-1 R^T G z  on a padded field z = V r.
+def answers_of(z: Real, rows: Rows, answers: Array, scale: float) -> Array:
+    """(m,) (1 + B^T Y)^-1 R^T G z x scale for a padded field z = V r."""
+    count, size = answers.shape
+    amount = np.zeros(count)
+    if count:
+        wrench = scale * wrench_of(z, rows, size)
+        for n in range(count):
+            for c in range(size):
+                amount[n] += answers[n, c] * wrench[c]
+    return amount
+
+
+@kernel
+def with_answers(out: Array, z: Real, r: Array, scale: float, amount: Array, fields: Real) -> float:
+    """out = scale z - Y amount in the cells; returns out . r.
 
     In double precision, because a light body leaves very little of z where it is pushed.
+
+    NumPy:  out[cells] = (scale * z - np.tensordot(amount, fields, 1))[cells]
     """
-    count, size = answers.shape
-    if count == 0:
-        return
-    amount = np.zeros(count)
-    wrench = wrench_of(z, rows, size)
-    for n in range(count):
-        for c in range(size):
-            amount[n] += answers[n, c] * wrench[c]
-    for i in prange(z.shape[0]):
-        for n in range(count):
-            for j in range(z.shape[1]):
-                for k in range(z.shape[2]):
-                    z[i, j, k] -= amount[n] * fields[n, i, j, k]
+    d = 1 if z.shape[0] > 1 else 0
+    planes, last = z.shape[0] - 2 * d, z.shape[2] - 1
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        m = i + d
+        row = np.zeros(last + 1)
+        for j in range(1, z.shape[1] - 1):
+            for k in range(1, last):
+                out[m, j, k] = scale * z[m, j, k]
+            for n in range(amount.size):
+                for k in range(1, last):
+                    out[m, j, k] -= amount[n] * fields[n, m, j, k]
+            for k in range(1, last):
+                row[k] += out[m, j, k] * r[m, j, k]
+        for k in range(1, last):
+            parts[i] += row[k]
+    total = 0.0
+    for i in range(planes):
+        total += parts[i]
+    return total

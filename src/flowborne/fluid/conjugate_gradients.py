@@ -10,10 +10,10 @@ import numpy as np
 from numba import prange
 
 from flowborne.fluid.arrays import Hierarchy, Labels, Real, Rows, Triple
-from flowborne.fluid.body_modes import let_bodies_answer, push, wrench_of
+from flowborne.fluid.body_modes import answers_of, push, with_answers, wrench_of
 from flowborne.fluid.grid import Array
 from flowborne.fluid.jit import kernel
-from flowborne.fluid.levels import at_level, scaled, scaled_cells, wrap_ghosts
+from flowborne.fluid.levels import at_level, scaled, wrap_ghosts
 from flowborne.fluid.multigrid import v_cycle
 from flowborne.fluid.regions import remove_null
 from flowborne.fluid.response import Answers, respond
@@ -188,9 +188,8 @@ def solve(
             scale = 1.0 / np.sqrt(square)
             scaled(r, b, scale)
             v_cycle(hierarchy, cycle[0], cycle[1], cycle[2])
-            scaled_cells(z, q, 1.0 / scale)
-            let_bodies_answer(q, rows, fields, answers)
-            before, product = product, dot(q, r)
+            amount = answers_of(z, rows, answers, 1.0 / scale)
+            before, product = product, with_answers(q, z, r, 1.0 / scale, amount, fields)
             turn(p, q, product / before if before > 0.0 else 0.0)
             wrap_ghosts(p, periodic)
             curvature = apply_laplacian(q, p, finest)

@@ -49,14 +49,15 @@ def smooth(x: Real, b: Real, w: Triple, inverse: Real, colour: int) -> None:
         m = i + d
         row = np.empty(n2 + 2, x.dtype)
         for j in range(1, x.shape[1] - 1):
+            parity = (i + j + colour) & 1
             for k in range(1, n2 + 1):
                 total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
                 total += w1[m, j + 1, k] * x[m, j + 1, k]
                 total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
                 if d:
                     total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
-                row[k] = total * inverse[m, j, k]
-            for k in range(1 + ((i + j + 1 + colour) & 1), n2 + 1, 2):
+                row[k] = total * inverse[m, j, k] if (k & 1) == parity else x[m, j, k]
+            for k in range(1, n2 + 1):
                 x[m, j, k] = row[k]
 
 

@@ -325,8 +325,9 @@ class PressureSystem:
         if self.regions:
             wrench = region_wrenches(b.label, self.regions, response.size, rows)
             null = null_basis(b.count[: self.regions], wrench, response)
-        modes = body_modes(response, rows, diagonal, max(self.shape))
-        modes *= np.sqrt(self.scale)
+        inverse = at_level(b.inverse, b.table, 0)
+        held = null.shape[1] < self.regions
+        modes = body_modes(response, rows, inverse, self.scale, max(self.shape), held)
         if modes.size:
             fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
             answers = mode_answers(modes, gram)
