@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -170,173 +171,45 @@ def list_cells(
     return at
 
 
-@njit(nogil=True, cache=True)
-def cut(
-    kind: Integers,
-    size: Array,
-    reach: Array,
-    body_of: Integers,
-    tables: Array,
-    table: Integers,
-    corner: Array,
-    pitch: Array,
+def solid_sides(boundaries: Boundaries) -> Integers:
+    """(3, 2) 1 where the lower or upper side across an axis is solid or an inflow."""
+    solid = ("closed", "no-slip", "inflow")
+    return np.array(
+        [[int(side.kind in solid) for side in boundaries.pair(axis)] for axis in range(3)]
+    )
+
+
+def around_bodies(
+    shapes: Shapes,
     position: Array,
     rotation: Array,
-    origin: Array,
-    h: float,
-    area: float,
-    shape: Integers,
-    walls: Integers,
+    skins: Skins,
     first_skin: int,
-    skin_box: Integers,
-    skin_start: Integers,
-    skin_distance: Array,
-) -> tuple[
-    Array,
-    Integers,
-    Array,
-    Array,
-    Array,
-    Integers,
-    Integers,
-    Integers,
-    Array,
-    Integers,
-    Integers,
-    Array,
-]:
-    """The whole geometry in one call; see `Geometry` for what comes back, in its order."""
-    nx, ny, nz = shape
-    flat = nz == 1
-    distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
-    nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
-    ox, oy, oz = np.ones((nx + 1, ny, nz)), np.ones((nx, ny + 1, nz)), np.ones((nx, ny, nz + 1))
-    tx, ty, tz = np.zeros(ox.shape), np.zeros(oy.shape), np.zeros(oz.shape)
-    rigid = np.unique(body_of)
-    bodies = np.append(rigid, first_skin + np.arange(len(skin_start)))
-    boxes = np.empty((bodies.size, 3, 2), np.int64)
-    beside = beside_sides(shape, walls)
-    phis = []
-    shares_x = []
-    shares_y = []
-    shares_z = []
-    for n in range(bodies.size):
-        if n < rigid.size:
-            geoms = np.nonzero(body_of == bodies[n])[0]
-            box = node_box(geoms, position, rotation, reach, origin, h, shape)
-            if flat:
-                box[2, 0], box[2, 1] = 0, 2
-            if np.any(box[:, 1] - box[:, 0] < 2):
-                box[:, :] = 0
-        else:
-            box = skin_box[n - rigid.size]
-        boxes[n] = box
-        d = box[:, 1] - box[:, 0]
-        phi = np.empty((d[0], d[1], d[2]))
-        if n < rigid.size:
-            sample_body(
-                phi,
-                box,
-                geoms,
-                kind,
-                size,
-                position,
-                rotation,
-                tables,
-                table,
-                corner,
-                pitch,
-                origin,
-                h,
-                flat,
-            )
-        else:
-            start = skin_start[n - rigid.size]
-            phi.reshape(-1)[:] = skin_distance[start : start + phi.size]
-        merge(distance, nearest, phi, box, bodies[n])
-        count_beside(beside, phi, box, 1 if n < rigid.size else ITS_FOLDS)
-        phis.append(phi)
-        add_closed(tx, phi, box, 0)
-        add_closed(ty, phi, box, 1)
-        if not flat:
-            add_closed(tz, phi, box, 2)
-    parts, rows = 0, 0
-    none = np.empty(0, np.int64)
-    empty = np.empty(0)
-    for n in range(bodies.size):
-        box = boxes[n]
-        d = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
-        shares_x.append(np.zeros((d[0] + 1, d[1], d[2])))
-        shares_y.append(np.zeros((d[0], d[1] + 1, d[2])))
-        shares_z.append(np.zeros((d[0], d[1], d[2] + 1)))
-        phi = phis[n]
-        parts += share_closed(shares_x[n], ox, tx, distance, beside, phi, box, 0, walls[0])
-        parts += share_closed(shares_y[n], oy, ty, distance, beside, phi, box, 1, walls[1])
-        if not flat:
-            parts += share_closed(shares_z[n], oz, tz, distance, beside, phi, box, 2, walls[2])
-    for n in range(rigid.size):
-        rows = list_cells(
-            shares_x[n],
-            shares_y[n],
-            shares_z[n],
-            ox,
-            oy,
-            oz,
-            walls,
-            boxes[n],
-            bodies[n],
-            origin,
-            h,
-            area,
-            flat,
-            rows,
-            none,
-            none,
-            empty,
-        )
-    axis = np.empty(parts, np.int64)
-    face = np.empty(parts, np.int64)
-    body = np.empty(parts, np.int64)
-    closed = np.empty(parts)
-    cells = np.empty(rows, np.int64)
-    columns = np.empty(6 * rows, np.int64)
-    values = np.empty(6 * rows)
-    at, row = 0, 0
-    for n in range(bodies.size):
-        b = bodies[n]
-        at = list_closed(
-            shares_x[n], boxes[n], 0, b, np.array(ox.shape), at, axis, face, body, closed
-        )
-        at = list_closed(
-            shares_y[n], boxes[n], 1, b, np.array(oy.shape), at, axis, face, body, closed
-        )
-        if not flat:
-            at = list_closed(
-                shares_z[n], boxes[n], 2, b, np.array(oz.shape), at, axis, face, body, closed
-            )
-        if rows and n < rigid.size:
-            row = list_cells(
-                shares_x[n],
-                shares_y[n],
-                shares_z[n],
-                ox,
-                oy,
-                oz,
-                walls,
-                boxes[n],
-                b,
-                origin,
-                h,
-                area,
-                flat,
-                row,
-                cells,
-                columns,
-                values,
-            )
-    if flat:
-        oz[:] = 0.0
-    return distance, nearest, ox, oy, oz, axis, face, body, closed, cells, columns, values
+    grid: Grid,
+) -> Iterator[tuple[int, Integers, Array]]:
+    """The distance to each body and flesh at the nodes around it.
+
+    yields  its number; (3, 2) ranges of nodes; the distances there, m
+    """
+    shape, origin, h = np.array(grid.shape), np.array(grid.origin), grid.spacing
+    for body in np.unique(shapes.body):
+        geoms = np.flatnonzero(shapes.body == body)
+        box = node_box(geoms, position, rotation, shapes.reach, origin, h, shape)
+        if grid.is_slab:
+            box[2] = 0, 2
+        if np.any(box[:, 1] - box[:, 0] < 2):
+            box[:] = 0
+        phi = np.empty(box[:, 1] - box[:, 0])
+        sample_body(
+            phi, box, geoms, shapes.kind, shapes.size, position, rotation, shapes.tables,
+            shapes.table, shapes.corner, shapes.pitch, origin, h, grid.is_slab,
+        )  # fmt: skip
+        yield int(body), box, phi
+    for n, start in enumerate(skins.start):
+        box = np.ascontiguousarray(skins.box[n])
+        counts = box[:, 1] - box[:, 0]
+        phi = skins.distance[start : start + counts.prod()].reshape(counts)
+        yield first_skin + n, box, phi
 
 
 def geometry(
@@ -353,71 +226,92 @@ def geometry(
     position, rotation  (ng, 3), (ng, 3, 3) where the geometries stand, in the order of `shapes`
     skins, first_skin   of the fleshes, and the number of bodies
     """
-    solid = ("closed", "no-slip", "inflow")
-    walls = np.array(
-        [[int(side.kind in solid) for side in boundaries.pair(axis)] for axis in range(3)]
-    )
-    found = cut(
-        shapes.kind,
-        shapes.size,
-        shapes.reach,
-        shapes.body,
-        shapes.tables,
-        shapes.table,
-        shapes.corner,
-        shapes.pitch,
-        position,
-        rotation,
-        np.array(grid.origin),
-        grid.spacing,
-        grid.face_area,
-        np.array(grid.shape),
-        walls,
-        first_skin,
-        skins.box,
-        skins.start,
-        skins.distance,
-    )
-    distance, nearest, ox, oy, oz, axis, face, body, closed, cells, columns, values = found
-    opened = (ox, oy, oz)
+    nx, ny, nz = grid.shape
+    shape, flat = np.array(grid.shape), grid.is_slab
+    h, area, origin = grid.spacing, grid.face_area, np.array(grid.origin)
+    walls = solid_sides(boundaries)
+    distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
+    nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
+    beside = beside_sides(shape, walls)
+    ox, oy, oz = opened = [np.ones(grid.face_shape(d)) for d in range(3)]
+    total = grid.zeros_faces()
+    pieces = []
+    for body, box, phi in around_bodies(shapes, position, rotation, skins, first_skin, grid):
+        merge(distance, nearest, phi, box, body)
+        count_beside(beside, phi, box, 1 if body < first_skin else ITS_FOLDS)
+        for d in grid.axes:
+            add_closed(total[d], phi, box, d)
+        pieces.append((body, box, phi))
+    parts, rows, shared = 0, 0, []
+    for _, box, phi in pieces:
+        inside = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
+        share = [np.zeros(inside + (np.arange(3) == d)) for d in range(3)]
+        for d in grid.axes:
+            parts += share_closed(
+                share[d], opened[d], total[d], distance, beside, phi, box, d, walls[d]
+            )
+        shared.append(share)
+    rigid = [n for n, (body, _, _) in enumerate(pieces) if body < first_skin]
+    none, empty = np.zeros(0, np.int64), np.zeros(0)
+    for n in rigid:
+        body, box, _ = pieces[n]
+        rows = list_cells(
+            *shared[n], ox, oy, oz, walls, box, body, origin, h, area, flat, rows, none, none, empty
+        )
+    axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
+    closed = np.empty(parts)
+    cells, columns = np.empty(rows, np.int64), np.empty(6 * rows, np.int64)
+    values = np.empty(6 * rows)
+    at = row = 0
+    for (body, box, _), share in zip(pieces, shared, strict=True):
+        for d in grid.axes:
+            counts = np.array(grid.face_shape(d))
+            at = list_closed(share[d], box, d, body, counts, at, axis, face, part_body, closed)
+        if rows and body < first_skin:
+            row = list_cells(
+                *share, ox, oy, oz, walls, box, body, origin, h, area, flat, row, cells, columns,
+                values,
+            )  # fmt: skip
+    if flat:
+        oz[:] = 0.0
     row_start = 6 * np.arange(cells.size + 1, dtype=np.int64)
-    owner, area = columns[::6] // 6, values.reshape(-1, 6)[:, :3]
-    first = int(np.searchsorted(body, first_skin)) if len(skins.start) else axis.size
+    owner, force = columns[::6] // 6, values.reshape(-1, 6)[:, :3]
+    first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else axis.size
     corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
     if first < axis.size:
-        place, at = face_centres(axis[first:], face[first:], grid)
+        place, index = face_centres(axis[first:], face[first:], grid)
         corner, weight = skin_at(skins, place, grid)
         part, *more = flesh_rows(
             axis[first:],
-            at,
+            index,
             closed[first:],
             corner,
             weight,
             6 * first_skin,
-            grid.face_area,
+            area,
             *opened,
             walls,
         )
         more_cells, more_start, more_columns, more_values = more
         across = (more_columns[::3] - 6 * first_skin) % 3
-        more_area = more_values.reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
-        cells, owner = np.append(cells, more_cells), np.append(owner, body[first:][part])
-        area = np.concatenate([area, more_area])
+        more_force = more_values.reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
+        cells, owner = np.append(cells, more_cells), np.append(owner, part_body[first:][part])
+        force = np.concatenate([force, more_force])
         row_start = np.append(row_start, row_start[-1] + more_start[1:])
         columns, values = np.append(columns, more_columns), np.append(values, more_values)
     return Geometry(
         distance,
         nearest,
-        opened,
+        (ox, oy, oz),
         axis,
         face,
-        body,
+        part_body,
         closed,
         corner,
         weight,
         cells,
         owner,
-        area,
+        force,
         row_start,
         columns,
         values,
