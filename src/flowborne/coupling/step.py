@@ -23,7 +23,7 @@ from flowborne.coupling.report import Momentum, Outcome, StepReport
 from flowborne.coupling.solve import Solved, solve_bodies, solve_together
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.stream import winds_on
-from flowborne.coupling.world import World
+from flowborne.coupling.world import Setup, World
 from flowborne.fluid.grid import Array
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
 from flowborne.solids.flesh_dynamics import assemble_flesh
@@ -129,12 +129,21 @@ def command(world: World, dt: float, drive: Drive | None) -> Drive:
 
 
 def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
-    """The grid cut by the bodies where they are."""
-    setup = world.setup
+    """The grid cut by the bodies where they are: once for each pose, and kept beside it.
+
+    pose  of the bodies at the world's positions, where it is known
+    """
+    if world.cut is None or not np.array_equal(world.cut[0], world.solid.q):
+        if pose is None:
+            pose = kinematics(world.setup.solid, world.solid.q)
+        world.cut = world.solid.q.copy(), cut_at(world.setup, pose)
+    return world.cut[1]
+
+
+def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
+    """The grid cut by the bodies in a pose."""
     assert setup.fluid is not None
     seen = None if setup.fluid.one_way else setup.solid.flesh
-    if pose is None:
-        pose = kinematics(setup.solid, world.solid.q)
     if setup.shapes.body.size == 0 and seen is None:
         return uncut(setup.fluid.grid, pose.vertices)
     return geometry(

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.motion import Motion
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
@@ -94,6 +95,8 @@ class World:
     time    s
     steps   number of steps taken
     memory  the controller's own arrays, by name
+    cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
+            and not part of it
     """
 
     setup: Setup
@@ -102,6 +105,10 @@ class World:
     time: float = 0.0
     steps: int = 0
     memory: dict[str, Array] = field(default_factory=dict)
+    cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, object]:
+        return vars(self) | {"cut": None}
 
     @classmethod
     def at_rest(cls, setup: Setup) -> World:
@@ -127,6 +134,7 @@ class World:
             self.time,
             self.steps,
             {name: values.copy() for name, values in self.memory.items()},
+            self.cut,
         )
 
     def arrays(self) -> dict[str, Array]:
