@@ -13,6 +13,7 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.pressure import PressureSolution, PressureSystem
 from flowborne.validation.worlds import advance, world_of
 
 BOX = """<mujoco><worldbody>
@@ -51,7 +52,7 @@ def test_contact_without_friction_settles(grid: str, monkeypatch: pytest.MonkeyP
     for _ in range(20):
         passes.append(0)
         assert advance(bare, 0.01).contacts > 0
-        assert passes[-1] <= 3
+        assert passes[-1] <= 3 + (grid != "no fluid")  # a fluid's step tries the last pressure
         passes.append(0)
         advance(plain, 0.01)
     np.testing.assert_allclose(bare.solid.v, plain.solid.v, atol=1e-6)
@@ -72,10 +73,14 @@ def test_what_does_not_settle_is_told_apart_from_a_solve(
     assert 0 in report.unsettled
 
 
+def missed(solution: PressureSolution) -> PressureSolution:
+    return replace(solution, converged=False)
+
+
 def test_each_solve_that_misses_its_tolerance_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     world = sliding(GRIDS["slab"], 1)
-    diffuse, project = solve.diffuse, solve.project
+    diffuse, solved = solve.diffuse, PressureSystem.solve
     monkeypatch.setattr(solve, "diffuse", lambda *given: (*diffuse(*given)[:2], False))
     assert step(world.copy(), 0.01).outcome is Outcome.VISCOSITY_NOT_CONVERGED
-    monkeypatch.setattr(solve, "project", lambda *given: replace(project(*given), converged=False))
+    monkeypatch.setattr(PressureSystem, "solve", lambda *given: missed(solved(*given)))
     assert step(world.copy(), 0.01).outcome is Outcome.PRESSURE_NOT_CONVERGED
