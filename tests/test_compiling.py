@@ -1,6 +1,10 @@
+from types import SimpleNamespace
+
 import numba
 
-from flowborne.compiling import compilation_watched
+from flowborne import compiling
+from flowborne.compiling import compilation_watched, compile_solver, compile_solver_beside
+from flowborne.fluid import conjugate_gradients, jit
 
 
 def test_kernels_are_counted_once_and_only_while_watching():
@@ -15,3 +19,20 @@ def test_kernels_are_counted_once_and_only_while_watching():
         double(1.0)
     double(1j)
     assert seen == [1, 2]
+
+
+def test_another_process_compiles_the_solver_unless_it_is_there(tmp_path, monkeypatch):
+    """Here it is put into the cache first, then asked for with that cache and with an empty one."""
+    started = []
+    monkeypatch.setattr(compiling.subprocess, "Popen", lambda command, **_: started.append(command))
+    monkeypatch.setattr(jit, "cores", lambda: 2)
+    compile_solver()
+    compile_solver_beside.__wrapped__()
+    assert started == []
+    empty = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
+    monkeypatch.setattr(conjugate_gradients, "solve", SimpleNamespace(serial=empty))
+    compile_solver_beside.__wrapped__()
+    assert [command[1:] for command in started] == [["-m", "flowborne.compiling"]]
+    monkeypatch.setattr(jit, "cores", lambda: 1)
+    compile_solver_beside.__wrapped__()
+    assert len(started) == 1

@@ -120,6 +120,7 @@ class Simulation:
         workers: int | None = None,
         executor: str | object | None = None,
     ) -> None:
+        from flowborne.compiling import compile_solver_beside
         from flowborne.control.executors import mapper
         from flowborne.coupling.step import step
         from flowborne.scenes.build import build
@@ -128,6 +129,8 @@ class Simulation:
         if workers is not None and workers < 1:
             raise ValueError(f"workers is {workers}; give 1 or more")
         self.scene: Scene = load_scene(scene) if isinstance(scene, str | Path) else scene
+        if self.scene.has_fluid:
+            compile_solver_beside()
         count = workers or default_workers(
             len(self.scene.controlled_joints()), self.scene.has_fluid
         )

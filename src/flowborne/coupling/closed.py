@@ -79,13 +79,12 @@ def add_closed(total: Array, phi: Array, box: Integers, axis: int) -> None:
                 )
 
 
-@njit(nogil=True, cache=True)
 def beside_sides(shape: Integers, walls: Integers) -> Integers:
     """(nx, ny, nz) how many solid sides bound each cell.
 
     walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
     """
-    beside = np.zeros((shape[0], shape[1], shape[2]), np.int64)
+    beside = np.zeros(shape, np.int64)
     beside[0] += walls[0, 0]
     beside[-1] += walls[0, 1]
     beside[:, 0] += walls[1, 0]
