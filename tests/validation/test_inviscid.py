@@ -1,4 +1,4 @@
-"""Cases I4, I6, I7 and I8, short and on coarse grids."""
+"""Cases I4, I6, I7, I8 and I9, short and on coarse grids."""
 
 from __future__ import annotations
 
@@ -35,3 +35,10 @@ def test_I8_plug_moves_all_the_fluid(solid: bool) -> None:
     ends = BoundaryOpen()
     for sides in (Boundaries(ends, ends), Boundaries(PERIODIC, PERIODIC)):
         assert case.slug(8, 0.5, 0.1, sides, 5, solid) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_I9_a_free_body_never_gains_energy_and_loses_less_on_a_finer_grid() -> None:
+    coarse, fine = case.turning(8), case.turning(16)
+    for energies in (coarse, fine):
+        assert energies.max() == pytest.approx(1.0, abs=1e-12)
+    assert 1.0 - fine[-1] < 0.6 * (1.0 - coarse[-1])

@@ -26,6 +26,7 @@ MODULES = {
     "I6": "inviscid",
     "I7": "inviscid",
     "I8": "inviscid",
+    "I9": "inviscid",
     "V2": "settling",
     "V8": "viscous",
     "D1": "flesh",

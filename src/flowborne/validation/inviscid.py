@@ -1,4 +1,4 @@
-"""Bodies and an ideal fluid that answer each other: I4, I6, I7, I8."""
+"""Bodies and an ideal fluid that answer each other: I4, I6, I7, I8, I9."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.coupling.operators import face_mass
+from flowborne.coupling.step import cut_by_bodies
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.fluid.energy import energy
 from flowborne.fluid.grid import Array, Grid
+from flowborne.solids.momentum import kinetic_energy
 from flowborne.solids.wind import WindForce
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.fluid_cases import Uniform, all_inflow
 from flowborne.validation.pendulums import passages
-from flowborne.validation.reference import table
+from flowborne.validation.reference import reference, table
 from flowborne.validation.worlds import (
     PERIODIC,
     RING,
@@ -297,9 +301,64 @@ def piston(quick: bool) -> list[Finding]:
     return findings
 
 
+TURNING = (0.5, 0.35)
+"""Semi-axes of I9's ellipse, which is as heavy as the fluid, m."""
+
+SPIN, DRIFT = 1.0, (0.1, 0.06)
+"""rad/s and m/s that it is set going with, before the fluid takes its share."""
+
+
+def kinetic(world: World) -> float:
+    """Kinetic energy of fluid and bodies, J per metre of depth."""
+    fluid, state = world.flow()
+    mass = face_mass(cut_by_bodies(world).open, fluid.grid, fluid.boundaries, fluid.density)
+    return energy(state.velocity, mass) + kinetic_energy(world.setup.solid, world.solid)
+
+
+def turning(cells: int) -> Array:
+    """Kinetic energy after every step of half a turn, over that at its start.
+
+    cells  along the long axis; a tip moves half a cell a step
+    """
+    side = 3.0
+    count = round(cells * side)
+    grid = Grid.slab(count, count, side / count, (-0.5 * side, -0.5 * side))
+    geom = f'<geom type="ellipsoid" size="{TURNING[0]} {TURNING[1]} 1"/>'
+    world = world_of(grid, mjcf(f"<body><freejoint/>{geom}</body>"), solid_density=1.0)
+    world.solid.q[:2] = -0.0123, 0.0177
+    world.solid.v[[0, 1, 5]] = *DRIFT, SPIN
+    start_at_once(world, 1e-9)
+    dt = 0.5 * grid.spacing / (SPIN * TURNING[0])
+    energies, turned = [kinetic(world)], 0.0
+    while turned < np.pi:
+        advance(world, dt)
+        turned += dt * abs(world.solid.v[5])
+        energies.append(kinetic(world))
+    return np.array(energies) / energies[0]
+
+
+def free_turn(quick: bool) -> list[Finding]:
+    """I9: a body that turns freely in a closed box, and the fluid around it, keep their energy."""
+    name = "energy lost in half a turn, cells across the long axis: part"
+    allowed = {int(cells): part for cells, part in reference("I9", name).items()}
+    grids = tuple(allowed)[:2] if quick else tuple(allowed)
+    runs = [turning(n) for n in grids]
+    lost = [float(1.0 - run[-1]) for run in runs]
+    series = GridSeries("cells along the long axis", grids, lost, lost)
+    findings = [
+        at_most(
+            f"part of the energy lost in half a turn, {n} cells", part, allowed[n], series=series
+        )
+        for n, part in zip(grids, lost, strict=True)
+    ]
+    most = float(max(run.max() for run in runs))
+    return [*findings, at_most("largest energy over that at the start", most, 1.0)]
+
+
 CASES = (
     Case("I4", neutrally_buoyant),
     Case("I6", munk_moment),
     Case("I7", pendulum),
     Case("I8", piston),
+    Case("I9", free_turn),
 )
