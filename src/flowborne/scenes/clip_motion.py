@@ -75,7 +75,7 @@ class MotionClip:
             flat = np.concatenate([2.0 * spin[:, 1:].ravel(), rate[balls:]])
             known = row[self.columns.q], flat[self.columns.v]
             for values in known:
-                values.flags.writeable = False
+                values.setflags(write=False)
             if len(self._known) >= KEPT:
                 self._known.clear()
             self._known[time] = known

@@ -89,7 +89,7 @@ def subtree_halfway_momentum(model: SolidModel, s: Scratch, state: SolidState, d
     if known is None:
         q = model.integrate(state.q, state.v, 0.5 * dt)
         known = subtree_momentum(model, s, SolidState(q, state.v))
-        known.flags.writeable = False
+        known.setflags(write=False)
         if len(s.momenta) >= KEPT:
             s.momenta.pop(next(iter(s.momenta)))
     else:
