@@ -28,6 +28,7 @@ from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.projection import CLOSED, side_codes
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
@@ -171,14 +172,6 @@ def list_cells(
     return at
 
 
-def solid_sides(boundaries: Boundaries) -> Integers:
-    """(3, 2) 1 where the lower or upper side across an axis is solid or an inflow."""
-    solid = ("closed", "no-slip", "inflow")
-    return np.array(
-        [[int(side.kind in solid) for side in boundaries.pair(axis)] for axis in range(3)]
-    )
-
-
 def around_bodies(
     shapes: Shapes,
     position: Array,
@@ -229,7 +222,7 @@ def geometry(
     nx, ny, nz = grid.shape
     shape, flat = np.array(grid.shape), grid.is_slab
     h, area, origin = grid.spacing, grid.face_area, np.array(grid.origin)
-    walls = solid_sides(boundaries)
+    walls = (side_codes(boundaries) == CLOSED).astype(np.int64)
     distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
     nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
     beside = beside_sides(shape, walls)

@@ -113,7 +113,8 @@ def correct(driven: Driven, v: Array, actuator: Array, limit: Array) -> Driven |
 
 
 def unsettled(driven: Driven, changed: Driven | None, v: Array) -> Integers:
-    """(k,) dofs whose contacts, joint limits or drives `v` (nv,) asks to change."""
+    """(k,) dofs whose contacts, joint limits or drives `v` (nv,) asks to change; none when it asks
+    for no change."""
     if changed is None:
         return np.zeros(0, np.int64)
     system = driven.system
@@ -126,14 +127,14 @@ def unsettled(driven: Driven, changed: Driven | None, v: Array) -> Integers:
 
 def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
     """Bodies without a fluid; k is `size`."""
-    none = np.zeros(driven.velocity.size)
+    none, tried = np.zeros(driven.velocity.size), driven
     for _ in range(PASSES):
         actuator = driven.actuator(driven.velocity, none)
         changed = correct(driven, driven.velocity, actuator, torque_limit)
-        left = unsettled(driven, changed, driven.velocity)
         if changed is None:
             break
-        driven = changed
+        tried, driven = driven, changed
+    left = unsettled(tried, changed, tried.velocity)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
     return Solved(driven, driven.velocity, actuator, np.zeros(size), None, None, outcome, left)
 
@@ -173,7 +174,7 @@ def solve_together(
     coupling = Coupling(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     floor = rounding_floor(smooth, fluid.grid)
-    iterations = 0
+    iterations, tried = 0, driven
     for _ in range(PASSES):
         start = motion(pose, driven.after(generalised(pose, viscous)))
         rhs = -net
@@ -185,7 +186,6 @@ def solve_together(
         v = driven.after(impulse)
         actuator = driven.actuator(v, impulse)
         changed = correct(driven, v, actuator, torque_limit)
-        left = unsettled(driven, changed, v)
         watch.lap("projection")
         if changed is None and tolerance <= fluid.tolerance:
             break
@@ -195,7 +195,7 @@ def solve_together(
                 smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, changed, dt)
                 watch.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
-            driven = changed
+            tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
     after = subtract_pressure_gradient(smooth, solution.pressure, cut, fluid)
@@ -209,6 +209,7 @@ def solve_together(
         largest_divergence(after, cut, moved, rate, fluid),
         max(largest_speed(after[axis], cut.open[axis]) for axis in fluid.grid.axes),
     )
+    left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
     if not smoothed:
         outcome = Outcome.VISCOSITY_NOT_CONVERGED
