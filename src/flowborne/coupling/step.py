@@ -76,8 +76,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     # 1. the bodies move with the velocity they have, driven joints as they are told
     before, pose = move_bodies(world, orders, dt)
     watch.lap("solids")
-    still = np.array_equal(before.q, world.solid.q)
-    cut = cut_before if still else cut_by_bodies(world, pose)
+    cut = cut_by_bodies(world, pose)
     watch.lap("geometry")
     # 2. and 3. velocity and scalars are carried by the leak-proof field
     carried = carry_fluid(world, cut_before, cut, blown, drift, dt)
