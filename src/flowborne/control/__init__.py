@@ -1,5 +1,5 @@
 """The controller: objectives, gradients, step rules, schedule, executors.
 
-Knows only a world that can be copied, stepped and measured. Paper: sections 2.1-2.3, 3.1-3.3 and
-4.3 (eq. 10).
+Knows only a world that can be copied, stepped and measured. Paper: sections 2, 3 and 4.3
+(eq. 10).
 """

@@ -1,6 +1,6 @@
 """The controller: decides targets for the controlled joints and drives the joints there.
 
-Paper: sections 2.1 (algorithm), 4.3 (Navier-Stokes: fewer decisions, frozen flow).
+Paper: sections 2.1 and 4.3 (algorithm).
 """
 
 from __future__ import annotations

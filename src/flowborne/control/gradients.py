@@ -99,7 +99,7 @@ class FiniteDifference:
 class GradientCentral(FiniteDifference):
     """(f(+d) - f(-d)) / 2d for every dof: 2n evaluations, error O(d^2).
 
-    source  Lentine et al. 2011, section 2.1
+    source  Lentine et al. 2011, sections 2.1 and 4.3
     """
 
     def estimate(self, poses: Poses) -> Estimate:
@@ -119,7 +119,7 @@ class GradientOneSided(FiniteDifference):
 
     A dof that its range keeps from going forward is tried backward.
 
-    source  Lentine et al. 2011, section 4.3
+    source  Lentine et al. 2011
     """
 
     def estimate(self, poses: Poses) -> Estimate:

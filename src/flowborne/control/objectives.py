@@ -73,7 +73,7 @@ class ObjectiveWindDrag:
     """Force of the simple winds on `bodies` along `direction`, eqs. (2)-(4), N.
 
     raises  ValueError for a direction of no length
-    source  Lentine et al. 2011, sections 3.1 and 3.2
+    source  Lentine et al. 2011, eqs. (2)-(4)
     """
 
     bodies: Integers

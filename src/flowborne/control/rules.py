@@ -1,4 +1,4 @@
-"""How far to go down the gradient. Paper: sections 2.1 and 4.3."""
+"""How far to go down the gradient. Paper: section 2.1."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class GoldenSection:
                far as strength allows in one decision
     tolerance  length, as a part of the search, to which the least is bracketed
     raises     ValueError when reach is not positive or tolerance is outside (0, 1)
-    source     Lentine et al. 2011, section 4.3
+    source     Lentine et al. 2011
     """
 
     reach: float | None = None

@@ -1,6 +1,7 @@
 """How the drives take the joints to their targets: exactly, or by a critically damped PD law.
 
-Paper: section 2.1.
+The PD law is solved analytically, as in Weinstein, Guendelman and Fedkiw 2008, "Impulse-based
+control of joints and muscles", which the paper uses.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """One hypothetical evaluation: copy the world, move the controlled joints, step, measure.
 
 Paper: sections 2.1 and 2.2 (positional change), 2.3 and 3.2 (which velocities are there when the
-objective is read), 3.3 (what is outboard is rigid), 4.3 (settling).
+objective is read), 3.3 and 5 (what is outboard is rigid), 3.3 and 4.3 (steady state).
 """
 
 from __future__ import annotations
@@ -47,13 +47,15 @@ class Hypothesis:
     velocities  what the controlled dofs' velocities are while the objective is read, which is in
                 the last step:
                 "removed"  none: relative velocities are taken out first, momentum kept, and the
-                           fluid sees the pose, not the motion into it (steady state, section 3.1)
+                           fluid sees the pose, not the motion into it (steady state, sections 3.3
+                           and 4.3)
                 "present"  those that the dofs have now: the drives' force is what holds them
                            (effort, eq. 1). In the last steps, at least one, the dofs move on with
                            them, having started so far behind that they end in the pose tried
                 "probe"    that of the displacement itself, from the start and over all steps; the
-                           other controlled dofs have none (section 3.2). In a fluid the first step
-                           holds the impulse that starts the flow: take two steps or settle
+                           other controlled dofs have none (section 3.2; in a fluid the
+                           pseudo-velocity of section 4.3). There the first step holds the impulse
+                           that starts the flow: take two steps or settle
     raises      ValueError when dt is not positive, steps < 1, settle < 0 or velocities is unknown
     """
 
