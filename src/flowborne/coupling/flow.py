@@ -60,7 +60,7 @@ def carry_fluid(
     drift: Array,
     dt: float,
 ) -> Carried:
-    """Advect velocity and scalars by the leak-proof field (section 6, items 2 and 3).
+    """Advect velocity and scalars by the leak-proof field (section 6).
 
     With the acceleration A = (u - u*)/dt of the last step, c = u + dt/2 A is the velocity of a
     particle half-way; c is what is carried, along the paths of c, and dt/2 A is taken off where
@@ -248,7 +248,7 @@ def faces_of(values: list[Array]) -> Faces:
 
 
 def forced(carried: Faces, fluid: Fluid, time: float, dt: float) -> Faces:
-    """Velocity with the body force, driven regions and prescribed sides (item 4).
+    """Velocity with the body force, driven regions and prescribed sides.
 
     time  s at the end of the step
     """
@@ -285,7 +285,7 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
 def settle_state(
     world: World, after: Geometry, velocity: Faces, start: Faces, leak_free: Faces, dt: float
 ) -> None:
-    """Put the new velocity into the state, continued a few layers into the bodies (item 7).
+    """Put the new velocity into the state, continued a few layers into the bodies.
 
     velocity   Faces u after the solve
     start      Faces u* after advection

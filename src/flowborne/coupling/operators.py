@@ -2,8 +2,8 @@
 
 A body's twist holds the velocity (3) of its point at the world origin and its angular velocity (3).
 The motion of everything (k,) holds all twists, then the velocity (3) of every vertex of flesh.
-J v of the paper, the flux that moving bodies push into a cell, is  values @ motion  over the rows
-of `Geometry`; J^T p is the transpose, a push (k,): wrenches, then forces on vertices. Motion and
+J v, the flux of moving bodies out of a cell (see `solve`), is  values @ motion  over the rows of
+`Geometry`; J^T p is the transpose, a push (k,): wrenches, then forces on vertices. Motion and
 generalised velocities are related by the Jacobians of the kinematics, T.
 """
 
@@ -78,7 +78,7 @@ def rigid_response(kinematics: Kinematics, driven: PrescribedSystem) -> Array:
 
 
 def response(kinematics: Kinematics, driven: Driven) -> Response:
-    """The motion that a unit impulsive push gives: M = T A^-1 T^T, eq. (9) eliminated."""
+    """The motion that a unit impulsive push gives: M = T A^-1 T^T, eq. (9) with v eliminated."""
     if isinstance(driven, PrescribedSystem):
         return dense_response(rigid_response(kinematics, driven))
     twist = twist_rows(kinematics)
@@ -135,7 +135,9 @@ def add_body_velocity(
 
 
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:
-    """Field that crosses no body: open part fluid, closed part body (section 6, item 2).
+    """Field that crosses no body: open part fluid, closed part body.
+
+    In place of the leak-proof projection of section 6, item 4: nothing is solved for.
 
     moving  (k,) see `motion`
     """

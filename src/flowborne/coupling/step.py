@@ -66,24 +66,24 @@ def step_bodies(world: World, dt: float, orders: Drive, watch: Stopwatch) -> Ste
 
 
 def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
-    """A step of bodies and fluid: the seven items of section 6."""
+    """A step of bodies and fluid (section 6)."""
     fluid, state = world.flow()
     cut_before = cut_by_bodies(world)
     blown = jets_at(world, cut_before, world.time)
     watch.lap("geometry")
     drift = drift_velocity(world, cut_before, dt)
     watch.lap("advection")
-    # 1. the bodies move with the velocity they have, driven joints as they are told
+    # the bodies move with the velocity they have, driven joints as they are told
     before, pose = move_bodies(world, orders, dt)
     watch.lap("solids")
     cut = cut_by_bodies(world, pose)
     watch.lap("geometry")
-    # 2. and 3. velocity and scalars are carried by the leak-proof field
+    # velocity and scalars are carried by the leak-proof field
     carried = carry_fluid(world, cut_before, cut, blown, drift, dt)
-    # 4. forces on the fluid
+    # forces on the fluid
     velocity = forced(carried.velocity, fluid, world.time + dt, dt)
     watch.lap("advection")
-    # 5. forces on the bodies, and their own equations of motion
+    # forces on the bodies, and their own equations of motion
     wind = winds_on(world, pose)
     buoyancy = buoyant_push(world.setup.solid, pose, fluid.density)
     reaction = jet_wrench(blown, fluid.density, len(wind))
@@ -91,13 +91,13 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     push[: wind.size] += (wind + reaction).ravel()
     driven = equations(world, before, pose, push, orders, dt)
     watch.lap("solids")
-    # 6. viscosity, pressure, bodies, joints and contact in one solve
+    # viscosity, pressure, bodies, joints and contact in one solve (item 6)
     jets = jets_at(world, cut, world.time + dt, pose)
     solved = solve_together(
         world, velocity, driven, pose, cut, jets, orders.torque_limit, dt, watch
     )
     watch.lap("projection")
-    # 7. the new state: it holds the promises of section 6 on the next step's leak-proof field
+    # the new state, with the leak-proof field of the next step (item 4)
     assert solved.projected is not None
     world.solid.v[:] = solved.v
     leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
