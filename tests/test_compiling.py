@@ -3,8 +3,9 @@ from types import SimpleNamespace
 import numba
 
 from flowborne import compiling
-from flowborne.compiling import compilation_watched, compile_solver, compile_solver_beside
-from flowborne.fluid import conjugate_gradients, jit
+from flowborne.compiling import compile_solver, compile_solver_beside
+from flowborne.kernels import conjugate_gradients, jit
+from flowborne.kernels.compilation import compilation_watched
 
 
 def test_kernels_are_counted_once_and_only_while_watching():

@@ -1,4 +1,4 @@
-"""Compiling kernels: watching it, and having a second process at it.
+"""Compiling the kernels of the pressure solver in a second process.
 
 A first run compiles for a minute on one core. The pressure solver is half of that and needs nothing
 of the rest, so another process compiles it for the cache on disc while this one begins with the
@@ -9,47 +9,18 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 
-@contextmanager
-def compilation_watched(notify: Callable[[int], None]) -> Iterator[None]:
-    """Call `notify(n)` when the n-th kernel begins to compile.
-
-    Kernels that come from the cache of an earlier run are not compiled, and nothing is called.
-    Calls come from whichever thread compiles.
-    """
-    from numba.core import event
-
-    class Listener(event.Listener):
-        compiled = 0
-
-        def on_start(self, started: object) -> None:
-            self.compiled += 1
-            notify(self.compiled)
-
-        def on_end(self, ended: object) -> None:
-            """Nothing: only the beginning of a compilation is news."""
-
-    listener = Listener()
-    event.register("numba:compile", listener)
-    try:
-        yield
-    finally:
-        event.unregister("numba:compile", listener)
-
-
 @cache
 def compile_solver_beside() -> None:
     """Have the pressure solver compiled by another process, unless it is in the cache or this
     machine has one core. At most once in a process; it need not be waited for."""
-    from flowborne.fluid.conjugate_gradients import solve
-    from flowborne.fluid.jit import cores
+    from flowborne.kernels.conjugate_gradients import solve
+    from flowborne.kernels.jit import cores
 
     index = Path(solve.serial.stats.cache_path)
     if cores() == 1 or any(index.glob("conjugate_gradients.solve-*.nbi")):

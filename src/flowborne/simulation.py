@@ -16,7 +16,7 @@ from threadpoolctl import ThreadpoolController
 
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
-from flowborne.fluid.jit import cores, kernel_threads
+from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
 from flowborne.solids.inversion import inversion
 

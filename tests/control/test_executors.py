@@ -14,8 +14,8 @@ import pytest
 
 from flowborne.control import executors
 from flowborne.control.executors import Foreign, Processes, Serial, Threads, mapper
-from flowborne.fluid import jit
-from flowborne.fluid.jit import allowed_threads, kernel_threads
+from flowborne.kernels import jit
+from flowborne.kernels.jit import allowed_threads, kernel_threads
 
 
 class LikeDask:

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flowborne.coupling.closed import add_closed, closed_fraction
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
+from flowborne.kernels.closed_fractions import add_closed, closed_fraction
 
 Cut = Callable[..., Geometry]
 

@@ -18,7 +18,7 @@ from flowborne.coupling.operators import (
 )
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import outflow
+from flowborne.kernels.outflow import outflow
 
 Cut = Callable[..., Geometry]
 

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from flowborne.fluid.body_modes import with_answers
-from flowborne.fluid.conjugate_gradients import apply_laplacian
-from flowborne.fluid.levels import at_level, guests_at, leaning_at, weights_at
-from flowborne.fluid.multigrid import defect, interpolate, restrict, smooth, v_cycle
 from flowborne.fluid.pressure import PressureSystem
+from flowborne.kernels.deflation import deflated
+from flowborne.kernels.laplacian import apply_laplacian
+from flowborne.kernels.levels import at_level, guests_at, leaning_at, weights_at
+from flowborne.kernels.smoothing import defect, smooth
+from flowborne.kernels.transfer import interpolate, restrict
+from flowborne.kernels.v_cycle import v_cycle
 
 SHAPES = [
     ((12, 9, 1), (False, False, False)),
@@ -108,7 +110,7 @@ def test_the_preconditioner_takes_off_what_bodies_answer(shape, count):
     fields = rng.standard_normal((count, *padded))
     out, expected = np.zeros(padded), np.zeros(padded)
     expected[cells] = (0.5 * z - np.tensordot(amount, fields, 1))[cells]
-    product = with_answers(out, z, r, 0.5, amount, fields)
+    product = deflated(out, z, r, 0.5, amount, fields)
     np.testing.assert_allclose(out, expected, atol=1e-14)
     assert product == pytest.approx(np.vdot(expected, r))
 

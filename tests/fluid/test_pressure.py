@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flowborne.fluid import jit
-from flowborne.fluid.jit import kernel_threads
 from flowborne.fluid.pressure import UNCOUPLED, Coupling, PressureSystem
 from flowborne.fluid.response import dense_response
+from flowborne.kernels import jit
+from flowborne.kernels.jit import kernel_threads
 
 
 def random_weights(shape, sides, seed=0, blocked=0.3):

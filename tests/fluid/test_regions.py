@@ -51,9 +51,9 @@ def test_null_basis_is_orthonormal_and_moves_nothing():
 
 def test_rounding_of_a_wrench_that_cancels_is_no_push():
     """Constant pressure around a body that the fluid surrounds."""
-    from flowborne.fluid.regions import region_wrenches
+    from flowborne.kernels.regions import region_loads
 
     label = np.zeros((1, 4, 4), np.int32)
     cells = np.array([5, 6, 9])
     rows = (cells, np.arange(4), np.zeros(3, np.int64), np.array([0.1, 0.2, -0.3]))
-    assert not region_wrenches(label, 1, 6, rows).any()
+    assert not region_loads(label, 1, 6, rows).any()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.coupling.distance import BAND
 from flowborne.fluid.advection import cells_per_step
 from flowborne.fluid.boundary import (
     Boundaries,
@@ -17,6 +16,7 @@ from flowborne.fluid.boundary import (
 from flowborne.fluid.ghosts import pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.scalars import carry_scalars, cells_in
+from flowborne.kernels.node_distance import BAND
 
 RING = BoundaryPeriodic()
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from flowborne.kernels.momentum import OF_THE_WHOLE, ROUNDING, momentum_impulse
 from flowborne.solids.dynamics import assemble
-from flowborne.solids.halfway import OF_THE_WHOLE, ROUNDING, momentum_impulse
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import twists_about_origin
 from flowborne.solids.prescribed import prescribe

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
+from flowborne.kernels.momentum import about_origin
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import (
     KEPT,
-    about_origin,
     subtree_halfway_momentum,
     subtree_momentum,
     twists_about_origin,

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flowborne.kernels.wind import places, pushed
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
-from flowborne.solids.wind import Wind, WindFaces, WindForce, places, pushed
+from flowborne.solids.wind import Wind, WindFaces, WindForce
 
 LENGTH, WIDTH, RHO, SPEED = 2.0, 0.4, 1.3, 5.0
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.jit import kernel_threads
+from flowborne.kernels.jit import kernel_threads
 from flowborne.simulation import Simulation
 
 Array = NDArray[np.float64]

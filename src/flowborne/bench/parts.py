@@ -8,7 +8,7 @@ import numpy as np
 
 from flowborne.bench.frames import FRAMES
 from flowborne.bench.result import Result
-from flowborne.fluid.jit import kernel_threads
+from flowborne.kernels.jit import kernel_threads
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.simulation import PARTS, Simulation

@@ -17,7 +17,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from itertools import chain
 from typing import Any, Protocol, TypeVar
 
-from flowborne.fluid.jit import allowed_threads, cores, kernel_threads
+from flowborne.kernels.jit import allowed_threads, cores, kernel_threads
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")

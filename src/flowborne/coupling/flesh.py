@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from flowborne.coupling.shapes import WATERTIGHT
-from flowborne.coupling.skin import sample_skin, skin_box, skin_weights
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array, Grid
+from flowborne.kernels.arrays import Integers
+from flowborne.kernels.skin import sample_skin, skin_box, skin_weights
 from flowborne.solids.flesh import Flesh
 
 
@@ -85,72 +84,6 @@ def face_centres(axis: Integers, face: Integers, grid: Grid) -> tuple[Array, Int
 def skin_at(skins: Skins, place: Array, grid: Grid) -> tuple[Integers, Array]:
     """(n, 3) vertices and weights of the point of the skin that is nearest to each place (n, 3)."""
     return skin_weights(place, skins.vertices, skins.triangles, grid.spacing)
-
-
-@njit(nogil=True, cache=True)
-def has_open_face(i: int, j: int, k: int, ox: Array, oy: Array, oz: Array, walls: Integers) -> bool:
-    """Whether cell (i, j, k) has a face that is not wholly closed, and not on a solid side.
-
-    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
-    """
-    cell = i, j, k
-    for axis in range(2 if ox.shape[2] == 1 else 3):
-        opened = ox if axis == 0 else (oy if axis == 1 else oz)
-        last = opened.shape[axis] - 2
-        x, y, z = i + int(axis == 0), j + int(axis == 1), k + int(axis == 2)
-        if opened[i, j, k] > 0.0 and not (cell[axis] == 0 and walls[axis, 0]):
-            return True
-        if opened[x, y, z] > 0.0 and not (cell[axis] == last and walls[axis, 1]):
-            return True
-    return False
-
-
-@njit(nogil=True, cache=True)
-def flesh_rows(
-    axis: Integers,
-    at: Integers,
-    closed: Array,
-    corner: Integers,
-    weight: Array,
-    first_column: int,
-    area: float,
-    ox: Array,
-    oy: Array,
-    oz: Array,
-    walls: Integers,
-) -> tuple[Integers, Integers, Integers, Integers, Array]:
-    """Coupling rows of the cells beside closed parts of faces: one row per part and open cell.
-
-    axis, at        (n,), (n, 3) faces
-    closed          (n,) part of each that flesh closes
-    corner, weight  (n, 3) vertices that move it
-    first_column    of the vertices' velocities
-    walls           (3, 2) as in `has_open_face`
-    returns         number of the part of each row; cells, row_start, columns, values as in
-                    `Geometry`
-    """
-    shape = (oy.shape[0], ox.shape[1], ox.shape[2])
-    part, cells = np.empty(2 * axis.size, np.int64), np.empty(2 * axis.size, np.int64)
-    columns = np.empty(6 * axis.size, np.int64)
-    values = np.empty(6 * axis.size)
-    cell = np.empty(3, np.int64)
-    rows = 0
-    for n in range(axis.size):
-        for side in range(2):
-            cell[:] = at[n]
-            cell[axis[n]] -= 1 - side
-            if cell[axis[n]] < 0 or cell[axis[n]] >= shape[axis[n]]:
-                continue
-            if not has_open_face(cell[0], cell[1], cell[2], ox, oy, oz, walls):
-                continue
-            part[rows] = n
-            cells[rows] = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
-            for c in range(3):
-                columns[3 * rows + c] = first_column + 3 * corner[n, c] + axis[n]
-                values[3 * rows + c] = (1.0 - 2.0 * side) * area * closed[n] * weight[n, c]
-            rows += 1
-    start = 3 * np.arange(rows + 1)
-    return part[:rows], cells[:rows], start, columns[: 3 * rows], values[: 3 * rows]
 
 
 def hydrostatic_push(vertices: Array, triangles: Integers, gravity: Array, density: float) -> Array:

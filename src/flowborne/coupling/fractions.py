@@ -6,29 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from flowborne.coupling.closed import (
-    add_closed,
-    beside_sides,
-    count_beside,
-    list_closed,
-    share_closed,
-)
-from flowborne.coupling.distance import BAND, merge, node_box, sample_body
-from flowborne.coupling.flesh import (
-    Skins,
-    face_centres,
-    flesh_rows,
-    has_open_face,
-    skin_at,
-    skins_on,
-)
+from flowborne.coupling.flesh import Skins, face_centres, skin_at, skins_on
 from flowborne.coupling.shapes import Shapes
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import CLOSED, side_codes
+from flowborne.fluid.projection import side_codes
+from flowborne.kernels.arrays import Integers
+from flowborne.kernels.closed_fractions import add_closed, count_beside, list_closed, share_closed
+from flowborne.kernels.coupling_rows import flesh_rows, list_cells
+from flowborne.kernels.node_distance import BAND, merge, node_box, sample_body
+from flowborne.kernels.sides import CLOSED
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
@@ -80,96 +68,20 @@ class Geometry:
     skins: Skins
 
 
-@njit(nogil=True, cache=True)
-def cell_wrench(
-    wrench: Array,
-    i: int,
-    j: int,
-    k: int,
-    sx: Array,
-    sy: Array,
-    sz: Array,
-    ox: Array,
-    oy: Array,
-    oz: Array,
-    walls: Integers,
-    box: Integers,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
-) -> int:
-    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given.
+def beside_sides(shape: Integers, walls: Integers) -> Integers:
+    """(nx, ny, nz) how many solid sides bound each cell.
 
-    Gives 0 when the cell is wholly closed or touches no closed part, else 1.
+    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
     """
-    a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
-    x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
-    z = 0.0 if flat else origin[2] + h * (k + 0.5)
-    touched = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
-    if not flat:
-        touched += sz[a, b, c] + sz[a, b, c + 1]
-    if touched == 0.0 or not has_open_face(i, j, k, ox, oy, oz, walls):
-        return 0
-    wrench[:] = 0.0
-    for side in range(2):
-        sign = 2.0 * side - 1.0
-        f = sign * area * sx[a + side, b, c]
-        wrench[0] += f
-        wrench[4] += z * f
-        wrench[5] -= y * f
-        f = sign * area * sy[a, b + side, c]
-        wrench[1] += f
-        wrench[3] -= z * f
-        wrench[5] += x * f
-        if not flat:
-            f = sign * area * sz[a, b, c + side]
-            wrench[2] += f
-            wrench[3] += y * f
-            wrench[4] -= x * f
-    return 1
-
-
-@njit(nogil=True, cache=True)
-def list_cells(
-    sx: Array,
-    sy: Array,
-    sz: Array,
-    ox: Array,
-    oy: Array,
-    oz: Array,
-    walls: Integers,
-    box: Integers,
-    body: int,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
-    at: int,
-    cells: Integers,
-    columns: Integers,
-    values: Array,
-) -> int:
-    """Write the coupling rows of one body from row `at` on; gives the next one.
-
-    With `cells` of length 0 it only counts.
-    """
-    wrench = np.empty(6)
-    n = ox.shape
-    for i in range(box[0, 0], box[0, 1] - 1):
-        for j in range(box[1, 0], box[1, 1] - 1):
-            for k in range(box[2, 0], box[2, 1] - 1):
-                found = cell_wrench(
-                    wrench, i, j, k, sx, sy, sz, ox, oy, oz, walls, box, origin, h, area, flat
-                )
-                if found:
-                    if cells.size:
-                        cells[at] = (i * n[1] + j) * n[2] + k
-                        for m in range(6):
-                            columns[6 * at + m] = 6 * body + m
-                            values[6 * at + m] = wrench[m]
-                    at += 1
-    return at
+    beside = np.zeros(shape, np.int64)
+    beside[0] += walls[0, 0]
+    beside[-1] += walls[0, 1]
+    beside[:, 0] += walls[1, 0]
+    beside[:, -1] += walls[1, 1]
+    if shape[2] > 1:
+        beside[:, :, 0] += walls[2, 0]
+        beside[:, :, -1] += walls[2, 1]
+    return beside
 
 
 def around_bodies(

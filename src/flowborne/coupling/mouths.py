@@ -23,8 +23,8 @@ from scipy.ndimage import map_coordinates
 
 from flowborne.coupling.flesh import face_centres
 from flowborne.coupling.fractions import Geometry
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.kernels.arrays import Integers
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0

@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array, vstack
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.response import Response, dense_response, factored_response
+from flowborne.kernels.body_velocity import add_body_velocity
+from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import Driven, PrescribedSystem
 
@@ -86,54 +86,6 @@ def response(kinematics: Kinematics, driven: Driven) -> Response:
     return factored_response(free, *driven.factors(), free @ driven.soft(twist))
 
 
-@njit(nogil=True, cache=True)
-def add_body_velocity(
-    out: Array,
-    axis: int,
-    axes: Integers,
-    faces: Integers,
-    bodies: Integers,
-    closed: Array,
-    corner: Integers,
-    weight: Array,
-    twist: Array,
-    flesh: Array,
-    origin: Array,
-    h: float,
-    flat: bool,
-) -> None:
-    """Add closed fraction x body velocity on the faces across `axis`, at their centres.
-
-    corner, weight  (nf, 3) vertices that move the last nf parts
-    twist, flesh    (nbody, 6) of the bodies, (n, 3) velocity of the vertices
-    """
-    n1, n2 = out.shape[1], out.shape[2]
-    flat_out = out.reshape(-1)
-    rigid = axes.size - len(corner)
-    for n in range(axes.size):
-        if axes[n] != axis:
-            continue
-        f = faces[n]
-        if n >= rigid:
-            velocity = 0.0
-            for c in range(3):
-                velocity += weight[n - rigid, c] * flesh[corner[n - rigid, c], axis]
-            flat_out[f] += closed[n] * velocity
-            continue
-        i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
-        x = origin[0] + h * (i + (0.0 if axis == 0 else 0.5))
-        y = origin[1] + h * (j + (0.0 if axis == 1 else 0.5))
-        z = 0.0 if flat else origin[2] + h * (k + (0.0 if axis == 2 else 0.5))
-        t = twist[bodies[n]]
-        if axis == 0:
-            velocity = t[0] + t[4] * z - t[5] * y
-        elif axis == 1:
-            velocity = t[1] + t[5] * x - t[3] * z
-        else:
-            velocity = t[2] + t[3] * y - t[4] * x
-        flat_out[f] += closed[n] * velocity
-
-
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:
     """Field that crosses no body: open part fluid, closed part body.
 
@@ -163,47 +115,10 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
     return carried[0], carried[1], carried[2]
 
 
-@njit(nogil=True, cache=True)
-def add_rows(
-    out: Array,
-    cells: Integers,
-    row_start: Integers,
-    columns: Integers,
-    values: Array,
-    moving: Array,
-) -> None:
-    """Add rows x motion to the cells of a field."""
-    flat_out = out.reshape(-1)
-    for n in range(cells.size):
-        flux = 0.0
-        for m in range(row_start[n], row_start[n + 1]):
-            flux += values[m] * moving[columns[m]]
-        flat_out[cells[n]] += flux
-
-
 def add_flux(out: Array, geometry: Geometry, moving: Array) -> None:
     """Add the volume rate that the bodies' motion (k,) takes from each cell, J v, m^3/s."""
     g = geometry
-    add_rows(out, g.cells, g.row_start, g.columns, g.values, moving)
-
-
-@njit(nogil=True, cache=True)
-def sum_rows(
-    cells: Integers,
-    row_start: Integers,
-    columns: Integers,
-    values: Array,
-    pressure: Array,
-    size: int,
-) -> Array:
-    """(size,) transposed rows x field."""
-    push = np.zeros(size)
-    flat = pressure.reshape(-1)
-    for n in range(cells.size):
-        p = flat[cells[n]]
-        for m in range(row_start[n], row_start[n + 1]):
-            push[columns[m]] += values[m] * p
-    return push
+    add_rows(out, (g.cells, g.row_start, g.columns, g.values), moving)
 
 
 def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
@@ -211,7 +126,7 @@ def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
     forces on vertices of flesh, N and N m (impulses for p^ = p dt)."""
     g = geometry
     field = np.ascontiguousarray(pressure)
-    return sum_rows(g.cells, g.row_start, g.columns, g.values, field, size)
+    return sum_rows(field, (g.cells, g.row_start, g.columns, g.values), size)
 
 
 def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:

@@ -34,11 +34,12 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.pressure import NO_REACTION, Coupling, PressureSystem
-from flowborne.fluid.projection import face_weights, outflow, push
+from flowborne.fluid.projection import face_weights, push
 from flowborne.fluid.response import Response
+from flowborne.kernels.arrays import Integers
+from flowborne.kernels.outflow import outflow
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import Driven, within_limits
 

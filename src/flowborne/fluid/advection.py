@@ -10,11 +10,10 @@ ghosts (see `ghosts`).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Faces
-from flowborne.fluid.jit import kernel
+from flowborne.kernels.jit import kernel, njit, prange
 
 Mask = NDArray[np.uint8]
 

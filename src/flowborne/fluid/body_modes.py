@@ -1,7 +1,7 @@
 """What the preconditioner knows of the bodies.
 
 A V-cycle V on K alone is a poor guide to  K + G^T M G  where the bodies are light: pressure finds
-it far easier to push them than the fluid they displace. With M = R R^T and B = G^T R,
+it far easier to add_rows them than the fluid they displace. With M = R R^T and B = G^T R,
 
     (V^-1 + B B^T)^-1  =  V - Y (1 + B^T Y)^-1 Y^T        Y = V B
 
@@ -11,14 +11,14 @@ takes in every motion of the bodies at the price of a V-cycle each (Woodbury's i
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
-from flowborne.fluid.arrays import Hierarchy, Real, Rows
 from flowborne.fluid.grid import Array
-from flowborne.fluid.jit import kernel
-from flowborne.fluid.levels import at_level, scaled_cells
-from flowborne.fluid.multigrid import v_cycle
 from flowborne.fluid.response import Response
+from flowborne.kernels.arrays import Hierarchy, Real, Rows
+from flowborne.kernels.levels import at_level
+from flowborne.kernels.sparse_rows import add_rows, row_gram, row_gram_along, sum_rows
+from flowborne.kernels.v_cycle import v_cycle
+from flowborne.kernels.vectors import scaled_cells
 
 MOST = 32
 """Motions that are taken in, the lightest first; more would cost more than they save."""
@@ -31,63 +31,6 @@ LIGHT_IN_FLESH = 100.0
 cost less than it does."""
 
 
-@kernel
-def wrench_of(p: Real, rows: Rows, size: int) -> Array:
-    """(size,) G p of a padded field."""
-    cells, row_start, columns, values = rows
-    flat = p.reshape(-1)
-    wrench = np.zeros(size)
-    for n in range(cells.size):
-        value = flat[cells[n]]
-        for e in range(row_start[n], row_start[n + 1]):
-            wrench[columns[e]] += values[e] * value
-    return wrench
-
-
-@kernel
-def push(p: Real, rows: Rows, twist: Array) -> None:
-    """p += G^T twist on a padded field."""
-    cells, row_start, columns, values = rows
-    flat = p.reshape(-1)
-    for n in range(cells.size):
-        total = 0.0
-        for e in range(row_start[n], row_start[n + 1]):
-            total += values[e] * twist[columns[e]]
-        flat[cells[n]] += total
-
-
-@kernel
-def nearby_mass(rows: Rows, inverse: Real, size: int) -> Array:
-    """(size, size) G D^-1 G^T for a padded D^-1: added mass of the nearest fluid only."""
-    cells, row_start, columns, values = rows
-    flat = inverse.reshape(-1)
-    gram = np.zeros((size, size))
-    for n in range(cells.size):
-        share = flat[cells[n]]
-        for e in range(row_start[n], row_start[n + 1]):
-            for f in range(row_start[n], row_start[n + 1]):
-                gram[columns[e], columns[f]] += share * values[e] * values[f]
-    return gram
-
-
-@kernel
-def nearby_mass_along(rows: Rows, inverse: Real, root: Array) -> Array:
-    """(m, m) R^T G D^-1 G^T R for motions R (k, m), without the (k, k) matrix between them."""
-    cells, row_start, columns, values = rows
-    flat = inverse.reshape(-1)
-    count = root.shape[1]
-    gram, flux = np.zeros((count, count)), np.empty(count)
-    for n in range(cells.size):
-        flux[:] = 0.0
-        for e in range(row_start[n], row_start[n + 1]):
-            for a in range(count):
-                flux[a] += values[e] * root[columns[e], a]
-        for a in range(count):
-            for b in range(count):
-                gram[a, b] += flux[a] * flux[b] * flat[cells[n]]
-    return gram
-
-
 def body_modes(
     response: Response, rows: Rows, inverse: Real, scale: float, across: int, held: bool
 ) -> Array:
@@ -95,16 +38,16 @@ def body_modes(
 
     response  M
     inverse   padded: of the diagonal that the V-cycle is made for, which knows how flesh gives way;
-              what a motion moves of the nearest fluid is `nearby_mass` with it
+              what a motion moves of the nearest fluid is `row_gram` with it
     scale     of the hierarchy's weights
     across    most cells along an axis: how much more than the nearest fluid a body may move
     held      whether a region's pressure has no hold but bodies, which no V-cycle knows
     """
     root = np.sqrt(scale) * response.soft
     if response.is_dense:
-        nearby = root.T @ nearby_mass(rows, inverse, response.size) @ root
+        nearby = root.T @ row_gram(rows, inverse, response.size) @ root
     else:
-        nearby = nearby_mass_along(rows, inverse, root)
+        nearby = row_gram_along(rows, inverse, root)
     ratio, turned = np.linalg.eigh(nearby)
     light = LIGHT if response.is_dense or held else LIGHT_IN_FLESH
     chosen = np.flatnonzero(ratio * across > light)[-MOST:]
@@ -122,10 +65,10 @@ def mode_fields(
     gram = np.empty((count, count))
     for n in range(count):
         source[:] = 0.0
-        push(source, rows, np.ascontiguousarray(modes[:, n]))
+        add_rows(source, rows, np.ascontiguousarray(modes[:, n]))
         v_cycle(hierarchy, *cycle)
         scaled_cells(z, fields[n], 1.0)
-        gram[:, n] = wrench_of(z, rows, size) @ modes
+        gram[:, n] = sum_rows(z, rows, size) @ modes
     return fields, gram
 
 
@@ -138,46 +81,3 @@ def mode_answers(modes: Array, gram: Array) -> Array:
     scale = 1.0 / np.sqrt(np.diag(matrix))
     inverse: Array = scale[:, None] * np.linalg.inv(scale[:, None] * matrix * scale) * scale
     return inverse @ modes.T
-
-
-@kernel
-def answers_of(z: Real, rows: Rows, answers: Array, scale: float) -> Array:
-    """(m,) (1 + B^T Y)^-1 R^T G z x scale for a padded field z = V r."""
-    count, size = answers.shape
-    amount = np.zeros(count)
-    if count:
-        wrench = scale * wrench_of(z, rows, size)
-        for n in range(count):
-            for c in range(size):
-                amount[n] += answers[n, c] * wrench[c]
-    return amount
-
-
-@kernel
-def with_answers(out: Array, z: Real, r: Array, scale: float, amount: Array, fields: Real) -> float:
-    """out = scale z - Y amount in the cells; returns out . r.
-
-    In double precision, because a light body leaves very little of z where it is pushed.
-
-    NumPy:  out[cells] = (scale * z - np.tensordot(amount, fields, 1))[cells]
-    """
-    d = 1 if z.shape[0] > 1 else 0
-    planes, last = z.shape[0] - 2 * d, z.shape[2] - 1
-    parts = np.zeros(planes)
-    for i in prange(planes):
-        m = i + d
-        row = np.zeros(last + 1)
-        for j in range(1, z.shape[1] - 1):
-            for k in range(1, last):
-                out[m, j, k] = scale * z[m, j, k]
-            for n in range(amount.size):
-                for k in range(1, last):
-                    out[m, j, k] -= amount[n] * fields[n, m, j, k]
-            for k in range(1, last):
-                row[k] += out[m, j, k] * r[m, j, k]
-        for k in range(1, last):
-            parts[i] += row[k]
-    total = 0.0
-    for i in range(planes):
-        total += parts[i]
-    return total

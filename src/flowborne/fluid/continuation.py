@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array
-from flowborne.fluid.jit import kernel
+from flowborne.kernels.jit import kernel
 
 LAYERS = 3
 """Layers that are filled: as far as a body's side can move in a step, and one more."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from flowborne.fluid.grid import Array, Faces
+from flowborne.kernels.jit import njit
 
 
 @njit(nogil=True, cache=True)

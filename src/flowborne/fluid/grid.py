@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Faces = tuple[Array, Array, Array]
-"""One array per axis: u (nx+1, ny, nz), v (nx, ny+1, nz), w (nx, ny, nz+1)."""
+from flowborne.kernels.arrays import Array as Array
+from flowborne.kernels.arrays import Faces as Faces
 
 
 @dataclass(frozen=True)

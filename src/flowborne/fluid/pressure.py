@@ -15,23 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.fluid.aggregates import OWN
-from flowborne.fluid.arrays import Hierarchy, Integers, Labels, Marks, Places, Real, Rows
 from flowborne.fluid.body_modes import body_modes, mode_answers, mode_fields
-from flowborne.fluid.conjugate_gradients import Finest, solve
 from flowborne.fluid.grid import Array, Faces
-from flowborne.fluid.jit import kernel
-from flowborne.fluid.levels import (
-    LEAN,
-    at_level,
-    coarsen,
-    finest_weights,
-    largest,
-    level_table,
-    scaled,
-)
-from flowborne.fluid.regions import label_regions, null_basis, region_wrenches
+from flowborne.fluid.levels import level_table
+from flowborne.fluid.regions import null_basis
 from flowborne.fluid.response import Response, dense_response
+from flowborne.kernels.aggregates import OWN
+from flowborne.kernels.arrays import Finest, Hierarchy, Integers, Labels, Marks, Places, Real, Rows
+from flowborne.kernels.conjugate_gradients import solve
+from flowborne.kernels.levels import LEAN, at_level, coarsen, finest_weights
+from flowborne.kernels.regions import label_regions, region_loads
+from flowborne.kernels.sparse_rows import padded_rows
+from flowborne.kernels.vectors import largest, load_cells, scaled
 
 
 @dataclass(frozen=True)
@@ -178,45 +173,6 @@ def prepare(
     return label_regions(finest, hierarchy[1], label, parent, count), scale
 
 
-@kernel
-def load(target: Array, source: Array, diagonal: Array) -> None:
-    """Cells into a padded array; 0 in ghosts and in cells without an open face."""
-    d = 1 if target.shape[0] > 1 else 0
-    n1, n2 = source.shape[1], source.shape[2]
-    for i in range(target.shape[0]):
-        target[i] = 0.0
-        if d == 0 or 0 < i < target.shape[0] - 1:
-            for j in range(n1):
-                for k in range(n2):
-                    if diagonal[i, j + 1, k + 1] > 0.0:
-                        target[i, j + 1, k + 1] = source[i - d, j, k]
-
-
-@kernel
-def padded_rows(rows: Rows, diagonal: Array) -> Rows:
-    """The rows of a coupling in active cells, with padded flat indices."""
-    cells, row_start, columns, values = rows
-    p0, p1, p2 = diagonal.shape
-    d = 1 if p0 > 1 else 0
-    n1, n2 = p1 - 2, p2 - 2
-    flat = diagonal.reshape(-1)
-    kept = np.empty_like(cells)
-    starts = np.zeros_like(row_start)
-    places, entries = np.empty_like(columns), np.empty_like(values)
-    count, used = 0, 0
-    for n in range(cells.size):
-        c = cells[n]
-        at = ((c // (n1 * n2) + d) * p1 + (c // n2) % n1 + 1) * p2 + c % n2 + 1
-        if flat[at] > 0.0:
-            kept[count] = at
-            for e in range(row_start[n], row_start[n + 1]):
-                places[used], entries[used] = columns[e], values[e]
-                used += 1
-            count += 1
-            starts[count] = used
-    return kept[:count], starts[: count + 1], places[:used], entries[:used]
-
-
 class PressureSystem:
     """The matrix for one geometry: build once, solve for any right-hand side and coupling.
 
@@ -287,8 +243,8 @@ class PressureSystem:
         diagonal = b.finest[3]
         x, right = b.vectors[:2]
         first = np.zeros(self.shape) if guess is None else np.ascontiguousarray(guess, np.float64)
-        load(x, first.reshape(cells), diagonal)
-        load(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
+        load_cells(x, first.reshape(cells), diagonal)
+        load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
         coupled = self.coupled(coupling)
         iterations, residual, converged = solve(
             self.hierarchy,
@@ -323,7 +279,7 @@ class PressureSystem:
         )
         null, answers, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
         if self.regions:
-            wrench = region_wrenches(b.label, self.regions, response.size, rows)
+            wrench = region_loads(b.label, self.regions, response.size, rows)
             null = null_basis(b.count[: self.regions], wrench, response)
         inverse = at_level(b.inverse, b.table, 0)
         held = null.shape[1] < self.regions

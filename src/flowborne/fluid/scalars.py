@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from flowborne.fluid.advection import (
@@ -20,7 +19,7 @@ from flowborne.fluid.advection import (
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, Source
 from flowborne.fluid.ghosts import edge, pad, pad_cells
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.jit import kernel
+from flowborne.kernels.jit import kernel, prange
 
 Mask = NDArray[np.uint8]
 

@@ -20,17 +20,17 @@ from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.conjugate_gradients import descend, dot, turn
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.jit import kernel
-from flowborne.fluid.viscosity import TIED, ViscousFaces
+from flowborne.fluid.viscosity import ViscousFaces
+from flowborne.kernels.arrays import Integers
+from flowborne.kernels.vectors import descend, dot, turn
+from flowborne.kernels.viscosity import TIED
+from flowborne.kernels.viscous_operator import apply_component
 
 WIDTH = 256
 """Faces in a row of the vectors of the conjugate gradients."""
@@ -41,33 +41,6 @@ ROUNDING = 1e-15
 MOST = 20
 """Iterations for each cell along the longest edge of the domain, at most; and at least as many as
 for a domain of MOST cells."""
-
-
-@kernel
-def apply_component(out: Array, x: Array, scale: Array, links: Array, wraps: Integers) -> None:
-    """out = x - scale sum of links (scale x) of the neighbours, for one component.
-
-    wraps  (3,) number of distinct faces along each axis where the domain is periodic, else 0
-    """
-    _, ni, nj, nk = links.shape
-    steps = nj * nk, nk, 1
-    link = links.reshape(3, -1)
-    for plane in prange(ni):
-        i = np.int64(plane)
-        for j in range(nj):
-            for k in range(nk):
-                f = i * steps[0] + j * steps[1] + k
-                total = 0.0
-                for d in range(3):
-                    at = i if d == 0 else (j if d == 1 else k)
-                    around = steps[d] * (wraps[d] - 1)
-                    if link[d, f] != 0.0:
-                        g = f - around if at + 1 == wraps[d] else f + steps[d]
-                        total += link[d, f] * scale[g] * x[g]
-                    if at != wraps[d]:
-                        g = f - steps[d] if at > 0 else f + around
-                        total += link[d, g] * scale[g] * x[g]
-                out[f] = x[f] - scale[f] * total
 
 
 @dataclass(frozen=True)

@@ -11,20 +11,16 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from flowborne.kernels.momentum import momentum_impulse
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import subtree_halfway_momentum, weight
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
 
 Array = NDArray[np.float64]
-
-ROUNDING, OF_THE_WHOLE = 1e-14, 1e-15
-"""Shares of the terms of an impulse, and of the largest impulse of all, that rounding may change: a
-hand's forces are sums in which those of the whole creature cancel."""
 
 
 @dataclass(frozen=True)
@@ -84,51 +80,6 @@ class Halfway:
             self.outer,
             dt,
         )
-
-
-@njit(nogil=True, cache=True)
-def momentum_impulse(
-    cdof: Array,
-    centre: Array,
-    given: Array,
-    later: Array,
-    body: NDArray[np.int64],
-    conserved: NDArray[np.bool_],
-    gained: Array,
-    still: Array,
-    bias: Array,
-    outer: Array,
-    dt: float,
-) -> tuple[Array, Array]:
-    """(nv,) r of A v+ = r, and (nv,) how much of it may be rounding errors.
-
-        r = A v + (M - armature) (v+ - v) + S.(P - P+) + dt f      along conserved dofs
-        r = A v - dt c + dt f                                      along the others
-
-    cdof, centre                (nv, 6), (nv, 3) of the twists S about the world origin
-    given, later, body          (bodies, 6) P and P+, and (nv,) their rows for each dof
-    gained, still, bias, outer  (nv,) (M - armature) (v+ - v), A v, c, f
-    """
-    dofs = len(cdof)
-    impulse, rounding, largest = np.empty(dofs), np.empty(dofs), 0.0
-    twist = np.empty(6)
-    for n in range(dofs):
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            across = centre[n, j] * cdof[n, k] - centre[n, k] * cdof[n, j]
-            twist[i], twist[3 + i] = cdof[n, 3 + i] + across, cdof[n, i]
-        change, scale = 0.0, 0.0
-        for i in range(6):
-            before, after = given[body[n], i], later[body[n], i]
-            change += twist[i] * (before - after)
-            scale += abs(twist[i]) * (abs(before) + abs(after))
-        moved = change + gained[n] if conserved[n] else -dt * bias[n]
-        impulse[n] = still[n] + moved + dt * outer[n]
-        rounding[n] = ROUNDING * (scale + dt * abs(outer[n]))
-        largest = max(largest, scale)
-    for n in range(dofs):
-        rounding[n] += OF_THE_WHOLE * largest
-    return impulse, rounding
 
 
 def halfway(

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from flowborne.kernels.momentum import about_origin
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
 
@@ -28,22 +28,6 @@ def cross(a: Array, b: Array) -> Array:
     product[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
     product[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return product
-
-
-@njit(nogil=True, cache=True)
-def about_origin(vector: Array, moment: Array, centre: Array) -> Array:
-    """(n, 6) vectors f, and their moments m + c x f about the world origin.
-
-    vector, moment, centre  (n, 3) f, m about c, and c
-    """
-    screw = np.empty((len(vector), 6))
-    for n in range(len(vector)):
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            screw[n, i] = vector[n, i]
-            across = centre[n, j] * vector[n, k] - centre[n, k] * vector[n, j]
-            screw[n, 3 + i] = moment[n, i] + across
-    return screw
 
 
 def twists_about_origin(cdof: Array, centre: Array) -> Array:

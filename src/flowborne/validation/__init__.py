@@ -80,7 +80,7 @@ def run_cases(
     """
     from threadpoolctl import threadpool_limits
 
-    from flowborne.fluid.jit import kernel_threads
+    from flowborne.kernels.jit import kernel_threads
 
     results = []
     for name in case_ids() if ids is None else ids:

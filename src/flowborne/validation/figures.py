@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from flowborne.bench.frames import frame_times
-from flowborne.fluid.jit import cores
 from flowborne.io.atomic import write_atomically
+from flowborne.kernels.jit import cores
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 from flowborne.validation.blocked_arms import COLUMNS, blocked_rows, draw_frame

@@ -18,7 +18,7 @@ from flowborne.control.trial import Hypothesis
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.jit import cores, kernel_threads
+from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 from flowborne.solids.wind import WindFaces, WindForce

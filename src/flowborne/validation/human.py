@@ -18,8 +18,8 @@ from flowborne.control.trial import Hypothesis
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Setup, World
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Integers
 from flowborne.scenes.human.body import human_mjcf
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.solids.dynamics import kinematics

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.distance import BAND
 from flowborne.fluid.advection import CENTRE, carry, cells_per_step
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import pad_cells
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.scalars import carry_scalars
+from flowborne.kernels.node_distance import BAND
 from flowborne.validation.case import Case, Finding, GridSeries, order_of
 from flowborne.validation.worlds import whole_steps
 

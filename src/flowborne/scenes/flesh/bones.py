@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 import pyvista as pv
-from numba import njit
 from numpy.typing import NDArray
 
-from flowborne.coupling.shapes import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, signed_distance
+from flowborne.kernels.distance import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, distances
 from flowborne.scenes.wording import suggestion
 from flowborne.solids.mjcf import (
     compiled_quietly,
@@ -61,7 +60,7 @@ class Part:
         """(n,) signed distances of points (n, 3), negative inside, m."""
         local = np.ascontiguousarray((points - self.position) @ self.rotation)
         if self.mesh is None:
-            return _distances(KINDS[self.kind], self.size, local)
+            return distances(KINDS[self.kind], self.size, local)
         cloud = pv.PolyData(local).compute_implicit_distance(self.mesh)
         return np.asarray(cloud["implicit_distance"], dtype=np.float64)
 
@@ -143,38 +142,3 @@ def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: A
         float(half.min()),
         None if mesh is None else pv.PolyData.from_regular_faces(*mesh),
     )
-
-
-@njit(nogil=True, cache=True)
-def _distances(kind: int, size: Array, points: Array) -> Array:
-    none, nowhere = np.zeros(1), np.zeros(3)
-    table = np.zeros(4, np.int64)
-    distance = np.empty(len(points))
-    for i in range(len(points)):
-        if kind == ELLIPSOID:
-            distance[i] = distance_off_ellipsoid(points[i], size)
-        else:
-            x, y, z = points[i]
-            distance[i] = signed_distance(kind, size, x, y, z, none, table, nowhere, 1.0)
-    return distance
-
-
-@njit(nogil=True, cache=True)
-def distance_off_ellipsoid(point: Array, semi: Array) -> float:
-    """Signed distance of a point to an ellipsoid about the origin, m (Eberly 2013).
-
-    The nearest point is semi^2 point / (t + semi^2) for the largest root t of the ellipsoid's
-    equation. That is convex above -min(semi)^2, so Newton's method climbs to it from below.
-    """
-    least = semi.min()
-    place = np.maximum(np.abs(point), 1e-9 * least)
-    t = (semi * (place - semi)).max()
-    for _ in range(100):
-        ratio = semi * place / (t + semi**2)
-        excess = (ratio**2).sum() - 1.0
-        step = 0.5 * excess / (ratio**2 / (t + semi**2)).sum()
-        t += step
-        if step <= 1e-14 * least**2:
-            break
-    offset = place * t / (t + semi**2)
-    return float(np.sign(t) * np.sqrt((offset**2).sum()))

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.kernels.jit import numba_thread_count
 from flowborne.scenes.flesh import mesh_run
 from flowborne.solids.slab import Mesh
 from flowborne.solids.tissue import right_handed
@@ -42,7 +42,7 @@ def tetrahedra_within(
             triangles=np.concatenate(triangles).astype(np.int32),
             size=size,
             tolerance=tolerance / np.linalg.norm(np.ptp(points, axis=0)),
-            threads=numba.get_num_threads(),
+            threads=numba_thread_count(),
         )
         # -P: no module of this folder stands in for one of Python's own
         command = [sys.executable, "-P", str(Path(mesh_run.__file__).resolve())]

@@ -32,7 +32,8 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # read when Numba loads Ope
 
 import numba
 import numpy as np
-from numba import njit
+from numba import njit as njit
+from numba import prange as prange
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -103,6 +104,11 @@ def is_large(arguments: tuple[Any, ...]) -> bool:
         elif isinstance(given, tuple) and is_large(given):
             return True
     return False
+
+
+def numba_thread_count() -> int:
+    """Threads that Numba would use by itself."""
+    return int(numba.get_num_threads())
 
 
 @cache

@@ -8,18 +8,12 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from flowborne.coupling.closed import add_closed, face_closed
-from flowborne.coupling.distance import BAND
-from flowborne.coupling.shapes import sample_mesh
-from flowborne.coupling.skin import (
-    BESIDE,
-    ON_SKIN,
-    sample_skin,
-    skin_box,
-    skin_weights,
-)
-from flowborne.fluid.arrays import Integers
 from flowborne.fluid.grid import Array, Grid
+from flowborne.kernels.arrays import Integers
+from flowborne.kernels.closed_fractions import add_closed, face_closed
+from flowborne.kernels.mesh_distance import sample_mesh
+from flowborne.kernels.node_distance import BAND
+from flowborne.kernels.skin import BESIDE, ON_SKIN, sample_skin, skin_box, skin_weights
 
 Skin = tuple[Array, Integers]
 """Vertices (n, 3) in m and triangles (k, 3)."""

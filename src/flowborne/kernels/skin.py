@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.coupling.distance import BAND
-from flowborne.coupling.triangles import Point, closest_on_triangle, squared_distance
-from flowborne.fluid.arrays import Integers
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array, Integers, Point
+from flowborne.kernels.node_distance import BAND
+from flowborne.kernels.triangles import closest_on_triangle, squared_distance
 
 BESIDE = 2.0
 """Places are moved by the skin up to this many cells away."""

@@ -7,11 +7,9 @@ is shared among them by what each closes alone.
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
-from flowborne.fluid.arrays import Integers
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array, Integers
 
 CREASE = 0.02
 """Open part below which a face in a crease is closed. Bodies that overlap at a joint, or reach into
@@ -77,22 +75,6 @@ def add_closed(total: Array, phi: Array, box: Integers, axis: int) -> None:
                 total[i, j, k] += face_closed(
                     phi, axis, i - box[0, 0], j - box[1, 0], k - box[2, 0]
                 )
-
-
-def beside_sides(shape: Integers, walls: Integers) -> Integers:
-    """(nx, ny, nz) how many solid sides bound each cell.
-
-    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
-    """
-    beside = np.zeros(shape, np.int64)
-    beside[0] += walls[0, 0]
-    beside[-1] += walls[0, 1]
-    beside[:, 0] += walls[1, 0]
-    beside[:, -1] += walls[1, 1]
-    if shape[2] > 1:
-        beside[:, :, 0] += walls[2, 0]
-        beside[:, :, -1] += walls[2, 1]
-    return beside
 
 
 @njit(nogil=True, cache=True)

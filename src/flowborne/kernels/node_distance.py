@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.coupling.shapes import signed_distance
-from flowborne.fluid.arrays import Integers
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.distance import signed_distance
 
 BAND = 4.0
 """Distances are known up to this many cells from a body; beyond, they are this large."""

@@ -1,15 +1,12 @@
-"""One symmetric V-cycle on K: the preconditioner of the pressure solve.
+"""Interpolation between two levels, and restriction, its transpose.
 
-Red-black Gauss-Seidel, red first on the way down and black first on the way up, so that the cycle
-is a symmetric positive definite operator. Interpolation is linear along each axis,
+Interpolation is linear along each axis,
 
     p_f = p_C + sum over axes of  c (p_next - p_C)      only where nothing lies between
 
 with C the coarse cell that covers f and `next` the one towards which f lies from its centre (four
-coarse values in 3D; Khalil and Wesseling 1992 use the same points); restriction is its transpose.
-Cells that a thin plate cuts off from C have the value of another coarse cell (see `aggregates`).
-
-Rows are worked on whole and without branches, so that the compiler makes vector code of them.
+coarse values in 3D; Khalil and Wesseling 1992 use the same points). Cells that a thin plate cuts
+off from C have the value of another coarse cell (see `aggregates`).
 """
 
 from __future__ import annotations
@@ -17,77 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.fluid.aggregates import OWN
-from flowborne.fluid.arrays import Hierarchy, Marks, Places, Real, Triple
-from flowborne.fluid.jit import kernel
-from flowborne.fluid.levels import (
-    OFFSET,
-    at_level,
-    guests_at,
-    leaning_at,
-    weights_at,
-    wrap_ghosts,
-)
-
-COARSEST_SWEEPS = 8
-"""Symmetric sweeps on the coarsest level, of at most 4 cells along an axis."""
-
-SERIAL = 40_000
-"""Cells of a level, ghosts included, below which threads would cost more than they save."""
-
-
-@kernel
-def smooth(x: Real, b: Real, w: Triple, inverse: Real, colour: int) -> None:
-    """Gauss-Seidel on the cells of one colour of the chequerboard (0: first cell's; 1: others).
-
-    NumPy:  x[colour] = ((b + sum over faces of w x_neighbour) * inverse)[colour]
-    """
-    w0, w1, w2 = w
-    d = 1 if x.shape[0] > 1 else 0
-    n2 = x.shape[2] - 2
-    for i in prange(x.shape[0] - 2 * d):
-        m = i + d
-        row = np.empty(n2 + 2, x.dtype)
-        for j in range(1, x.shape[1] - 1):
-            parity = (i + j + colour) & 1
-            for k in range(1, n2 + 1):
-                total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
-                total += w1[m, j + 1, k] * x[m, j + 1, k]
-                total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
-                if d:
-                    total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
-                row[k] = total * inverse[m, j, k] if (k & 1) == parity else x[m, j, k]
-            for k in range(1, n2 + 1):
-                x[m, j, k] = row[k]
-
-
-@kernel
-def first_smooth(x: Real, b: Real, inverse: Real) -> None:
-    """Red sweep from x = 0: red cells b * inverse, all else and the ghosts 0."""
-    d = 1 if x.shape[0] > 1 else 0
-    for i in prange(x.shape[0]):
-        for j in range(x.shape[1]):
-            for k in range(x.shape[2]):
-                red = ((i - d + j + k) & 1) == 0
-                x[i, j, k] = b[i, j, k] * inverse[i, j, k] if red else 0.0
-
-
-@kernel
-def defect(r: Real, x: Real, b: Real, w: Triple, inverse: Real) -> None:
-    """r = b - K x in active cells, else 0; ghosts of r are left alone."""
-    w0, w1, w2 = w
-    d = 1 if x.shape[0] > 1 else 0
-    for i in prange(x.shape[0] - 2 * d):
-        m = i + d
-        for j in range(1, x.shape[1] - 1):
-            for k in range(1, x.shape[2] - 1):
-                total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
-                total += w1[m, j + 1, k] * x[m, j + 1, k]
-                total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
-                if d:
-                    total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
-                a = inverse[m, j, k]
-                r[m, j, k] = total - x[m, j, k] / a if a > 0.0 else 0.0
+from flowborne.kernels.aggregates import OWN
+from flowborne.kernels.arrays import Marks, Places, Real, Triple
+from flowborne.kernels.jit import kernel
 
 
 @kernel
@@ -203,64 +132,3 @@ def restrict(b: Real, r: Real, marks: Marks, lean: Triple, guests: Places, hosts
     wide, fine, host = b.reshape(-1), r.reshape(-1), hosts.reshape(-1)
     for g in range(guests.size):
         wide[host[guests[g]]] += fine[guests[g]]
-
-
-@kernel
-def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool) -> None:
-    """The cycle's work on one level, on its way down (from x = 0, then b of the next level) or up
-    (from x of the next level)."""
-    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
-    coarsest = table.shape[0] - 2
-    w, a = weights_at(weights, table, level), at_level(inverse, table, level)
-    xl, bl = at_level(x, table, level), at_level(b, table, level)
-    if down:
-        first_smooth(xl, bl, a)
-        sweeps = 1 if level < coarsest else 4 * COARSEST_SWEEPS - 1
-    else:
-        interpolate(
-            xl,
-            at_level(x, table, level + 1),
-            at_level(marks, table, level),
-            leaning_at(lean, table, level),
-            guests_at(guests, table, level),
-            at_level(hosts, table, level),
-        )
-        sweeps = 2
-    for n in range(sweeps):
-        wrap_ghosts(xl, periodic)
-        mirrored = n > 2 * COARSEST_SWEEPS - 2
-        smooth(xl, bl, w, a, n % 2 if mirrored else 1 - n % 2)
-    wrap_ghosts(xl, periodic)
-    if down and level < coarsest:
-        rl = at_level(r, table, level)
-        defect(rl, xl, bl, w, a)
-        wrap_ghosts(rl, periodic)
-        restrict(
-            at_level(b, table, level + 1),
-            rl,
-            at_level(marks, table, level),
-            leaning_at(lean, table, level),
-            guests_at(guests, table, level),
-            at_level(hosts, table, level),
-        )
-
-
-serial_leg = leg.serial
-"""For levels too small for threads, in the cycle's parallel twin as well."""
-
-
-@kernel
-def v_cycle(hierarchy: Hierarchy, x: Real, b: Real, r: Real) -> None:
-    """x = V b on the finest level, V symmetric positive definite, close to the inverse of K.
-
-    x, b, r  packed over the levels; b's finest level is given, all else is overwritten
-    """
-    table = hierarchy[0]
-    coarsest = table.shape[0] - 2
-    for n in range(2 * coarsest + 1):
-        down = n <= coarsest
-        level = n if down else 2 * coarsest - n
-        if table[level + 1, OFFSET] - table[level, OFFSET] < SERIAL:
-            serial_leg(hierarchy, x, b, r, level, down)
-        else:
-            leg(hierarchy, x, b, r, level, down)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
-Point = tuple[float, float, float]
-"""In kernels; a row of an array serves as well."""
+from flowborne.kernels.arrays import Point
 
 
 @njit(nogil=True, cache=True)

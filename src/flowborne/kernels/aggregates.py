@@ -12,9 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.fluid.arrays import Integers, Marks, Periodic, Places, Real, Triple
-from flowborne.fluid.grid import Array
-from flowborne.fluid.jit import kernel
+from flowborne.kernels.arrays import Array, Integers, Marks, Periodic, Places, Real, Triple
+from flowborne.kernels.jit import kernel
 
 OWN = 8
 """Mark of a fine cell that belongs to the coarse cell over it; marks 1, 2 and 4 besides: it may

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numba import prange
 
-from flowborne.fluid import jit
-from flowborne.fluid.jit import LARGE, Pause, allowed_threads, kernel, kernel_threads
+from flowborne.kernels import jit
+from flowborne.kernels.jit import LARGE, Pause, allowed_threads, kernel, kernel_threads
 
 
 @pytest.fixture(autouse=True)

@@ -1,0 +1,45 @@
+"""Types of the arrays that kernels take."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Faces = tuple[Array, Array, Array]
+"""One array per axis: u (nx+1, ny, nz), v (nx, ny+1, nz), w (nx, ny, nz+1)."""
+
+Integers = NDArray[np.int64]
+Real = NDArray[np.floating]
+"""Double precision, or single in the preconditioner."""
+
+Triple = tuple[Real, Real, Real]
+"""One array per axis."""
+
+Periodic = NDArray[np.uint8]
+"""(3,) 1 for axes that are periodic."""
+
+Marks = NDArray[np.uint8]
+Places = NDArray[np.int32]
+Labels = NDArray[np.int32]
+
+Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Real, Marks, Places, Places]
+"""Table of levels; which axes are periodic; packed over the levels: weights across each axis, what
+is added to the diagonal, the inverse of that, interpolation coefficients (see `levels.leaning`),
+marks, guests and their hosts (see `aggregates`)."""
+
+Finest = tuple[Array, Array, Array, Array]
+"""Padded weights across each axis and diagonal of the finest level."""
+
+Vectors = tuple[Array, Array, Array, Array, Array]
+"""Padded x, right-hand side, and three of scratch."""
+
+Rows = tuple[Integers, Integers, Integers, Array]
+"""Sparse rows J: flat cell of each, where each begins, columns and values of the entries."""
+
+Answers = tuple[Array, Places, Places, Array, Places, Places, Array, Array, Integers, Array]
+"""Dense A^-1; rows of T (start, column, value); columns of L below its diagonal (start, row,
+value); D; the order P; Y (see `solvers.response`)."""
+
+Point = tuple[float, float, float]
+"""In kernels; a row of an array serves as well."""

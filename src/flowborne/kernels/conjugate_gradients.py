@@ -1,0 +1,120 @@
+"""Conjugate gradients on K + J A^-1 J^T, preconditioned by one V-cycle on K and a deflation.
+
+All vectors are padded (see `levels`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.kernels.arrays import (
+    Answers,
+    Array,
+    Finest,
+    Hierarchy,
+    Labels,
+    Real,
+    Rows,
+    Triple,
+    Vectors,
+)
+from flowborne.kernels.deflation import deflated, mode_strengths
+from flowborne.kernels.jit import kernel
+from flowborne.kernels.laplacian import apply_laplacian
+from flowborne.kernels.levels import at_level, wrap_ghosts
+from flowborne.kernels.regions import remove_null
+from flowborne.kernels.response import respond
+from flowborne.kernels.sparse_rows import add_rows, sum_rows
+from flowborne.kernels.v_cycle import v_cycle
+from flowborne.kernels.vectors import descend, dot, scaled, true_residual, turn
+
+LIMIT = 500
+"""Most iterations."""
+
+STAGNATION = 0.5
+"""A restart from the true residual that has not fallen below this times the last ends the solve."""
+
+
+@kernel
+def apply_low_rank(out: Array, p: Array, rows: Rows, answers: Answers) -> float:
+    """out += J A^-1 J^T p; returns p . J A^-1 J^T p."""
+    size = max(answers[0].shape[0], answers[1].size - 1)
+    load = sum_rows(p, rows, size)
+    motion = respond(load, answers)
+    energy = 0.0
+    for a in range(size):
+        energy += motion[a] * load[a]
+    add_rows(out, rows, motion)
+    return energy
+
+
+@kernel
+def solve(
+    hierarchy: Hierarchy,
+    cycle: Triple,
+    finest: Finest,
+    vectors: Vectors,
+    rows: Rows,
+    response: Answers,
+    label: Labels,
+    null: Array,
+    fields: Real,
+    amounts: Array,
+    tolerance: float,
+    absolute: float,
+) -> tuple[int, float, bool]:
+    """Solve (K + J A^-1 J^T) x = rhs from the guess in x; all of it on one thread, or on all.
+
+    hierarchy  of K in the precision of the preconditioner, at any scale; cycle: its x, b, r
+    finest     padded weights and diagonal of K
+    vectors    padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
+               vectors, x as well at the end
+    rows       of J with padded flat cells; response: A^-1 (see `response`)
+    null       see `solvers.regions.null_basis`
+    fields, amounts  of the modes in the preconditioner, at the scale of the hierarchy; see
+               `solvers.deflation`
+    returns    iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
+    """
+    table, periodic = hierarchy[0], hierarchy[1]
+    x, rhs, r, p, q = vectors
+    norm0 = np.sqrt(dot(rhs, rhs))
+    remove_null(rhs, label, null)
+    norm = np.sqrt(dot(rhs, rhs))
+    goal = max(tolerance * norm, absolute, 1e-15 * norm0)
+    residual, last = 0.0, np.inf
+    z, b = at_level(cycle[0], table, 0), at_level(cycle[1], table, 0)
+    iterations = 0
+    converged = False
+    if not norm > goal:
+        x[:] = 0.0
+        return 0, 1.0 if norm > 0.0 else norm, norm <= goal
+    while True:
+        remove_null(x, label, null)
+        wrap_ghosts(x, periodic)
+        apply_laplacian(q, x, finest)
+        apply_low_rank(q, x, rows, response)
+        true_residual(r, rhs, q)
+        remove_null(r, label, null)
+        square = dot(r, r)
+        residual = np.sqrt(square)
+        converged = residual <= goal
+        if converged or not residual < STAGNATION * last or iterations >= LIMIT:
+            break
+        last = residual
+        p[:] = 0.0
+        product = 0.0
+        while np.sqrt(square) > goal and iterations < LIMIT:
+            scale = 1.0 / np.sqrt(square)
+            scaled(r, b, scale)
+            v_cycle(hierarchy, cycle[0], cycle[1], cycle[2])
+            strength = mode_strengths(z, rows, amounts, 1.0 / scale)
+            before, product = product, deflated(q, z, r, 1.0 / scale, strength, fields)
+            turn(p, q, product / before if before > 0.0 else 0.0)
+            wrap_ghosts(p, periodic)
+            curvature = apply_laplacian(q, p, finest)
+            curvature += apply_low_rank(q, p, rows, response)
+            if not (curvature > 0.0 and product > 0.0):
+                break
+            square = descend(x, r, p, q, product / curvature)
+            iterations += 1
+    return iterations, residual / norm, converged

@@ -1,0 +1,166 @@
+"""Rows of J: what unit pressure in a cell beside closed faces exerts on bodies and vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from flowborne.kernels.arrays import Array, Integers
+
+
+@njit(nogil=True, cache=True)
+def has_open_face(i: int, j: int, k: int, ox: Array, oy: Array, oz: Array, walls: Integers) -> bool:
+    """Whether cell (i, j, k) has a face that is not wholly closed, and not on a solid side.
+
+    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
+    """
+    cell = i, j, k
+    for axis in range(2 if ox.shape[2] == 1 else 3):
+        opened = ox if axis == 0 else (oy if axis == 1 else oz)
+        last = opened.shape[axis] - 2
+        x, y, z = i + int(axis == 0), j + int(axis == 1), k + int(axis == 2)
+        if opened[i, j, k] > 0.0 and not (cell[axis] == 0 and walls[axis, 0]):
+            return True
+        if opened[x, y, z] > 0.0 and not (cell[axis] == last and walls[axis, 1]):
+            return True
+    return False
+
+
+@njit(nogil=True, cache=True)
+def cell_wrench(
+    wrench: Array,
+    i: int,
+    j: int,
+    k: int,
+    sx: Array,
+    sy: Array,
+    sz: Array,
+    ox: Array,
+    oy: Array,
+    oz: Array,
+    walls: Integers,
+    box: Integers,
+    origin: Array,
+    h: float,
+    area: float,
+    flat: bool,
+) -> int:
+    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given.
+
+    Gives 0 when the cell is wholly closed or touches no closed part, else 1.
+    """
+    a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
+    x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
+    z = 0.0 if flat else origin[2] + h * (k + 0.5)
+    touched = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
+    if not flat:
+        touched += sz[a, b, c] + sz[a, b, c + 1]
+    if touched == 0.0 or not has_open_face(i, j, k, ox, oy, oz, walls):
+        return 0
+    wrench[:] = 0.0
+    for side in range(2):
+        sign = 2.0 * side - 1.0
+        f = sign * area * sx[a + side, b, c]
+        wrench[0] += f
+        wrench[4] += z * f
+        wrench[5] -= y * f
+        f = sign * area * sy[a, b + side, c]
+        wrench[1] += f
+        wrench[3] -= z * f
+        wrench[5] += x * f
+        if not flat:
+            f = sign * area * sz[a, b, c + side]
+            wrench[2] += f
+            wrench[3] += y * f
+            wrench[4] -= x * f
+    return 1
+
+
+@njit(nogil=True, cache=True)
+def list_cells(
+    sx: Array,
+    sy: Array,
+    sz: Array,
+    ox: Array,
+    oy: Array,
+    oz: Array,
+    walls: Integers,
+    box: Integers,
+    body: int,
+    origin: Array,
+    h: float,
+    area: float,
+    flat: bool,
+    at: int,
+    cells: Integers,
+    columns: Integers,
+    values: Array,
+) -> int:
+    """Write the coupling rows of one body from row `at` on; gives the next one.
+
+    With `cells` of length 0 it only counts.
+    """
+    wrench = np.empty(6)
+    n = ox.shape
+    for i in range(box[0, 0], box[0, 1] - 1):
+        for j in range(box[1, 0], box[1, 1] - 1):
+            for k in range(box[2, 0], box[2, 1] - 1):
+                found = cell_wrench(
+                    wrench, i, j, k, sx, sy, sz, ox, oy, oz, walls, box, origin, h, area, flat
+                )
+                if found:
+                    if cells.size:
+                        cells[at] = (i * n[1] + j) * n[2] + k
+                        for m in range(6):
+                            columns[6 * at + m] = 6 * body + m
+                            values[6 * at + m] = wrench[m]
+                    at += 1
+    return at
+
+
+@njit(nogil=True, cache=True)
+def flesh_rows(
+    axis: Integers,
+    at: Integers,
+    closed: Array,
+    corner: Integers,
+    weight: Array,
+    first_column: int,
+    area: float,
+    ox: Array,
+    oy: Array,
+    oz: Array,
+    walls: Integers,
+) -> tuple[Integers, Integers, Integers, Integers, Array]:
+    """Coupling rows of the cells beside closed parts of faces: one row per part and open cell.
+
+    axis, at        (n,), (n, 3) faces
+    closed          (n,) part of each that flesh closes
+    corner, weight  (n, 3) vertices that move it
+    first_column    of the vertices' velocities
+    walls           (3, 2) as in `has_open_face`
+    returns         number of the part of each row; cells, row_start, columns, values as in
+                    `Geometry`
+    """
+    shape = (oy.shape[0], ox.shape[1], ox.shape[2])
+    part, cells = np.empty(2 * axis.size, np.int64), np.empty(2 * axis.size, np.int64)
+    columns = np.empty(6 * axis.size, np.int64)
+    values = np.empty(6 * axis.size)
+    cell = np.empty(3, np.int64)
+    rows = 0
+    for n in range(axis.size):
+        for side in range(2):
+            cell[:] = at[n]
+            cell[axis[n]] -= 1 - side
+            if cell[axis[n]] < 0 or cell[axis[n]] >= shape[axis[n]]:
+                continue
+            if not has_open_face(cell[0], cell[1], cell[2], ox, oy, oz, walls):
+                continue
+            part[rows] = n
+            cells[rows] = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
+            for c in range(3):
+                columns[3 * rows + c] = first_column + 3 * corner[n, c] + axis[n]
+                values[3 * rows + c] = (1.0 - 2.0 * side) * area * closed[n] * weight[n, c]
+            rows += 1
+    start = 3 * np.arange(rows + 1)
+    return part[:rows], cells[:rows], start, columns[: 3 * rows], values[: 3 * rows]

@@ -1,0 +1,37 @@
+"""The weighted cell Laplacian K on the finest level."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from flowborne.kernels.arrays import Array, Finest
+from flowborne.kernels.jit import kernel
+
+
+@kernel
+def apply_laplacian(out: Array, p: Array, finest: Finest) -> float:
+    """out = K p; returns p . K p.  Ghosts of p hold what lies beyond the sides."""
+    w0, w1, w2, diagonal = finest
+    d = 1 if p.shape[0] > 1 else 0
+    n2 = p.shape[2] - 2
+    planes = p.shape[0] - 2 * d
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        m = i + d
+        row = np.zeros(n2 + 2)
+        for j in range(1, p.shape[1] - 1):
+            for k in range(1, n2 + 1):
+                total = diagonal[m, j, k] * p[m, j, k] - w1[m, j, k] * p[m, j - 1, k]
+                total -= w1[m, j + 1, k] * p[m, j + 1, k]
+                total -= w2[m, j, k] * p[m, j, k - 1] + w2[m, j, k + 1] * p[m, j, k + 1]
+                if d:
+                    total -= w0[m, j, k] * p[m - 1, j, k] + w0[m + 1, j, k] * p[m + 1, j, k]
+                out[m, j, k] = total
+                row[k] += total * p[m, j, k]
+        for k in range(n2 + 2):
+            parts[i] += row[k]
+    total = 0.0
+    for i in range(planes):
+        total += parts[i]
+    return total

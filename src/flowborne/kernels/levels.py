@@ -1,0 +1,306 @@
+"""Levels of the multigrid hierarchy in packed arrays, and how coarse ones follow from fine ones.
+
+Every level is a weighted cell Laplacian like the finest,
+
+    (K p)_c = sum over faces f of c of  w_f (p_c - p_neighbour)
+
+held by its lower-face weights in arrays with one layer of ghost cells, all levels of one quantity
+in one flat array. Ghost values of p are 0, which is what lies beyond an open side, or those of the
+opposite side where the domain is periodic. A coarse cell covers two fine ones along each axis that
+is coarsened, fewer at the upper end of an odd count; a coarse weight is the sum of the fine ones
+that its face covers, times the ratio of the fine to the coarse distance between centres.
+
+A slab (nx, ny, 1) is held as (1, nx, ny), the same order in memory, with no ghosts across it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from flowborne.kernels.aggregates import OWN, add_guest_weights, mark_leaning, mark_own, seat_guests
+from flowborne.kernels.arrays import (
+    Array,
+    Hierarchy,
+    Integers,
+    Marks,
+    Periodic,
+    Places,
+    Real,
+    Triple,
+)
+from flowborne.kernels.jit import kernel
+
+OFFSET, N0, N1, N2, LEAN, S0, S1, S2, GUESTS = range(9)
+"""Columns of the table of levels: where it begins in the packed arrays, cells along each axis,
+where its interpolation coefficients begin, the finest cells in one of its cells, how many of its
+cells are guests."""
+
+
+@kernel
+def padded_size(n0: int, n1: int, n2: int) -> int:
+    """Cells of a level with its ghosts."""
+    return (n0 + 2 if n0 > 1 else 1) * (n1 + 2) * (n2 + 2)
+
+
+@kernel
+def at_level(packed: NDArray[Any], table: Integers, level: int) -> NDArray[Any]:
+    """The padded array of one level."""
+    n0, n1, n2 = table[level, N0], table[level, N1], table[level, N2]
+    p0 = n0 + 2 if n0 > 1 else 1
+    first = table[level, OFFSET]
+    last = first + p0 * (n1 + 2) * (n2 + 2)
+    return packed[first:last].reshape((p0, n1 + 2, n2 + 2))
+
+
+@kernel
+def weights_at(packed: Triple, table: Integers, level: int) -> Triple:
+    """The weights across each axis of one level."""
+    w0, w1, w2 = packed
+    return at_level(w0, table, level), at_level(w1, table, level), at_level(w2, table, level)
+
+
+@kernel
+def leaning_at(lean: Real, table: Integers, level: int) -> Triple:
+    """The interpolation coefficients of one level along each axis, with ghosts."""
+    a = table[level, LEAN]
+    b = a + table[level, N0] + 2
+    c = b + table[level, N1] + 2
+    return lean[a:b], lean[b:c], lean[c : c + table[level, N2] + 2]
+
+
+@kernel
+def guests_at(guests: Places, table: Integers, level: int) -> Places:
+    """Padded flat cells of one level that are guests."""
+    first = table[level, OFFSET]
+    return guests[first : first + table[level, GUESTS]]
+
+
+@kernel
+def wrap_ghosts(x: NDArray[Any], periodic: Periodic) -> None:
+    """Copy the values at each end of a periodic axis to the ghosts at the other end."""
+    p0, p1, p2 = x.shape
+    if periodic[0] and p0 > 1:
+        for j in range(p1):
+            for k in range(p2):
+                x[0, j, k] = x[p0 - 2, j, k]
+                x[p0 - 1, j, k] = x[1, j, k]
+    if periodic[1]:
+        for i in range(p0):
+            for k in range(p2):
+                x[i, 0, k] = x[i, p1 - 2, k]
+                x[i, p1 - 1, k] = x[i, 1, k]
+    if periodic[2]:
+        for i in range(p0):
+            for j in range(p1):
+                x[i, j, 0] = x[i, j, p2 - 2]
+                x[i, j, p2 - 1] = x[i, j, 1]
+
+
+@kernel
+def finest_weights(
+    faces: tuple[Array, Array, Array], w: tuple[Array, Array, Array], diagonal: Array
+) -> None:
+    """Face weights into the padded arrays of the finest level, and the diagonal of K.
+
+    faces  weights (n0+1, n1, n2), (n0, n1+1, n2), (n0, n1, n2+1)
+    w      padded with 0; entry c is the face between c and the cell before it along that axis
+    """
+    x, y, z = faces
+    w0, w1, w2 = w
+    d = 1 if w0.shape[0] > 1 else 0
+    n1, n2 = w0.shape[1] - 2, w0.shape[2] - 2
+    for i in prange(w0.shape[0] - d):
+        inside = i < w0.shape[0] - 2 * d
+        m = i + d
+        for j in range(n1 + 1):
+            for k in range(n2):
+                if d and j < n1:
+                    w0[m, j + 1, k + 1] = x[i, j, k]
+                if inside:
+                    w1[m, j + 1, k + 1] = y[i, j, k]
+            if inside and j < n1:
+                for k in range(n2 + 1):
+                    w2[m, j + 1, k + 1] = z[i, j, k]
+                for k in range(n2):
+                    total = y[i, j, k] + y[i, j + 1, k] + z[i, j, k] + z[i, j, k + 1]
+                    if d:
+                        total += x[i, j, k] + x[i + 1, j, k]
+                    diagonal[m, j + 1, k + 1] = total
+
+
+@kernel
+def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool) -> float:
+    """Distance between the centres beside fine face `factor * face` over that of the coarse face.
+
+    face    of the coarse level, 0 to its last
+    factor  1 or 2, the coarsening of this axis
+    fine    finest cells in a fine cell of this axis; `cells` finest cells in all
+    """
+    ratio = np.zeros(2)
+    for n in range(2):
+        size = fine if n == 0 else fine * factor
+        count = (cells + size - 1) // size
+        at = min(factor * face, count) if n == 0 else face
+        below, above = at - 1, at
+        if periodic:
+            below, above = below % count, above % count
+        for c in (below, above):
+            if 0 <= c < count:
+                ratio[n] += min(size, cells - c * size)
+    return float(ratio[0] / ratio[1])
+
+
+@kernel
+def coarse_weights(
+    fine: Real, coarse: Real, marks: Marks, axis: int, factor: Integers, ratio: Array
+) -> None:
+    """Coarse lower-face weights across `axis` from faces between fine cells marked as OWN.
+
+    factor  fine cells in a coarse one along each axis
+    ratio   of distances, per coarse face across `axis`; see `distance_ratio`
+    """
+    f0, f1, f2 = factor
+    d = 1 if fine.shape[0] > 1 else 0
+    n0, n1, n2 = fine.shape[0] - 2 * d, fine.shape[1] - 2, fine.shape[2] - 2
+    coarse[:] = 0.0
+    if axis == 0 and not d:
+        return
+    s0, s1, s2 = int(axis == 0), int(axis == 1), int(axis == 2)
+    planes = coarse.shape[0] - 2 * d + s0
+    for i in prange(planes):
+        row = np.empty(n2 + 2, fine.dtype)
+        first0 = min(f0 * i, n0) + d
+        end0 = first0 + 1 if axis == 0 else min(f0 * i + f0, n0) + d
+        for j in range(coarse.shape[1] - 2 + s1):
+            first1 = min(f1 * j, n1) + 1
+            end1 = first1 + 1 if axis == 1 else min(f1 * j + f1, n1) + 1
+            row[:] = 0.0
+            for a in range(first0, end0):
+                for b in range(first1, end1):
+                    for k in range(1, n2 + 2):
+                        both = marks[a, b, k] & marks[a - s0, b - s1, k - s2]
+                        row[k] += fine[a, b, k] if both >= OWN else 0.0
+            for k in range(coarse.shape[2] - 2 + s2):
+                first2 = min(f2 * k, n2) + 1
+                total = row[first2]
+                if axis != 2 and first2 + 1 < min(f2 * k + f2, n2) + 1:
+                    total += row[first2 + 1]
+                shrink = ratio[i] if axis == 0 else (ratio[j] if axis == 1 else ratio[k])
+                coarse[i + d, j + 1, k + 1] = total * shrink
+
+
+@kernel
+def inverse_diagonal(w: Triple, added: Real, inverse: Real) -> None:
+    """1 / diagonal of K from padded weights and what is added to it; 0 in cells without an open
+    face and in ghosts."""
+    w0, w1, w2 = w
+    d = 1 if w0.shape[0] > 1 else 0
+    inverse[:] = 0.0
+    for i in prange(w0.shape[0] - 2 * d):
+        m = i + d
+        for j in range(1, w0.shape[1] - 1):
+            for k in range(1, w0.shape[2] - 1):
+                total = w1[m, j, k] + w1[m, j + 1, k] + w2[m, j, k] + w2[m, j, k + 1]
+                if d:
+                    total += w0[m, j, k] + w0[m + 1, j, k]
+                if total > 0.0:
+                    inverse[m, j, k] = 1.0 / (total + added[m, j, k])
+
+
+@kernel
+def leaning(lean: Real, n: int, factor: int, size: int, cells: int, periodic: bool) -> None:
+    """How far each fine cell's centre lies from its coarse cell's towards the next coarse cell.
+
+    lean      (n + 2,) with ghosts: fraction of the distance between the coarse centres (at an open
+              side: of that to the side), negative towards the lower neighbour
+    size      finest cells in a fine cell of this axis, `cells` finest cells in all
+    """
+    lean[:] = 0.0
+    if factor == 1:
+        return
+    count = (n + 1) // 2
+    for i in range(n):
+        c = i // 2
+        first, second = 2 * c, 2 * c + 1
+        if second >= n:
+            continue
+        a = float(min(size, cells - first * size))
+        b = float(min(size, cells - second * size))
+        other = c - 1 if i == first else c + 1
+        if periodic:
+            other = other % count
+        width = 0.0
+        if 0 <= other < count:
+            width = float(min(2 * size, cells - other * 2 * size))
+        reach = a + b + width
+        lean[i + 1] = -b / reach if i == first else a / reach
+    if periodic:
+        lean[0], lean[n + 1] = lean[n], lean[1]
+
+
+@kernel
+def coarse_sums(
+    fine: Real, coarse: Real, marks: Marks, factor: Integers, guests: Places, hosts: Places
+) -> None:
+    """What is added to the diagonal of coarse cells: the sum over the fine cells that have their
+    value."""
+    f0, f1, f2 = factor
+    d = 1 if fine.shape[0] > 1 else 0
+    n0, n1, n2 = fine.shape[0] - 2 * d, fine.shape[1] - 2, fine.shape[2] - 2
+    coarse[:] = 0.0
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                if marks[i + d, j + 1, k + 1] & OWN:
+                    coarse[i // f0 + d, j // f1 + 1, k // f2 + 1] += fine[i + d, j + 1, k + 1]
+    flat, wide, host = fine.reshape(-1), coarse.reshape(-1), hosts.reshape(-1)
+    for g in range(guests.size):
+        wide[host[guests[g]]] += flat[guests[g]]
+
+
+@kernel
+def coarsen(hierarchy: Hierarchy) -> None:
+    """Fill all levels from the weights of the finest, and from what is added to its diagonal."""
+    table, periodic, weights, reaction, inverse, lean, marks, guests, hosts = hierarchy
+    reacts = np.any(at_level(reaction, table, 0))
+    for level in range(table.shape[0] - 1):
+        w, share = weights_at(weights, table, level), at_level(inverse, table, level)
+        added = at_level(reaction, table, level)
+        inverse_diagonal(w, added, share)
+        if level == table.shape[0] - 2:
+            break
+        factor = np.empty(3, np.int64)
+        ratio = np.empty((3, table[level + 1, N0 : N2 + 1].max() + 1))
+        towards = leaning_at(lean, table, level)
+        for axis in range(3):
+            n, size, cells = table[level, N0 + axis], table[level, S0 + axis], table[0, N0 + axis]
+            wraps = periodic[axis] != 0
+            factor[axis] = table[level + 1, S0 + axis] // size
+            leaning(towards[axis], n, factor[axis], size, cells, wraps)
+            for face in range(table[level + 1, N0 + axis] + 1):
+                ratio[axis, face] = distance_ratio(face, factor[axis], size, cells, wraps)
+        mark, host = at_level(marks, table, level), at_level(hosts, table, level)
+        wide = weights_at(weights, table, level + 1)
+        coarse_shape = np.array(wide[0].shape)
+        mark_own(mark, w, share, factor)
+        wrap_ghosts(mark, periodic)
+        mark_leaning(mark, w, share, towards)
+        wrap_ghosts(mark, periodic)
+        space = guests[table[level, OFFSET] : table[level + 1, OFFSET]]
+        table[level, GUESTS] = seat_guests(
+            mark, w, share, factor, periodic, coarse_shape, space, host
+        )
+        if reacts:
+            seated = guests_at(guests, table, level)
+            coarse_sums(added, at_level(reaction, table, level + 1), mark, factor, seated, host)
+        else:
+            at_level(reaction, table, level + 1)[:] = 0.0
+        for axis in range(3):
+            coarse_weights(w[axis], wide[axis], mark, axis, factor, ratio[axis])
+        add_guest_weights(
+            mark, w, wide, factor, ratio, periodic, guests_at(guests, table, level), host
+        )

@@ -1,0 +1,44 @@
+"""Signed distance to a closed mesh by a search through all its triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flowborne.kernels.arrays import Array
+from flowborne.kernels.triangles import closest_on_triangle, squared_distance
+
+
+@njit(nogil=True, cache=True)
+def sample_mesh(
+    vertices: Array, faces: NDArray[np.int64], corner: Array, pitch: float, counts: Array
+) -> Array:
+    """Signed distance to a closed mesh on a lattice; the sign is that of the winding number
+    (van Oosterom and Strackee 1983)."""
+    n1, n2, n3 = int(counts[0]), int(counts[1]), int(counts[2])
+    samples = np.empty(n1 * n2 * n3)
+    p = np.empty(3)
+    for i in range(n1):
+        for j in range(n2):
+            for k in range(n3):
+                p[0] = corner[0] + pitch * i
+                p[1] = corner[1] + pitch * j
+                p[2] = corner[2] + pitch * k
+                nearest, angle = 1e30, 0.0
+                for t in range(faces.shape[0]):
+                    a, b, c = vertices[faces[t, 0]], vertices[faces[t, 1]], vertices[faces[t, 2]]
+                    closest = closest_on_triangle(p, a, b, c)
+                    nearest = min(nearest, squared_distance(p, a, b, c, closest))
+                    u, v, w = a - p, b - p, c - p
+                    lu, lv, lw = np.sqrt(u.dot(u)), np.sqrt(v.dot(v)), np.sqrt(w.dot(w))
+                    triple = (
+                        u[0] * (v[1] * w[2] - v[2] * w[1])
+                        + u[1] * (v[2] * w[0] - v[0] * w[2])
+                        + u[2] * (v[0] * w[1] - v[1] * w[0])
+                    )
+                    below = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv
+                    angle += 2.0 * np.arctan2(triple, below)
+                away = np.sqrt(nearest)
+                samples[(i * n2 + j) * n3 + k] = -away if angle > 2.0 * np.pi else away
+    return samples

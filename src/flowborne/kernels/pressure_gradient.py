@@ -1,0 +1,54 @@
+"""Pressure gradient on cut cells."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from flowborne.kernels.arrays import Array
+from flowborne.kernels.jit import kernel
+from flowborne.kernels.sides import CLOSED, PERIODIC
+
+
+@kernel
+def push_faces(
+    velocity: Array,
+    opened: Array,
+    pressure: Array,
+    axis: int,
+    scale: float,
+    codes: NDArray[np.int64],
+) -> None:
+    """Subtract scale (p_upper - p_lower) from the velocity of the faces across `axis`.
+
+    scale  dt / (rho h) for a pressure, 1 / (rho h) for p^. Faces that are wholly closed, and those
+    on closed sides, keep their velocity; on an open side the pressure is 0 half a cell away.
+    """
+    n = pressure.shape[axis]
+    di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
+    for i in prange(velocity.shape[0]):
+        for j in range(velocity.shape[1]):
+            for k in range(velocity.shape[2]):
+                if opened[i, j, k] == 0.0:
+                    continue
+                at = i if axis == 0 else (j if axis == 1 else k)
+                if 0 < at < n:
+                    difference = pressure[i, j, k] - pressure[i - di, j - dj, k - dk]
+                elif at == 0:
+                    if codes[axis, 0] == CLOSED:
+                        continue
+                    difference = 2.0 * pressure[i, j, k]
+                    if codes[axis, 0] == PERIODIC:
+                        far = pressure[i + di * (n - 1), j + dj * (n - 1), k + dk * (n - 1)]
+                        difference = pressure[i, j, k] - far
+                else:
+                    if codes[axis, 1] == CLOSED:
+                        continue
+                    difference = -2.0 * pressure[i - di, j - dj, k - dk]
+                    if codes[axis, 1] == PERIODIC:
+                        difference = (
+                            pressure[i - di * n, j - dj * n, k - dk * n]
+                            - pressure[i - di, j - dj, k - dk]
+                        )
+                velocity[i, j, k] -= scale * difference

@@ -1,0 +1,180 @@
+"""Connected regions of a field: labels, sums, and null vectors that are constant in each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from flowborne.kernels.arrays import Array, Labels, Periodic, Rows
+from flowborne.kernels.jit import kernel
+
+NULL = 1e-10
+"""Share of the largest below which a sum over a region counts as 0."""
+
+
+@kernel
+def root(parent: Labels, a: int) -> int:
+    """Representative of a's set, with the path to it halved."""
+    while parent[a] != a:
+        parent[a] = parent[parent[a]]
+        a = parent[a]
+    return a
+
+
+@kernel
+def join(parent: Labels, a: int, b: int) -> None:
+    """Make the sets of a and b one; the smaller representative stays."""
+    a, b = root(parent, a), root(parent, b)
+    if a < b:
+        parent[b] = a
+    else:
+        parent[a] = b
+
+
+@kernel
+def label_regions(
+    finest: tuple[Array, Array, Array, Array],
+    periodic: Periodic,
+    label: Labels,
+    parent: Labels,
+    count: Labels,
+) -> int:
+    """Number the regions that have no open side.
+
+    finest    padded weights and diagonal of the finest level (see `levels`)
+    label     padded: filled with 0, 1, ... in regions without an open side, -1 elsewhere
+    parent    scratch, one entry per padded cell and one more
+    count     filled with the cells of each such region
+    returns   number of regions without an open side
+    """
+    w0, w1, w2, diagonal = finest
+    d = 1 if w0.shape[0] > 1 else 0
+    p0, p1, p2 = diagonal.shape
+    label[:] = -1
+    parent[0] = 0
+    used = 1
+    for i in range(d, p0 - d):
+        for j in range(1, p1 - 1):
+            run = -1
+            last1, last0 = -1, -1
+            for k in range(1, p2 - 1):
+                if not diagonal[i, j, k] > 0.0:
+                    run = -1
+                    continue
+                if run < 0 or not w2[i, j, k] > 0.0:
+                    run = used
+                    parent[run] = run
+                    used += 1
+                    last1, last0 = -1, -1
+                label[i, j, k] = run
+                if w1[i, j, k] > 0.0 and j > 1 and label[i, j - 1, k] != last1:
+                    last1 = label[i, j - 1, k]
+                    join(parent, run, last1)
+                if d and w0[i, j, k] > 0.0 and i > 1 and label[i - 1, j, k] != last0:
+                    last0 = label[i - 1, j, k]
+                    join(parent, run, last0)
+    if d:
+        for j in range(1, p1 - 1):
+            for k in range(1, p2 - 1):
+                for end in range(2):
+                    w = w0[1, j, k] if end == 0 else w0[p0 - 1, j, k]
+                    if w > 0.0:
+                        other = label[p0 - 2, j, k] if periodic[0] else 0
+                        join(parent, label[1 if end == 0 else p0 - 2, j, k], other)
+    for i in range(d, p0 - d):
+        for k in range(1, p2 - 1):
+            for end in range(2):
+                w = w1[i, 1, k] if end == 0 else w1[i, p1 - 1, k]
+                if w > 0.0:
+                    other = label[i, p1 - 2, k] if periodic[1] else 0
+                    join(parent, label[i, 1 if end == 0 else p1 - 2, k], other)
+        for j in range(1, p1 - 1):
+            for end in range(2):
+                w = w2[i, j, 1] if end == 0 else w2[i, j, p2 - 1]
+                if w > 0.0:
+                    other = label[i, j, p2 - 2] if periodic[2] else 0
+                    join(parent, label[i, j, 1 if end == 0 else p2 - 2], other)
+    regions = 0
+    for a in range(1, used):
+        top = parent[a]
+        if top == a:
+            parent[a] = -1 - regions
+            count[regions] = 0
+            regions += 1
+        elif top > 0:
+            parent[a] = parent[top]
+    for i in range(d, p0 - d):
+        for j in range(1, p1 - 1):
+            for k in range(1, p2 - 1):
+                if label[i, j, k] >= 0:
+                    number = -1 - parent[label[i, j, k]]
+                    label[i, j, k] = number
+                    if number >= 0:
+                        count[number] += 1
+    return regions
+
+
+@kernel
+def region_sums(x: Array, label: Labels, regions: int) -> Array:
+    """(regions,) sum of a padded field over each region, plane after plane."""
+    d = 1 if x.shape[0] > 1 else 0
+    planes = x.shape[0] - 2 * d
+    parts = np.zeros((planes, regions))
+    for i in prange(planes):
+        for j in range(1, x.shape[1] - 1):
+            for k in range(1, x.shape[2] - 1):
+                a = label[i + d, j, k]
+                if a >= 0:
+                    parts[i, a] += x[i + d, j, k]
+    total = np.zeros(regions)
+    for i in range(planes):
+        total += parts[i]
+    return total
+
+
+@kernel
+def remove_null(x: Array, label: Labels, basis: Array) -> None:
+    """Take the null vectors' part out of a padded field, x -= N N^T x.
+
+    basis  (regions, q): the vectors N have the constant basis[r] in region r, and are orthonormal
+    """
+    regions, q = basis.shape
+    if q == 0:
+        return
+    sums = region_sums(x, label, regions)
+    constants = np.zeros(regions)
+    for n in range(q):
+        part = 0.0
+        for a in range(regions):
+            part += basis[a, n] * sums[a]
+        for a in range(regions):
+            constants[a] -= basis[a, n] * part
+    d = 1 if x.shape[0] > 1 else 0
+    for i in prange(x.shape[0] - 2 * d):
+        for j in range(1, x.shape[1] - 1):
+            for k in range(1, x.shape[2] - 1):
+                a = label[i + d, j, k]
+                if a >= 0:
+                    x[i + d, j, k] += constants[a]
+
+
+@kernel
+def region_loads(label: Labels, regions: int, size: int, rows: Rows) -> Array:
+    """(regions, size) J^T 1_r of each region without an open side.
+
+    What is left by rounding of contributions that cancel is made 0.
+    """
+    cells, row_start, columns, values = rows
+    flat = label.reshape(-1)
+    load, amount = np.zeros((regions, size)), np.zeros((regions, size))
+    for n in range(cells.size):
+        a = flat[cells[n]]
+        if a >= 0:
+            for e in range(row_start[n], row_start[n + 1]):
+                load[a, columns[e]] += values[e]
+                amount[a, columns[e]] += abs(values[e])
+    for a in range(regions):
+        for c in range(size):
+            if abs(load[a, c]) < NULL * amount[a, c]:
+                load[a, c] = 0.0
+    return load

@@ -1,0 +1,61 @@
+"""A^-1 on a load, for a dense matrix or a factorised one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.kernels.arrays import Answers, Array, Places
+from flowborne.kernels.jit import kernel
+
+
+@kernel
+def solve_factored(x: Array, start: Places, row: Places, value: Array, diagonal: Array) -> None:
+    """x = (L D L^T)^-1 x, in place."""
+    n = x.size
+    for j in range(n):
+        known = x[j]
+        if known != 0.0:
+            for e in range(start[j], start[j + 1]):
+                x[row[e]] -= value[e] * known
+    for j in range(n):
+        x[j] /= diagonal[j]
+    for j in range(n - 1, -1, -1):
+        total = x[j]
+        for e in range(start[j], start[j + 1]):
+            total -= value[e] * x[row[e]]
+        x[j] = total
+
+
+@kernel
+def respond(load: Array, answers: Answers) -> Array:
+    """(k,) A^-1 load."""
+    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = answers
+    size = load.size
+    motion = np.zeros(size)
+    if t_start.size == 1:
+        for a in range(size):
+            for b in range(size):
+                motion[a] += dense[a, b] * load[b]
+        return motion
+    force = np.zeros(order.size)
+    for a in range(size):
+        if load[a] != 0.0:
+            for e in range(t_start[a], t_start[a + 1]):
+                force[t_column[e]] += t_value[e] * load[a]
+    turned = np.empty(order.size)
+    for i in range(order.size):
+        turned[order[i]] = force[i]
+    solve_factored(turned, start, row, value, diagonal)
+    answer = np.empty(order.size)
+    for i in range(order.size):
+        answer[i] = turned[order[i]]
+    for c in range(taken.shape[1]):
+        part = 0.0
+        for i in range(order.size):
+            part += taken[i, c] * force[i]
+        for i in range(order.size):
+            answer[i] -= part * taken[i, c]
+    for a in range(size):
+        for e in range(t_start[a], t_start[a + 1]):
+            motion[a] += t_value[e] * answer[t_column[e]]
+    return motion

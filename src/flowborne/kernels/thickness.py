@@ -1,0 +1,61 @@
+"""How far it is through a body of triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from flowborne.kernels.arrays import Array, Integers, Point
+
+
+@njit(nogil=True, cache=True)
+def crossed(a: Point, b: Point) -> Point:
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(nogil=True, cache=True)
+def along(a: Point, b: Point) -> float:
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(nogil=True, cache=True)
+def apart(vertices: Array, a: int, b: int) -> Point:
+    """From vertex a to vertex b."""
+    p, q = vertices[a], vertices[b]
+    return q[0] - p[0], q[1] - p[1], q[2] - p[2]
+
+
+@njit(nogil=True, cache=True)
+def way_inward(vertices: Array, triangles: Integers) -> Array:
+    """(k,) distance from the middle of each triangle straight inward to another one, m.
+
+    The ray meets a triangle where the volumes that it spans with its edges have one sign (Möller
+    and Trumbore 1997). Infinite where there is no other side.
+    """
+    way = np.full(len(triangles), np.inf)
+    for n in range(len(triangles)):
+        a, b, c = triangles[n]
+        inward = crossed(apart(vertices, a, c), apart(vertices, a, b))
+        length = np.sqrt(along(inward, inward))
+        for m in range(len(triangles)):
+            p, q, r = triangles[m]
+            e, f = apart(vertices, p, q), apart(vertices, p, r)
+            side = crossed(inward, f)
+            volume = along(e, side)
+            if m == n or volume == 0.0:
+                continue
+            i, j, k = apart(vertices, p, a), apart(vertices, p, b), apart(vertices, p, c)
+            gap = (i[0] + j[0] + k[0]) / 3.0, (i[1] + j[1] + k[1]) / 3.0, (i[2] + j[2] + k[2]) / 3.0
+            u = along(gap, side) / volume
+            if u < 0.0 or u > 1.0:
+                continue
+            up = crossed(gap, e)
+            v = along(inward, up) / volume
+            if v < 0.0 or u + v > 1.0:
+                continue
+            t = length * along(f, up) / volume
+            if 0.0 < t < way[n]:
+                way[n] = t
+    return way

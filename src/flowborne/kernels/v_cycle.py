@@ -1,0 +1,87 @@
+"""One symmetric V-cycle on K: the preconditioner of the pressure solve.
+
+Red first on the way down and black first on the way up, so that the cycle is a symmetric positive
+definite operator.
+"""
+
+from __future__ import annotations
+
+from flowborne.kernels.arrays import Hierarchy, Real
+from flowborne.kernels.jit import kernel
+from flowborne.kernels.levels import (
+    OFFSET,
+    at_level,
+    guests_at,
+    leaning_at,
+    weights_at,
+    wrap_ghosts,
+)
+from flowborne.kernels.smoothing import defect, first_smooth, smooth
+from flowborne.kernels.transfer import interpolate, restrict
+
+COARSEST_SWEEPS = 8
+"""Symmetric sweeps on the coarsest level, of at most 4 cells along an axis."""
+
+SERIAL = 40_000
+"""Cells of a level, ghosts included, below which threads would cost more than they save."""
+
+
+@kernel
+def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool) -> None:
+    """The cycle's work on one level, on its way down (from x = 0, then b of the next level) or up
+    (from x of the next level)."""
+    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
+    coarsest = table.shape[0] - 2
+    w, a = weights_at(weights, table, level), at_level(inverse, table, level)
+    xl, bl = at_level(x, table, level), at_level(b, table, level)
+    if down:
+        first_smooth(xl, bl, a)
+        sweeps = 1 if level < coarsest else 4 * COARSEST_SWEEPS - 1
+    else:
+        interpolate(
+            xl,
+            at_level(x, table, level + 1),
+            at_level(marks, table, level),
+            leaning_at(lean, table, level),
+            guests_at(guests, table, level),
+            at_level(hosts, table, level),
+        )
+        sweeps = 2
+    for n in range(sweeps):
+        wrap_ghosts(xl, periodic)
+        mirrored = n > 2 * COARSEST_SWEEPS - 2
+        smooth(xl, bl, w, a, n % 2 if mirrored else 1 - n % 2)
+    wrap_ghosts(xl, periodic)
+    if down and level < coarsest:
+        rl = at_level(r, table, level)
+        defect(rl, xl, bl, w, a)
+        wrap_ghosts(rl, periodic)
+        restrict(
+            at_level(b, table, level + 1),
+            rl,
+            at_level(marks, table, level),
+            leaning_at(lean, table, level),
+            guests_at(guests, table, level),
+            at_level(hosts, table, level),
+        )
+
+
+serial_leg = leg.serial
+"""For levels too small for threads, in the cycle's parallel twin as well."""
+
+
+@kernel
+def v_cycle(hierarchy: Hierarchy, x: Real, b: Real, r: Real) -> None:
+    """x = V b on the finest level, V symmetric positive definite, close to the inverse of K.
+
+    x, b, r  packed over the levels; b's finest level is given, all else is overwritten
+    """
+    table = hierarchy[0]
+    coarsest = table.shape[0] - 2
+    for n in range(2 * coarsest + 1):
+        down = n <= coarsest
+        level = n if down else 2 * coarsest - n
+        if table[level + 1, OFFSET] - table[level, OFFSET] < SERIAL:
+            serial_leg(hierarchy, x, b, r, level, down)
+        else:
+            leg(hierarchy, x, b, r, level, down)

@@ -1,0 +1,111 @@
+"""Sums and steps of padded vectors.
+
+Sums run plane after plane, so that they do not depend on how many threads there are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from flowborne.kernels.arrays import Array, Real
+from flowborne.kernels.jit import kernel
+
+
+@kernel
+def largest(values: Array) -> float:
+    """Largest value of an array, at least 0."""
+    found = 0.0
+    for value in values.flat:
+        found = max(found, value)
+    return found
+
+
+@kernel
+def scaled(source: Real, target: Real, scale: float) -> None:
+    """target = scale x source, in target's precision."""
+    a, b = source.reshape(-1), target.reshape(-1)
+    for n in prange(a.size):
+        b[n] = scale * a[n]
+
+
+@kernel
+def scaled_cells(source: Real, target: Real, scale: float) -> None:
+    """target = scale x source, in target's precision; ghosts of target are left alone."""
+    d = 1 if source.shape[0] > 1 else 0
+    for i in prange(source.shape[0] - 2 * d):
+        for j in range(1, source.shape[1] - 1):
+            for k in range(1, source.shape[2] - 1):
+                target[i + d, j, k] = scale * source[i + d, j, k]
+
+
+@kernel
+def dot(a: Array, b: Array) -> float:
+    """Sum of a x b, planes in order."""
+    planes, size = a.shape[0], a.shape[2]
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        row = np.zeros(size)
+        for j in range(a.shape[1]):
+            for k in range(size):
+                row[k] += a[i, j, k] * b[i, j, k]
+        for k in range(size):
+            parts[i] += row[k]
+    total = 0.0
+    for i in range(planes):
+        total += parts[i]
+    return total
+
+
+@kernel
+def descend(x: Array, r: Array, p: Array, q: Array, alpha: float) -> float:
+    """x += alpha p, r -= alpha q; returns r . r."""
+    planes, size = r.shape[0], r.shape[2]
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        row = np.zeros(size)
+        for j in range(r.shape[1]):
+            for k in range(size):
+                x[i, j, k] += alpha * p[i, j, k]
+                value = r[i, j, k] - alpha * q[i, j, k]
+                r[i, j, k] = value
+                row[k] += value * value
+        for k in range(size):
+            parts[i] += row[k]
+    total = 0.0
+    for i in range(planes):
+        total += parts[i]
+    return total
+
+
+@kernel
+def turn(p: Array, z: Array, beta: float) -> None:
+    """p = z + beta p."""
+    for i in prange(p.shape[0]):
+        for j in range(p.shape[1]):
+            for k in range(p.shape[2]):
+                p[i, j, k] = z[i, j, k] + beta * p[i, j, k]
+
+
+@kernel
+def true_residual(r: Array, rhs: Array, q: Array) -> float:
+    """r = rhs - q; returns r . r."""
+    for i in prange(r.shape[0]):
+        for j in range(r.shape[1]):
+            for k in range(r.shape[2]):
+                r[i, j, k] = rhs[i, j, k] - q[i, j, k]
+    return dot(r, r)
+
+
+@kernel
+def load_cells(target: Array, source: Array, diagonal: Array) -> None:
+    """Cells into a padded array; 0 in ghosts and in cells without an open face."""
+    d = 1 if target.shape[0] > 1 else 0
+    n1, n2 = source.shape[1], source.shape[2]
+    for i in range(target.shape[0]):
+        target[i] = 0.0
+        if d == 0 or 0 < i < target.shape[0] - 1:
+            for j in range(n1):
+                for k in range(n2):
+                    if diagonal[i, j + 1, k + 1] > 0.0:
+                        target[i, j + 1, k + 1] = source[i - d, j, k]
