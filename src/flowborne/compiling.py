@@ -33,8 +33,8 @@ def compile_solver_beside() -> None:
 def compile_solver() -> None:
     """Solve for the pressure around a light body in a small slab: all kernels of that are then in
     the cache."""
-    from flowborne.fluid.pressure import Coupling, PressureSystem
-    from flowborne.fluid.response import dense_response
+    from flowborne.solvers.pressure import LowRankTerm, PressureSystem
+    from flowborne.solvers.response import dense_response
 
     count = 8
     weights = (
@@ -46,7 +46,7 @@ def compile_solver() -> None:
         for end in (0, -1):
             np.moveaxis(weights[axis], axis, 0)[end] = 0.0
     rows = np.array([27, 28])
-    coupling = Coupling(
+    term = LowRankTerm(
         rows,
         np.array([0, 6, 12]),
         np.tile(np.arange(6), 2),
@@ -55,7 +55,7 @@ def compile_solver() -> None:
     )
     rhs = np.zeros((count, count, 1))
     rhs[2, 2], rhs[5, 5] = 1.0, -1.0
-    PressureSystem(weights).solve(rhs, coupling=coupling)
+    PressureSystem(weights).solve(rhs, term=term)
 
 
 if __name__ == "__main__":

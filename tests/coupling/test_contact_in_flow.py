@@ -13,7 +13,7 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.pressure import PressureSolution, PressureSystem
+from flowborne.solvers.pressure import PressureSolution, PressureSystem
 from flowborne.validation.worlds import advance, world_of
 
 BOX = """<mujoco><worldbody>

@@ -20,10 +20,10 @@ from flowborne.fluid.boundary import (
 )
 from flowborne.fluid.ghosts import impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.pressure import PressureSystem
 from flowborne.fluid.projection import face_weights, push
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.model import SolidModel
+from flowborne.solvers.pressure import PressureSystem
 
 SLAB = Grid.slab(24, 20, 0.1, (0.0, 0.0))
 CUBE = Grid((12, 10, 8), 0.1, (0.0, 0.0, 0.0))

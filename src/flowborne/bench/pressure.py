@@ -11,8 +11,8 @@ from scipy import sparse
 
 from flowborne.bench.result import Result, timed, verdict
 from flowborne.fluid.grid import Array, Faces
-from flowborne.fluid.pressure import PressureSolution, PressureSystem
 from flowborne.kernels.jit import cores, kernel_threads
+from flowborne.solvers.pressure import PressureSolution, PressureSystem
 
 NAME = "pressure"
 TOLERANCE = 1e-5

@@ -17,11 +17,11 @@ from flowborne.coupling.operators import (
     pressure_push,
     rigid_response,
 )
+from flowborne.coupling.viscous_solve import Answer, Answering, ViscousSystem, Walls, walls_of
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import push
 from flowborne.fluid.viscosity import assemble_viscosity
-from flowborne.fluid.viscous_solve import Answer, Answering, ViscousSystem, Walls, walls_of
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh_solve import PrescribedFlesh, symmetric_factor
 from flowborne.solids.prescribed import Driven, PrescribedSystem

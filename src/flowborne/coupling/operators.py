@@ -17,11 +17,11 @@ from scipy.sparse import csr_array, vstack
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.response import Response, dense_response, factored_response
 from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import Driven, PrescribedSystem
+from flowborne.solvers.response import Response, dense_response, factored_response
 
 
 def twists(kinematics: Kinematics, v: Array) -> Array:

@@ -35,13 +35,13 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.pressure import NO_REACTION, Coupling, PressureSystem
 from flowborne.fluid.projection import face_weights, push
-from flowborne.fluid.response import Response
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import Driven, within_limits
+from flowborne.solvers.pressure import NO_REACTION, LowRankTerm, PressureSystem
+from flowborne.solvers.response import Response
 
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
@@ -172,7 +172,7 @@ def solve_together(
     watch.lap("projection")
     smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, driven, dt)
     watch.lap("viscosity")
-    coupling = Coupling(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
+    term = LowRankTerm(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     floor = rounding_floor(smooth, fluid.grid)
     iterations, tried = 0, driven
@@ -180,7 +180,7 @@ def solve_together(
         start = motion(pose, driven.after(generalised(pose, viscous)))
         rhs = -net
         add_flux(rhs, cut, -start)
-        solution = matrix.solve(rhs, pressure, coupling, tolerance, floor)
+        solution = matrix.solve(rhs, pressure, term, tolerance, floor)
         iterations += solution.iterations
         on_solids = pressure_push(cut, solution.pressure, start.size)
         impulse = generalised(pose, viscous + on_solids)
@@ -192,7 +192,7 @@ def solve_together(
             break
         if changed is not None:
             if not changed.answers_as(driven):
-                coupling = replace(coupling, response=response(pose, changed))
+                term = replace(term, response=response(pose, changed))
                 smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, changed, dt)
                 watch.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
@@ -200,7 +200,7 @@ def solve_together(
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
     after = subtract_pressure_gradient(smooth, solution.pressure, cut, fluid)
-    moved = start + coupling.response.times(on_solids)
+    moved = start + term.response.times(on_solids)
     projected = Projected(
         after,
         solution.pressure / dt,

@@ -37,7 +37,7 @@ Vectors = tuple[Array, Array, Array, Array, Array]
 Rows = tuple[Integers, Integers, Integers, Array]
 """Sparse rows J: flat cell of each, where each begins, columns and values of the entries."""
 
-Answers = tuple[Array, Places, Places, Array, Places, Places, Array, Array, Integers, Array]
+ResponseArrays = tuple[Array, Places, Places, Array, Places, Places, Array, Array, Integers, Array]
 """Dense A^-1; rows of T (start, column, value); columns of L below its diagonal (start, row,
 value); D; the order P; Y (see `solvers.response`)."""
 

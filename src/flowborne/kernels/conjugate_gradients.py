@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import (
-    Answers,
     Array,
     Finest,
     Hierarchy,
     Labels,
     Real,
+    ResponseArrays,
     Rows,
     Triple,
     Vectors,
@@ -36,11 +36,11 @@ STAGNATION = 0.5
 
 
 @kernel
-def apply_low_rank(out: Array, p: Array, rows: Rows, answers: Answers) -> float:
+def apply_low_rank(out: Array, p: Array, rows: Rows, response: ResponseArrays) -> float:
     """out += J A^-1 J^T p; returns p . J A^-1 J^T p."""
-    size = max(answers[0].shape[0], answers[1].size - 1)
+    size = max(response[0].shape[0], response[1].size - 1)
     load = sum_rows(p, rows, size)
-    motion = respond(load, answers)
+    motion = respond(load, response)
     energy = 0.0
     for a in range(size):
         energy += motion[a] * load[a]
@@ -55,7 +55,7 @@ def solve(
     finest: Finest,
     vectors: Vectors,
     rows: Rows,
-    response: Answers,
+    response: ResponseArrays,
     label: Labels,
     null: Array,
     fields: Real,

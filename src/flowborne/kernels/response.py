@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Answers, Array, Places
+from flowborne.kernels.arrays import Array, Places, ResponseArrays
 from flowborne.kernels.jit import kernel
 
 
@@ -27,9 +27,9 @@ def solve_factored(x: Array, start: Places, row: Places, value: Array, diagonal:
 
 
 @kernel
-def respond(load: Array, answers: Answers) -> Array:
+def respond(load: Array, response: ResponseArrays) -> Array:
     """(k,) A^-1 load."""
-    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = answers
+    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = response
     size = load.size
     motion = np.zeros(size)
     if t_start.size == 1:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from flowborne.fluid.pressure import PressureSystem
-from flowborne.fluid.regions import null_basis
-from flowborne.fluid.response import dense_response
+from flowborne.solvers.pressure import PressureSystem
+from flowborne.solvers.regions import null_basis
+from flowborne.solvers.response import dense_response
 
 
 def boxes(shape, walls, periodic=(False, False, False)):
@@ -39,14 +39,14 @@ def test_closed_regions_are_counted(shape):
 def test_null_basis_is_orthonormal_and_moves_nothing():
     rng = np.random.default_rng(0)
     count = np.array([5, 9, 2, 30, 7], np.int32)
-    wrench = rng.standard_normal((5, 6))
-    wrench[3] = 0.0
+    loads = rng.standard_normal((5, 6))
+    loads[3] = 0.0
     half = rng.standard_normal((6, 2))
     response = half @ half.T
-    basis = null_basis(count, wrench, dense_response(response))
+    basis = null_basis(count, loads, dense_response(response))
     assert basis.shape == (5, 3)
     np.testing.assert_allclose(basis.T @ (count[:, None] * basis), np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(half.T @ wrench.T @ basis, 0.0, atol=1e-12)
+    np.testing.assert_allclose(half.T @ loads.T @ basis, 0.0, atol=1e-12)
 
 
 def test_rounding_of_a_wrench_that_cancels_is_no_push():

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from flowborne.fluid.pressure import PressureSystem
 from flowborne.kernels.aggregates import OWN
 from flowborne.kernels.levels import at_level, guests_at, weights_at
+from flowborne.solvers.pressure import PressureSystem
 
 
 def walled(n, wall):

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flowborne.fluid.pressure import UNCOUPLED, Coupling, PressureSystem
-from flowborne.fluid.response import dense_response
 from flowborne.kernels import jit
 from flowborne.kernels.jit import kernel_threads
+from flowborne.solvers.pressure import NO_TERM, LowRankTerm, PressureSystem
+from flowborne.solvers.response import dense_response
 
 
 def random_weights(shape, sides, seed=0, blocked=0.3):
@@ -52,14 +52,14 @@ def laplacian(weights, periodic):
     return K
 
 
-def random_coupling(shape, bodies, seed=1, rank=None):
-    """Rows on a third of the cells, some cells with two; M of the given rank."""
+def random_term(shape, bodies, seed=1, rank=None):
+    """Rows on a third of the cells, some cells with two; A^-1 of the given rank."""
     rng = np.random.default_rng(seed)
     k = 6 * bodies
     cells = np.sort(rng.choice(np.prod(shape), np.prod(shape) // 3))
     columns = (6 * rng.integers(0, bodies, cells.size)[:, None] + np.arange(6)).ravel()
     half = rng.standard_normal((k, k if rank is None else rank))
-    return Coupling(
+    return LowRankTerm(
         cells,
         6 * np.arange(cells.size + 1),
         columns,
@@ -68,21 +68,21 @@ def random_coupling(shape, bodies, seed=1, rank=None):
     )
 
 
-def wrench_matrix(coupling, cells):
-    """Dense G."""
-    G = np.zeros((coupling.response.size, cells))
-    for n, cell in enumerate(coupling.cells):
-        for e in range(coupling.row_start[n], coupling.row_start[n + 1]):
-            G[coupling.columns[e], cell] += coupling.values[e]
-    return G
+def row_matrix(term, cells):
+    """Dense J."""
+    J = np.zeros((cells, term.response.size))
+    for n, cell in enumerate(term.cells):
+        for e in range(term.row_start[n], term.row_start[n + 1]):
+            J[cell, term.columns[e]] += term.values[e]
+    return J
 
 
-def dense_solution(weights, periodic, coupling, rhs):
+def dense_solution(weights, periodic, term, rhs):
     """Least-norm solution over the active cells; rhs as far as it is in the range; the matrix."""
     K = laplacian(weights, periodic)
     active = np.diag(K) > 0.0
-    G = wrench_matrix(coupling, active.size)
-    A = (K + G.T @ coupling.response.times(G.T).T)[np.ix_(active, active)]
+    J = row_matrix(term, active.size)
+    A = (K + J @ term.response.times(J).T)[np.ix_(active, active)]
     inverse = np.linalg.pinv(A, rcond=1e-11, hermitian=True)
     p = np.zeros(active.size)
     p[active] = inverse @ rhs.ravel()[active]
@@ -108,10 +108,10 @@ def test_solution_equals_dense_least_norm_solution(shape, sides, blocked, bodies
     """Cut cells, isolated pockets and solid cells at random; regions joined by bodies."""
     weights = random_weights(shape, sides, blocked=blocked)
     periodic = tuple(side == "periodic" for side in sides)
-    coupling = random_coupling(shape, bodies) if bodies else UNCOUPLED
+    term = random_term(shape, bodies) if bodies else NO_TERM
     rhs = np.random.default_rng(2).standard_normal(shape)
-    expected, A, _ = dense_solution(weights, periodic, coupling, rhs)
-    found = PressureSystem(weights, periodic).solve(rhs, None, coupling, tolerance=1e-12)
+    expected, A, _ = dense_solution(weights, periodic, term, rhs)
+    found = PressureSystem(weights, periodic).solve(rhs, None, term, tolerance=1e-12)
     assert found.residual <= 1e-11
     condition = np.linalg.cond(A) if not len(A) else np.linalg.norm(np.linalg.pinv(A, 1e-11), 2)
     error = np.abs(found.pressure - expected).max()
@@ -125,11 +125,11 @@ def test_light_heavy_and_jointed_bodies(sides, strength, rank):
     shape = (7, 9, 6)
     weights = random_weights(shape, sides)
     periodic = tuple(side == "periodic" for side in sides)
-    plain = random_coupling(shape, 2, rank=rank)
-    coupling = replace(plain, response=dense_response(strength * plain.response.arrays[0]))
+    plain = random_term(shape, 2, rank=rank)
+    term = replace(plain, response=dense_response(strength * plain.response.arrays[0]))
     rhs = np.random.default_rng(3).standard_normal(shape)
-    expected, A, _ = dense_solution(weights, periodic, coupling, rhs)
-    found = PressureSystem(weights, periodic).solve(rhs, None, coupling, tolerance=1e-9)
+    expected, A, _ = dense_solution(weights, periodic, term, rhs)
+    found = PressureSystem(weights, periodic).solve(rhs, None, term, tolerance=1e-9)
     largest = np.linalg.norm(A, 2) * np.linalg.norm(expected)
     rounding = np.finfo(float).eps * largest / np.linalg.norm(rhs)
     assert found.residual <= max(1e-9, rounding)  # the dense solution has no smaller one
@@ -139,7 +139,7 @@ def test_light_heavy_and_jointed_bodies(sides, strength, rank):
 
 
 def channel(n, low=0, high=0):
-    """Straight closed channel (3n, n, 1) whose middle third is a plug; weights and its coupling.
+    """Straight closed channel (3n, n, 1) whose middle third is a plug; weights and its term.
 
     low, high  face weight of the channel's ends
     """
@@ -156,17 +156,17 @@ def channel(n, low=0, high=0):
     response[0, 0] = 2.0
     rows = np.arange(2 * n + 1)
     columns = np.zeros(2 * n, np.int64)
-    return weights, Coupling(cells, rows, columns, values, dense_response(response))
+    return weights, LowRankTerm(cells, rows, columns, values, dense_response(response))
 
 
 def test_plug_between_closed_cavities_shares_one_constant():
     """Pushed from both sides by what flows in, it settles so that the cavities agree."""
-    weights, coupling = channel(8)
+    weights, term = channel(8)
     rhs = np.zeros((24, 8, 1))
     rhs[2, 3, 0], rhs[20, 5, 0] = 1.0, -1.0
-    expected, _, _ = dense_solution(weights, (False,) * 3, coupling, rhs)
+    expected, _, _ = dense_solution(weights, (False,) * 3, term, rhs)
     system = PressureSystem(weights)
-    found = system.solve(rhs, None, coupling, tolerance=1e-12)
+    found = system.solve(rhs, None, term, tolerance=1e-12)
     assert system.regions == 2
     assert found.converged
     np.testing.assert_allclose(found.pressure, expected, atol=1e-10)
@@ -176,11 +176,11 @@ def test_plug_between_closed_cavities_shares_one_constant():
 
 def test_plug_between_a_cavity_and_an_open_side():
     """The cavity's pressure is held by the plug alone."""
-    weights, coupling = channel(8, high=2.0)
+    weights, term = channel(8, high=2.0)
     rhs = np.zeros((24, 8, 1))
     rhs[2, 3, 0] = 1.0
-    expected, _, _ = dense_solution(weights, (False,) * 3, coupling, rhs)
-    found = PressureSystem(weights).solve(rhs, None, coupling, tolerance=1e-12)
+    expected, _, _ = dense_solution(weights, (False,) * 3, term, rhs)
+    found = PressureSystem(weights).solve(rhs, None, term, tolerance=1e-12)
     assert found.converged
     np.testing.assert_allclose(found.pressure, expected, atol=1e-10)
 
@@ -201,7 +201,7 @@ def disc_in_box(n, open_side=True):
     return [*weights, np.zeros((n, n, 2))]
 
 
-def disc_coupling(weights, n, mass):
+def disc_term(weights, n, mass):
     """The disc moves along x with this mass, the fluid's density being 1."""
     closed = 1.0 - np.clip(weights[0], 0.0, 1.0)
     closed[0] = closed[-1] = 0.0
@@ -211,7 +211,7 @@ def disc_coupling(weights, n, mass):
     response = np.zeros((6, 6))
     response[0, 0] = 1.0 / mass
     columns = np.zeros(cells.size, np.int64)
-    return Coupling(cells, rows, columns, values[cells], dense_response(response))
+    return LowRankTerm(cells, rows, columns, values[cells], dense_response(response))
 
 
 def stream(n):
@@ -238,8 +238,8 @@ def test_iterations_do_not_depend_on_how_light_the_body_is():
     system = PressureSystem(weights)
     counts = []
     for mass in (1e3, 1.0, 1e-2, 1e-4):
-        coupling = disc_coupling(weights, n, mass)
-        found = system.solve(stream(n), None, coupling, tolerance=1e-9)
+        term = disc_term(weights, n, mass)
+        found = system.solve(stream(n), None, term, tolerance=1e-9)
         assert found.converged
         counts.append(found.iterations)
     assert max(counts) - min(counts) <= 2, counts
@@ -284,16 +284,16 @@ def test_nothing_to_solve_gives_zero():
 def test_threads_do_not_change_a_bit(monkeypatch):
     shape = (60, 43, 48)
     weights = random_weights(shape, ("closed", "periodic", "open"), blocked=0.1)
-    coupling = random_coupling(shape, 2)
+    term = random_term(shape, 2)
     rhs = np.random.default_rng(4).standard_normal(shape)
     periodic = (False, True, False)
-    serial = PressureSystem(weights, periodic).solve(rhs, None, coupling)
+    serial = PressureSystem(weights, periodic).solve(rhs, None, term)
     assert serial.converged
     monkeypatch.setattr(jit, "cores", lambda: 3)
     monkeypatch.setattr(jit, "GAIN", 0.0)
     for threads in (2, 3):
         with kernel_threads(threads):
-            parallel = PressureSystem(weights, periodic).solve(rhs, None, coupling)
+            parallel = PressureSystem(weights, periodic).solve(rhs, None, term)
         np.testing.assert_array_equal(serial.pressure, parallel.pressure)
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from flowborne.fluid.pressure import PressureSystem
 from flowborne.kernels.deflation import deflated
 from flowborne.kernels.laplacian import apply_laplacian
 from flowborne.kernels.levels import at_level, guests_at, leaning_at, weights_at
 from flowborne.kernels.smoothing import defect, smooth
 from flowborne.kernels.transfer import interpolate, restrict
 from flowborne.kernels.v_cycle import v_cycle
+from flowborne.solvers.pressure import PressureSystem
 
 SHAPES = [
     ((12, 9, 1), (False, False, False)),

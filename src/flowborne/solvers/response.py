@@ -1,9 +1,9 @@
-"""How what moves in the fluid answers impulses: the matrix M, whole or by its factors.
+"""The matrix A^-1 of a term of low rank, whole or by its factors.
 
-M                                       a few rigid bodies
-M = T ( (P^T L D L^T P)^-1 - Y Y^T ) T^T    flesh: T from its dofs to the velocities that the
-                                        fluid sees, and a factorised matrix of which Y takes out
-                                        what contacts hold
+    A^-1 = T ( (P^T L D L^T P)^-1 - Y Y^T ) T^T
+
+T leads from the unknowns of a factorised matrix to the k columns; Y takes out the motions of those
+unknowns that constraints hold.
 """
 
 from __future__ import annotations
@@ -11,26 +11,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from flowborne.fluid.grid import Array
-from flowborne.kernels.arrays import Answers, Integers
+from flowborne.kernels.arrays import Array, Integers, Places, ResponseArrays
 from flowborne.kernels.response import respond
-
-Places = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
 class Response:
-    """M (k, k), symmetric positive semidefinite.
+    """A^-1 (k, k), symmetric positive semidefinite.
 
-    arrays  for kernels; the factors are empty where M is dense, and M is where they are not
-    soft    (k, m) R with R R^T close to M for the motions that meet little resistance
+    arrays     for kernels; the factors are empty where A^-1 is dense, and it is where they are not
+    compliant  (k, m) R with R R^T close to A^-1 for the modes that meet little resistance
     """
 
-    arrays: Answers
-    soft: Array
+    arrays: ResponseArrays
+    compliant: Array
 
     @property
     def size(self) -> int:
@@ -41,20 +37,20 @@ class Response:
     def is_dense(self) -> bool:
         return len(self.arrays[1]) == 1
 
-    def times(self, push: Array) -> Array:
-        """M applied to a push (k,), or to every row of (n, k)."""
+    def times(self, load: Array) -> Array:
+        """A^-1 applied to a load (k,), or to every row of (n, k)."""
         if self.is_dense:
-            return np.asarray(push @ self.arrays[0])
-        answers = np.zeros_like(push)
-        for row, answer in zip(np.atleast_2d(push), np.atleast_2d(answers), strict=True):
+            return np.asarray(load @ self.arrays[0])
+        answers = np.zeros_like(load)
+        for row, answer in zip(np.atleast_2d(load), np.atleast_2d(answers), strict=True):
             answer[:] = respond(np.ascontiguousarray(row), self.arrays)
         return answers
 
     def largest(self) -> float:
-        """Size of the largest entry of M; for flesh, of what its dofs would do one by one."""
+        """Size of the largest entry of A^-1; of a factorised one, of its compliant modes alone."""
         if self.is_dense:
             return float(np.abs(self.arrays[0]).max(initial=0.0))
-        return float(np.square(self.soft).sum(axis=1).max(initial=0.0)) or 1.0
+        return float(np.square(self.compliant).sum(axis=1).max(initial=0.0)) or 1.0
 
 
 NONE = np.zeros(0, np.int32)
@@ -62,7 +58,7 @@ START = np.zeros(1, np.int32)
 
 
 def dense_response(matrix: Array) -> Response:
-    """Of a dense M (k, k)."""
+    """Of a dense A^-1 (k, k)."""
     whole = np.ascontiguousarray(matrix)
     share, axes = np.linalg.eigh(whole) if len(whole) else (np.zeros(0), whole)
     arrays = (
@@ -78,18 +74,18 @@ def factored_response(
     diagonal: Array,
     order: Integers,
     taken: Array,
-    soft: Array,
+    compliant: Array,
 ) -> Response:
     """Of a factorised matrix.
 
     jacobian  (k, n) T
     lower     columns of L (n, n) below its diagonal of ones: start, row, value
-    diagonal  (n,) D;  order  (n,) place of each dof in L
-    taken     (n, c) Y;  soft  see `Response`
+    diagonal  (n,) D;  order  (n,) index of each unknown in L
+    taken     (n, c) Y;  compliant  see `Response`
     """
     starts, columns = jacobian.indptr.astype(np.int32), jacobian.indices.astype(np.int32)
     arrays = (
         np.zeros((0, 0)), starts, columns, jacobian.data, *lower, diagonal,
         order.astype(np.int64), np.ascontiguousarray(taken),
     )  # fmt: skip
-    return Response(arrays, np.ascontiguousarray(soft))
+    return Response(arrays, np.ascontiguousarray(compliant))

@@ -10,11 +10,12 @@ import pytest
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.friction import TOLERANCE
 from flowborne.coupling.step import cut_by_bodies
+from flowborne.coupling.viscous_solve import Answer, ViscousSystem, walls_of
 from flowborne.fluid.boundary import Boundaries, BoundaryNoSlip
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.viscosity import assemble_viscosity
-from flowborne.fluid.viscous_solve import Answer, ViscousSystem, spread, walls_of
 from flowborne.kernels.viscosity import TIED, UNKNOWN
+from flowborne.solvers.conjugate_gradients import spread
 from flowborne.validation.viscous import measured
 from flowborne.validation.worlds import PERIODIC, RING, mjcf, world_of
 

@@ -1,4 +1,4 @@
-"""The viscous system over all components and bodies, and its solution (see `viscosity`).
+"""The viscous system over all components and bodies, and its solution (see `fluid.viscosity`).
 
 With B the velocity of the wall points and C the couple of the bodies' own rotation,
 
@@ -28,15 +28,12 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.viscosity import ViscousFaces
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.vectors import descend, dot, turn
 from flowborne.kernels.viscosity import TIED
 from flowborne.kernels.viscous_operator import apply_component
-
-WIDTH = 256
-"""Faces in a row of the vectors of the conjugate gradients."""
+from flowborne.solvers.conjugate_gradients import conjugate_gradients, spread
 
 ROUNDING = 1e-15
-"""Relative size of residuals, in the matrix scaled to a diagonal of 1, that are rounding errors."""
+"""Relative size of eigenvalues of M that are rounding errors."""
 
 MOST = 20
 """Iterations for each cell along the longest edge of the domain, at most; and at least as many as
@@ -261,18 +258,8 @@ class ViscousSystem:
     def _conjugate_gradients(self, rhs: Array, x: Array, tolerance: float) -> tuple[Array, bool]:
         """Solution from the guess x, and whether the residual is within the tolerance."""
         y, right = spread(x * np.sqrt(self.diagonal)), spread(self.scale * rhs)
-        residual = right - self.apply(y)
-        direction = np.zeros_like(y)
-        goal = max(tolerance**2 * dot(right, right), ROUNDING**2 * dot(y, y))
-        square, beta, iterations = dot(residual, residual), 0.0, 0
-        while square > goal and iterations < self.most:
-            turn(direction, residual, beta)
-            image = self.apply(direction)
-            step = square / dot(direction, image)
-            before, square = square, descend(y, residual, direction, image, step)
-            beta = square / before
-            iterations += 1
-        return self.scale * y.reshape(-1)[: x.size], bool(square <= goal)
+        converged = conjugate_gradients(self.apply, right, y, tolerance, self.most)
+        return self.scale * y.reshape(-1)[: x.size], converged
 
     def _split(self, values: Array, like: Faces) -> Faces:
         """Concatenated components as faces; periodic ends joined; a slab's z as it was."""
@@ -286,13 +273,6 @@ class ViscousSystem:
                 parts[axis][edge(axis, -1)] = parts[axis][edge(axis, 0)]
             first += count
         return parts[0], parts[1], parts[2]
-
-
-def spread(values: Array) -> Array:
-    """A vector over the concatenated faces in rows of WIDTH, filled up with zeros."""
-    rows = np.zeros((-(-values.size // WIDTH), 1, WIDTH))
-    rows.reshape(-1)[: values.size] = values
-    return rows
 
 
 class Answer:

@@ -1,0 +1,51 @@
+"""Conjugate gradients on an operator that is given as a function.
+
+For the pressure, with its preconditioner, all of it is one kernel (`kernels.conjugate_gradients`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from flowborne.kernels.arrays import Array
+from flowborne.kernels.vectors import descend, dot, turn
+
+WIDTH = 256
+"""Entries in a row of the vectors."""
+
+ROUNDING = 1e-15
+"""Relative size of residuals, for a matrix with a diagonal of 1, that are rounding errors."""
+
+
+def spread(values: Array) -> Array:
+    """A flat vector in rows of WIDTH, filled up with zeros: what threads share out."""
+    rows = np.zeros((-(-values.size // WIDTH), 1, WIDTH))
+    rows.reshape(-1)[: values.size] = values
+    return rows
+
+
+def conjugate_gradients(
+    apply: Callable[[Array], Array], right: Array, x: Array, tolerance: float, most: int
+) -> bool:
+    """Solve apply(x) = right from the guess in x, in place; returns whether the residual asked for
+    was reached.
+
+    apply      a symmetric positive definite matrix with a diagonal of 1 on a vector
+    right, x   vectors as `spread` gives them
+    tolerance  relative residual
+    most       iterations
+    """
+    residual = right - apply(x)
+    direction = np.zeros_like(x)
+    goal = max(tolerance**2 * dot(right, right), ROUNDING**2 * dot(x, x))
+    square, beta, iterations = dot(residual, residual), 0.0, 0
+    while square > goal and iterations < most:
+        turn(direction, residual, beta)
+        image = apply(direction)
+        step = square / dot(direction, image)
+        before, square = square, descend(x, residual, direction, image, step)
+        beta = square / before
+        iterations += 1
+    return bool(square <= goal)

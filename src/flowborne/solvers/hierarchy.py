@@ -1,0 +1,117 @@
+"""Arrays of a multigrid hierarchy, and their filling from face weights (see `kernels.levels`).
+
+Arrays are large and the same for every system of one grid, so those that a system has done with are
+kept for the next one.
+"""
+
+from __future__ import annotations
+
+import weakref
+
+import numpy as np
+
+from flowborne.kernels.aggregates import OWN
+from flowborne.kernels.arrays import Array, Finest, Hierarchy, Integers, Labels, Marks, Places, Real
+from flowborne.kernels.levels import LEAN, at_level, coarsen, finest_weights, padded_size
+from flowborne.kernels.regions import label_regions
+from flowborne.kernels.vectors import largest, scaled
+
+COARSEST = 4
+"""Most cells along an axis of the coarsest level."""
+
+
+def level_table(shape: tuple[int, int, int]) -> Integers:
+    """(levels + 1, 9) hierarchy over a grid of `shape` cells; see `levels.OFFSET` to `GUESTS`."""
+    rows = []
+    counts, size = list(shape), [1, 1, 1]
+    offset = lean = 0
+    while True:
+        rows.append([offset, *counts, lean, *size, 0])
+        offset += padded_size(counts[0], counts[1], counts[2])
+        lean += sum(counts) + 6
+        if max(counts) <= COARSEST:
+            break
+        for axis in range(3):
+            if counts[axis] > 2:
+                counts[axis] = (counts[axis] + 1) // 2
+                size[axis] *= 2
+    rows.append([offset, 0, 0, 0, lean, 0, 0, 0, 0])
+    return np.array(rows, np.int64)
+
+
+def zeros(shape: tuple[int, int, int]) -> Array:
+    return np.zeros(shape)
+
+
+def packed(size: int) -> Real:
+    return np.zeros(size, np.float32)
+
+
+class Buffers:
+    """Arrays of one hierarchy and of one solve, kept for the next system of the same kind."""
+
+    def __init__(self, shape: tuple[int, int, int]) -> None:
+        self.table = level_table(shape)
+        total = int(self.table[-1, 0])
+        n0, n1, n2 = shape
+        padded = (n0 + 2 if n0 > 1 else 1, n1 + 2, n2 + 2)
+        self.finest = zeros(padded), zeros(padded), zeros(padded), zeros(padded)
+        self.weights = packed(total), packed(total), packed(total)
+        self.reaction = packed(total)
+        self.inverse = packed(total)
+        self.lean = packed(int(self.table[-1, LEAN]))
+        self.marks: Marks = np.full(total, OWN, np.uint8)
+        self.guests: Places = np.zeros(total, np.int32)
+        self.hosts: Places = np.zeros(total, np.int32)
+        self.cycle = packed(total), packed(total), packed(total)
+        self.vectors = zeros(padded), zeros(padded), zeros(padded), zeros(padded), zeros(padded)
+        self.label: Labels = np.zeros(padded, np.int32)
+        self.parent: Labels = np.zeros(self.label.size + 1, np.int32)
+        self.count: Labels = np.zeros(self.label.size + 1, np.int32)
+
+
+Kind = tuple[tuple[int, int, int], tuple[bool, bool, bool]]
+"""Cells and which axes are periodic: what decides the ghosts that buffers are left with."""
+
+_spare: dict[Kind, list[Buffers]] = {}
+
+
+def borrow(kind: Kind, owner: object) -> Buffers:
+    """Buffers that go back into store when `owner` is gone."""
+    store = _spare.setdefault(kind, [])
+    try:
+        buffers = store.pop()
+    except IndexError:
+        buffers = Buffers(kind[0])
+    weakref.finalize(owner, store.append, buffers)
+    return buffers
+
+
+def prepare(
+    hierarchy: Hierarchy,
+    faces: tuple[Array, Array, Array],
+    reaction: Array,
+    finest: Finest,
+    label: Labels,
+    parent: Labels,
+    count: Labels,
+) -> tuple[int, float]:
+    """Fill finest level, hierarchy and region labels from the weights on the faces.
+
+    reaction  (cells) of K + D, which the hierarchy is made for; see `pressure.PressureSystem`
+    returns  number of regions without an open side, scale of the hierarchy's weights
+    """
+    *weights, diagonal = finest
+    finest_weights(faces, (weights[0], weights[1], weights[2]), diagonal)
+    most = largest(diagonal)
+    scale = 1.0 / most if most > 0.0 else 1.0
+    for source, target in zip(weights, hierarchy[2], strict=True):
+        scaled(source, target[: source.size], scale)
+    added = at_level(hierarchy[3], hierarchy[0], 0)
+    added[:] = 0.0
+    d = 1 if added.shape[0] > 1 else 0
+    if reaction.size:
+        inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
+        inner[:] = scale * reaction.reshape(inner.shape)
+    coarsen(hierarchy)
+    return label_regions(finest, hierarchy[1], label, parent, count), scale

@@ -1,0 +1,207 @@
+"""The pressure equation: a weighted cell Laplacian and a term of low rank.
+
+    ( K + J A^-1 J^T ) p = rhs        K     weighted cell Laplacian (see `kernels.levels`)
+                                      J     rows in some of the cells
+                                      A^-1  the response between their columns (see `response`)
+
+Equation (9) of the paper with all other unknowns eliminated: symmetric positive definite but for
+its null vectors (see `regions`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flowborne.kernels.arrays import Array, Faces, Integers, Real, Rows
+from flowborne.kernels.conjugate_gradients import solve
+from flowborne.kernels.levels import at_level
+from flowborne.kernels.regions import region_loads
+from flowborne.kernels.sparse_rows import padded_rows
+from flowborne.kernels.vectors import load_cells
+from flowborne.solvers.deflation import compliant_modes, mode_amounts, mode_fields
+from flowborne.solvers.hierarchy import borrow, prepare
+from flowborne.solvers.regions import null_basis
+from flowborne.solvers.response import Response, dense_response
+
+
+@dataclass(frozen=True)
+class LowRankTerm:
+    """J A^-1 J^T: rows of J in some of the cells, and A^-1.
+
+    cells      (m,) flat index of the cell of each row; a cell may have several rows
+    row_start  (m+1,) where each row's entries begin
+    columns    (nnz,) column of J, row of A^-1
+    values     (nnz,) entries
+    response   A^-1
+    """
+
+    cells: Integers
+    row_start: Integers
+    columns: Integers
+    values: Array
+    response: Response
+
+
+NO_TERM = LowRankTerm(
+    np.zeros(0, np.int64),
+    np.zeros(1, np.int64),
+    np.zeros(0, np.int64),
+    np.zeros(0),
+    dense_response(np.zeros((0, 0))),
+)
+"""K alone."""
+
+
+@dataclass(frozen=True)
+class Deflation:
+    """What a term adds to the system of one geometry, the same for every right-hand side.
+
+    rows     of J in active cells, with padded flat indices
+    null     see `regions.null_basis`
+    fields   (m, padded shape) and
+    amounts  (m, k) of the modes in the preconditioner; see `deflation`
+    """
+
+    rows: Rows
+    null: Array
+    fields: Real
+    amounts: Array
+
+
+@dataclass(frozen=True)
+class PressureSolution:
+    """What a solve gave.
+
+    pressure    (nx, ny, nz); 0 in cells without an open face, and with no part along null vectors
+    iterations  of conjugate gradients
+    residual    |rhs - A p| / |rhs| over the active cells, computed from p; rhs without its part
+                along the null vectors, which no pressure can balance
+    converged   whether the residual asked for was reached
+    """
+
+    pressure: Array
+    iterations: int
+    residual: float
+    converged: bool
+
+
+NO_VECTORS = np.zeros((0, 0))
+NO_REACTION = np.zeros((0, 0, 0))
+NO_FIELDS = np.zeros((0, 0, 0, 0), np.float32)
+
+
+class PressureSystem:
+    """The matrix for one geometry: build once, solve for any right-hand side and term.
+
+    weights   face weights (nx+1, ny, nz), (nx, ny+1, nz), (nx, ny, nz+1), at least 0. On the outer
+              faces of an axis that is not periodic a weight above 0 is an open side, p = 0 on it,
+              at the distance that the weight was made with; a periodic axis has the same weights on
+              its first and last face. A cell is active when one of its weights is above 0.
+    periodic  of each axis
+    reaction  (nx, ny, nz), at least 0: D with K + D closer than K to the matrix that is solved; for
+              the preconditioner alone
+    raises    ValueError for one cell along x or y in 3D, which the ghost layout has no room for
+    """
+
+    def __init__(
+        self,
+        weights: Faces,
+        periodic: tuple[bool, bool, bool] = (False, False, False),
+        reaction: Array = NO_REACTION,
+    ) -> None:
+        nx, ny, nz = weights[1].shape[0], weights[0].shape[1], weights[0].shape[2]
+        self.shape = (nx, ny, nz)
+        if nz > 1 and nx == 1:
+            raise ValueError(
+                f"a grid of {nx} x {ny} x {nz} cells is one cell thick along x. "
+                "Turn it so that its thin axis is z."
+            )
+        self.slab = nz == 1
+        inner = (1, nx, ny) if self.slab else self.shape
+        wraps = (False, periodic[0], periodic[1]) if self.slab else periodic
+        self.periodic = np.array(wraps, np.uint8)
+        x, y, z = (np.ascontiguousarray(w, np.float64) for w in weights)
+        faces = (x, y, z)
+        if self.slab:
+            faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
+        self._deflation: tuple[LowRankTerm, Deflation] | None = None
+        self.buffers = borrow((inner, wraps), self)
+        b = self.buffers
+        self.hierarchy = (
+            b.table,
+            self.periodic,
+            b.weights,
+            b.reaction,
+            b.inverse,
+            b.lean,
+            b.marks,
+            b.guests,
+            b.hosts,
+        )
+        self.regions, self.scale = prepare(
+            self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
+        )
+
+    def solve(
+        self,
+        rhs: Array,
+        guess: Array | None = None,
+        term: LowRankTerm = NO_TERM,
+        tolerance: float = 1e-9,
+        absolute: float = 0.0,
+    ) -> PressureSolution:
+        """Solve to  |rhs - A p| <= max(tolerance |rhs|, absolute).
+
+        rhs, guess  (nx, ny, nz); values in cells without an open face are ignored
+        """
+        b = self.buffers
+        inner = b.label.shape
+        cells = (inner[0] - 2 if inner[0] > 1 else 1, inner[1] - 2, inner[2] - 2)
+        diagonal = b.finest[3]
+        x, right = b.vectors[:2]
+        first = np.zeros(self.shape) if guess is None else np.ascontiguousarray(guess, np.float64)
+        load_cells(x, first.reshape(cells), diagonal)
+        load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
+        added = self.deflation(term)
+        iterations, residual, converged = solve(
+            self.hierarchy,
+            b.cycle,
+            b.finest,
+            b.vectors,
+            added.rows,
+            term.response.arrays,
+            b.label,
+            added.null,
+            added.fields,
+            added.amounts,
+            tolerance,
+            absolute,
+        )
+        start = (1 if inner[0] > 1 else 0, 1, 1)
+        inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
+        pressure = x[inside].copy().reshape(self.shape)
+        return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
+
+    def deflation(self, term: LowRankTerm) -> Deflation:
+        """What the term adds; made when it is another than that of the last solve."""
+        if self._deflation is None or self._deflation[0] is not term:
+            self._deflation = term, self._deflate(term)
+        return self._deflation[1]
+
+    def _deflate(self, term: LowRankTerm) -> Deflation:
+        b, response = self.buffers, term.response
+        diagonal = b.finest[3]
+        rows = padded_rows((term.cells, term.row_start, term.columns, term.values), diagonal)
+        null, amounts, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
+        if self.regions:
+            loads = region_loads(b.label, self.regions, response.size, rows)
+            null = null_basis(b.count[: self.regions], loads, response)
+        inverse = at_level(b.inverse, b.table, 0)
+        held = null.shape[1] < self.regions
+        modes = compliant_modes(response, rows, inverse, self.scale, max(self.shape), held)
+        if modes.size:
+            fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
+            amounts = mode_amounts(modes, gram)
+        return Deflation(rows, null, fields, amounts)
