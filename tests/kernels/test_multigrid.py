@@ -3,12 +3,24 @@
 import numpy as np
 import pytest
 
-from flowborne.kernels.deflation import deflated
-from flowborne.kernels.laplacian import apply_laplacian
-from flowborne.kernels.levels import at_level, guests_at, leaning_at, weights_at
-from flowborne.kernels.smoothing import defect, smooth
-from flowborne.kernels.transfer import interpolate, restrict
+from flowborne.kernels.deflation import deflated, deflated_reference
+from flowborne.kernels.laplacian import apply_laplacian, apply_laplacian_reference
+from flowborne.kernels.levels import at_level, guests_at, leaning_at, weights_at, wrap_ghosts
+from flowborne.kernels.smoothing import (
+    defect,
+    defect_reference,
+    first_smooth,
+    smooth,
+    smooth_reference,
+)
+from flowborne.kernels.transfer import (
+    interpolate,
+    interpolate_reference,
+    restrict,
+    restrict_reference,
+)
 from flowborne.kernels.v_cycle import v_cycle
+from flowborne.kernels.vectors import cells_of
 from flowborne.solvers.pressure import PressureSystem
 
 SHAPES = [
@@ -34,44 +46,75 @@ def system_of(shape, periodic, seed=0):
     return PressureSystem(weights, periodic)
 
 
-@pytest.mark.parametrize(("shape", "periodic"), SHAPES)
-def test_smoothing_and_defect_are_what_numpy_says(shape, periodic):
-    system = system_of(shape, periodic)
-    table = system.buffers.table
-    w = weights_at(system.buffers.weights, table, 0)
+def finest_of(system, count, seed=1):
+    """Weights and 1 / diagonal of the finest level, and random fields of its padded shape."""
+    table, rng = system.buffers.table, np.random.default_rng(seed)
     inverse = at_level(system.buffers.inverse, table, 0)
-    rng = np.random.default_rng(1)
-    x, b = (rng.standard_normal(inverse.shape).astype(np.float32) for _ in range(2))
-    i, j, k = np.indices(x.shape)
-    d = int(x.shape[0] > 1)
-    inside = np.zeros(x.shape, bool)
-    inside[slice(1, -1) if d else slice(None), 1:-1, 1:-1] = True
-    pull = np.zeros_like(x)
-    for axis in range(1 - d, 3):
-        upper = np.roll(w[axis], -1, axis)
-        pull += w[axis] * np.roll(x, 1, axis) + upper * np.roll(x, -1, axis)
-    expected = np.where(inside & ((i - d + j + k) % 2 == 1), (b + pull) * inverse, x)
-    smoothed = x.copy()
-    smooth(smoothed, b, w, inverse, 1)
+    fields = [rng.standard_normal(inverse.shape).astype(np.float32) for _ in range(count)]
+    return weights_at(system.buffers.weights, table, 0), inverse, fields
+
+
+@pytest.mark.parametrize(("shape", "periodic"), SHAPES)
+@pytest.mark.parametrize("colour", [0, 1])
+def test_smoothing_and_defect_are_what_numpy_says(shape, periodic, colour):
+    w, inverse, (x, b) = finest_of(system_of(shape, periodic), 2)
+    smoothed, r = x.copy(), np.zeros_like(x)
+    smooth(smoothed, b, w, inverse, colour)
+    expected = smooth_reference(x, b, w, inverse, colour)
     np.testing.assert_allclose(smoothed, expected, rtol=1e-5, atol=1e-5)
-    r = np.zeros_like(x)
     defect(r, x, b, w, inverse)
-    active = inside & (inverse > 0.0)
-    safe = np.where(active, inverse, 1.0)
-    np.testing.assert_allclose(r, np.where(active, b + pull - x / safe, 0.0), atol=1e-4)
+    np.testing.assert_allclose(r, defect_reference(x, b, w, inverse), atol=1e-4)
+
+
+def test_the_first_sweep_is_a_red_one_from_nothing():
+    w, inverse, (x, b) = finest_of(system_of(*SHAPES[2]), 2)
+    first_smooth(x, b, inverse)
+    expected = smooth_reference(np.zeros_like(x), b, w, inverse, 0)
+    np.testing.assert_allclose(x, expected, rtol=1e-6)
+
+
+def with_ghosts(values):
+    """A field with a layer of zeros around it, but for an axis of one cell."""
+    return np.pad(values, [(int(n > 1),) * 2 for n in values.shape])
+
+
+def transfer_of(system):
+    """Marks, interpolation coefficients, guests and hosts of the finest level."""
+    b = system.buffers
+    return (
+        at_level(b.marks, b.table, 0),
+        leaning_at(b.lean, b.table, 0),
+        guests_at(b.guests, b.table, 0),
+        at_level(b.hosts, b.table, 0),
+    )
+
+
+@pytest.mark.parametrize(("shape", "periodic"), SHAPES)
+def test_transfer_is_what_numpy_says(shape, periodic):
+    system = system_of(shape, periodic)
+    parts, table = transfer_of(system), system.buffers.table
+    assert parts[2].size > 0
+    _, _, (x, r) = finest_of(system, 2)
+    coarse = np.zeros_like(at_level(system.buffers.inverse, table, 1))
+    coarse[:] = with_ghosts(
+        np.random.default_rng(3).standard_normal(coarse[cells_of(coarse)].shape)
+    )
+    wrap_ghosts(coarse, system.periodic)
+    expected = interpolate_reference(x, coarse, *parts)
+    interpolate(x, coarse, *parts)
+    np.testing.assert_allclose(x, expected, rtol=1e-5, atol=1e-5)
+    r = with_ghosts(r[cells_of(r)])
+    wrap_ghosts(r, system.periodic)
+    restrict(coarse, r, *parts)
+    expected = restrict_reference(coarse, r, *parts, system.periodic)
+    np.testing.assert_allclose(coarse[cells_of(coarse)], expected[cells_of(coarse)], atol=1e-5)
 
 
 @pytest.mark.parametrize(("shape", "periodic"), [*SHAPES[:1], ((7, 6, 9), (False, False, False))])
 def test_restriction_is_the_transpose_of_interpolation(shape, periodic):
     """Guests included; without periodic axes, where ghosts would have to be folded back."""
     system = system_of(shape, periodic)
-    b = system.buffers
-    parts = (
-        at_level(b.marks, b.table, 0),
-        leaning_at(b.lean, b.table, 0),
-        guests_at(b.guests, b.table, 0),
-        at_level(b.hosts, b.table, 0),
-    )
+    b, parts = system.buffers, transfer_of(system)
     assert parts[2].size > 0
     fine, coarse = (np.zeros_like(at_level(b.inverse, b.table, level)) for level in (0, 1))
     rng = np.random.default_rng(2)
@@ -102,15 +145,13 @@ def test_cycle_is_symmetric_and_positive(shape, periodic):
 
 @pytest.mark.parametrize("shape", [(6, 7, 10), (1, 12, 9)])
 @pytest.mark.parametrize("count", [0, 3])
-def test_the_preconditioner_takes_off_what_bodies_answer(shape, count):
+def test_deflation_is_what_numpy_says(shape, count):
     rng = np.random.default_rng(2)
     padded = tuple(n + 2 if n > 1 else 1 for n in shape)
-    cells = tuple(slice(1, -1) if n > 1 else slice(None) for n in shape)
-    z, r, amount = rng.standard_normal(padded), rng.standard_normal(padded), rng.random(count)
-    fields = rng.standard_normal((count, *padded))
-    out, expected = np.zeros(padded), np.zeros(padded)
-    expected[cells] = (0.5 * z - np.tensordot(amount, fields, 1))[cells]
-    product = deflated(out, z, r, 0.5, amount, fields)
+    z, r, strength = rng.standard_normal(padded), rng.standard_normal(padded), rng.random(count)
+    fields, out = rng.standard_normal((count, *padded)), np.zeros(padded)
+    product = deflated(out, z, r, 0.5, strength, fields)
+    expected = deflated_reference(z, 0.5, strength, fields)
     np.testing.assert_allclose(out, expected, atol=1e-14)
     assert product == pytest.approx(np.vdot(expected, r))
 
@@ -119,14 +160,9 @@ def test_the_preconditioner_takes_off_what_bodies_answer(shape, count):
 def test_the_laplacian_is_what_numpy_says(shape):
     rng = np.random.default_rng(3)
     padded = tuple(n + 2 if n > 1 else 1 for n in shape)
-    cells = tuple(slice(1, -1) if n > 1 else slice(None) for n in shape)
-    p, *w = (rng.standard_normal(padded) for _ in range(4))
-    out, expected = np.zeros(padded), np.zeros(padded)
-    diagonal = np.zeros(padded)
-    for axis in [axis for axis in range(3) if shape[axis] > 1]:
-        for step, weight in ((1, w[axis]), (-1, np.roll(w[axis], -1, axis))):
-            expected += weight * (p - np.roll(p, step, axis))
-            diagonal += weight
-    energy = apply_laplacian(out, p, (w[0], w[1], w[2], diagonal))
-    np.testing.assert_allclose(out[cells], expected[cells], atol=1e-13)
-    assert energy == pytest.approx(np.vdot(p[cells], expected[cells]))
+    p, *finest = (rng.standard_normal(padded) for _ in range(5))
+    out = np.zeros(padded)
+    energy = apply_laplacian(out, p, tuple(finest))
+    expected = apply_laplacian_reference(p, tuple(finest))
+    np.testing.assert_allclose(out, expected, atol=1e-13)
+    assert energy == pytest.approx(np.vdot(p, expected))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Faces, Integers
 
 
 @njit(nogil=True, cache=True)
@@ -24,6 +25,18 @@ def has_open_face(i: int, j: int, k: int, ox: Array, oy: Array, oz: Array, walls
         if opened[x, y, z] > 0.0 and not (cell[axis] == last and walls[axis, 1]):
             return True
     return False
+
+
+def has_open_face_reference(opened: Faces, walls: Integers) -> NDArray[np.bool_]:
+    """(nx, ny, nz) `has_open_face` of all cells in NumPy."""
+    slab = opened[0].shape[2] == 1
+    found = np.zeros((opened[1].shape[0], *opened[0].shape[1:]), bool)
+    for axis in range(2 if slab else 3):
+        passes = np.moveaxis(opened[axis] > 0.0, axis, 0)
+        passes[0] &= not walls[axis, 0]
+        passes[-1] &= not walls[axis, 1]
+        found |= np.moveaxis(passes[:-1] | passes[1:], 0, axis)
+    return found
 
 
 @njit(nogil=True, cache=True)
@@ -118,6 +131,35 @@ def list_cells(
     return at
 
 
+def list_cells_reference(
+    share: Faces,
+    opened: Faces,
+    walls: Integers,
+    box: Integers,
+    body: int,
+    origin: Array,
+    h: float,
+    area: float,
+    flat: bool,
+) -> tuple[Integers, Integers, Array]:
+    """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
+    inside = tuple(slice(low, high - 1) for low, high in box)
+    found = has_open_face_reference(opened, walls)[inside]
+    force, touched = np.zeros((*found.shape, 3)), np.zeros(found.shape, bool)
+    for axis in range(2 if flat else 3):
+        ends = np.moveaxis(share[axis], axis, 0)
+        force[..., axis] = np.moveaxis(area * (ends[1:] - ends[:-1]), 0, axis)
+        touched |= np.moveaxis(ends[1:] + ends[:-1] > 0.0, 0, axis)
+    place = np.stack(np.nonzero(found & touched), axis=1) + box[:, 0]
+    centre = origin + h * (place + 0.5)
+    if flat:
+        centre[:, 2] = 0.0
+    force = force[found & touched]
+    values = np.concatenate([force, np.cross(centre, force)], axis=1)
+    cells = np.ravel_multi_index(tuple(place.T), (opened[1].shape[0], *opened[0].shape[1:]))
+    return cells, np.tile(6 * body + np.arange(6), cells.size), values.ravel()
+
+
 @njit(nogil=True, cache=True)
 def flesh_rows(
     axis: Integers,
@@ -164,3 +206,27 @@ def flesh_rows(
             rows += 1
     start = 3 * np.arange(rows + 1)
     return part[:rows], cells[:rows], start, columns[: 3 * rows], values[: 3 * rows]
+
+
+def flesh_rows_reference(
+    axis: Integers,
+    at: Integers,
+    closed: Array,
+    corner: Integers,
+    weight: Array,
+    first_column: int,
+    area: float,
+    opened: Faces,
+    walls: Integers,
+) -> tuple[Integers, Integers, Integers, Integers, Array]:
+    """`flesh_rows` in NumPy."""
+    shape = np.array([opened[1].shape[0], *opened[0].shape[1:]])
+    part, side = np.divmod(np.arange(2 * axis.size), 2)
+    cell = at[part] - (1 - side)[:, None] * np.eye(3, dtype=np.int64)[axis[part]]
+    inside = np.all((cell >= 0) & (cell < shape), axis=1)
+    inside[inside] = has_open_face_reference(opened, walls)[tuple(cell[inside].T)]
+    part, side, cell = part[inside], side[inside], cell[inside]
+    columns = first_column + 3 * corner[part] + axis[part][:, None]
+    values = ((1.0 - 2.0 * side) * area * closed[part])[:, None] * weight[part]
+    cells = np.ravel_multi_index(tuple(cell.T), tuple(shape))
+    return part, cells, 3 * np.arange(part.size + 1), columns.ravel(), values.ravel()

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.jit import kernel
 
 
 @kernel
 def outflow(out: Array, u: Array, v: Array, w: Array, ax: Array, ay: Array, az: Array) -> None:
-    """Net volume that leaves each cell per area of a full face: sum of a (u . outward), m/s.
-
-    NumPy:  out = diff(ax * u, axis=0) + diff(ay * v, axis=1) + diff(az * w, axis=2)
-    """
+    """Net volume that leaves each cell per area of a full face: sum of a (u . outward), m/s."""
     for i in prange(out.shape[0]):
         for j in range(out.shape[1]):
             for k in range(out.shape[2]):
@@ -25,3 +23,9 @@ def outflow(out: Array, u: Array, v: Array, w: Array, ax: Array, ay: Array, az: 
                     + az[i, j, k + 1] * w[i, j, k + 1]
                     - az[i, j, k] * w[i, j, k]
                 )
+
+
+def outflow_reference(velocity: Faces, opened: Faces) -> Array:
+    """`outflow` in NumPy."""
+    parts = [np.diff(a * u, axis=n) for n, (a, u) in enumerate(zip(opened, velocity, strict=True))]
+    return parts[0] + parts[1] + parts[2]

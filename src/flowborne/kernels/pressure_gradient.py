@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.sides import CLOSED, PERIODIC
+from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 
 @kernel
@@ -52,3 +52,22 @@ def push_faces(
                             - pressure[i - di, j - dj, k - dk]
                         )
                 velocity[i, j, k] -= scale * difference
+
+
+def push_faces_reference(
+    velocity: Array,
+    opened: Array,
+    pressure: Array,
+    axis: int,
+    scale: float,
+    codes: NDArray[np.int64],
+) -> Array:
+    """`push_faces` in NumPy: the velocity after it.
+
+    Beyond a closed side lies the pressure inside, beyond an open one its opposite.
+    """
+    p = np.moveaxis(pressure, axis, 0)
+    low = {CLOSED: p[:1], OPEN: -p[:1], PERIODIC: p[-1:]}[int(codes[axis, 0])]
+    high = {CLOSED: p[-1:], OPEN: -p[-1:], PERIODIC: p[:1]}[int(codes[axis, 1])]
+    difference = np.moveaxis(np.diff(np.concatenate([low, p, high]), axis=0), 0, axis)
+    return np.where(opened > 0.0, velocity - scale * difference, velocity)

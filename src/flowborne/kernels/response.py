@@ -59,3 +59,15 @@ def respond(load: Array, response: ResponseArrays) -> Array:
         for e in range(t_start[a], t_start[a + 1]):
             motion[a] += t_value[e] * answer[t_column[e]]
     return motion
+
+
+def respond_reference(load: Array, response: ResponseArrays) -> Array:
+    """`respond` in NumPy, by dense matrices."""
+    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = response
+    if t_start.size == 1:
+        return np.asarray(dense @ load)
+    T, L = np.zeros((load.size, order.size)), np.eye(order.size)
+    np.add.at(T, (np.repeat(np.arange(load.size), np.diff(t_start)), t_column), t_value)
+    L[row, np.repeat(np.arange(order.size), np.diff(start))] = value
+    factored = (L @ np.diag(diagonal) @ L.T)[np.ix_(order, order)]
+    return np.asarray(T @ (np.linalg.inv(factored) - taken @ taken.T) @ T.T @ load)

@@ -8,16 +8,15 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Real, Triple
+from flowborne.kernels.arrays import Array, Real, Triple
 from flowborne.kernels.jit import kernel
+from flowborne.kernels.laplacian import neighbour_sum
+from flowborne.kernels.vectors import cells_of
 
 
 @kernel
 def smooth(x: Real, b: Real, w: Triple, inverse: Real, colour: int) -> None:
-    """Gauss-Seidel on the cells of one colour of the chequerboard (0: first cell's; 1: others).
-
-    NumPy:  x[colour] = ((b + sum over faces of w x_neighbour) * inverse)[colour]
-    """
+    """Gauss-Seidel on the cells of one colour of the chequerboard (0: first cell's; 1: others)."""
     w0, w1, w2 = w
     d = 1 if x.shape[0] > 1 else 0
     n2 = x.shape[2] - 2
@@ -35,6 +34,16 @@ def smooth(x: Real, b: Real, w: Triple, inverse: Real, colour: int) -> None:
                 row[k] = total * inverse[m, j, k] if (k & 1) == parity else x[m, j, k]
             for k in range(1, n2 + 1):
                 x[m, j, k] = row[k]
+
+
+def smooth_reference(x: Real, b: Real, w: Triple, inverse: Real, colour: int) -> Array:
+    """`smooth` in NumPy: x after it."""
+    i, j, k = np.indices(x.shape)
+    chosen = (i - (x.shape[0] > 1) + j + k) % 2 == colour
+    inside = cells_of(x)
+    out = np.array(x, np.float64)
+    out[inside] = np.where(chosen, (b + neighbour_sum(x, w)) * inverse, x)[inside]
+    return out
 
 
 @kernel
@@ -64,3 +73,12 @@ def defect(r: Real, x: Real, b: Real, w: Triple, inverse: Real) -> None:
                     total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
                 a = inverse[m, j, k]
                 r[m, j, k] = total - x[m, j, k] / a if a > 0.0 else 0.0
+
+
+def defect_reference(x: Real, b: Real, w: Triple, inverse: Real) -> Array:
+    """`defect` in NumPy, with ghosts 0."""
+    r, inside = np.zeros(x.shape), cells_of(x)
+    active = inverse > 0.0
+    K_x = x / np.where(active, inverse, 1.0) - neighbour_sum(x, w)
+    r[inside] = np.where(active, b - K_x, 0.0)[inside]
+    return r

@@ -24,6 +24,15 @@ def sum_rows(p: Real, rows: Rows, size: int) -> Array:
     return load
 
 
+def dense_rows(rows: Rows, cells: int, size: int) -> Array:
+    """(cells, size) J, in which `sum_rows` is J^T p, `add_rows` p += J motion and `row_gram`
+    J^T D^-1 J."""
+    cell, row_start, columns, values = rows
+    J = np.zeros((cells, size))
+    np.add.at(J, (np.repeat(cell, np.diff(row_start)), columns), values)
+    return J
+
+
 @kernel
 def add_rows(p: Real, rows: Rows, motion: Array) -> None:
     """p += J motion on a field."""
@@ -91,3 +100,14 @@ def padded_rows(rows: Rows, diagonal: Array) -> Rows:
             count += 1
             starts[count] = used
     return kept[:count], starts[: count + 1], places[:used], entries[:used]
+
+
+def padded_rows_reference(rows: Rows, diagonal: Array) -> Rows:
+    """`padded_rows` in NumPy."""
+    cells, row_start, columns, values = rows
+    inside = tuple(slice(1, -1) if n > 1 else slice(None) for n in diagonal.shape)
+    padded = np.arange(diagonal.size).reshape(diagonal.shape)[inside].ravel()[cells]
+    active, count = diagonal.ravel()[padded] > 0.0, np.diff(row_start)
+    entries = np.repeat(active, count)
+    starts = np.append(0, np.cumsum(count[active]))
+    return padded[active], starts, columns[entries], values[entries]

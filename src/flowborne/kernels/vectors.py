@@ -12,6 +12,12 @@ from flowborne.kernels.arrays import Array, Real
 from flowborne.kernels.jit import kernel
 
 
+def cells_of(padded: Real) -> tuple[slice, slice, slice]:
+    """Index of the cells of a padded array, without its ghosts."""
+    i, j, k = (slice(1, -1) if n > 1 else slice(None) for n in padded.shape)
+    return i, j, k
+
+
 @kernel
 def largest(values: Array) -> float:
     """Largest value of an array, at least 0."""

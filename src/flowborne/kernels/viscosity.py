@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.sides import PERIODIC
+from flowborne.kernels.sides import CLOSED, PERIODIC
 
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
@@ -33,6 +33,13 @@ def face_distances(distance: Array, axis: int, out: Array) -> None:
                 )
 
 
+def face_distances_reference(distance: Array, axis: int) -> Array:
+    """`face_distances` in NumPy."""
+    p = np.moveaxis(distance, axis, 0)
+    mean = 0.25 * (p[:, :-1, :-1] + p[:, 1:, :-1] + p[:, :-1, 1:] + p[:, 1:, 1:])
+    return np.moveaxis(mean, 0, axis)
+
+
 @kernel
 def classify(
     kind: NDArray[np.uint8],
@@ -51,12 +58,30 @@ def classify(
                 kind[i, j, k] = UNKNOWN
                 if opened[i, j, k] == 0.0:
                     kind[i, j, k] = INACTIVE
-                elif (at == 0 and codes[axis, 0] == 0) or (at == last and codes[axis, 1] == 0):
+                elif (at == 0 and codes[axis, 0] == CLOSED) or (
+                    at == last and codes[axis, 1] == CLOSED
+                ):
                     kind[i, j, k] = GIVEN
                 elif at == last and codes[axis, 1] == PERIODIC:
                     kind[i, j, k] = INACTIVE
                 elif distance[i, j, k] <= touching:
                     kind[i, j, k] = TIED
+
+
+def classify_reference(
+    opened: Array, distance: Array, axis: int, codes: Integers, touching: float
+) -> NDArray[np.uint8]:
+    """`classify` in NumPy: the kinds."""
+    kind = np.where(distance <= touching, TIED, UNKNOWN).astype(np.uint8)
+    ends = np.moveaxis(kind, axis, 0)
+    if codes[axis, 0] == CLOSED:
+        ends[0] = GIVEN
+    if codes[axis, 1] == CLOSED:
+        ends[-1] = GIVEN
+    if codes[axis, 1] == PERIODIC:
+        ends[-1] = INACTIVE
+    kind[opened == 0.0] = INACTIVE
+    return kind
 
 
 @kernel
@@ -82,6 +107,18 @@ def aperture(
         total += across[i + ei, j + ej, k + ek]
         count += 1
     return total / count
+
+
+def aperture_reference(opened: Array, across: Array, axis: int, d: int) -> Array:
+    """`aperture` in NumPy, between all faces across `axis` and the next ones along d; for d other
+    than `axis` those at the upper side of the domain come last."""
+    if d == axis:
+        return 0.5 * (np.delete(opened, -1, axis) + np.delete(opened, 0, axis))
+    sides = np.delete(across, 0, d)
+    ends = [(int(n == axis),) * 2 for n in range(3)]
+    total, count = np.pad(sides, ends), np.pad(np.ones_like(sides), ends)
+    both = [np.delete(values, 0, axis) + np.delete(values, -1, axis) for values in (total, count)]
+    return np.asarray(both[0] / both[1])
 
 
 @kernel
@@ -138,6 +175,38 @@ def link_faces(
                     given[g] += coefficient * velocity[i, j, k]
 
 
+def link_faces_reference(
+    axis: int,
+    d: int,
+    kind: NDArray[np.uint8],
+    opened: Array,
+    across: Array,
+    velocity: Array,
+    stiffness: float,
+    periodic: bool,
+) -> tuple[Array, Array, Array]:
+    """`link_faces` in NumPy: what it adds to the diagonal, the links, what it adds to the force."""
+    faces = kind.shape[d] - int(periodic and d == axis)
+    between = np.moveaxis(aperture_reference(opened, across, axis, d), d, 0)
+    links = faces if periodic else faces - 1
+    distinct = np.moveaxis(kind, d, 0)[:faces]
+    here, there = distinct[:links], np.roll(distinct, -1, axis=0)[:links]
+    both = (here == UNKNOWN) & (there == UNKNOWN)
+    from_here = (here == GIVEN) & (there == UNKNOWN)
+    from_there = (here == UNKNOWN) & (there == GIVEN)
+    k = stiffness * between[:links]
+    u = np.moveaxis(velocity, d, 0)
+    out = np.zeros((3, *np.moveaxis(kind, d, 0).shape))
+    diagonal, link, given = out
+    above = (np.arange(links) + 1) % faces
+    diagonal[:links] += k * (both | from_there)
+    diagonal[above] += k * (both | from_here)
+    link[:links] = k * both
+    given[:links] += k * from_there * u[above]
+    given[above] += k * from_here * u[:links]
+    return np.moveaxis(diagonal, 0, d), np.moveaxis(link, 0, d), np.moveaxis(given, 0, d)
+
+
 @kernel
 def meet_walls(
     axis: int,
@@ -186,3 +255,34 @@ def meet_walls(
         if size > 0.0:
             wall[n] = max(slope, OBLIQUE * size) / phi[i, j, k]
             gap[n] = area / wall[n]
+
+
+def meet_walls_reference(
+    axis: int,
+    kind: NDArray[np.uint8],
+    opened: Faces,
+    phi: Array,
+    stiffness: float,
+    spacing: float,
+    codes: Integers,
+    beside: Integers,
+) -> tuple[Array, Array]:
+    """`meet_walls` in NumPy: W and x_f - x_w."""
+    slope, area = np.zeros(kind.shape), np.zeros((3, *kind.shape))
+    for d in range(2 if opened[0].shape[2] == 1 else 3):
+        periodic = bool(codes[d, 0] == PERIODIC)
+        faces = kind.shape[d] - int(periodic and d == axis)
+        between = np.moveaxis(aperture_reference(opened[axis], opened[d], axis, d), d, 0)
+        known = np.moveaxis((kind == UNKNOWN) | (kind == GIVEN), d, 0)
+        p, rise, gain = (np.moveaxis(values, d, 0) for values in (phi, slope, area[d]))
+        low = np.arange(faces if periodic else faces - 1)
+        high = (low + 1) % faces
+        for side, here, there in ((1, low, high), (-1, high, low)):
+            link = stiffness * between[low] * known[there]
+            gain[here] -= side * spacing * (stiffness - link)
+            rise[here] += link * (p[there] - p[here])
+    area, slope = area.reshape(3, -1)[:, beside], slope.ravel()[beside]
+    size = np.linalg.norm(area, axis=0)
+    cut = size > 0.0
+    wall = np.where(cut, np.maximum(slope, OBLIQUE * size) / phi.ravel()[beside], 0.0)
+    return wall, np.divide(area.T, wall[:, None], np.zeros_like(area.T), where=cut[:, None])

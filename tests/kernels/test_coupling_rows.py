@@ -1,0 +1,96 @@
+"""Rows of cells beside bodies and flesh, and the velocity of closed parts, against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.body_velocity import add_body_velocity, body_velocity_reference
+from flowborne.kernels.coupling_rows import (
+    flesh_rows,
+    flesh_rows_reference,
+    has_open_face,
+    has_open_face_reference,
+    list_cells,
+    list_cells_reference,
+)
+
+from .cut_cells import ORIGIN, SHAPES, H, cut, face_shape
+
+WALLS = [np.zeros((3, 2), np.int64), np.array([[1, 0], [0, 1], [1, 1]])]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("walls", WALLS)
+def test_has_open_face(shape: tuple[int, int, int], walls: np.ndarray) -> None:
+    made = cut(shape)
+    expected = has_open_face_reference(made.opened, walls)
+    found = [has_open_face(*cell, *made.opened, walls) for cell in np.ndindex(shape)]
+    assert not expected.all()
+    np.testing.assert_array_equal(np.reshape(found, shape), expected)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("walls", WALLS)
+def test_list_cells(shape: tuple[int, int, int], walls: np.ndarray) -> None:
+    made, random = cut(shape), np.random.default_rng(4)
+    inside = made.box[:, 1] - made.box[:, 0] - 1
+    share = [random.random(inside + (np.arange(3) == d)) for d in range(3)]
+    for values in share:
+        values[random.random(values.shape) < 0.7] = 0.0
+    expected = list_cells_reference(
+        share, made.opened, walls, made.box, 5, ORIGIN, H, 0.3, made.flat
+    )
+    given = *share, *made.opened, walls, made.box, 5, ORIGIN, H, 0.3, made.flat
+    none, nothing = np.zeros(0, np.int64), np.zeros(0)
+    count = list_cells(*given, 0, none, none, nothing)
+    assert 0 < count == expected[0].size < inside.prod()
+    found = np.empty(count, np.int64), np.empty(6 * count, np.int64), np.empty(6 * count)
+    assert list_cells(*given, 0, *found) == count
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-14)
+
+
+def parts(shape: tuple[int, int, int], count: int = 40) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) axes and (n, 3) indices of random faces."""
+    random = np.random.default_rng(5)
+    axis = random.integers(0, 3 if shape[2] > 1 else 2, count)
+    sizes = np.array([face_shape(shape, d) for d in axis])
+    return axis, (random.random((count, 3)) * sizes).astype(np.int64)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("walls", WALLS)
+def test_flesh_rows(shape: tuple[int, int, int], walls: np.ndarray) -> None:
+    made, random = cut(shape), np.random.default_rng(6)
+    axis, at = parts(shape)
+    corner, weight = random.integers(0, 9, (axis.size, 3)), random.random((axis.size, 3))
+    given = axis, at, random.random(axis.size), corner, weight, 12, 0.3
+    found = flesh_rows(*given, *made.opened, walls)
+    expected = flesh_rows_reference(*given, made.opened, walls)
+    assert 0 < expected[0].size < 2 * axis.size
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("skin", [0, 15])
+def test_body_velocity(shape: tuple[int, int, int], skin: int) -> None:
+    random, flat = np.random.default_rng(7), shape[2] == 1
+    axis, at = parts(shape)
+    place = ORIGIN + H * (at + 0.5 * (np.arange(3) != axis[:, None]))
+    if flat:
+        place[:, 2] = 0.0
+    body, closed = random.integers(0, 3, axis.size), random.random(axis.size)
+    corner, weight = random.integers(0, 9, (skin, 3)), random.random((skin, 3))
+    twist, flesh = random.standard_normal((3, 6)), random.standard_normal((9, 3))
+    moved = body_velocity_reference(place, axis, body, corner, weight, twist, flesh)
+    for d in range(2 if flat else 3):
+        out = random.random(face_shape(shape, d))
+        expected, own = out.copy(), axis == d
+        np.add.at(expected, tuple(at[own].T), (closed * moved)[own])
+        face = np.where(own, np.ravel_multi_index(tuple(at.T), out.shape, mode="clip"), 0)
+        add_body_velocity(
+            out, d, axis, face, body, closed, corner, weight, twist, flesh, ORIGIN, H, flat
+        )
+        np.testing.assert_allclose(out, expected, atol=1e-13)

@@ -1,0 +1,41 @@
+"""Divergence and pressure gradient on cut cells against NumPy."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.outflow import outflow, outflow_reference
+from flowborne.kernels.pressure_gradient import push_faces, push_faces_reference
+from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
+
+SHAPES = [(5, 7, 6), (9, 8, 1), (1, 4, 3)]
+SIDES = [*itertools.product((CLOSED, OPEN), repeat=2), (PERIODIC, PERIODIC)]
+
+
+def faces(shape: tuple[int, int, int], seed: int) -> list[np.ndarray]:
+    """Random values on the faces, a third of them 0."""
+    random = np.random.default_rng(seed)
+    sizes = [tuple(n + (axis == d) for d, n in enumerate(shape)) for axis in range(3)]
+    return [random.random(size) * (random.random(size) > 1 / 3) for size in sizes]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_outflow(shape: tuple[int, int, int]) -> None:
+    velocity, opened, out = faces(shape, 0), faces(shape, 1), np.empty(shape)
+    outflow(out, *velocity, *opened)
+    np.testing.assert_allclose(out, outflow_reference(velocity, opened), atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sides", SIDES)
+def test_push_faces(shape: tuple[int, int, int], axis: int, sides: tuple[int, int]) -> None:
+    velocity, opened = faces(shape, 2)[axis], faces(shape, 3)[axis]
+    pressure, codes = np.random.default_rng(4).standard_normal(shape), np.full((3, 2), OPEN)
+    codes[axis] = sides
+    expected = push_faces_reference(velocity, opened, pressure, axis, 0.7, codes)
+    push_faces(velocity, opened, pressure, axis, 0.7, codes)
+    np.testing.assert_allclose(velocity, expected, atol=1e-14)

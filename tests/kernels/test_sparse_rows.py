@@ -1,0 +1,88 @@
+"""Sparse rows against their dense matrix, and the response to a load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, csr_array
+
+from flowborne.kernels.arrays import Rows
+from flowborne.kernels.response import respond, respond_reference
+from flowborne.kernels.sparse_rows import (
+    add_rows,
+    dense_rows,
+    padded_rows,
+    padded_rows_reference,
+    row_gram,
+    row_gram_along,
+    sum_rows,
+)
+from flowborne.solvers.response import dense_response, factored_response
+
+SHAPE, SIZE = (5, 4, 6), 7
+
+
+def random_rows(count: int = 30, seed: int = 0) -> Rows:
+    """Rows of none to four entries; some cells have several."""
+    random = np.random.default_rng(seed)
+    start = np.append(0, np.cumsum(random.integers(0, 5, count)))
+    cells = np.sort(random.integers(0, np.prod(SHAPE), count))
+    return cells, start, random.integers(0, SIZE, start[-1]), random.standard_normal(start[-1])
+
+
+def test_sums_and_their_transpose() -> None:
+    random, rows = np.random.default_rng(1), random_rows()
+    J = dense_rows(rows, int(np.prod(SHAPE)), SIZE)
+    p, motion = random.standard_normal(SHAPE), random.standard_normal(SIZE)
+    np.testing.assert_allclose(sum_rows(p, rows, SIZE), J.T @ p.ravel(), atol=1e-13)
+    expected = p.ravel() + J @ motion
+    add_rows(p, rows, motion)
+    np.testing.assert_allclose(p.ravel(), expected, atol=1e-13)
+
+
+def test_gram() -> None:
+    """Each row on a cell of its own: rows of one cell are not added up."""
+    random, rows = np.random.default_rng(2), random_rows()
+    rows = (np.arange(30), *rows[1:])
+    J, D = dense_rows(rows, int(np.prod(SHAPE)), SIZE), random.random(SHAPE)
+    expected = J.T @ (D.ravel()[:, None] * J)
+    np.testing.assert_allclose(row_gram(rows, D, SIZE), expected, atol=1e-13)
+    root = random.standard_normal((SIZE, 3))
+    np.testing.assert_allclose(row_gram_along(rows, D, root), root.T @ expected @ root, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [SHAPE, (1, 10, 12)])
+def test_padded_rows(shape: tuple[int, int, int]) -> None:
+    rows, random = random_rows(), np.random.default_rng(3)
+    diagonal = random.random(tuple(n + 2 if n > 1 else 1 for n in shape))
+    diagonal[random.random(diagonal.shape) < 0.3] = 0.0
+    found, expected = padded_rows(rows, diagonal), padded_rows_reference(rows, diagonal)
+    assert 0 < expected[0].size < rows[0].size
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_dense_response() -> None:
+    half, load = np.random.default_rng(4).standard_normal((2, SIZE, SIZE))
+    response = dense_response(half @ half.T)
+    expected = respond_reference(load[0], response.arrays)
+    np.testing.assert_allclose(respond(load[0], response.arrays), expected, rtol=1e-12)
+    np.testing.assert_allclose(response.times(load), load @ half @ half.T, rtol=1e-10, atol=1e-12)
+
+
+def test_factored_response() -> None:
+    random, n = np.random.default_rng(5), 11
+    T = csr_array(random.standard_normal((SIZE, n)) * (random.random((SIZE, n)) < 0.4))
+    lower = csc_array(np.tril(random.standard_normal((n, n)), -1) * (random.random((n, n)) < 0.3))
+    start, row = lower.indptr.astype(np.int32), lower.indices.astype(np.int32)
+    response = factored_response(
+        T,
+        (start, row, lower.data),
+        random.uniform(0.5, 2.0, n),
+        random.permutation(n),
+        0.1 * random.standard_normal((n, 2)),
+        np.zeros((SIZE, 0)),
+    )
+    for load in random.standard_normal((3, SIZE)):
+        expected = respond_reference(load, response.arrays)
+        np.testing.assert_allclose(respond(load, response.arrays), expected, rtol=1e-9, atol=1e-11)

@@ -1,0 +1,110 @@
+"""The viscous system of one component against NumPy."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
+from flowborne.kernels.viscosity import (
+    GIVEN,
+    INACTIVE,
+    TIED,
+    UNKNOWN,
+    classify,
+    classify_reference,
+    face_distances,
+    face_distances_reference,
+    link_faces,
+    link_faces_reference,
+    meet_walls,
+    meet_walls_reference,
+)
+from flowborne.kernels.viscous_operator import apply_component, apply_component_reference
+
+from .cut_cells import SHAPES, H, cut, face_shape
+
+CODES = [
+    np.full((3, 2), CLOSED),
+    np.array([[PERIODIC, PERIODIC], [OPEN, CLOSED], [PERIODIC, PERIODIC]]),
+    np.array([[OPEN, OPEN], [PERIODIC, PERIODIC], [CLOSED, OPEN]]),
+]
+CASES = [
+    (shape, codes, axis)
+    for shape, codes in itertools.product(SHAPES, CODES)
+    for axis in range(3 if shape[2] > 1 else 2)
+]
+
+
+def kinds(shape: tuple[int, int, int], codes: np.ndarray, axis: int) -> tuple:
+    """Open fractions, distance at the faces and kinds; some open faces inside are prescribed."""
+    made = cut(shape)
+    phi = face_distances_reference(made.distance, axis)
+    kind = classify_reference(made.opened[axis], phi, axis, codes, 0.3)
+    random = np.random.default_rng(1).random(kind.shape)
+    kind[(kind == UNKNOWN) & (random < 0.1)] = GIVEN
+    return made, phi, kind
+
+
+@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
+def test_distances_and_kinds(shape: tuple, codes: np.ndarray, axis: int) -> None:
+    made = cut(shape)
+    phi = np.empty(face_shape(shape, axis))
+    face_distances(made.distance, axis, phi)
+    np.testing.assert_allclose(phi, face_distances_reference(made.distance, axis), atol=1e-15)
+    kind = np.empty(phi.shape, np.uint8)
+    classify(kind, made.opened[axis], phi, axis, codes, 0.3)
+    expected = classify_reference(made.opened[axis], phi, axis, codes, 0.3)
+    assert {INACTIVE, UNKNOWN, TIED} <= set(np.unique(expected))
+    np.testing.assert_array_equal(kind, expected)
+
+
+@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
+def test_links(shape: tuple, codes: np.ndarray, axis: int) -> None:
+    made, _, kind = kinds(shape, codes, axis)
+    velocity = np.random.default_rng(2).standard_normal(kind.shape)
+    for d in range(2 if made.flat else 3):
+        periodic = bool(codes[d, 0] == PERIODIC)
+        across = made.opened[axis], made.opened[d]
+        found = [np.zeros(kind.shape) for _ in range(3)]
+        link_faces(axis, d, kind, *across, velocity, 0.7, *found, periodic)
+        expected = link_faces_reference(axis, d, kind, *across, velocity, 0.7, periodic)
+        for one, other in zip(found, expected, strict=True):
+            assert other.any()
+            np.testing.assert_allclose(one, other, atol=1e-14)
+
+
+@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
+def test_walls(shape: tuple, codes: np.ndarray, axis: int) -> None:
+    made, phi, kind = kinds(shape, codes, axis)
+    beside = np.flatnonzero((kind == UNKNOWN) & (phi < 2.0 * H))
+    wall, gap = np.zeros(beside.size), np.zeros((beside.size, 3))
+    opened = tuple(made.opened)
+    meet_walls(axis, kind, opened, phi, 0.7, H, codes, beside, wall, gap)
+    expected = meet_walls_reference(axis, kind, opened, phi, 0.7, H, codes, beside)
+    assert wall.any()
+    np.testing.assert_allclose(wall, expected[0], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(gap, expected[1], rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
+def test_apply_component(shape: tuple, codes: np.ndarray, axis: int) -> None:
+    """No links beyond the domain, and none from a face that stands twice."""
+    random, size = np.random.default_rng(3), face_shape(shape, axis)
+    links, wraps = random.random((3, *size)), np.zeros(3, np.int64)
+    for d in range(3):
+        along = np.moveaxis(links[d], d, 0)
+        if codes[d, 0] == PERIODIC:
+            wraps[d] = shape[d]
+            along[shape[d] :] = 0.0
+        else:
+            along[-1] = 0.0
+        if codes[axis, 0] == PERIODIC:
+            np.moveaxis(links[d], axis, 0)[-1] = 0.0
+    x, scale = random.standard_normal(links[0].size), random.random(links[0].size)
+    out = np.empty_like(x)
+    apply_component(out, x, scale, links, wraps)
+    expected = apply_component_reference(x, scale, links, wraps)
+    np.testing.assert_allclose(out, expected, atol=1e-13)
