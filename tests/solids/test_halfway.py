@@ -1,40 +1,18 @@
-"""The compiled impulse of the forces half-way through a step, against NumPy's statement of it."""
+"""The impulse of the forces half-way through a step."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from flowborne.kernels.momentum import OF_THE_WHOLE, ROUNDING, momentum_impulse
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import twists_about_origin
 from flowborne.solids.prescribed import prescribe
 from flowborne.solids.state import SolidState
 
 from .test_momentum import CHAIN, tumbled
 
 MODEL = SolidModel.from_string(CHAIN)
-
-
-@pytest.mark.parametrize("dofs", [0, 8])
-def test_momentum_impulse(dofs: int) -> None:
-    random, dt = np.random.default_rng(dofs), 0.2
-    cdof, centre = random.normal(size=(dofs, 6)), random.normal(size=(dofs, 3))
-    along = twists_about_origin(cdof, centre)
-    given, later = random.normal(size=(2, 5, 6))
-    body, conserved = random.integers(5, size=dofs), random.uniform(size=dofs) < 0.5
-    gained, still, bias, outer = random.normal(size=(4, dofs))
-    change = gained + (along * (given - later)[body]).sum(axis=1)
-    expected = still + np.where(conserved, change, -dt * bias) + dt * outer
-    scale = (np.abs(along) * (np.abs(given) + np.abs(later))[body]).sum(axis=1)
-    room = ROUNDING * (scale + dt * np.abs(outer)) + OF_THE_WHOLE * scale.max(initial=0.0)
-    impulse, rounding = momentum_impulse(
-        cdof, centre, given, later, body, conserved, gained, still, bias, outer, dt
-    )
-    assert_allclose(impulse, expected, rtol=1e-13, atol=1e-13)
-    assert_allclose(rounding, room, rtol=1e-13)
 
 
 def test_the_impulse_depends_on_the_velocity_alone() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
-from flowborne.kernels.momentum import about_origin
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import (
     KEPT,
@@ -42,12 +41,6 @@ def tumbled(seed: int) -> SolidState:
     random, rest = np.random.default_rng(seed), MODEL.rest()
     q = MODEL.integrate(rest.q, random.normal(size=MODEL.nv), 1.0)
     return SolidState(q, random.normal(size=MODEL.nv))
-
-
-def test_about_origin() -> None:
-    vector, moment, centre = np.random.default_rng(1).normal(size=(3, 7, 3))
-    expected = np.concatenate([vector, moment + np.cross(centre, vector)], axis=1)
-    assert_allclose(about_origin(vector, moment, centre), expected, rtol=1e-13, atol=1e-14)
 
 
 def test_twists_about_origin() -> None:

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flowborne.kernels.wind import places, pushed
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.wind import Wind, WindFaces, WindForce
@@ -102,25 +101,3 @@ def test_field_is_taken_at_each_face() -> None:
     total = wind.wrench(BLOCK, pose, np.zeros(2), 0.5)[1]
     assert total[0] == pytest.approx(2 * RHO * 9.0 * LENGTH**3 / 3, rel=1e-2)
     assert total[5] == pytest.approx(-2 * RHO * 9.0 * LENGTH**4 / 4, rel=1e-2)
-
-
-def test_the_kernel_is_eq_2_patch_by_patch() -> None:
-    random = np.random.default_rng(5)
-    n, nbody = 40, 3
-    body = np.sort(random.integers(0, nbody, n))
-    centre, position = random.normal(size=(n, 3)), random.normal(size=(nbody, 3))
-    twist, area = random.normal(size=(nbody, 6)), random.uniform(0.1, 1.0, n)
-    rotation = np.linalg.qr(random.normal(size=(nbody, 3, 3)))[0]
-    normal = random.normal(size=(n, 3))
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    for wind in (random.normal(size=(1, 3)), random.normal(size=(n, 3))):
-        x = position[body] + np.einsum("nij,nj->ni", rotation[body], centre)
-        out = np.einsum("nij,nj->ni", rotation[body], normal)
-        inflow = ((wind - twist[body, :3] - np.cross(twist[body, 3:], x)) * out).sum(axis=1)
-        f = (np.sign(inflow) * area * inflow**2)[:, None] * out
-        expected = np.zeros((nbody, 6))
-        np.add.at(expected, body, np.concatenate([f, np.cross(x, f)], axis=1))
-        screw = np.concatenate([normal, np.cross(centre, normal)], axis=1)
-        found = pushed(body, screw, area, position, rotation, twist, wind)
-        assert found == pytest.approx(expected, abs=1e-12)
-        assert places(body, centre, position, rotation) == pytest.approx(x, abs=1e-12)

@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 from flowborne.kernels.aggregates import OWN, add_guest_weights, mark_leaning, mark_own, seat_guests
 from flowborne.kernels.arrays import (
     Array,
+    Faces,
+    Finest,
     Hierarchy,
     Integers,
     Marks,
@@ -33,6 +35,8 @@ from flowborne.kernels.arrays import (
     Triple,
 )
 from flowborne.kernels.jit import kernel
+from flowborne.kernels.laplacian import neighbour_sum
+from flowborne.kernels.vectors import cells_of
 
 OFFSET, N0, N1, N2, LEAN, S0, S1, S2, GUESTS = range(9)
 """Columns of the table of levels: where it begins in the packed arrays, cells along each axis,
@@ -132,6 +136,23 @@ def finest_weights(
                     diagonal[m, j + 1, k + 1] = total
 
 
+def finest_weights_reference(faces: Faces) -> Finest:
+    """`finest_weights` in NumPy: padded weights and diagonal."""
+    shape = faces[1].shape[0], faces[1].shape[1] - 1, faces[1].shape[2]
+    if shape[0] == 1:
+        faces = np.zeros((2, *shape[1:])), faces[1], faces[2]
+    sides = [(int(n > 1),) * 2 for n in shape]
+    diagonal = np.zeros(shape)
+    w = []
+    for axis, values in enumerate(faces):
+        diagonal += np.delete(values, -1, axis) + np.delete(values, 0, axis)
+        ends = sides.copy()
+        ends[axis] = (sides[axis][0], 0)
+        padded = np.pad(values, ends)
+        w.append(padded if shape[axis] > 1 else np.delete(padded, -1, axis))
+    return w[0], w[1], w[2], np.pad(diagonal, sides)
+
+
 @kernel
 def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool) -> float:
     """Distance between the centres beside fine face `factor * face` over that of the coarse face.
@@ -152,6 +173,25 @@ def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool
             if 0 <= c < count:
                 ratio[n] += min(size, cells - c * size)
     return float(ratio[0] / ratio[1])
+
+
+def cell_edges(size: int, cells: int) -> Array:
+    """Where cells of `size` finest cells each begin and end, in finest cells; the last is cut."""
+    return np.append(np.arange(0, cells, size), cells).astype(np.float64)
+
+
+def distance_ratio_reference(
+    face: int, factor: int, fine: int, cells: int, periodic: bool
+) -> float:
+    """`distance_ratio` in NumPy."""
+    distance = []
+    for size, at in ((fine, factor * face), (fine * factor, face)):
+        width = np.diff(cell_edges(size, cells))
+        beyond = (width[-1:], width[:1]) if periodic else ([0.0], [0.0])
+        width = np.concatenate([beyond[0], width, beyond[1]])
+        at = min(at, len(width) - 2)
+        distance.append(0.5 * (width[at] + width[at + 1]))
+    return float(distance[0] / distance[1])
 
 
 @kernel
@@ -193,6 +233,29 @@ def coarse_weights(
                 coarse[i + d, j + 1, k + 1] = total * shrink
 
 
+def coarse_weights_reference(
+    fine: Real, marks: Marks, axis: int, factor: Integers, ratio: Array
+) -> Array:
+    """`coarse_weights` in NumPy: weights of the faces across `axis`, without ghosts."""
+    own = (marks & np.roll(marks, 1, axis)) >= OWN
+    values = np.where(own, fine, 0.0)
+    for n in range(3):
+        ends = int(fine.shape[n] > 1)
+        inner = np.moveaxis(values, n, 0)[
+            ends : len(np.moveaxis(values, n, 0)) + (n == axis) - ends
+        ]
+        if n == axis:
+            chosen = np.minimum(
+                factor[n] * np.arange(-(-(len(inner) - 1) // factor[n]) + 1), len(inner) - 1
+            )
+            values = np.moveaxis(inner[chosen], 0, n)
+        else:
+            values = np.moveaxis(np.add.reduceat(inner, np.arange(0, len(inner), factor[n])), 0, n)
+    across = [1, 1, 1]
+    across[axis] = -1
+    return values * ratio[: values.shape[axis]].reshape(across)
+
+
 @kernel
 def inverse_diagonal(w: Triple, added: Real, inverse: Real) -> None:
     """1 / diagonal of K from padded weights and what is added to it; 0 in cells without an open
@@ -209,6 +272,14 @@ def inverse_diagonal(w: Triple, added: Real, inverse: Real) -> None:
                     total += w0[m, j, k] + w0[m + 1, j, k]
                 if total > 0.0:
                     inverse[m, j, k] = 1.0 / (total + added[m, j, k])
+
+
+def inverse_diagonal_reference(w: Triple, added: Real) -> Array:
+    """`inverse_diagonal` in NumPy."""
+    inside, out = cells_of(w[0]), np.zeros(w[0].shape)
+    total = neighbour_sum(np.ones_like(out), w)[inside]
+    out[inside] = np.divide(1.0, total + added[inside], np.zeros_like(total), where=total > 0.0)
+    return out
 
 
 @kernel
@@ -242,6 +313,24 @@ def leaning(lean: Real, n: int, factor: int, size: int, cells: int, periodic: bo
         lean[0], lean[n + 1] = lean[n], lean[1]
 
 
+def leaning_reference(n: int, factor: int, size: int, cells: int, periodic: bool) -> Array:
+    """`leaning` in NumPy: (n + 2,)."""
+    lean = np.zeros(n + 2)
+    if factor == 2:
+        fine, coarse = cell_edges(size, cells), cell_edges(2 * size, cells)
+        centre, over = 0.5 * (fine[1:] + fine[:-1]), 0.5 * (coarse[1:] + coarse[:-1])
+        width = np.diff(coarse)
+        beyond = (width[-1:], width[:1]) if periodic else ([0.0], [0.0])
+        width = np.concatenate([beyond[0], width, beyond[1]])
+        parent = np.arange(n) // 2
+        offset = centre - over[parent]
+        reach = 0.5 * (width[parent + 1] + width[parent + 1 + np.sign(offset).astype(int)])
+        lean[1:-1] = offset / reach
+    if periodic:
+        lean[0], lean[-1] = lean[-2], lean[1]
+    return lean
+
+
 @kernel
 def coarse_sums(
     fine: Real, coarse: Real, marks: Marks, factor: Integers, guests: Places, hosts: Places
@@ -260,6 +349,19 @@ def coarse_sums(
     flat, wide, host = fine.reshape(-1), coarse.reshape(-1), hosts.reshape(-1)
     for g in range(guests.size):
         wide[host[guests[g]]] += flat[guests[g]]
+
+
+def coarse_sums_reference(
+    fine: Real, marks: Marks, factor: Integers, guests: Places, hosts: Places, shape: Integers
+) -> Array:
+    """`coarse_sums` in NumPy: a padded array of `shape`."""
+    out, inside = np.zeros(shape), cells_of(fine)
+    values = np.where(marks & OWN, fine, 0.0)[inside]
+    for n in range(3):
+        values = np.add.reduceat(values, np.arange(0, values.shape[n], factor[n]), axis=n)
+    out[cells_of(out)] = values
+    np.add.at(out.reshape(-1), hosts.reshape(-1)[guests], fine.reshape(-1)[guests])
+    return out
 
 
 @kernel

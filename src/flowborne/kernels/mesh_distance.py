@@ -7,7 +7,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
-from flowborne.kernels.triangles import closest_on_triangle, squared_distance
+from flowborne.kernels.triangles import (
+    closest_on_triangle,
+    closest_on_triangle_reference,
+    squared_distance,
+)
 
 
 @njit(nogil=True, cache=True)
@@ -41,4 +45,25 @@ def sample_mesh(
                     angle += 2.0 * np.arctan2(triple, below)
                 away = np.sqrt(nearest)
                 samples[(i * n2 + j) * n3 + k] = -away if angle > 2.0 * np.pi else away
+    return samples
+
+
+def sample_mesh_reference(
+    vertices: Array, faces: NDArray[np.int64], corner: Array, pitch: float, counts: Array
+) -> Array:
+    """`sample_mesh` in NumPy."""
+    shape = tuple(int(n) for n in counts)
+    lattice = corner + pitch * np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 3)
+    samples = np.empty(len(lattice))
+    for n, p in enumerate(lattice):
+        corners = vertices[faces]
+        closest = [closest_on_triangle_reference(p, one) @ one for one in corners]
+        away = np.linalg.norm(np.array(closest) - p, axis=1).min()
+        u, v, w = np.moveaxis(corners - p, 1, 0)
+        lu, lv, lw = (np.linalg.norm(side, axis=1) for side in (u, v, w))
+        triple = np.einsum("td,td->t", u, np.cross(v, w))
+        below = lu * lv * lw
+        for one, other, length in ((u, v, lw), (v, w, lu), (w, u, lv)):
+            below += np.einsum("td,td->t", one, other) * length
+        samples[n] = -away if np.arctan2(triple, below).sum() > np.pi else away
     return samples

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.distance import signed_distance
+from flowborne.kernels.distance import signed_distance, signed_distance_reference
 
 BAND = 4.0
 """Distances are known up to this many cells from a body; beyond, they are this large."""
@@ -37,6 +37,16 @@ def node_box(
         box[axis, 0] = int(min(max(first, 0.0), shape[axis] + 1.0))
         box[axis, 1] = int(min(max(last, 0.0), shape[axis] + 1.0))
     return box
+
+
+def node_box_reference(
+    position: Array, rotation: Array, reach: Array, origin: Array, h: float, shape: Integers
+) -> Integers:
+    """`node_box` around all of the geometries in NumPy."""
+    extent = np.einsum("gam,gm->ga", np.abs(rotation), reach)
+    low, high = (position - extent).min(axis=0), (position + extent).max(axis=0)
+    first, last = np.floor((low - origin) / h - BAND), np.ceil((high - origin) / h + BAND) + 1.0
+    return np.clip(np.stack([first, last], axis=1), 0, shape[:, None] + 1).astype(np.int64)
 
 
 @njit(nogil=True, cache=True)
@@ -80,6 +90,36 @@ def sample_body(
                         ),
                     )
                 phi[i - box[0, 0], j - box[1, 0], k - box[2, 0]] = value
+
+
+def sample_body_reference(
+    box: Integers,
+    geoms: Integers,
+    kind: Integers,
+    size: Array,
+    position: Array,
+    rotation: Array,
+    tables: Array,
+    table: Integers,
+    corner: Array,
+    pitch: Array,
+    origin: Array,
+    h: float,
+    flat: bool,
+) -> Array:
+    """`sample_body` in NumPy: the distances."""
+    shape = box[:, 1] - box[:, 0]
+    x = origin + h * (np.moveaxis(np.indices(tuple(shape)), 0, -1).reshape(-1, 3) + box[:, 0])
+    if flat:
+        x[:, 2] = 0.0
+    phi = np.full(len(x), BAND * h)
+    for g in geoms:
+        local = (x - position[g]) @ rotation[g]
+        own = signed_distance_reference(
+            kind[g], size[g], local, tables, table[g], corner[g], pitch[g]
+        )
+        phi = np.minimum(phi, own)
+    return phi.reshape(shape)
 
 
 @njit(nogil=True, cache=True)

@@ -1,0 +1,61 @@
+"""Wind on patches, momenta and thickness against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.momentum import (
+    about_origin,
+    about_origin_reference,
+    momentum_impulse,
+    momentum_impulse_reference,
+)
+from flowborne.kernels.thickness import way_inward, way_inward_reference
+from flowborne.kernels.wind import places, pushed, pushed_reference
+
+
+@pytest.mark.parametrize("winds", [1, 40])
+def test_pushed_is_eq_2_patch_by_patch(winds: int) -> None:
+    random = np.random.default_rng(5)
+    n, bodies = 40, 3
+    body = np.sort(random.integers(0, bodies, n))
+    centre, normal, position = (random.normal(size=(m, 3)) for m in (n, n, bodies))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    rotation = np.linalg.qr(random.normal(size=(bodies, 3, 3)))[0]
+    twist, area = random.normal(size=(bodies, 6)), random.uniform(0.1, 1.0, n)
+    moving, wind = (position, rotation, twist), random.normal(size=(winds, 3))
+    expected = pushed_reference(body, centre, normal, area, *moving, wind)
+    screw = np.concatenate([normal, np.cross(centre, normal)], axis=1)
+    np.testing.assert_allclose(pushed(body, screw, area, *moving, wind), expected, atol=1e-12)
+    x = position[body] + np.einsum("nij,nj->ni", rotation[body], centre)
+    np.testing.assert_allclose(places(body, centre, position, rotation), x, atol=1e-12)
+
+
+def test_about_origin() -> None:
+    given = np.random.default_rng(6).normal(size=(3, 7, 3))
+    np.testing.assert_allclose(about_origin(*given), about_origin_reference(*given), atol=1e-14)
+
+
+@pytest.mark.parametrize("dofs", [0, 8])
+def test_momentum_impulse(dofs: int) -> None:
+    random = np.random.default_rng(dofs)
+    cdof, centre = random.normal(size=(dofs, 6)), random.normal(size=(dofs, 3))
+    body, conserved = random.integers(5, size=dofs), random.uniform(size=dofs) < 0.5
+    momenta, forces = random.normal(size=(2, 5, 6)), random.normal(size=(4, dofs))
+    given = cdof, centre, *momenta, body, conserved, *forces, 0.2
+    impulse, rounding = momentum_impulse(*given)
+    expected, room = momentum_impulse_reference(*given)
+    np.testing.assert_allclose(impulse, expected, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(rounding, room, rtol=1e-13)
+
+
+def test_way_inward() -> None:
+    """Random triangles, and the way out on most of them."""
+    random = np.random.default_rng(7)
+    vertices = random.normal(size=(30, 3))
+    triangles = np.array([random.choice(30, 3, replace=False) for _ in range(60)])
+    expected = way_inward_reference(vertices, triangles)
+    assert np.isinf(expected).any()
+    assert np.isfinite(expected).sum() > 20
+    np.testing.assert_allclose(way_inward(vertices, triangles), expected, rtol=1e-9)
