@@ -19,7 +19,7 @@ from flowborne.kernels.transfer import (
     restrict,
     restrict_reference,
 )
-from flowborne.kernels.v_cycle import v_cycle
+from flowborne.kernels.v_cycle import v_cycle, v_cycle_reference
 from flowborne.kernels.vectors import cells_of
 from flowborne.solvers.pressure import PressureSystem
 
@@ -126,6 +126,27 @@ def test_restriction_is_the_transpose_of_interpolation(shape, periodic):
     restrict(coarse, r, *parts)
     up, down = np.vdot(fine[inside], r[inside]), np.vdot(c[inside], coarse[inside])
     assert up == pytest.approx(down, rel=1e-5)
+
+
+@pytest.mark.parametrize("periodic", [(0, 0, 0), (1, 0, 1), (0, 1, 0)])
+def test_ghosts_are_those_of_the_other_end(periodic):
+    x = np.random.default_rng(4).standard_normal((5, 6, 7))
+    expected = x.copy()
+    for axis in np.flatnonzero(periodic):
+        ends = np.moveaxis(expected, axis, 0)
+        ends[0], ends[-1] = ends[-2], ends[1]
+    wrap_ghosts(x, np.array(periodic, np.uint8))
+    np.testing.assert_array_equal(x, expected)
+
+
+@pytest.mark.parametrize(("shape", "periodic"), SHAPES)
+def test_cycle_is_what_numpy_says(shape, periodic):
+    system = system_of(shape, periodic)
+    x, b, _ = (at_level(a, system.buffers.table, 0) for a in system.buffers.cycle)
+    b[:] = with_ghosts(np.random.default_rng(5).standard_normal(b[cells_of(b)].shape))
+    expected = v_cycle_reference(system.hierarchy, b)
+    v_cycle(system.hierarchy, *system.buffers.cycle)
+    np.testing.assert_allclose(x, expected, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(("shape", "periodic"), SHAPES)

@@ -7,6 +7,8 @@ import pytest
 from scipy.sparse import csc_array, csr_array
 
 from flowborne.kernels.arrays import Rows
+from flowborne.kernels.conjugate_gradients import apply_low_rank
+from flowborne.kernels.deflation import mode_strengths
 from flowborne.kernels.response import respond, respond_reference
 from flowborne.kernels.sparse_rows import (
     add_rows,
@@ -38,6 +40,21 @@ def test_sums_and_their_transpose() -> None:
     expected = p.ravel() + J @ motion
     add_rows(p, rows, motion)
     np.testing.assert_allclose(p.ravel(), expected, atol=1e-13)
+
+
+def test_a_term_of_low_rank_and_the_strength_of_modes() -> None:
+    random, rows = np.random.default_rng(6), random_rows()
+    J = dense_rows(rows, int(np.prod(SHAPE)), SIZE)
+    p, out = random.standard_normal((2, *SHAPE))
+    half, amounts = random.standard_normal((SIZE, SIZE)), random.standard_normal((3, SIZE))
+    strength = mode_strengths(p, rows, amounts, 0.7)
+    np.testing.assert_allclose(strength, 0.7 * amounts @ J.T @ p.ravel(), atol=1e-12)
+    assert mode_strengths(p, rows, amounts[:0], 0.7).size == 0
+    term = J @ (half @ half.T) @ (J.T @ p.ravel())
+    expected = out.ravel() + term
+    energy = apply_low_rank(out, p, rows, dense_response(half @ half.T).arrays)
+    np.testing.assert_allclose(out.ravel(), expected, atol=1e-11)
+    assert energy == pytest.approx(p.ravel() @ term)
 
 
 def test_gram() -> None:

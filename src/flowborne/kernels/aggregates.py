@@ -9,11 +9,14 @@ called a guest there. Fine cells that find no such neighbour are left to the smo
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Array, Integers, Marks, Periodic, Places, Real, Triple
 from flowborne.kernels.jit import kernel
+from flowborne.kernels.vectors import cells_of
 
 OWN = 8
 """Mark of a fine cell that belongs to the coarse cell over it; marks 1, 2 and 4 besides: it may
@@ -110,6 +113,35 @@ def mark_largest(
                 marks[i, j, k] = OWN if part[n] == best else 0
 
 
+def mark_own_reference(w: Triple, inverse: Real, factor: Integers) -> Marks:
+    """`mark_own` in NumPy: the marks of all cells, without ghosts."""
+    from scipy.sparse import coo_array  # for this statement alone
+    from scipy.sparse.csgraph import connected_components
+
+    inside = cells_of(inverse)
+    share = inverse[inside]
+    active, number = share > 0.0, np.arange(share.size).reshape(share.shape)
+    pairs, block = [], np.zeros(share.shape, np.int64)
+    for axis in range(3):
+        n = share.shape[axis]
+        over = np.expand_dims(np.arange(n) // factor[axis], [d for d in range(3) if d != axis])
+        block = block * n + over
+        s, c, face = (np.moveaxis(a, axis, 0) for a in (share, number, w[axis][inside]))
+        together = np.arange(1, n) % factor[axis] != 0
+        touch = (face[1:] * np.maximum(s[1:], s[:-1]) > WEAK) & together[:, None, None]
+        touch &= (s[1:] > 0.0) & (s[:-1] > 0.0)
+        pairs.append(np.stack([c[1:][touch], c[:-1][touch]]))
+    a, b = np.concatenate(pairs, axis=1)
+    graph = coo_array((np.ones(a.size), (a, b)), shape=(share.size, share.size))
+    part = connected_components(graph, directed=False)[1]
+    _, first = np.unique(part, return_index=True)
+    size = np.bincount(part) * active.ravel()[first]
+    order = np.lexsort((first, -size, block.ravel()[first]))
+    chosen = order[np.unique(block.ravel()[first][order], return_index=True)[1]]
+    own = np.isin(part, chosen).reshape(share.shape) & active
+    return np.where(own, OWN, 0).astype(np.uint8)
+
+
 @kernel
 def mark_leaning(marks: Marks, w: Triple, inverse: Real, lean: Triple) -> None:
     """Add 1, 2, 4 where the cell towards the next coarse cell along an axis touches and is OWN.
@@ -141,6 +173,20 @@ def mark_leaning(marks: Marks, w: Triple, inverse: Real, lean: Triple) -> None:
                 row[k] = mark + OWN if marks[i, j, k] >= OWN else 0
             for k in range(1, p2 - 1):
                 marks[i, j, k] = row[k]
+
+
+def mark_leaning_reference(marks: Marks, w: Triple, inverse: Real, lean: Triple) -> Marks:
+    """`mark_leaning` in NumPy: the marks after it."""
+    inside, out = cells_of(marks), marks.copy()
+    for axis in range(3):
+        if marks.shape[axis] > 1:
+            up = np.expand_dims(lean[axis] > 0.0, [d for d in range(3) if d != axis])
+            face = np.where(up, np.roll(w[axis], -1, axis), w[axis])
+            beyond = np.where(up, np.roll(marks, -1, axis), np.roll(marks, 1, axis))
+            touches = (face * inverse > WEAK) & (beyond >= OWN) & (marks >= OWN)
+            out[inside] += ((1 << axis) * touches[inside]).astype(np.uint8)
+    out[inside] *= (marks >= OWN)[inside]
+    return out
 
 
 @kernel
@@ -228,6 +274,63 @@ def seat_guests(
     return count
 
 
+def neighbours_reference(
+    cells: Integers, shape: Integers, periodic: Periodic
+) -> Iterator[tuple[int, int, Integers]]:
+    """Padded flat indices of the cells beyond each face of some cells; -1 outside.
+
+    yields  axis, 0 for the lower and 1 for the upper face, indices
+    """
+    place = np.stack(np.unravel_index(cells, tuple(shape)))
+    for axis in range(3):
+        if shape[axis] > 1:
+            inner = shape[axis] - 2
+            for up in range(2):
+                beyond = place.copy()
+                beyond[axis] += 2 * up - 1
+                outside = (beyond[axis] < 1) | (beyond[axis] > inner)
+                beyond[axis] = (beyond[axis] - 1) % inner + 1
+                found = np.ravel_multi_index(tuple(beyond), tuple(shape))
+                yield axis, up, np.where(outside & (not periodic[axis]), -1, found)
+
+
+def cover_reference(
+    cells: Integers, shape: Integers, factor: Integers, coarse_shape: Integers
+) -> Integers:
+    """`cover` of several cells in NumPy."""
+    place = np.stack(np.unravel_index(cells, tuple(shape)))
+    ghost = (shape > 1).astype(np.int64)[:, None]
+    over = (place - ghost) // factor[:, None] + ghost
+    return np.asarray(np.ravel_multi_index(tuple(over), tuple(coarse_shape)))
+
+
+def seat_guests_reference(
+    marks: Marks,
+    w: Triple,
+    inverse: Real,
+    factor: Integers,
+    periodic: Periodic,
+    coarse_shape: Integers,
+) -> tuple[Integers, Integers]:
+    """`seat_guests` in NumPy: the guests, and the host of each."""
+    shape, flat, share = np.array(marks.shape), marks.ravel(), inverse.ravel()
+    inside = np.zeros(marks.shape, bool)
+    inside[cells_of(marks)] = True
+    lost = np.flatnonzero(inside.ravel() & (flat < OWN) & (share > 0.0))
+    weights, others = [], []
+    for axis, up, other in neighbours_reference(lost, shape, periodic):
+        step = up * int(np.prod(shape[axis + 1 :]))
+        kept = (other >= 0) & (flat[other] >= OWN)
+        weights.append(np.where(kept, w[axis].ravel()[lost + step], 0.0))
+        others.append(other)
+    best = np.argmax(weights, axis=0)
+    along = np.arange(lost.size)
+    found = np.array(weights)[best, along] > WEAK / share[lost]
+    return lost[found], cover_reference(
+        np.array(others)[best, along][found], shape, factor, coarse_shape
+    )
+
+
 @kernel
 def add_guest_weights(
     marks: Marks,
@@ -263,6 +366,43 @@ def add_guest_weights(
                 else:
                     continue
                 add_between(coarse, wide, host[at], there, weight, ratio, periodic)
+
+
+def add_guest_weights_reference(
+    marks: Marks,
+    w: Triple,
+    coarse: Triple,
+    factor: Integers,
+    ratio: Array,
+    periodic: Periodic,
+    guests: Places,
+    hosts: Places,
+) -> Triple:
+    """`add_guest_weights` in NumPy: the coarse weights after it."""
+    shape, wide = np.array(marks.shape), np.array(coarse[0].shape)
+    out = coarse[0].copy(), coarse[1].copy(), coarse[2].copy()
+    host, flat = hosts.ravel(), marks.ravel()
+    at = guests.astype(np.int64)
+    for axis, up, other in neighbours_reference(at, shape, periodic):
+        weight = w[axis].ravel()[at + up * int(np.prod(shape[axis + 1 :]))]
+        guest = (other >= 0) & (host[other] > 0)
+        counts = (other >= 0) & np.where(guest, other > at, flat[other] >= OWN)
+        own = np.where(counts & ~guest, other, at)
+        there = np.where(guest, host[other], cover_reference(own, shape, factor, wide))
+        ends = np.stack([np.minimum(host[at], there), np.maximum(host[at], there)])
+        low, high = (np.stack(np.unravel_index(end, tuple(wide))) for end in ends)
+        for d in range(3):
+            level = np.all(np.delete(low, d, 0) == np.delete(high, d, 0), axis=0) & counts
+            n = wide[d] - 2
+            across = np.where(level, high[d] - low[d], 0)
+            inner = across == 1
+            np.add.at(out[d], tuple(high[:, inner]), (weight * ratio[d][high[d] - 1])[inner])
+            around = (across == n - 1) & (n > 2) & bool(periodic[d])
+            np.add.at(out[d], tuple(low[:, around]), (weight * ratio[d][0])[around])
+            high[d] += 1
+            np.add.at(out[d], tuple(high[:, around]), (weight * ratio[d][n])[around])
+            high[d] -= 1
+    return out
 
 
 @kernel

@@ -6,7 +6,9 @@ definite operator.
 
 from __future__ import annotations
 
-from flowborne.kernels.arrays import Hierarchy, Real
+import numpy as np
+
+from flowborne.kernels.arrays import Array, Hierarchy, Real
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.levels import (
     OFFSET,
@@ -16,8 +18,19 @@ from flowborne.kernels.levels import (
     weights_at,
     wrap_ghosts,
 )
-from flowborne.kernels.smoothing import defect, first_smooth, smooth
-from flowborne.kernels.transfer import interpolate, restrict
+from flowborne.kernels.smoothing import (
+    defect,
+    defect_reference,
+    first_smooth,
+    smooth,
+    smooth_reference,
+)
+from flowborne.kernels.transfer import (
+    interpolate,
+    interpolate_reference,
+    restrict,
+    restrict_reference,
+)
 
 COARSEST_SWEEPS = 8
 """Symmetric sweeps on the coarsest level, of at most 4 cells along an axis."""
@@ -85,3 +98,36 @@ def v_cycle(hierarchy: Hierarchy, x: Real, b: Real, r: Real) -> None:
             serial_leg(hierarchy, x, b, r, level, down)
         else:
             leg(hierarchy, x, b, r, level, down)
+
+
+def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
+    """`v_cycle` in NumPy: x of a level for its b, both padded, ghosts of x as the sides have it."""
+    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
+    w, a = weights_at(weights, table, level), at_level(inverse, table, level)
+    x = smooth_reference(np.zeros(b.shape), b, w, a, 0)
+    colours = [1]
+    if level == table.shape[0] - 2:
+        there = [1, 0] * COARSEST_SWEEPS
+        colours = [*there[:-1], *there]
+    for colour in colours:
+        wrap_ghosts(x, periodic)
+        x = smooth_reference(x, b, w, a, colour)
+    wrap_ghosts(x, periodic)
+    if level == table.shape[0] - 2:
+        return x
+    parts = (
+        at_level(marks, table, level),
+        leaning_at(lean, table, level),
+        guests_at(guests, table, level),
+        at_level(hosts, table, level),
+    )
+    r = defect_reference(x, b, w, a)
+    coarse = np.zeros(at_level(inverse, table, level + 1).shape)
+    wrap_ghosts(r, periodic)
+    coarse = restrict_reference(coarse, r, *parts, periodic)
+    x = interpolate_reference(x, v_cycle_reference(hierarchy, coarse, level + 1), *parts)
+    for colour in (1, 0):
+        wrap_ghosts(x, periodic)
+        x = smooth_reference(x, b, w, a, colour)
+    wrap_ghosts(x, periodic)
+    return x

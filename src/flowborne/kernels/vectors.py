@@ -5,14 +5,17 @@ Sums run plane after plane, so that they do not depend on how many threads there
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Real
 from flowborne.kernels.jit import kernel
 
 
-def cells_of(padded: Real) -> tuple[slice, slice, slice]:
+def cells_of(padded: NDArray[Any]) -> tuple[slice, slice, slice]:
     """Index of the cells of a padded array, without its ghosts."""
     i, j, k = (slice(1, -1) if n > 1 else slice(None) for n in padded.shape)
     return i, j, k
