@@ -20,7 +20,7 @@ def cut_grid(
     grid: Grid, *bodies: str, q: np.ndarray | None = None, boundaries: Boundaries | None = None
 ) -> Geometry:
     """The grid cut by bodies (MJCF elements) in their rest pose, or at q."""
-    world = world_of(grid, mjcf(*bodies), boundaries=boundaries)
+    world = world_of(grid, mjcf(*bodies), boundaries=boundaries or Boundaries())
     if q is not None:
         world.solid.q[:] = q
     return cut_by_bodies(world)

@@ -31,7 +31,9 @@ def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = 
         MotionSinusoid(np.array([0]), shift, 1.0),
         MotionSinusoid(np.array([1]), turn, 0.77),
     )
-    return world_of(SQUARE, mjcf(body), boundaries=boundaries, motions=motions, scalars=("dye",))
+    return world_of(
+        SQUARE, mjcf(body), boundaries=boundaries or Boundaries(), motions=motions, scalars=("dye",)
+    )
 
 
 def ahead_of(world: World) -> Array:

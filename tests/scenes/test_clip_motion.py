@@ -17,7 +17,7 @@ from flowborne.coupling.motion import Motion
 from flowborne.errors import SceneError
 from flowborne.io.bvh import read_bvh
 from flowborne.quaternions import about, angle, inverse, product
-from flowborne.scenes.clip_following import motion_of_clip
+from flowborne.scenes.clip_following import Passage, motion_of_clip
 from flowborne.scenes.clip_motion import KEPT, MotionClip
 from flowborne.solids.model import SolidModel
 
@@ -28,8 +28,10 @@ MODEL, WANDER, CIRCLE = model(), wandering(), circling()
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def motion(clip: Any = WANDER, **options: Any) -> MotionClip:
-    return motion_of_clip(MODEL, clip, MAPPING, **options)
+def motion(
+    clip: Any = WANDER, joints: Any = None, initial: Any = None, **passage: Any
+) -> MotionClip:
+    return motion_of_clip(MODEL, clip, MAPPING, Passage(**passage), joints=joints, initial=initial)
 
 
 def whole(prescribed: MotionClip, time: float) -> np.ndarray:
@@ -284,7 +286,7 @@ def test_real_clip_keeps_its_feet_on_the_ground() -> None:
         text += f'<body name="{bone}" pos="{offset[0]} {offset[1]} {offset[2]}">'
         text += f'<joint name="{joint}" type="{kind}"/><geom size="0.05"/>'
     leg = SolidModel.from_string(text + "</body>" * len(legs) + "</worldbody></mujoco>")
-    m = motion_of_clip(leg, clip, {joint: bone for bone, joint in legs}, smooth=6.0)
+    m = motion_of_clip(leg, clip, {joint: bone for bone, joint in legs}, Passage(smooth=6.0))
     data = mujoco.MjData(leg.mj)
     heights = []
     for time in np.arange(0.0, clip.duration, 0.02):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flowborne.errors import SceneError
 from flowborne.io.bvh import read_bvh
 from flowborne.io.clip import Clip
-from flowborne.scenes.clip_following import motion_of_clip
+from flowborne.scenes.clip_following import Passage, motion_of_clip
 from flowborne.scenes.clip_motion import MotionClip
 from flowborne.scenes.clip_scale import check_scale, leg_length
 from flowborne.scenes.human.body import ELBOWS, human_mjcf
@@ -132,12 +132,14 @@ def clip_motion(
         model,
         capture.clip,
         capture.mapping,
+        Passage(
+            start=table.start,
+            stop=table.stop,
+            loop=table.file is None if table.loop is None else table.loop,
+            blend=table.blend,
+            smooth=table.smooth,
+        ),
         joints=chosen,
-        start=table.start,
-        stop=table.stop,
-        loop=table.file is None if table.loop is None else table.loop,
-        blend=table.blend,
-        smooth=table.smooth,
         initial=start,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,51 +20,65 @@ from flowborne.solids.model import SolidModel
 Array = NDArray[np.float64]
 
 
-def motion_of_clip(
-    model: SolidModel,
-    clip: Clip,
-    mapping: Mapping[str, str],
-    *,
-    joints: Sequence[str] | None = None,
-    start: float = 0.0,
-    stop: float | None = None,
-    loop: bool = False,
-    blend: float = 0.0,
-    smooth: float | None = None,
-    initial: Array | None = None,
-) -> MotionClip:
-    """Motion of a model's joints along a clip.
+@dataclass(frozen=True)
+class Passage:
+    """What of a clip is followed, and how.
 
-    mapping      model joint -> clip joint; names that the model lacks are passed over
-    joints       model joints that follow; all mapped ones by default
-    start, stop  s of the clip; its ends by default
+    start, stop  s of the clip; None is its end
     loop         begin anew at the end, from the place and heading that were reached
     blend        s, at most half of what is between start and stop; see MotionClip. A clip that
                  ends as it begins makes a loop as it is, any other is joined over `blend`
     smooth       Hz at which a low-pass halves the power (two passes of a Butterworth filter of
-                 second order, forth and back, so that there is no lag); none by default
-    initial      (nq,) pose before the start, put where the clip starts; the model's rest by default
-    raises       SceneError when one of these does not fit the clip or the model
+                 second order, forth and back, so that there is no lag), or None
     source       Winter 2009, Biomechanics and Motor Control of Human Movement, section 3.4.4.2
                  (what the cut-off of one pass is for two)
     """
+
+    start: float = 0.0
+    stop: float | None = None
+    loop: bool = False
+    blend: float = 0.0
+    smooth: float | None = None
+
+
+WHOLE = Passage()
+"""All of a clip, once."""
+
+
+def motion_of_clip(
+    model: SolidModel,
+    clip: Clip,
+    mapping: Mapping[str, str],
+    passage: Passage = WHOLE,
+    *,
+    joints: Sequence[str] | None = None,
+    initial: Array | None = None,
+) -> MotionClip:
+    """Motion of a model's joints along a clip.
+
+    mapping  model joint -> clip joint; names that the model lacks are passed over
+    joints   model joints that follow; all mapped ones by default
+    initial  (nq,) pose before the start, put where the clip starts; the model's rest by default
+    raises   SceneError when one of these does not fit the clip or the model
+    """
+    start, blend = passage.start, passage.blend
     chosen = joints if joints is not None else [j for j in mapping if j in model.joint_names]
     columns, rows = curves_of(model, clip, mapping, chosen)
-    stop = clip.duration if stop is None else stop
+    stop = clip.duration if passage.stop is None else passage.stop
     _check_times(clip, start, stop, blend)
     times = clip.frame_time * np.arange(clip.frames)
     length, overlap, stride = stop - start, 0.0, None
-    if loop:
+    if passage.loop:
         stride = _whole_cycle(columns, rows, start / clip.frame_time, stop / clip.frame_time)
         if stride is not None:
             times, rows = _repeated(columns, rows, clip.frame_time, (start, stop), stride)
         else:
             overlap = blend
             length -= blend
-    if smooth is not None:
-        rows = _smoothed(rows, clip.frame_time, smooth)
+    if passage.smooth is not None:
+        rows = _smoothed(rows, clip.frame_time, passage.smooth)
     spline = CubicSpline(times, rows)
-    if loop and stride is None:
+    if passage.loop and stride is None:
         stride = _joined(columns, spline, start, length, overlap)
     pose = model.rest().q if initial is None else initial
     places = np.concatenate([model.positions_of(name) for name in columns.names])

@@ -67,7 +67,7 @@ def neutral(
         mjcf(*elements),
         gravity=(0.0, -G, 0.0),
         solid_density=1.0,
-        boundaries=None if stream is None else RING,
+        boundaries=Boundaries() if stream is None else RING,
     )
     state = world.solid
     start = state.q.copy()

@@ -45,7 +45,7 @@ def swimmer(cells: int, gait: tuple[MotionSinusoid, ...], sides: Boundaries | No
     world = world_of(
         grid,
         chain(len(gait) + 1),
-        boundaries=sides,
+        boundaries=sides or Boundaries(),
         solid_density=1.0,
         motions=gait,
         tolerance=1e-11,

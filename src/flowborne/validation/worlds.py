@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -27,6 +28,16 @@ RING = Boundaries(PERIODIC, PERIODIC, PERIODIC, PERIODIC)
 """Periodic in x and y."""
 
 
+class FluidProperties(TypedDict, total=False):
+    """Those of a `Fluid` that the cases set."""
+
+    viscosity: float
+    boundaries: Boundaries
+    body_force: Vector
+    tolerance: float
+    scalars: tuple[str, ...]
+
+
 def mjcf(*elements: str, options: str = "") -> str:
     """An MJCF model of world-body elements; angles in radians, no contact."""
     return (
@@ -43,31 +54,18 @@ def world_of(
     gravity: Vector = NOWHERE,
     solid_density: float | None = None,
     density: float = 1.0,
-    viscosity: float = 0.0,
-    boundaries: Boundaries | None = None,
-    body_force: Vector = NOWHERE,
-    tolerance: float = 1e-9,
-    scalars: tuple[str, ...] = (),
     motions: tuple[Motion, ...] = (),
     winds: tuple[Wind, ...] = (),
+    **properties: Unpack[FluidProperties],
 ) -> World:
     """A world at rest. With a grid, `slab` follows the grid.
 
     solid_density  kg/m^3 of every geom, in place of the model's own
+    density        kg/m^3 of the fluid, whose other properties may follow
     """
     flat = slab if grid is None else grid.is_slab
     solid = SolidModel.from_string(model, slab=flat, gravity=gravity, density=solid_density)
-    fluid = None
-    if grid is not None:
-        fluid = Fluid(
-            grid,
-            density,
-            viscosity,
-            boundaries or Boundaries(),
-            scalars=scalars,
-            body_force=body_force,
-            tolerance=tolerance,
-        )
+    fluid = None if grid is None else Fluid(grid, density, **properties)
     return World.at_rest(Setup(solid, fluid, motions, winds))
 
 
