@@ -5,12 +5,14 @@ import pytest
 
 from flowborne.kernels.aggregates import (
     OWN,
-    add_guest_weights,
-    add_guest_weights_reference,
     mark_leaning,
     mark_leaning_reference,
     mark_own,
     mark_own_reference,
+)
+from flowborne.kernels.guests import (
+    add_guest_weights,
+    add_guest_weights_reference,
     seat_guests,
     seat_guests_reference,
 )

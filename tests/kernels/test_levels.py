@@ -7,6 +7,12 @@ import itertools
 import numpy as np
 import pytest
 
+from flowborne.kernels.centres import (
+    distance_ratio,
+    distance_ratio_reference,
+    leaning,
+    leaning_reference,
+)
 from flowborne.kernels.levels import (
     N0,
     S0,
@@ -15,15 +21,11 @@ from flowborne.kernels.levels import (
     coarse_sums_reference,
     coarse_weights,
     coarse_weights_reference,
-    distance_ratio,
-    distance_ratio_reference,
     finest_weights,
     finest_weights_reference,
     guests_at,
     inverse_diagonal,
     inverse_diagonal_reference,
-    leaning,
-    leaning_reference,
     weights_at,
 )
 from flowborne.kernels.regions import (

@@ -25,7 +25,7 @@ Labels = NDArray[np.int32]
 
 Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Real, Marks, Places, Places]
 """Table of levels; which axes are periodic; packed over the levels: weights across each axis, what
-is added to the diagonal, the inverse of that, interpolation coefficients (see `levels.leaning`),
+is added to the diagonal, the inverse of that, interpolation coefficients (see `centres.leaning`),
 marks, guests and their hosts (see `aggregates`)."""
 
 Finest = tuple[Array, Array, Array, Array]

@@ -1,0 +1,98 @@
+"""Distances between the centres of cells of two levels along one axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.kernels.arrays import Array, Real
+from flowborne.kernels.jit import kernel
+
+
+@kernel
+def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool) -> float:
+    """Distance between the centres beside fine face `factor * face` over that of the coarse face.
+
+    face    of the coarse level, 0 to its last
+    factor  1 or 2, the coarsening of this axis
+    fine    finest cells in a fine cell of this axis; `cells` finest cells in all
+    """
+    ratio = np.zeros(2)
+    for n in range(2):
+        size = fine if n == 0 else fine * factor
+        count = (cells + size - 1) // size
+        at = min(factor * face, count) if n == 0 else face
+        below, above = at - 1, at
+        if periodic:
+            below, above = below % count, above % count
+        for c in (below, above):
+            if 0 <= c < count:
+                ratio[n] += min(size, cells - c * size)
+    return float(ratio[0] / ratio[1])
+
+
+def cell_edges(size: int, cells: int) -> Array:
+    """Where cells of `size` finest cells each begin and end, in finest cells; the last is cut."""
+    return np.append(np.arange(0, cells, size), cells).astype(np.float64)
+
+
+def distance_ratio_reference(
+    face: int, factor: int, fine: int, cells: int, periodic: bool
+) -> float:
+    """`distance_ratio` in NumPy."""
+    distance = []
+    for size, at in ((fine, factor * face), (fine * factor, face)):
+        width = np.diff(cell_edges(size, cells))
+        beyond = (width[-1:], width[:1]) if periodic else ([0.0], [0.0])
+        width = np.concatenate([beyond[0], width, beyond[1]])
+        at = min(at, len(width) - 2)
+        distance.append(0.5 * (width[at] + width[at + 1]))
+    return float(distance[0] / distance[1])
+
+
+@kernel
+def leaning(lean: Real, n: int, factor: int, size: int, cells: int, periodic: bool) -> None:
+    """How far each fine cell's centre lies from its coarse cell's towards the next coarse cell.
+
+    lean      (n + 2,) with ghosts: fraction of the distance between the coarse centres (at an open
+              side: of that to the side), negative towards the lower neighbour
+    size      finest cells in a fine cell of this axis, `cells` finest cells in all
+    """
+    lean[:] = 0.0
+    if factor == 1:
+        return
+    count = (n + 1) // 2
+    for i in range(n):
+        c = i // 2
+        first, second = 2 * c, 2 * c + 1
+        if second >= n:
+            continue
+        a = float(min(size, cells - first * size))
+        b = float(min(size, cells - second * size))
+        other = c - 1 if i == first else c + 1
+        if periodic:
+            other = other % count
+        width = 0.0
+        if 0 <= other < count:
+            width = float(min(2 * size, cells - other * 2 * size))
+        reach = a + b + width
+        lean[i + 1] = -b / reach if i == first else a / reach
+    if periodic:
+        lean[0], lean[n + 1] = lean[n], lean[1]
+
+
+def leaning_reference(n: int, factor: int, size: int, cells: int, periodic: bool) -> Array:
+    """`leaning` in NumPy: (n + 2,)."""
+    lean = np.zeros(n + 2)
+    if factor == 2:
+        fine, coarse = cell_edges(size, cells), cell_edges(2 * size, cells)
+        centre, over = 0.5 * (fine[1:] + fine[:-1]), 0.5 * (coarse[1:] + coarse[:-1])
+        width = np.diff(coarse)
+        beyond = (width[-1:], width[:1]) if periodic else ([0.0], [0.0])
+        width = np.concatenate([beyond[0], width, beyond[1]])
+        parent = np.arange(n) // 2
+        offset = centre - over[parent]
+        reach = 0.5 * (width[parent + 1] + width[parent + 1 + np.sign(offset).astype(int)])
+        lean[1:-1] = offset / reach
+    if periodic:
+        lean[0], lean[-1] = lean[-2], lean[1]
+    return lean

@@ -1,0 +1,254 @@
+"""Fine cells that go with another coarse cell than the one over them (see `aggregates`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from flowborne.kernels.aggregates import OWN, WEAK
+from flowborne.kernels.arrays import Array, Integers, Marks, Periodic, Places, Real, Triple
+from flowborne.kernels.jit import kernel
+from flowborne.kernels.vectors import cells_of
+
+
+@kernel
+def neighbour(at: int, axis: int, up: int, shape: Integers, periodic: Periodic) -> int:
+    """Padded flat index of the cell beyond a face, around a periodic axis; -1 outside.
+
+    up     0: lower face, 1: upper face
+    shape  of the padded array
+    """
+    stride = shape[2] if axis == 1 else (1 if axis == 2 else shape[1] * shape[2])
+    place = (at // stride) % shape[axis]
+    inner = shape[axis] - 2
+    if up and place == inner:
+        return at - (inner - 1) * stride if periodic[axis] else -1
+    if not up and place == 1:
+        return at + (inner - 1) * stride if periodic[axis] else -1
+    return at + (2 * up - 1) * stride
+
+
+@kernel
+def cover(at: int, shape: Integers, factor: Integers, coarse_shape: Integers) -> int:
+    """Padded flat index of the coarse cell over a fine cell."""
+    d = 1 if shape[0] > 1 else 0
+    i, j, k = at // (shape[1] * shape[2]), (at // shape[2]) % shape[1], at % shape[2]
+    c0 = (i - d) // factor[0] + d
+    c1, c2 = (j - 1) // factor[1] + 1, (k - 1) // factor[2] + 1
+    return int((c0 * coarse_shape[1] + c1) * coarse_shape[2] + c2)
+
+
+@kernel
+def face_of(w: Triple, shape: Integers, axis: int, at: int, up: int) -> float:
+    """Weight of the lower or upper face of a cell."""
+    if axis == 0:
+        return float(w[0].reshape(-1)[at + up * shape[1] * shape[2]])
+    if axis == 1:
+        return float(w[1].reshape(-1)[at + up * shape[2]])
+    return float(w[2].reshape(-1)[at + up])
+
+
+@kernel
+def seat_guests(
+    marks: Marks,
+    w: Triple,
+    inverse: Real,
+    factor: Integers,
+    periodic: Periodic,
+    coarse_shape: Integers,
+    guests: Places,
+    hosts: Places,
+) -> int:
+    """Find a coarse cell for the fine cells that lost their own; returns how many found one.
+
+    coarse_shape  of the padded coarse arrays
+    guests        filled with the padded flat fine cells
+    hosts         padded over the fine level: flat coarse cell of each guest, 0 elsewhere
+    """
+    p0, p1, p2 = marks.shape
+    shape = np.array([p0, p1, p2])
+    d = 1 if p0 > 1 else 0
+    flat, share, host = marks.reshape(-1), inverse.reshape(-1), hosts.reshape(-1)
+    count = 0
+    for i in range(d, p0 - d):
+        for j in range(1, p1 - 1):
+            lost = 0
+            for k in range(1, p2 - 1):
+                hosts[i, j, k] = 0
+                lost += marks[i, j, k] < OWN
+            for k in range(1, p2 - 1 if lost else 1):
+                at = (i * p1 + j) * p2 + k
+                if flat[at] & OWN or share[at] == 0.0:
+                    continue
+                best = WEAK / share[at]
+                for axis in range(1 - d, 3):
+                    for up in range(2):
+                        other = neighbour(at, axis, up, shape, periodic)
+                        if other < 0 or not flat[other] & OWN:
+                            continue
+                        weight = face_of(w, shape, axis, at, up)
+                        if weight > best:
+                            best = weight
+                            host[at] = cover(other, shape, factor, coarse_shape)
+                if host[at] > 0:
+                    guests[count] = at
+                    count += 1
+    return count
+
+
+def neighbours_reference(
+    cells: Integers, shape: Integers, periodic: Periodic
+) -> Iterator[tuple[int, int, Integers]]:
+    """Padded flat indices of the cells beyond each face of some cells; -1 outside.
+
+    yields  axis, 0 for the lower and 1 for the upper face, indices
+    """
+    place = np.stack(np.unravel_index(cells, tuple(shape)))
+    for axis in range(3):
+        if shape[axis] > 1:
+            inner = shape[axis] - 2
+            for up in range(2):
+                beyond = place.copy()
+                beyond[axis] += 2 * up - 1
+                outside = (beyond[axis] < 1) | (beyond[axis] > inner)
+                beyond[axis] = (beyond[axis] - 1) % inner + 1
+                found = np.ravel_multi_index(tuple(beyond), tuple(shape))
+                yield axis, up, np.where(outside & (not periodic[axis]), -1, found)
+
+
+def cover_reference(
+    cells: Integers, shape: Integers, factor: Integers, coarse_shape: Integers
+) -> Integers:
+    """`cover` of several cells in NumPy."""
+    place = np.stack(np.unravel_index(cells, tuple(shape)))
+    ghost = (shape > 1).astype(np.int64)[:, None]
+    over = (place - ghost) // factor[:, None] + ghost
+    return np.asarray(np.ravel_multi_index(tuple(over), tuple(coarse_shape)))
+
+
+def seat_guests_reference(
+    marks: Marks,
+    w: Triple,
+    inverse: Real,
+    factor: Integers,
+    periodic: Periodic,
+    coarse_shape: Integers,
+) -> tuple[Integers, Integers]:
+    """`seat_guests` in NumPy: the guests, and the host of each."""
+    shape, flat, share = np.array(marks.shape), marks.ravel(), inverse.ravel()
+    inside = np.zeros(marks.shape, bool)
+    inside[cells_of(marks)] = True
+    lost = np.flatnonzero(inside.ravel() & (flat < OWN) & (share > 0.0))
+    weights, others = [], []
+    for axis, up, other in neighbours_reference(lost, shape, periodic):
+        step = up * int(np.prod(shape[axis + 1 :]))
+        kept = (other >= 0) & (flat[other] >= OWN)
+        weights.append(np.where(kept, w[axis].ravel()[lost + step], 0.0))
+        others.append(other)
+    best = np.argmax(weights, axis=0)
+    along = np.arange(lost.size)
+    found = np.array(weights)[best, along] > WEAK / share[lost]
+    return lost[found], cover_reference(
+        np.array(others)[best, along][found], shape, factor, coarse_shape
+    )
+
+
+@kernel
+def add_guest_weights(
+    marks: Marks,
+    w: Triple,
+    coarse: Triple,
+    factor: Integers,
+    ratio: Array,
+    periodic: Periodic,
+    guests: Places,
+    hosts: Places,
+) -> None:
+    """Add the faces of guests to the faces between their hosts and the coarse cells beyond.
+
+    w, coarse  padded weights of the fine and the coarse level
+    ratio      (3, most faces) of distances for each coarse face, see `centres.distance_ratio`
+    """
+    shape, wide = np.array(marks.shape), np.array(coarse[0].shape)
+    host, flat = hosts.reshape(-1), marks.reshape(-1)
+    for g in range(guests.size):
+        at = guests[g]
+        for axis in range(1 if shape[0] == 1 else 0, 3):
+            for up in range(2):
+                weight = face_of(w, shape, axis, at, up)
+                other = neighbour(at, axis, up, shape, periodic)
+                if weight == 0.0 or other < 0:
+                    continue
+                if host[other] > 0:
+                    there = host[other]
+                    if other < at:
+                        continue
+                elif flat[other] & OWN:
+                    there = cover(other, shape, factor, wide)
+                else:
+                    continue
+                add_between(coarse, wide, host[at], there, weight, ratio, periodic)
+
+
+def add_guest_weights_reference(
+    marks: Marks,
+    w: Triple,
+    coarse: Triple,
+    factor: Integers,
+    ratio: Array,
+    periodic: Periodic,
+    guests: Places,
+    hosts: Places,
+) -> Triple:
+    """`add_guest_weights` in NumPy: the coarse weights after it."""
+    shape, wide = np.array(marks.shape), np.array(coarse[0].shape)
+    out = coarse[0].copy(), coarse[1].copy(), coarse[2].copy()
+    host, flat = hosts.ravel(), marks.ravel()
+    at = guests.astype(np.int64)
+    for axis, up, other in neighbours_reference(at, shape, periodic):
+        weight = w[axis].ravel()[at + up * int(np.prod(shape[axis + 1 :]))]
+        guest = (other >= 0) & (host[other] > 0)
+        counts = (other >= 0) & np.where(guest, other > at, flat[other] >= OWN)
+        own = np.where(counts & ~guest, other, at)
+        there = np.where(guest, host[other], cover_reference(own, shape, factor, wide))
+        ends = np.stack([np.minimum(host[at], there), np.maximum(host[at], there)])
+        low, high = (np.stack(np.unravel_index(end, tuple(wide))) for end in ends)
+        for d in range(3):
+            level = np.all(np.delete(low, d, 0) == np.delete(high, d, 0), axis=0) & counts
+            n = wide[d] - 2
+            across = np.where(level, high[d] - low[d], 0)
+            inner = across == 1
+            np.add.at(out[d], tuple(high[:, inner]), (weight * ratio[d][high[d] - 1])[inner])
+            around = (across == n - 1) & (n > 2) & bool(periodic[d])
+            np.add.at(out[d], tuple(low[:, around]), (weight * ratio[d][0])[around])
+            high[d] += 1
+            np.add.at(out[d], tuple(high[:, around]), (weight * ratio[d][n])[around])
+            high[d] -= 1
+    return out
+
+
+@kernel
+def add_between(
+    coarse: Triple,
+    shape: Integers,
+    a: int,
+    b: int,
+    weight: float,
+    ratio: Array,
+    periodic: Periodic,
+) -> None:
+    """Add a fine weight to the coarse face between two coarse cells, if they share one."""
+    low, high = min(a, b), max(a, b)
+    for axis in range(3):
+        stride = shape[2] if axis == 1 else (1 if axis == 2 else shape[1] * shape[2])
+        inner = shape[axis] - 2
+        place = (high // stride) % shape[axis]
+        w = coarse[axis].reshape(-1)
+        if high - low == stride and place > 1:
+            w[high] += weight * ratio[axis, place - 1]
+            return
+        if periodic[axis] and high - low == (inner - 1) * stride and place == inner:
+            w[low] += weight * ratio[axis, 0]
+            w[high + stride] += weight * ratio[axis, inner]
+            return
