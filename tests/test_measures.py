@@ -5,8 +5,8 @@ from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.fluid.grid import Grid
+from flowborne.frame_report import FrameReport
 from flowborne.measures import Measures, quaternion
-from flowborne.simulation import FrameReport
 from flowborne.solids.model import SolidModel
 from flowborne.validation.worlds import mjcf, world_of
 

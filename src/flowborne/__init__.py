@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from flowborne.version import __version__
+
 if TYPE_CHECKING:
     from flowborne.running import run
     from flowborne.scenes.load import load_scene
     from flowborne.simulation import Simulation
-
-__version__ = "0.1.0"
 
 __all__ = ["Simulation", "__version__", "load_scene", "run"]
 

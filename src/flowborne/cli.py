@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flowborne import __version__
 from flowborne.errors import SceneError
 from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write
+from flowborne.version import __version__
 
 if TYPE_CHECKING:
     from flowborne.running import RunResult
@@ -177,7 +177,7 @@ def export(
 ) -> None:
     """Write the motion of a run as BVH, on the skeleton of its clip."""
     path = RunFolder.existing(folder).path
-    from flowborne.io.motion_out import export_bvh
+    from flowborne.scenes.motion_out import export_bvh
 
     try:
         export_bvh(path, out)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
+from flowborne.frame_report import FrameReport
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
-    from flowborne.simulation import FrameReport
 
 Array = NDArray[np.float64]
 

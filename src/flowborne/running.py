@@ -14,15 +14,16 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from flowborne.errors import SceneError
+from flowborne.frame_report import PARTS, FrameReport
 from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.io.history import History
 from flowborne.io.recorder import Recorder, write_model
 from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, check_space
-from flowborne.io.scene_copy import scene_to_resume, with_frames, write_scene
 from flowborne.io.summary import peak_memory, summarise, versions
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
-from flowborne.simulation import PARTS, BlowUpError, FrameReport, Simulation
+from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
+from flowborne.simulation import BlowUpError, Simulation
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene

@@ -16,6 +16,7 @@ from threadpoolctl import ThreadpoolController
 
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
+from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
 from flowborne.solids.inversion import inversion
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Step = Callable[[World, float, "Drive | None"], StepReport]
-
-PARTS = ("advection", "viscosity", "projection", "geometry", "solids", "control")
-"""Where the time of a frame goes."""
-
 
 TORN = 0.02
 """Part of the elements of flesh that may be inside out, on their way back for instance."""
@@ -55,37 +52,6 @@ class BlowUpError(Exception):
 
     def __reduce__(self) -> tuple[type[BlowUpError], tuple[int, int, str]]:
         return BlowUpError, (self.frame, self.step, self.cause)
-
-
-@dataclass(frozen=True)
-class FrameReport:
-    """What a frame did.
-
-    frame      counted from 1
-    time       at its end, s
-    steps      reports of its steps, in order
-    objective  the controller's objective after it (weighted sum); nan without a controller
-    terms      name -> value of each term of the objective
-    gradient   (n,) of the last decision, objective per rad or m; empty without a controller
-    targets    (n,) where the controlled dofs are going, rad or m; nan for ball joints
-    decided    whether the controller decided anew in this frame
-    seconds    by part (`PARTS`) and "total"
-    """
-
-    frame: int
-    time: float
-    steps: tuple[StepReport, ...]
-    objective: float
-    terms: dict[str, float]
-    gradient: Array
-    targets: Array
-    decided: bool
-    seconds: dict[str, float]
-
-    @property
-    def step(self) -> StepReport:
-        """Report of the last step."""
-        return self.steps[-1]
 
 
 @dataclass(frozen=True)

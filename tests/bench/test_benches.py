@@ -7,8 +7,9 @@ import pytest
 
 from flowborne.bench import chain, first_run, human, memory, parts, realtime, size, workers
 from flowborne.bench.frames import frame_times
+from flowborne.frame_report import PARTS
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import PARTS, Simulation
+from flowborne.simulation import Simulation
 
 COARSE = {"domain.resolution": "16", "controller.settle_steps": "0"}
 

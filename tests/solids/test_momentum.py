@@ -10,11 +10,11 @@ from flowborne.solids.momentum import (
     KEPT,
     subtree_halfway_momentum,
     subtree_momentum,
-    twists_about_origin,
     weight,
 )
 from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState
+from flowborne.solids.twists import twists_about_origin
 
 CHAIN = """
 <mujoco>

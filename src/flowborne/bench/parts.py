@@ -8,10 +8,11 @@ import numpy as np
 
 from flowborne.bench.frames import FRAMES
 from flowborne.bench.result import Result
+from flowborne.frame_report import PARTS
 from flowborne.kernels.jit import kernel_threads
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
-from flowborne.simulation import PARTS, Simulation
+from flowborne.simulation import Simulation
 
 NAME = "parts"
 SCENES = ("ns-block-drag-max", "ns-chain-4")

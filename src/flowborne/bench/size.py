@@ -11,10 +11,11 @@ import numpy as np
 
 from flowborne.bench.memory import held
 from flowborne.bench.result import Result
+from flowborne.frame_report import PARTS
 from flowborne.kernels.jit import kernel_threads
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
-from flowborne.simulation import PARTS, Simulation
+from flowborne.simulation import Simulation
 
 NAME = "size"
 SCENES = {"flyer-base": (32, 64, 96), "swimmer-jet-only": (72, 120, 168)}

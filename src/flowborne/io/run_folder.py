@@ -19,8 +19,8 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from flowborne import __version__
 from flowborne.io.atomic import partial_name, write_json
+from flowborne.version import __version__
 
 MARK = "flowborne"
 """Key of summary.json that tells a run folder from any other."""

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from flowborne import __version__
 from flowborne.io.history import history_columns, history_rows
+from flowborne.version import __version__
 
 FINAL_PART = 0.1
 """Part of the frames, the last ones, whose mean is a joint's final mean ..."""

@@ -12,9 +12,9 @@ from scipy.sparse import csr_array
 
 from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import twists_about_origin
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
+from flowborne.solids.twists import twists_about_origin
 
 Array = NDArray[np.float64]
 Zones = NDArray[np.int64]

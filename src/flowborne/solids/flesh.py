@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -15,16 +15,21 @@ from scipy.sparse.linalg import spsolve
 
 from flowborne.solids.cage import node_weights
 from flowborne.solids.mjcf import element_name, rest_poses
-from flowborne.solids.momentum import cross, dof_twists
-from flowborne.solids.scratch import Scratch, scratch
+from flowborne.solids.scratch import Compiled, Scratch, scratch
 from flowborne.solids.thickness import thinnest
 from flowborne.solids.tissue import right_handed, volumes
-
-if TYPE_CHECKING:
-    from flowborne.solids.model import SolidModel
+from flowborne.solids.twists import cross, twists_about_origin
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+
+class Jointed(Compiled, Protocol):
+    """What flesh asks of the model that it is a part of; see `SolidModel`."""
+
+    slab: bool
+    nv: int
+    dof_root: Indices
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,7 @@ class Flesh:
     carried     (n, nbody) share of each bone in carrying a vertex, from 0 to 1, together 1
     """
 
-    model: SolidModel
+    model: Jointed
     names: tuple[str, ...]
     body: Indices
     offset: Array
@@ -80,7 +85,7 @@ class Flesh:
     def moving(self, s: Scratch) -> csr_array:
         """(3n, nv) `jacobian` where `s` has been placed."""
         places = self._points(s)
-        twists = dof_twists(self.model, s)
+        twists = twists_about_origin(s.cdof, s.subtree_com[self.model.dof_root])
         point, dof = self.moved
         velocity = twists[dof, :3] + cross(twists[dof, 3:], places[point])
         row = (3 * point[:, None] + np.arange(3)).ravel()
@@ -140,7 +145,7 @@ class Flesh:
         return volumes(vertices, self.elements) / volumes(self.rest, self.elements)
 
 
-def flesh_of(model: SolidModel) -> Flesh:
+def flesh_of(model: Jointed) -> Flesh:
     """The flesh of a model that has some. Raises ValueError when it has none."""
     mj = model.mj
     if mj.nflex == 0:

@@ -11,19 +11,25 @@ import copy
 import logging
 import threading
 import weakref
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from flowborne.solids.model import SolidModel
-
 Array = NDArray[np.float64]
 
 # MuJoCo would leave a file of warnings where the user works: of its own solution, a mere start here
 mujoco.set_mju_user_warning(logging.getLogger(__name__).debug)
+
+
+class Compiled(Protocol):
+    """A model of which MuJoCo's is known, whatever else of it is still to be built.
+
+    mj  MuJoCo's model
+    """
+
+    mj: mujoco.MjModel
 
 
 class Scratch:
@@ -34,7 +40,7 @@ class Scratch:
     momenta     the last few half-way momenta by their state, see solids.momentum
     """
 
-    def __init__(self, model: SolidModel) -> None:
+    def __init__(self, model: Compiled) -> None:
         self.mj = copy.copy(model.mj)
         self.data = data = mujoco.MjData(self.mj)
         self.dt = float(self.mj.opt.timestep)
@@ -92,9 +98,9 @@ class Scratch:
 _local = threading.local()
 
 
-def scratch(model: SolidModel) -> Scratch:
+def scratch(model: Compiled) -> Scratch:
     """This thread's working memory for `model`."""
-    known: weakref.WeakKeyDictionary[SolidModel, Scratch] | None = getattr(_local, "known", None)
+    known: weakref.WeakKeyDictionary[Compiled, Scratch] | None = getattr(_local, "known", None)
     if known is None:
         known = _local.known = weakref.WeakKeyDictionary()
     found = known.get(model)

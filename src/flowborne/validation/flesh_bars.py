@@ -56,18 +56,16 @@ def bar_mesh(
 class Bar:
     """A clamped bar of flesh along x that bends in the plane z = 0 alone.
 
-    flesh  of the bar
+    model  of the bar
+    flesh  of the model
     fixed  (nv,) dofs along z, which do not move
     share  (n,) of an even load on the end face that each vertex bears; they add up to 1
     """
 
+    model: SolidModel
     flesh: Flesh
     fixed: NDArray[np.bool_]
     share: Array
-
-    @property
-    def model(self) -> SolidModel:
-        return self.flesh.model
 
     def end(self, q: Array) -> Array:
         """(3,) how far the middle of the end face has moved at positions q (nq,), m."""
@@ -228,7 +226,8 @@ def _bar(spec: mujoco.MjSpec, gravity: Vector, along_y: list[float], along_z: li
     ordered = face[np.lexsort((flesh.rest[face, 2].round(9), flesh.rest[face, 1].round(9)))]
     share = np.zeros(len(flesh.rest))
     share[ordered] = np.outer(along_y, along_z).ravel()
-    return Bar(flesh, model.mj.jnt_axis[model.mj.dof_jntid, 2] > 0.5, share / share.sum())
+    fixed = model.mj.jnt_axis[model.mj.dof_jntid, 2] > 0.5
+    return Bar(model, flesh, fixed, share / share.sum())
 
 
 def _composite(rule: list[float], cells: int) -> list[float]:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from flowborne.io.run_folder import RunFolder
-from flowborne.io.scene_copy import scene_to_resume, write_scene
 from flowborne.scenes.build import build
 from flowborne.scenes.flesh import grow
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.save import scene_files
+from flowborne.scenes.scene_copy import scene_to_resume, write_scene
 from flowborne.simulation import BlowUpError, Simulation
 from flowborne.solids.inversion import inversion
 

@@ -10,12 +10,12 @@ import pytest
 
 from flowborne.errors import SceneError
 from flowborne.io.bvh import read_bvh, write_clip
-from flowborne.io.motion_out import export_bvh
 from flowborne.quaternions import angle, inverse, product
 from flowborne.running import run
 from flowborne.scenes.human.gait import gait_clip
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import load_scene
+from flowborne.scenes.motion_out import export_bvh
 
 SCENE = """
 gravity = [0.0, 0.0, -9.81]
