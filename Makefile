@@ -2,16 +2,19 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint imports clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
 
 test: $(VENV)/installed-test
-	$(BIN)/ruff check src tests
-	$(BIN)/ruff format --check src tests
+	$(BIN)/ruff check src tests tools
+	$(BIN)/ruff format --check src tests tools
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+imports: $(VENV)/installed-test
+	$(BIN)/python tools/imports.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

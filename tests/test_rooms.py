@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 from pathlib import Path
 
 import pytest
 
 import flowborne
+from imports import PAGE, in_order, of_modules, of_rooms, page, room_of
 
 SOURCE = Path(flowborne.__file__).parent
+ROOMS = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
+MODULES = of_modules()
 
 BELOW = {
     "kernels": set(),
@@ -20,33 +22,42 @@ BELOW = {
 """Rooms that each of these may import from, besides itself; single modules are free."""
 
 
-def imported(path: Path) -> set[str]:
-    """Full names of the modules that a file imports, wherever in it."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return names
+def crossings(room: str) -> set[tuple[str, str]]:
+    """(module of the room, module of ours elsewhere that it imports)."""
+    return {
+        (module, other)
+        for module, others in MODULES.items()
+        if room_of(module) == room
+        for other in others
+        if room_of(other) not in (None, room)
+    }
+
+
+def test_no_circle_between_modules() -> None:
+    assert len(in_order(MODULES)) > 200
+
+
+def test_no_circle_between_rooms() -> None:
+    assert set(in_order(of_rooms(MODULES))) > ROOMS
+
+
+def test_picture_is_of_today() -> None:
+    assert PAGE.read_text() == page(MODULES), "docs/imports.md is out of date: run `make imports`"
 
 
 @pytest.mark.parametrize("room", BELOW)
 def test_imports_run_downward(room: str) -> None:
-    rooms = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
-    for path in (SOURCE / room).rglob("*.py"):
-        ours = {name.split(".")[1] for name in imported(path) if name.startswith("flowborne.")}
-        assert ours & rooms <= BELOW[room] | {room}, path
+    barred = ROOMS - BELOW[room]
+    assert not [(ours, other) for ours, other in crossings(room) if room_of(other) in barred]
 
 
 def test_kernels_and_solvers_import_nothing_else_of_ours() -> None:
-    for room in ("kernels", "solvers"):
-        for path in (SOURCE / room).rglob("*.py"):
-            ours = {name.split(".")[1] for name in imported(path) if name.startswith("flowborne")}
-            assert ours <= {"kernels", room}, path
+    assert not crossings("kernels")
+    assert not [
+        (ours, other) for ours, other in crossings("solvers") if room_of(other) != "kernels"
+    ]
 
 
 def test_numba_is_imported_by_kernels_alone() -> None:
-    for path in SOURCE.rglob("*.py"):
-        uses = any(name.split(".")[0] == "numba" for name in imported(path))
-        assert not uses or path.is_relative_to(SOURCE / "kernels"), path
+    users = {module for module, others in MODULES.items() if "numba" in others}
+    assert {room_of(module) for module in users} == {"kernels"}
