@@ -31,6 +31,7 @@ RING = Boundaries(PERIODIC, PERIODIC, PERIODIC, PERIODIC)
 class FluidProperties(TypedDict, total=False):
     """Those of a `Fluid` that the cases set."""
 
+    density: float
     viscosity: float
     boundaries: Boundaries
     body_force: Vector
@@ -53,7 +54,6 @@ def world_of(
     slab: bool = True,
     gravity: Vector = NOWHERE,
     solid_density: float | None = None,
-    density: float = 1.0,
     motions: tuple[Motion, ...] = (),
     winds: tuple[Wind, ...] = (),
     **properties: Unpack[FluidProperties],
@@ -61,11 +61,12 @@ def world_of(
     """A world at rest. With a grid, `slab` follows the grid.
 
     solid_density  kg/m^3 of every geom, in place of the model's own
-    density        kg/m^3 of the fluid, whose other properties may follow
+    properties     of the fluid; its density is 1 kg/m^3 unless another is given
     """
     flat = slab if grid is None else grid.is_slab
     solid = SolidModel.from_string(model, slab=flat, gravity=gravity, density=solid_density)
-    fluid = None if grid is None else Fluid(grid, density, **properties)
+    properties.setdefault("density", 1.0)
+    fluid = None if grid is None else Fluid(grid, **properties)
     return World.at_rest(Setup(solid, fluid, motions, winds))
 
 
