@@ -44,9 +44,10 @@ class Measures:
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
       momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
       momentum_{exchanged,advection,…}_…_Ns     given to the bodies by pressure; made in advection
-                                                or lost; given to the fluid by the sides' pressure
-                                                (boundary), by what flows through them (crossed),
-                                                and by forces and friction (forces)
+                                                or lost (0 but in the paper's scheme); given to the
+                                                fluid by the sides' pressure (boundary), by what
+                                                flows through them (crossed), and by forces and
+                                                friction (forces)
       momentum_jet_…_Ns, expelled_m3            brought into the fluid by mouths (m^2 in a slab), in
                                                 scenes that have some
       momentum_{exchange,budget}_error          relative: of the pressure solve; of all of these

@@ -39,7 +39,7 @@ def sliding(grid: Grid | None, condim: int) -> World:
 
 @pytest.mark.parametrize("grid", GRIDS)
 def test_contact_without_friction_settles(grid: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four edges of a pyramid that are one: they do not take turns."""
+    """Four edges of a pyramid that are one: they do not take turns, and settle like one."""
     passes: list[int] = []
     correct = solve.correct
 
@@ -52,9 +52,9 @@ def test_contact_without_friction_settles(grid: str, monkeypatch: pytest.MonkeyP
     for _ in range(20):
         passes.append(0)
         assert advance(bare, 0.01).contacts > 0
-        assert passes[-1] <= 3 + (grid != "no fluid")  # a fluid's step tries the last pressure
         passes.append(0)
         advance(plain, 0.01)
+        assert passes[-2] <= passes[-1] + 1, passes
     np.testing.assert_allclose(bare.solid.v, plain.solid.v, atol=1e-6)
 
 
@@ -82,5 +82,7 @@ def test_each_solve_that_misses_its_tolerance_is_named(monkeypatch: pytest.Monke
     diffuse, solved = solve.diffuse, PressureSystem.solve
     monkeypatch.setattr(solve, "diffuse", lambda *given: (*diffuse(*given)[:2], False))
     assert step(world.copy(), 0.01).outcome is Outcome.VISCOSITY_NOT_CONVERGED
-    monkeypatch.setattr(PressureSystem, "solve", lambda *given: missed(solved(*given)))
+    monkeypatch.setattr(
+        PressureSystem, "solve", lambda *given, **named: missed(solved(*given, **named))
+    )
     assert step(world.copy(), 0.01).outcome is Outcome.PRESSURE_NOT_CONVERGED

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.coupling.flow import face_masses, volumes_of
 from flowborne.coupling.operators import twists
 from flowborne.coupling.step import cut_by_bodies
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import face_weights
+from flowborne.kernels.closed_fractions import CREASE
 from flowborne.scenes.tracks import MotionSinusoid
 from flowborne.solids.dynamics import kinematics
 from flowborne.validation.swimmers import BOX, LINK, PERIOD, swimmer
@@ -63,7 +65,9 @@ CLOSING = {
 def test_fluid_between_a_body_and_a_side_is_squeezed_out_and_not_shot(
     shape: str, cells: int
 ) -> None:
-    """A body that slides along a side, and reaches 0.3 cells into it at its lowest."""
+    """A body that slides along a side, and reaches 0.3 cells into it at its lowest: what leaves the
+    narrowing gap fast is less than half of what the body displaces, and no sliver lets it out.
+    """
     geom, reach = CLOSING[shape]
     h = 1.0 / cells
     motions = (
@@ -74,11 +78,18 @@ def test_fluid_between_a_body_and_a_side_is_squeezed_out_and_not_shot(
     model = mjcf(f"<body>{body}<geom {geom}/></body>")
     world = world_of(Grid.slab(cells, cells, h, (-0.5, -0.5)), model, motions=motions)
     world.solid.q[:] = [float(motion.position(0.0)[0]) for motion in motions]
-    fluid, body_speed = [], []
+    speeds, gaps, body_speed = [], [], 0.0
     for _ in range(200):
-        fluid.append(advance(world, 0.01).fastest)
-        body_speed.append(np.linalg.norm(world.solid.v))
-    assert max(fluid) < 9.0 * max(body_speed), f"in step {np.argmax(fluid)}"
+        advance(world, 0.01)
+        body_speed = max(body_speed, float(np.linalg.norm(world.solid.v)))
+        opened, velocity = cut_by_bodies(world).open, world.flow()[1].velocity
+        for u, a in zip(velocity[:2], opened[:2], strict=True):
+            speeds.append(np.abs(u[a > 0.0]))
+            gaps.append(a[a > 0.0])
+    speed, gap = np.concatenate(speeds), np.concatenate(gaps)
+    fast = speed > 9.0 * body_speed
+    assert (gap[fast] >= CREASE).all()
+    assert (speed * gap * h)[fast].max(initial=0.0) < 0.5 * body_speed * reach
 
 
 def test_cells_that_a_body_and_a_side_seal_have_no_row() -> None:
@@ -89,7 +100,8 @@ def test_cells_that_a_body_and_a_side_seal_have_no_row() -> None:
         disc = f'<body pos="8.3 {3.0 + depth} 0"><freejoint/><geom type="sphere" size="3"/></body>'
         world = world_of(grid, mjcf(disc))
         cut, sides = cut_by_bodies(world), world.flow()[0].boundaries
-        x, y, _ = face_weights(cut.open, grid, sides, 1.0)
+        mass = face_masses(volumes_of(world, cut), 1.0)
+        x, y, _ = face_weights(cut.open, mass, grid, sides)
         total = x[1:] + x[:-1] + y[:, 1:] + y[:, :-1]
         assert total.ravel()[cut.cells].min() > 0.0, f"depth {depth}"
         sealed += int(((total[:, 0] == 0.0) & (cut.open[1][:, 0] > 0.0)).sum())
@@ -106,4 +118,4 @@ def test_a_crease_keeps_momentum() -> None:
     world.solid.v[:] = [0.5, 0.2, 0.0, 0.0, 0.0, 2.0, -0.4, 0.1, 0.0, 0.0, 0.0, -3.0]
     for _ in range(30):
         balance = advance(world, 0.005).momentum
-        assert balance.exchange_error < 1e-14
+        assert balance.exchange_error < 1e-13

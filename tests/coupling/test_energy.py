@@ -1,4 +1,4 @@
-"""A flow that the grid does not resolve keeps its energy and makes none."""
+"""A flow that the grid does not resolve makes no energy."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flowborne.solids.model import SolidModel
 
 
 def test_noise_in_a_closed_box_gains_no_energy() -> None:
-    """Without the bound MacCormack's scheme makes three times the energy of it in 40 steps."""
+    """Values of third order damp what the grid does not resolve, and never feed it."""
     grid = Grid((12, 12, 12), 1.0 / 12.0)
     world = World.at_rest(Setup(SolidModel.empty(), Fluid(grid, 1.0)))
     state, random = world.flow()[1], np.random.default_rng(3)
@@ -24,5 +24,4 @@ def test_noise_in_a_closed_box_gains_no_energy() -> None:
     for _ in range(80):
         assert step(world, 0.01).outcome.name == "DONE"
         energies.append(sum(float((u * u).sum()) for u in state.velocity))
-    assert max(energies) < 1.02 * energies[0]
-    assert energies[-1] > 0.85 * energies[0]
+    assert (np.diff(energies) < 0.0).all()

@@ -79,8 +79,13 @@ def test_volume_is_second_order(cut: Cut, shape: str) -> None:
             opened = cut(grid, f"<geom {geom}/>").open
             found.append([h**3 * (1.0 - opened[axis]).sum() for axis in range(3)])
         errors.append(float(np.abs(np.array(found) / volume - 1.0).mean()))
-    assert order_of(errors, grids) == pytest.approx(2.0, abs=0.2), errors
-    assert errors[-1] < 6e-3, errors
+    if shape == "box":
+        assert order_of(errors, grids) == pytest.approx(2.0, abs=0.2), errors
+        assert errors[-1] < 6e-3, errors
+    else:  # facets alone would leave 0.03, 0.008 and 0.002
+        assert errors[0] > errors[1] > errors[2], errors
+        assert errors[1] < 3e-3, errors
+        assert errors[2] < 1e-3, errors
 
 
 @pytest.mark.parametrize("axis", [0, 1])

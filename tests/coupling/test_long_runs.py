@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.coupling import flow
+from flowborne.coupling.flow import face_masses, volumes_of
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.operators import face_mass
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
@@ -51,9 +52,9 @@ CHANNEL = Boundaries(x_min=BoundaryInflow(stream), x_max=OPEN)
 def energy(world: World) -> float:
     """Kinetic energy of fluid and bodies, J per metre of depth."""
     fluid, state = world.flow()
-    mass = face_mass(cut_by_bodies(world).open, fluid.grid, fluid.boundaries, fluid.density)
-    moving = sum(0.5 * (m * u**2).sum() for m, u in zip(mass, state.velocity, strict=True))
-    return float(moving) + kinetic_energy(world.setup.solid, world.solid)
+    mass = face_masses(volumes_of(world, cut_by_bodies(world)), fluid.density)
+    moving = flow.kinetic_energy(state.velocity, mass, fluid.grid, fluid.boundaries)
+    return moving + kinetic_energy(world.setup.solid, world.solid)
 
 
 def fastest(world: World, cut: Geometry, least_open: float = 0.5) -> float:

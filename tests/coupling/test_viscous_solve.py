@@ -9,10 +9,12 @@ import pytest
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.friction import TOLERANCE
+from flowborne.coupling.leak_proof import unit_mass
 from flowborne.coupling.step import cut_by_bodies
 from flowborne.coupling.viscous_solve import Answer, ViscousSystem, walls_of
+from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries, BoundaryNoSlip
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.viscosity import assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
 from flowborne.solvers.conjugate_gradients import spread
@@ -67,8 +69,10 @@ def case_of(
     world = world_of(grid, mjcf(*bodies), boundaries=boundaries)
     cut = cut_by_bodies(world)
     still = grid.zeros_faces()
+    whole = unit_mass(cut.open, Fluid(grid, DENSITY, boundaries=boundaries))
+    masses = faces_of([DENSITY * mass for mass in whole])
     parts = assemble_viscosity(
-        cut.distance, cut.open, still, grid, boundaries, DENSITY, viscosity, dt, 0.0
+        cut.distance, cut.open, still, masses, grid, boundaries, viscosity, dt, 0.0
     )
     size = 6 * world.setup.solid.nbody
     mobility = np.zeros((size, size)) if response is None else response

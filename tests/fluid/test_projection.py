@@ -7,6 +7,7 @@ import pytest
 
 from flowborne.coupling.flow import source_rate
 from flowborne.coupling.fractions import uncut
+from flowborne.coupling.leak_proof import unit_mass
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import (
@@ -19,8 +20,8 @@ from flowborne.fluid.boundary import (
     Source,
 )
 from flowborne.fluid.ghosts import impose_sides
-from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import face_weights, push
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.projection import accelerated, face_weights, push
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.model import SolidModel
 from flowborne.solvers.pressure import PressureSystem
@@ -64,13 +65,13 @@ def net_outflow(velocity: Faces, opened: Faces, grid: Grid) -> Array:
 
 def project(velocity: Faces, opened: Faces, grid: Grid, sides: Boundaries, rate: Array) -> Array:
     """Make `velocity` free of divergence but for the sources, in place; gives p^."""
-    weights = face_weights(opened, grid, sides, DENSITY)
-    system = PressureSystem(weights, sides.periodic())
+    mass = faces_of([DENSITY * m for m in unit_mass(opened, Fluid(grid, DENSITY, 0.0, sides))])
+    system = PressureSystem(face_weights(opened, mass, grid, sides), sides.periodic())
     need = rate - net_outflow(velocity, opened, grid)
     solution = system.solve(need, tolerance=TOLERANCE)
     assert solution.converged
     assert solution.residual < TOLERANCE
-    push(velocity, opened, solution.pressure, grid, sides, 1.0 / (DENSITY * grid.spacing))
+    push(velocity, accelerated(opened, mass, grid), solution.pressure, grid, sides, 1.0)
     return solution.pressure
 
 

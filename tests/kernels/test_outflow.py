@@ -33,9 +33,9 @@ def test_outflow(shape: tuple[int, int, int]) -> None:
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("sides", SIDES)
 def test_push_faces(shape: tuple[int, int, int], axis: int, sides: tuple[int, int]) -> None:
-    velocity, opened = faces(shape, 2)[axis], faces(shape, 3)[axis]
+    velocity, rate = faces(shape, 2)[axis], faces(shape, 3)[axis]
     pressure, codes = np.random.default_rng(4).standard_normal(shape), np.full((3, 2), OPEN)
     codes[axis] = sides
-    expected = push_faces_reference(velocity, opened, pressure, axis, 0.7, codes)
-    push_faces(velocity, opened, pressure, axis, 0.7, codes)
+    expected = push_faces_reference(velocity, rate, pressure, axis, 0.7, codes)
+    push_faces(velocity, rate, pressure, axis, 0.7, codes)
     np.testing.assert_allclose(velocity, expected, atol=1e-14)

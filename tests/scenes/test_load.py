@@ -129,7 +129,7 @@ force = [0.1, 0.0]
 def test_every_default_is_written_out(write: Write) -> None:
     text = tomllib.loads(load_scene(write()).to_toml())
     assert text["fluid"]["viscosity"] == 0.0
-    assert text["fluid"]["advection"] == "maccormack"
+    assert text["fluid"]["advection"] == "flux"
     assert text["boundaries"]["y_max"] == {"kind": "closed"}
     assert text["controller"]["rule"] == {"kind": "fixed"}
     assert text["control"][0]["probe"] == 5.0

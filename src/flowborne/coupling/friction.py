@@ -20,7 +20,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.viscous_solve import Answer, Answering, ViscousSystem, Walls, walls_of
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import push
+from flowborne.fluid.projection import accelerated, push
 from flowborne.fluid.viscosity import assemble_viscosity
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh_solve import PrescribedFlesh, symmetric_factor
@@ -33,6 +33,7 @@ TOLERANCE = 1e-12
 def diffuse(
     world: World,
     velocity: Faces,
+    mass: Faces,
     cut: Geometry,
     jets: tuple[Jet, ...],
     pose: Kinematics,
@@ -53,17 +54,17 @@ def diffuse(
         return velocity, np.zeros(size), True
     grid, sides = fluid.grid, fluid.boundaries
     pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
-    scale = dt / (fluid.density * grid.spacing)
-    push(pushed, cut.open, state.pressure, grid, sides, scale)
+    rate = accelerated(cut.open, mass, grid)
+    push(pushed, rate, state.pressure, grid, sides, dt)
     earlier = pressure_push(cut, dt * state.pressure, size)
     moving = motion(pose, driven.after(generalised(pose, earlier)))
     parts = assemble_viscosity(
         cut.distance,
         cut.open,
         velocity,
+        mass,
         grid,
         sides,
-        fluid.density,
         fluid.viscosity,
         dt,
         world.time + dt,
@@ -74,7 +75,7 @@ def diffuse(
     )
     slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
     smooth, impulse, converged = system.solve(pushed, moving, TOLERANCE, slip)
-    push(smooth, cut.open, state.pressure, grid, sides, -scale)
+    push(smooth, rate, state.pressure, grid, sides, -dt)
     return smooth, impulse, converged
 
 

@@ -225,22 +225,16 @@ def add_closed_slip(carrier: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
             carrier[axis].reshape(-1)[jet.face[own]] += part * jet.velocity[axis]
 
 
-def fill_mouths(carried: Faces, resident: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
-    """Put the fluid that is to be expelled under the skin of the mouths, in place.
-
-    carried   Faces to be carried, m/s
-    resident  Faces, what cut faces keep besides (see `flow.beside_walls`)
-    """
+def fill_mouths(carried: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
+    """Put the fluid that is to be expelled under the skin of the mouths, in place (m/s)."""
     for jet in jets:
         if jet.rate <= 0.0:
             continue
         for axis in grid.axes:
             own = jet.axis == axis
             at, part = jet.face[own], jet.closed[own] * jet.share[own]
-            new = jet.skin[axis] + jet.velocity[axis]
-            values, kept = carried[axis].reshape(-1), resident[axis].reshape(-1)
-            values[at] += part * (new - values[at])
-            kept[at] *= 1.0 - part
+            values = carried[axis].reshape(-1)
+            values[at] += part * (jet.skin[axis] + jet.velocity[axis] - values[at])
 
 
 def colour(
@@ -285,14 +279,6 @@ def jet_force(jets: tuple[Jet, ...], density: float) -> Array:
     for jet in jets:
         force += density * jet.rate * (jet.skin + jet.velocity)
     return force
-
-
-def jet_power(jets: tuple[Jet, ...], density: float) -> tuple[float, float]:
-    """Kinetic energy per time that jets bring into the fluid and take out of it, W."""
-    powers = [
-        0.5 * density * jet.rate * float(((jet.skin + jet.velocity) ** 2).sum()) for jet in jets
-    ]
-    return sum(p for p in powers if p > 0.0), -sum(p for p in powers if p < 0.0)
 
 
 def jet_wrench(jets: tuple[Jet, ...], density: float, nbody: int) -> Array:

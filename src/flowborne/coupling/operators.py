@@ -135,33 +135,6 @@ def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: flo
     return np.concatenate([force, np.cross(centroid, force)], axis=1)
 
 
-def face_mass(opened: Faces, grid: Grid, boundaries: Boundaries, density: float) -> Faces:
-    """Fluid mass of every face: open fraction x density x volume, half of it on a side, kg.
-
-    The last face of a periodic axis is its first one and counts nothing.
-    """
-    masses = []
-    for axis in range(3):
-        mass = density * grid.cell_volume * opened[axis]
-        if axis in grid.axes:
-            ends = np.moveaxis(mass, axis, 0)
-            if boundaries.periodic()[axis]:
-                ends[-1] = 0.0
-            else:
-                ends[0] *= 0.5
-                ends[-1] *= 0.5
-        masses.append(mass)
-    return masses[0], masses[1], masses[2]
-
-
-def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid) -> Array:
-    """(3,) linear momentum of the fluid, N s."""
-    total = np.zeros(3)
-    for axis in grid.axes:
-        total[axis] = np.vdot(mass[axis], velocity[axis])
-    return total
-
-
 def side_push(pressure: Array, grid: Grid, boundaries: Boundaries) -> Array:
     """(3,) force of the solid and inflow sides on the fluid for a pressure field, N."""
     force = np.zeros(3)
@@ -172,19 +145,6 @@ def side_push(pressure: Array, grid: Grid, boundaries: Boundaries) -> Array:
         if high.kind not in ("open", "periodic"):
             force[axis] -= grid.face_area * float(pressure.take(-1, axis).sum())
     return force
-
-
-def energy_carried_in(
-    velocity: Faces, opened: Faces, grid: Grid, boundaries: Boundaries, density: float
-) -> tuple[float, float]:
-    """Kinetic energy per time that the flow carries in and out through the sides, W."""
-    inward, outward = 0.0, 0.0
-    for flux, beside in through_sides(velocity, opened, grid, boundaries, density):
-        square = sum(0.5 * (low * low + high * high) for low, high in beside.values())
-        power = 0.5 * flux * square
-        inward += float(power[power > 0.0].sum())
-        outward -= float(power[power < 0.0].sum())
-    return inward, outward
 
 
 def carried_in(

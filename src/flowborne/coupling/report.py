@@ -27,19 +27,19 @@ class Momentum:
 
     solid            momentum of the bodies half a step on, which keeps what it is given exactly
                      (see solids.momentum.halfway_momentum)
-    fluid            momentum of the fluid (open fraction x density x volume of each face)
+    fluid            momentum of the fluid (density x control volume of each face)
     exchanged        impulse that the pressure solve gave to the bodies
     exchange_error   |impulse given to the bodies + impulse taken from the fluid and the walls|
                      relative to the impulses given to bodies and faces, added up in size
-    advection        change of the fluid's momentum in advection that no boundary accounts for;
-                     along periodic axes it is given back at once
-    boundary         impulse of the sides of the domain on the fluid in the pressure solve
+    advection        change of the fluid's momentum in advection that no boundary accounts for: none
+                     in flux form
+    boundary         impulse of the sides of the domain on the fluid: their pressure, and what they
+                     stop of the flow that reaches them
     crossed          momentum that the flow itself carried in through the sides
-    jet              momentum that came into the fluid through mouths
+    jet              momentum that came into the fluid through mouths and sources
     forces           what body forces, driven regions and friction at walls and bodies gave to it
     budget_error     |change of the fluid's momentum in the step less all of these| relative to the
-                     impulses given to bodies and faces. Along periodic axes it shows what advection
-                     does not give back
+                     impulses given to bodies and faces
     """
 
     solid: Array = field(default_factory=lambda: np.zeros(3))

@@ -35,7 +35,7 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import face_weights, push
+from flowborne.fluid.projection import accelerated, face_weights, push
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.dynamics import Kinematics
@@ -143,23 +143,25 @@ def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
 def solve_together(
     world: World,
     velocity: Faces,
+    mass: Faces,
     driven: Driven,
     pose: Kinematics,
     cut: Geometry,
     jets: tuple[Jet, ...],
     torque_limit: Array,
-    dt: float,
     watch: Stopwatch,
 ) -> Solved:
     """Viscosity, pressure and bodies at the end of the step (section 6, item 6).
 
     velocity  Faces u*, m/s, after advection and forces
+    mass      Faces, of the fluid that pressure on each face accelerates, kg
     jets      of the mouths at the end of the step
     returns   velocity without divergence on the open parts of the faces, the bodies' velocity
               with driven dofs exactly at their targets, and what each gave to the other
     """
+    dt = driven.system.dt
     fluid, state = world.flow()
-    weights = face_weights(cut.open, fluid.grid, fluid.boundaries, fluid.density)
+    weights = face_weights(cut.open, mass, fluid.grid, fluid.boundaries)
     mobility = response(pose, driven)
     yielding = give_way(cut, mobility, fluid.grid)
     matrix = PressureSystem(weights, fluid.boundaries.periodic(), reaction=yielding)
@@ -170,7 +172,7 @@ def solve_together(
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
     watch.lap("projection")
-    smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, driven, dt)
+    smooth, viscous, smoothed = diffuse(world, velocity, mass, cut, jets, pose, driven, dt)
     watch.lap("viscosity")
     term = LowRankTerm(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
@@ -193,13 +195,15 @@ def solve_together(
         if changed is not None:
             if not changed.answers_as(driven):
                 term = replace(term, response=response(pose, changed))
-                smooth, viscous, smoothed = diffuse(world, velocity, cut, jets, pose, changed, dt)
+                smooth, viscous, smoothed = diffuse(
+                    world, velocity, mass, cut, jets, pose, changed, dt
+                )
                 watch.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
-    after = subtract_pressure_gradient(smooth, solution.pressure, cut, fluid)
+    after = subtract_pressure_gradient(smooth, solution.pressure, mass, cut, fluid)
     moved = start + term.response.times(on_solids)
     projected = Projected(
         after,
@@ -261,12 +265,12 @@ def net_outflow(velocity: Faces, cut: Geometry, rate: Array, fluid: Fluid) -> Ar
 
 
 def subtract_pressure_gradient(
-    velocity: Faces, pressure: Array, cut: Geometry, fluid: Fluid
+    velocity: Faces, pressure: Array, mass: Faces, cut: Geometry, fluid: Fluid
 ) -> Faces:
-    """u - (1/rho) G p^ for p^ (nx, ny, nz), Pa s."""
+    """u - (1/rho) G p^ for p^ (nx, ny, nz), Pa s, and the mass (kg) of each face."""
     after = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
-    scale = 1.0 / (fluid.density * fluid.grid.spacing)
-    push(after, cut.open, pressure, fluid.grid, fluid.boundaries, scale)
+    rate = accelerated(cut.open, mass, fluid.grid)
+    push(after, rate, pressure, fluid.grid, fluid.boundaries, 1.0)
     return after
 
 

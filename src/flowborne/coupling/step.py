@@ -5,14 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.coupling.flesh import hydrostatic_push, skins_on
-from flowborne.coupling.flow import Carried, carry_fluid, drift_velocity, forced, settle_state
+from flowborne.coupling.flow import (
+    Carried,
+    carry_fluid,
+    face_masses,
+    fluid_momentum,
+    forced,
+    settle_state,
+    volumes_of,
+)
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.motion import Drive
-from flowborne.coupling.mouths import Jet, add_closed_slip, jet_wrench, jets_of
+from flowborne.coupling.mouths import Jet, jet_wrench, jets_of
 from flowborne.coupling.operators import (
     buoyancy_wrench,
-    face_mass,
-    fluid_momentum,
     generalised,
     leak_proof,
     motion,
@@ -24,7 +30,7 @@ from flowborne.coupling.solve import Solved, solve_bodies, solve_together
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import Setup, World
-from flowborne.fluid.grid import Array
+from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
 from flowborne.solids.flesh_dynamics import assemble_flesh
 from flowborne.solids.flesh_solve import prescribe_flesh
@@ -71,7 +77,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     cut_before = cut_by_bodies(world)
     blown = jets_at(world, cut_before, world.time)
     watch.lap("geometry")
-    drift = drift_velocity(world, cut_before, dt)
+    start = volumes_of(world, cut_before)
     watch.lap("advection")
     # the bodies move with the velocity they have, driven joints as they are told
     before, pose = move_bodies(world, orders, dt)
@@ -79,9 +85,9 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     cut = cut_by_bodies(world, pose)
     watch.lap("geometry")
     # velocity and scalars are carried by the leak-proof field
-    carried = carry_fluid(world, cut_before, cut, blown, drift, dt)
-    # forces on the fluid
-    velocity = forced(carried.velocity, fluid, world.time + dt, dt)
+    carried = carry_fluid(world, before.q, cut_before, start, cut, blown, dt)
+    blown, mass = carried.jets, face_masses(carried.volumes, fluid.density)
+    velocity = forced(carried.velocity, cut.open, mass, fluid, world.time + dt, dt)
     watch.lap("advection")
     # forces on the bodies, and their own equations of motion
     wind = winds_on(world, pose)
@@ -94,19 +100,18 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     # viscosity, pressure, bodies, joints and contact in one solve (item 6)
     jets = jets_at(world, cut, world.time + dt, pose)
     solved = solve_together(
-        world, velocity, driven, pose, cut, jets, orders.torque_limit, dt, watch
+        world, velocity, mass, driven, pose, cut, jets, orders.torque_limit, watch
     )
     watch.lap("projection")
     # the new state, with the leak-proof field of the next step (item 4)
     assert solved.projected is not None
     world.solid.v[:] = solved.v
     leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
-    add_closed_slip(leak_free, jets, fluid.grid)
-    settle_state(world, cut, solved.projected.velocity, carried.velocity, leak_free, dt)
+    settle_state(world, carried, solved.projected.velocity, leak_free, cut_before, cut, dt)
     state.pressure[:] = solved.projected.pressure
     state.scalars = carried.scalars
     advance_clock(world, dt)
-    balance = momentum_balance(world, cut, carried, solved)
+    balance = momentum_balance(world, mass, carried, solved)
     watch.lap("advection")
     done = report(world, pose, solved, buoyancy, wind, reaction, balance, dt, watch)
     done.expelled = dt * sum(jet.rate for jet in blown)
@@ -231,20 +236,17 @@ def advance_clock(world: World, dt: float) -> None:
     world.steps += 1
 
 
-def momentum_balance(world: World, cut: Geometry, carried: Carried, solved: Solved) -> Momentum:
+def momentum_balance(world: World, mass: Faces, carried: Carried, solved: Solved) -> Momentum:
     """Where the fluid's momentum came from and went to in a step."""
     fluid, _ = world.flow()
     projected, before = solved.projected, solved.before_pressure
     assert projected is not None
     assert before is not None
     dt, grid, boundaries = solved.driven.system.dt, fluid.grid, fluid.boundaries
-    mass = face_mass(cut.open, grid, boundaries, fluid.density)
-    after = fluid_momentum(projected.velocity, mass, grid)
-    pressed = fluid_momentum(before, mass, grid)
-    moved = sum(
-        float(np.vdot(mass[axis], np.abs(projected.velocity[axis] - before[axis])))
-        for axis in grid.axes
-    )
+    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
+    pressed = fluid_momentum(before, mass, grid, boundaries)
+    pushed = faces_of([u - b for u, b in zip(projected.velocity, before, strict=True)])
+    moved = sum(float(np.vdot(mass[axis], np.abs(pushed[axis]))) for axis in grid.axes)
     sides = dt * side_push(projected.pressure, grid, boundaries)
     first = 6 * world.setup.solid.nbody
     forces = np.concatenate(
@@ -252,17 +254,18 @@ def momentum_balance(world: World, cut: Geometry, carried: Carried, solved: Solv
     )
     exchanged = forces.sum(axis=0)
     scale = float(np.abs(forces).sum()) + moved
-    missing = float(np.abs(exchanged + after - pressed - sides).max())
-    forces = pressed - fluid_momentum(carried.velocity, mass, grid)
-    advection = np.where(boundaries.periodic(), 0.0, carried.lost)
-    given = carried.crossed + carried.expelled + advection + forces + sides - exchanged
+    taken = fluid_momentum(pushed, mass, grid, boundaries)
+    missing = float(np.abs(exchanged + taken - sides).max())
+    forces = pressed - fluid_momentum(carried.velocity, mass, grid, boundaries)
+    came = carried.crossed + carried.expelled + carried.lost
+    given = came + carried.stopped + forces + sides - exchanged
     unknown = float(np.abs(after - carried.start - given).max())
     return Momentum(
         fluid=after,
         exchanged=exchanged,
         exchange_error=missing / scale if scale > 0.0 else 0.0,
         advection=carried.lost,
-        boundary=sides,
+        boundary=sides + carried.stopped,
         crossed=carried.crossed,
         jet=carried.expelled,
         forces=forces,

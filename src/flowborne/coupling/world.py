@@ -33,7 +33,7 @@ class Fluid:
     sources       interior sources
     scalars       names of the carried scalars
     body_force    (3,) uniform force per mass on the fluid, m/s^2, besides gravity
-    advection     "maccormack" or "semi-lagrangian"
+    advection     "flux", which keeps momentum, or "semi-lagrangian", the paper's
     tolerance     relative residual of the pressure solve
     one_way       whether the fluid does not feel the bodies, and pushes them as a wind alone
     """
@@ -45,7 +45,7 @@ class Fluid:
     sources: tuple[Source, ...] = ()
     scalars: tuple[str, ...] = ()
     body_force: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    advection: str = "maccormack"
+    advection: str = "flux"
     tolerance: float = 1e-9
     one_way: bool = False
 

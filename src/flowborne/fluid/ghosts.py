@@ -115,3 +115,44 @@ def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: floa
                 field[layer] = np.asarray(wall)[edge(axis, 0)]
             elif side.kind != "open":
                 field[layer] = 0.0
+
+
+def pad_deep(
+    values: Array, component: int, grid: Grid, boundaries: Boundaries, time: float
+) -> Array:
+    """One face field with two layers of ghosts that carry the boundary conditions.
+
+    Along the component's own axis they hold what the side's faces do. Along the others the mean of
+    the first ghost and its neighbour is what the side prescribes, and the second mirrors the
+    next neighbour likewise; beyond closed sides the field is mirrored, beyond open ones it goes on.
+    Corners are left alone.
+    """
+    depth = [2 * (axis in grid.axes) for axis in range(3)]
+    padded = np.empty([n + 2 * d for n, d in zip(values.shape, depth, strict=True)])
+    inner = [slice(d, -d) if d else slice(None) for d in depth]
+    padded[tuple(inner)] = values
+    for axis in grid.axes:
+        own, n = component == axis, padded.shape[axis]
+
+        def at(layer: int, axis: int = axis) -> tuple[slice, ...]:
+            index = list(inner)
+            index[axis] = slice(layer, layer + 1)
+            return tuple(index)
+
+        if boundaries.periodic()[axis]:
+            period = grid.shape[axis]
+            for ghost in (0, 1):
+                padded[at(ghost)] = padded[at(ghost + period)]
+                padded[at(n - 1 - ghost)] = padded[at(n - 1 - ghost - period)]
+            continue
+        for upper, side in enumerate(boundaries.pair(axis)):
+            first, second, one, two = (n - 2, n - 1, n - 3, n - 4) if upper else (1, 0, 2, 3)
+            if own or side.kind == "open":
+                padded[at(first)] = padded[at(second)] = padded[at(one)]
+            elif isinstance(side, (BoundaryInflow, BoundaryNoSlip)):
+                wall = wall_velocity(side, grid, axis, bool(upper), component, time)
+                padded[at(first)] = 2.0 * wall - padded[at(one)]
+                padded[at(second)] = 2.0 * wall - padded[at(two)]
+            else:
+                padded[at(first)], padded[at(second)] = padded[at(one)], padded[at(two)]
+    return padded

@@ -10,6 +10,11 @@ from flowborne.kernels.arrays import Array as Array
 from flowborne.kernels.arrays import Faces as Faces
 
 
+def faces_of(values: list[Array]) -> Faces:
+    """Three arrays as Faces."""
+    return values[0], values[1], values[2]
+
+
 @dataclass(frozen=True)
 class Grid:
     """Uniform MAC grid of cubic cells.

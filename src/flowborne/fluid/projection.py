@@ -3,10 +3,11 @@
 With face areas A, open fractions a and p^ = p dt,
 
     net outflow of a cell   D u  = sum over its faces of a A (u . outward)
-    velocity change         u   -= (1/rho) (p^_upper - p^_lower) / h
-    weights of the matrix   w    = a A / (rho h)        (doubled at an open side, half a cell away)
+    velocity change         u   -= a A (p^_upper - p^_lower) / m
+    weights of the matrix   w    = (a A)^2 / m
 
-so that momentum taken from a face, a rho V du, is what its two cells push with.
+for the mass m of the fluid that belongs to a face, so that the momentum taken from it, m du, is
+what its two cells push with.
 """
 
 from __future__ import annotations
@@ -29,29 +30,43 @@ def side_codes(boundaries: Boundaries) -> NDArray[np.int64]:
     )
 
 
-def face_weights(opened: Faces, grid: Grid, boundaries: Boundaries, density: float) -> Faces:
-    """Weights w of the pressure matrix, m^4/kg times area over spacing; see the module."""
-    scale = grid.face_area / (density * grid.spacing)
-    weights = [scale * values for values in opened]
+def face_weights(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) -> Faces:
+    """Weights w = (a A)^2 / m of the pressure matrix; see the module.
+
+    mass  of each face, kg; 0 where no pressure acts
+    """
+    weights = []
     codes = side_codes(boundaries)
     for axis in range(3):
+        area = grid.face_area * opened[axis]
+        weight = np.divide(
+            area * area, mass[axis], out=np.zeros(area.shape), where=mass[axis] > 0.0
+        )
         for end, layer in ((0, 0), (1, -1)):
             if codes[axis, end] == CLOSED:
-                weights[axis][edge(axis, layer)] = 0.0
-            elif codes[axis, end] == OPEN:
-                weights[axis][edge(axis, layer)] *= 2.0
+                weight[edge(axis, layer)] = 0.0
+        weights.append(weight)
     return weights[0], weights[1], weights[2]
+
+
+def accelerated(opened: Faces, mass: Faces, grid: Grid) -> Faces:
+    """a A / m of each face: what a difference of pressures accelerates it by, 1/(kg/m^2)."""
+    rates = []
+    for axis in range(3):
+        area = grid.face_area * opened[axis]
+        rates.append(np.divide(area, mass[axis], out=np.zeros(area.shape), where=mass[axis] > 0.0))
+    return rates[0], rates[1], rates[2]
 
 
 def push(
     velocity: Faces,
-    opened: Faces,
+    rate: Faces,
     pressure: Array,
     grid: Grid,
     boundaries: Boundaries,
     scale: float,
 ) -> None:
-    """Subtract scale (p_upper - p_lower) on every face, in place; see `push_faces`."""
+    """Subtract scale rate (p_upper - p_lower) on every face, in place; see `push_faces`."""
     codes = side_codes(boundaries)
     for axis in grid.axes:
-        push_faces(velocity[axis], opened[axis], pressure, axis, scale, codes)
+        push_faces(velocity[axis], rate[axis], pressure, axis, scale, codes)

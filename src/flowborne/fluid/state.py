@@ -14,11 +14,12 @@ class FluidState:
     """Everything that the fluid carries from one step to the next.
 
     velocity      u on the faces, m/s; zero where a face is wholly closed
-    acceleration  (u - u after advection) / dt of the last step, m/s^2
-    carrier       leak-proof field of the last step, m/s: u through the open and the body's
-                  velocity through the closed part of each face
+    acceleration  (u - u after advection) / dt of the last step, away from bodies, m/s^2
+    carrier       u half a step on, as the last two velocities tell, m/s
     pressure      (nx, ny, nz) dynamic pressure, Pa (hydrostatic part left out)
     scalars       name -> (nx, ny, nz), carried for pictures
+    cells         (nx, ny, nz) open volume of each cell, m^3; empty before the first step
+    pose          (nq,) positions of the bodies that left these volumes
     """
 
     velocity: Faces
@@ -26,6 +27,8 @@ class FluidState:
     carrier: Faces
     pressure: Array
     scalars: dict[str, Array] = field(default_factory=dict)
+    cells: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    pose: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def at_rest(cls, grid: Grid, scalars: tuple[str, ...] = ()) -> FluidState:
@@ -43,7 +46,7 @@ class FluidState:
 
     def arrays(self) -> dict[str, Array]:
         """Every array by a name; `from_arrays` is the way back."""
-        named: dict[str, Array] = {"pressure": self.pressure}
+        named = {"pressure": self.pressure, "cells": self.cells, "pose": self.pose}
         for name in ("velocity", "acceleration", "carrier"):
             for axis, values in zip("xyz", getattr(self, name), strict=True):
                 named[f"{name}_{axis}"] = values
@@ -65,4 +68,6 @@ class FluidState:
                 for name, values in arrays.items()
                 if name.startswith("scalar_")
             },
+            arrays["cells"],
+            arrays["pose"],
         )

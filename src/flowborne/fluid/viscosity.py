@@ -1,6 +1,6 @@
 """Implicit viscosity on cut cells, with no-slip bodies that may move freely.
 
-Finite volumes around every face f: with mass m = a rho V, links k = mu A_open / h to its
+Finite volumes around every face f: with mass m, links k = mu A_open / h to its
 neighbours g, and a wall coefficient W where a body closes a part of the links,
 
     m (u+ - u*) / dt = sum_g k (u_g - u_f) - W (u_f - b)        b = velocity of the body at x_w
@@ -28,7 +28,6 @@ from flowborne.fluid.ghosts import edge, wall_velocity
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import side_codes
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.sides import OPEN
 from flowborne.kernels.viscosity import UNKNOWN, classify, face_distances, link_faces, meet_walls
 
 TOUCHING = 1e-3
@@ -67,9 +66,9 @@ def assemble_viscosity(
     distance: Array,
     opened: Faces,
     velocity: Faces,
+    masses: Faces,
     grid: Grid,
     boundaries: Boundaries,
-    density: float,
     viscosity: float,
     dt: float,
     time: float,
@@ -78,6 +77,7 @@ def assemble_viscosity(
 
     distance  (nx+1, ny+1, nz+1) to the nearest body at the nodes, m
     velocity  Faces; used where a side prescribes it
+    masses    Faces, of the fluid that belongs to each face, kg
     time      s, of the sides' prescribed velocities
     """
     codes = side_codes(boundaries)
@@ -90,10 +90,7 @@ def assemble_viscosity(
         kind, phi = np.empty(shape, np.uint8), np.empty(shape)
         face_distances(distance, axis, phi)
         classify(kind, opened[axis], phi, axis, codes, TOUCHING * h)
-        mass = density * grid.cell_volume / dt * opened[axis]
-        for end, layer in ((0, 0), (1, -1)):
-            if codes[axis, end] == OPEN:
-                mass[edge(axis, layer)] *= 0.5
+        mass = masses[axis] / dt
         friction, given = stick_to_sides(kind, stiffness, grid, boundaries, axis, time)
         mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
         diagonal = np.where(kind == UNKNOWN, mass + friction, 0.0)

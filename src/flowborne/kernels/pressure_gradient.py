@@ -14,23 +14,24 @@ from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 @kernel
 def push_faces(
     velocity: Array,
-    opened: Array,
+    rate: Array,
     pressure: Array,
     axis: int,
     scale: float,
     codes: NDArray[np.int64],
 ) -> None:
-    """Subtract scale (p_upper - p_lower) from the velocity of the faces across `axis`.
+    """Subtract scale rate (p_upper - p_lower) from the velocity of the faces across `axis`.
 
-    scale  dt / (rho h) for a pressure, 1 / (rho h) for p^. Faces that are wholly closed, and those
-    on closed sides, keep their velocity; on an open side the pressure is 0 half a cell away.
+    rate   a A / m
+    scale  dt for a pressure, 1 for p^. Faces that are wholly closed, and those on closed sides,
+           keep their velocity; beyond an open side the pressure is 0
     """
     n = pressure.shape[axis]
     di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
     for i in prange(velocity.shape[0]):
         for j in range(velocity.shape[1]):
             for k in range(velocity.shape[2]):
-                if opened[i, j, k] == 0.0:
+                if rate[i, j, k] == 0.0:
                     continue
                 at = i if axis == 0 else (j if axis == 1 else k)
                 if 0 < at < n:
@@ -38,25 +39,25 @@ def push_faces(
                 elif at == 0:
                     if codes[axis, 0] == CLOSED:
                         continue
-                    difference = 2.0 * pressure[i, j, k]
+                    difference = pressure[i, j, k]
                     if codes[axis, 0] == PERIODIC:
                         far = pressure[i + di * (n - 1), j + dj * (n - 1), k + dk * (n - 1)]
                         difference = pressure[i, j, k] - far
                 else:
                     if codes[axis, 1] == CLOSED:
                         continue
-                    difference = -2.0 * pressure[i - di, j - dj, k - dk]
+                    difference = -pressure[i - di, j - dj, k - dk]
                     if codes[axis, 1] == PERIODIC:
                         difference = (
                             pressure[i - di * n, j - dj * n, k - dk * n]
                             - pressure[i - di, j - dj, k - dk]
                         )
-                velocity[i, j, k] -= scale * difference
+                velocity[i, j, k] -= scale * rate[i, j, k] * difference
 
 
 def push_faces_reference(
     velocity: Array,
-    opened: Array,
+    rate: Array,
     pressure: Array,
     axis: int,
     scale: float,
@@ -64,10 +65,10 @@ def push_faces_reference(
 ) -> Array:
     """`push_faces` in NumPy: the velocity after it.
 
-    Beyond a closed side lies the pressure inside, beyond an open one its opposite.
+    Beyond a closed side lies the pressure inside, beyond an open one none.
     """
     p = np.moveaxis(pressure, axis, 0)
-    low = {CLOSED: p[:1], OPEN: -p[:1], PERIODIC: p[-1:]}[int(codes[axis, 0])]
-    high = {CLOSED: p[-1:], OPEN: -p[-1:], PERIODIC: p[:1]}[int(codes[axis, 1])]
+    low = {CLOSED: p[:1], OPEN: 0.0 * p[:1], PERIODIC: p[-1:]}[int(codes[axis, 0])]
+    high = {CLOSED: p[-1:], OPEN: 0.0 * p[-1:], PERIODIC: p[:1]}[int(codes[axis, 1])]
     difference = np.moveaxis(np.diff(np.concatenate([low, p, high]), axis=0), 0, axis)
-    return np.where(opened > 0.0, velocity - scale * difference, velocity)
+    return velocity - scale * rate * difference

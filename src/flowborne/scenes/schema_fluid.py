@@ -126,7 +126,8 @@ class FluidTable(Table):
     viscosity   dynamic, Pa s; 0 is inviscid
     velocity    initial velocity everywhere, m/s
     body_force  uniform force per mass besides gravity, m/s^2
-    advection   scheme that carries the velocity
+    advection   scheme that carries the velocity: "flux" keeps its momentum exactly, the paper's
+                "semi-lagrangian" does not
     tolerance   relative residual at which the pressure solve stops
     coupling    "two-way": fluid and bodies push each other. "one-way": the fluid does not feel the
                 bodies, and pushes them by winds of kind "stream". "none": it is left out, and those
@@ -137,7 +138,7 @@ class FluidTable(Table):
     viscosity: NotNegative = 0.0
     velocity: Vector = (0.0, 0.0, 0.0)
     body_force: Vector = (0.0, 0.0, 0.0)
-    advection: Literal["maccormack", "semi-lagrangian"] = "maccormack"
+    advection: Literal["flux", "semi-lagrangian"] = "flux"
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
     coupling: Literal["two-way", "one-way", "none"] = "two-way"
 

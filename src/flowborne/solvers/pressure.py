@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Faces, Integers, Real, Rows
 from flowborne.kernels.conjugate_gradients import solve
@@ -183,6 +184,12 @@ class PressureSystem:
         inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
         pressure = x[inside].copy().reshape(self.shape)
         return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
+
+    def closed_regions(self) -> NDArray[np.int32]:
+        """(nx, ny, nz) number of the region without an open side of each cell, -1 in all others."""
+        label = self.buffers.label
+        inner = label[(slice(None) if self.slab else slice(1, -1), slice(1, -1), slice(1, -1))]
+        return inner.reshape(self.shape)
 
     def deflation(self, term: LowRankTerm) -> Deflation:
         """What the term adds; made when it is another than that of the last solve."""

@@ -1,0 +1,387 @@
+"""Small and closed control volumes share their velocity with others: amounts are kept exactly.
+
+Flat indices into the arrays of one component; lists are in ascending order, and are worked through
+in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@njit(nogil=True, cache=True)
+def neighbour(shape: Integers, wraps: Integers, f: int, axis: int, side: int) -> int:
+    """Flat index of the control volume beside f along an axis, -1 beyond the domain.
+
+    wraps  (3,) number of distinct volumes along each periodic axis, else 0
+    """
+    n1, n2 = shape[1], shape[2]
+    at = f // (n1 * n2) if axis == 0 else ((f // n2) % n1 if axis == 1 else f % n2)
+    step = n1 * n2 if axis == 0 else (n2 if axis == 1 else 1)
+    to = at + side
+    if wraps[axis] > 0:
+        if to < 0:
+            return int(f + step * (wraps[axis] - 1))
+        if to >= wraps[axis]:
+            return int(f - step * at + step * (to - wraps[axis]))
+    elif to < 0 or to >= shape[axis]:
+        return -1
+    return int(f + step * side)
+
+
+def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
+    """(6, n) `neighbour` of all control volumes: lower and upper one along each axis in turn; -1
+    along an axis of one layer too."""
+    at, found = np.indices(tuple(shape)), []
+    for axis in range(3):
+        for side in (-1, 1):
+            to = at.copy()
+            to[axis] += side
+            if wraps[axis] > 0:
+                to[axis] %= wraps[axis]
+            inside = (to[axis] >= 0) & (to[axis] < shape[axis]) & (shape[axis] > 1)
+            flat = np.ravel_multi_index(tuple(to), tuple(shape), mode="clip")
+            found.append(np.where(inside, flat, -1).ravel())
+    return np.stack(found)
+
+
+@njit(nogil=True, cache=True)
+def find_hosts(
+    guests: Integers,
+    opened: Array,
+    volumes: Array,
+    cells: Array,
+    component: int,
+    wraps: Integers,
+) -> Integers:
+    """Host of every guest, or the guest itself where there is none.
+
+    A face that is wholly closed has a control volume where a cell beside it is open in part. It
+    goes along with the opposite face of the larger of its two cells, else with that of the other,
+    else with the neighbour that has the largest volume, else with the host of a neighbour.
+
+    guests   (n,) closed faces with a volume
+    opened   open part of each face
+    volumes  of each control volume
+    cells    volume of each cell
+    """
+    hosts, shape, cell_shape = guests.copy(), np.array(opened.shape), np.array(cells.shape)
+    volume_flat = volumes.reshape(-1)
+    open_flat, cell_flat = opened.reshape(-1), cells.reshape(-1)
+    for n in range(guests.size):
+        f = guests[n]
+        n1, n2 = shape[1], shape[2]
+        i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
+        best, most = -1, 0.0
+        for side in range(-1, 2, 2):
+            a = i - int(component == 0 and side < 0)
+            b = j - int(component == 1 and side < 0)
+            c = k - int(component == 2 and side < 0)
+            if wraps[component] > 0:
+                if component == 0:
+                    a = (a + wraps[0]) % wraps[0]
+                elif component == 1:
+                    b = (b + wraps[1]) % wraps[1]
+                else:
+                    c = (c + wraps[2]) % wraps[2]
+            outside = a < 0 or b < 0 or c < 0
+            if outside or a >= cell_shape[0] or b >= cell_shape[1] or c >= cell_shape[2]:
+                continue
+            to = neighbour(shape, wraps, f, component, side)
+            volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
+            if to >= 0 and open_flat[to] > 0.0 and volume > most:
+                best, most = to, volume
+        if best < 0:
+            for axis in range(3):
+                if shape[axis] == 1:
+                    continue
+                for side in range(-1, 2, 2):
+                    to = neighbour(shape, wraps, f, axis, side)
+                    if to >= 0 and open_flat[to] > 0.0 and volume_flat[to] > most:
+                        best, most = to, volume_flat[to]
+        if best >= 0:
+            hosts[n] = best
+    first = hosts.copy()
+    for n in range(guests.size):
+        if first[n] != guests[n]:
+            continue
+        best, most = -1, -1.0
+        for axis in range(3):
+            if shape[axis] == 1:
+                continue
+            for side in range(-1, 2, 2):
+                to = neighbour(shape, wraps, guests[n], axis, side)
+                at = np.searchsorted(guests, to) if to >= 0 else guests.size
+                found = at < guests.size and guests[at] == to and first[at] != to
+                if found and volume_flat[to] > most:
+                    best, most = first[at], volume_flat[to]
+        if best >= 0:
+            hosts[n] = best
+    return hosts
+
+
+def largest_reference(candidates: Integers, worth: Array, least: float) -> tuple[Integers, Array]:
+    """Of candidates (k, n) the first of largest worth (k, n), and whether that exceeds `least`."""
+    best = worth.argmax(axis=0)[None]
+    return np.take_along_axis(candidates, best, 0)[0], worth.max(axis=0) > least
+
+
+def find_hosts_reference(
+    guests: Integers,
+    opened: Array,
+    volumes: Array,
+    cells: Array,
+    component: int,
+    wraps: Integers,
+) -> Integers:
+    """`find_hosts` in NumPy."""
+    beside = neighbours_reference(np.array(opened.shape), wraps)[:, guests]
+    driven = (beside >= 0) & (opened.ravel()[beside] > 0.0)
+    ends = [(int(axis == component),) * 2 for axis in range(3)]
+    wide = np.pad(cells, ends, mode="wrap" if wraps[component] > 0 else "constant")
+    own = np.unravel_index(guests, opened.shape)
+    cell = np.stack(
+        [
+            wide[tuple(at + side * (axis == component) for axis, at in enumerate(own))]
+            for side in (0, 1)
+        ]
+    )
+    opposite = slice(2 * component, 2 * component + 2)
+    volume = np.where(driven, volumes.ravel()[beside], 0.0)
+    far, reached = largest_reference(beside[opposite], np.where(driven[opposite], cell, 0.0), 0.0)
+    near, touched = largest_reference(beside, volume, 0.0)
+    first = np.where(reached, far, np.where(touched, near, guests))
+    host = np.arange(opened.size)
+    host[guests] = first
+    led = (beside >= 0) & np.isin(beside, guests[first != guests])
+    after, joined = largest_reference(
+        host[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
+    )
+    return np.where((first == guests) & joined, after, first)
+
+
+@njit(nogil=True, cache=True)
+def merge_guests(amount: Array, guests: Integers, hosts: Integers, shares: Array) -> None:
+    """Give these shares of the amounts of guests to their hosts, in place."""
+    flat = amount.reshape(-1)
+    for n in range(guests.size):
+        if hosts[n] != guests[n]:
+            given = shares[n] * flat[guests[n]]
+            flat[hosts[n]] += given
+            flat[guests[n]] -= given
+
+
+def merge_guests_reference(
+    amount: Array, guests: Integers, hosts: Integers, shares: Array
+) -> Array:
+    """`merge_guests` in NumPy: the amounts after it."""
+    merged, moved = amount.ravel().copy(), hosts != guests
+    given = shares[moved] * merged[guests[moved]]
+    np.add.at(merged, hosts[moved], given)
+    merged[guests[moved]] -= given
+    return merged.reshape(amount.shape)
+
+
+@njit(nogil=True, cache=True)
+def join_guests(
+    field: Array,
+    volumes: Array,
+    guests: Integers,
+    hosts: Integers,
+    shares: Array,
+    nothing: float,
+) -> None:
+    """Give these shares of what guests hold, and of their volumes, to their hosts, in place.
+
+    field    value of each control volume, what is left of the amount where there is no volume above
+             `nothing`
+    volumes  of each
+    """
+    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    for n in range(guests.size):
+        g, h, share = guests[n], hosts[n], shares[n]
+        if g == h:
+            continue
+        amount = share * flat[g] * (volume[g] if volume[g] > nothing else 1.0)
+        amount += flat[h] * (volume[h] if volume[h] > nothing else 1.0)
+        volume[h] += share * volume[g]
+        volume[g] -= share * volume[g]
+        flat[h] = amount / (volume[h] if volume[h] > nothing else 1.0)
+
+
+def join_guests_reference(
+    field: Array,
+    volumes: Array,
+    guests: Integers,
+    hosts: Integers,
+    shares: Array,
+    nothing: float,
+) -> tuple[Array, Array]:
+    """`join_guests` in NumPy: field, but for that of whole guests, and volumes after it."""
+    amount = field * np.where(volumes > nothing, volumes, 1.0)
+    amount = merge_guests_reference(amount, guests, hosts, shares)
+    merged = merge_guests_reference(volumes, guests, hosts, shares)
+    return amount / np.where(merged > nothing, merged, 1.0), merged
+
+
+@njit(nogil=True, cache=True)
+def follow_hosts(field: Array, guests: Integers, hosts: Integers) -> None:
+    """Give guests the value of their hosts, in place."""
+    flat = field.reshape(-1)
+    for n in range(guests.size):
+        flat[guests[n]] = flat[hosts[n]]
+
+
+def follow_hosts_reference(field: Array, guests: Integers, hosts: Integers) -> Array:
+    """`follow_hosts` in NumPy: the field after it."""
+    followed = field.ravel().copy()
+    followed[guests] = followed[hosts]
+    return followed.reshape(field.shape)
+
+
+@njit(nogil=True, cache=True)
+def fill_empty(
+    field: Array,
+    volumes: Array,
+    listed: Integers,
+    nothing: float,
+    shape: Integers,
+    wraps: Integers,
+) -> None:
+    """Give listed control volumes that hold nothing the mean of those beside them, in place."""
+    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    for n in range(listed.size):
+        f = listed[n]
+        if volume[f] > nothing:
+            continue
+        total, weight = 0.0, 0.0
+        for axis in range(3):
+            if shape[axis] == 1:
+                continue
+            for side in range(-1, 2, 2):
+                to = neighbour(shape, wraps, f, axis, side)
+                if to >= 0 and volume[to] > nothing:
+                    total += volume[to] * flat[to]
+                    weight += volume[to]
+        if weight > 0.0:
+            flat[f] = total / weight
+
+
+def fill_empty_reference(
+    field: Array, volumes: Array, listed: Integers, nothing: float, wraps: Integers
+) -> Array:
+    """`fill_empty` in NumPy: the field after it."""
+    beside = neighbours_reference(np.array(field.shape), wraps)[:, listed]
+    volume = volumes.ravel()[beside]
+    weight = np.where((beside >= 0) & (volume > nothing), volume, 0.0)
+    total = weight.sum(axis=0)
+    mean = (weight * field.ravel()[beside]).sum(axis=0) / np.where(total > 0.0, total, 1.0)
+    filled, empty = field.ravel().copy(), (volumes.ravel()[listed] <= nothing) & (total > 0.0)
+    filled[listed[empty]] = mean[empty]
+    return filled.reshape(field.shape)
+
+
+@njit(nogil=True, cache=True)
+def level(
+    field: Array,
+    volumes: Array,
+    listed: Integers,
+    tiny: float,
+    small: float,
+    nothing: float,
+    shape: Integers,
+    wraps: Integers,
+) -> None:
+    """Mix small control volumes with the largest one beside them, in place.
+
+    The exchange V_i V_t/(V_i + V_t) (u_t - u_i) levels both out and keeps their sum (Hu et al.
+    2006): all of it below the volume `tiny`, none above `small`, linear between.
+    """
+    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    for n in range(listed.size):
+        f = listed[n]
+        own = volume[f]
+        if own <= nothing or own >= small:
+            continue
+        best, most = -1, own
+        for axis in range(3):
+            if shape[axis] == 1:
+                continue
+            for side in range(-1, 2, 2):
+                to = neighbour(shape, wraps, f, axis, side)
+                if to >= 0 and volume[to] > most:
+                    best, most = to, volume[to]
+        if best < 0:
+            continue
+        share = min((small - own) / (small - tiny), 1.0)
+        exchange = share * (flat[best] - flat[f]) / (own + most)
+        flat[f] += most * exchange
+        flat[best] -= own * exchange
+
+
+def level_reference(
+    field: Array,
+    volumes: Array,
+    listed: Integers,
+    tiny: float,
+    small: float,
+    nothing: float,
+    wraps: Integers,
+) -> Array:
+    """`level` in NumPy: the field after it. One exchange comes after the other."""
+    levelled, volume = field.ravel().copy(), volumes.ravel()
+    beside = neighbours_reference(np.array(field.shape), wraps)
+    for f in listed[(volume[listed] > nothing) & (volume[listed] < small)]:
+        around = beside[:, f][beside[:, f] >= 0]
+        to = around[np.argmax(volume[around])]
+        if volume[to] > volume[f]:
+            share = np.clip((small - volume[f]) / (small - tiny), 0.0, 1.0)
+            mean = np.average(levelled[[f, to]], weights=volume[[f, to]])
+            levelled[[f, to]] += share * (mean - levelled[[f, to]])
+    return levelled.reshape(field.shape)
+
+
+@njit(nogil=True, cache=True)
+def find_parts(
+    before: Array, after: Array, whole: float, component: int, shape: Integers, wraps: Integers
+) -> Integers:
+    """Flat indices of the control volumes that are less than whole at one of two times.
+
+    The first and last ones along a component's own axis are half as large, and the last is the
+    first one where that is periodic.
+    """
+    one, two = before.reshape(-1), after.reshape(-1)
+    found = np.empty(one.size, np.int64)
+    count = 0
+    n1, n2 = shape[1], shape[2]
+    last = shape[component] - 1
+    for f in range(one.size):
+        at = f // (n1 * n2) if component == 0 else ((f // n2) % n1 if component == 1 else f % n2)
+        least = whole
+        if wraps[component] > 0:
+            if at == last:
+                continue
+        elif at == 0 or at == last:
+            least = 0.5 * whole
+        if one[f] < least or two[f] < least:
+            found[count] = f
+            count += 1
+    return found[:count].copy()
+
+
+def find_parts_reference(
+    before: Array, after: Array, whole: float, component: int, wraps: Integers
+) -> Integers:
+    """`find_parts` in NumPy."""
+    least = np.full(before.shape, whole)
+    ends = np.moveaxis(least, component, 0)
+    if wraps[component] > 0:
+        ends[-1] = 0.0
+    else:
+        ends[0], ends[-1] = 0.5 * whole, 0.5 * whole
+    return np.flatnonzero(np.minimum(before, after) < least)

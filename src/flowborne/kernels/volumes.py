@@ -1,0 +1,101 @@
+"""Open volume of the cells, from where the bodies cut their corners' distances."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flowborne.kernels.closed_fractions import closed_fraction, face_closed_reference
+
+Array = NDArray[np.float64]
+
+
+KUHN = np.array(
+    [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]]
+)
+"""Corners 4 x + 2 y + z of six tetrahedra that make up a cube, all with its main diagonal."""
+
+
+@njit(nogil=True, cache=True)
+def closed_tetrahedron(a: float, b: float, c: float, d: float) -> float:
+    """Part of a tetrahedron where the linear function with these corner values is negative."""
+    if a > b:
+        a, b = b, a
+    if c > d:
+        c, d = d, c
+    if a > c:
+        a, c = c, a
+    if b > d:
+        b, d = d, b
+    if b > c:
+        b, c = c, b
+    if a >= 0.0:
+        return 0.0
+    if d < 0.0:
+        return 1.0
+    if b >= 0.0:
+        return float(a / (a - b) * (a / (a - c)) * (a / (a - d)))
+    if c < 0.0:
+        return float(1.0 - d / (d - a) * (d / (d - b)) * (d / (d - c)))
+    p, q, r, s = a / (a - c), a / (a - d), b / (b - c), b / (b - d)
+    return float(p * q + (1.0 - p) * q * r + (1.0 - q) * r * s)
+
+
+def closed_tetrahedron_reference(corners: Array) -> Array:
+    """`closed_tetrahedron` in NumPy, of corner values (..., 4) that differ from each other.
+
+    The part below zero is a spline of third degree in the corner values (Curry and Schoenberg).
+    """
+    others = corners[..., None, :] - corners[..., :, None]
+    others[..., range(4), range(4)] = 1.0
+    return np.asarray((np.maximum(-corners, 0.0) ** 3 / others.prod(axis=-1)).sum(axis=-1))
+
+
+@njit(nogil=True, cache=True)
+def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> None:
+    """Open part of every cell; 0 where all its faces are closed.
+
+    In a slab that of its cross-section; else of six tetrahedra, exact for a plane.
+
+    distance    to the bodies at the nodes
+    ox, oy, oz  open parts of the faces
+    """
+    flat = out.shape[2] == 1
+    phi = np.empty(8)
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            for k in range(out.shape[2]):
+                for corner in range(8):
+                    phi[corner] = distance[i + corner // 4, j + (corner // 2) % 2, k + corner % 2]
+                faces = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
+                if not flat:
+                    faces += oz[i, j, k] + oz[i, j, k + 1]
+                if faces == 0.0:
+                    out[i, j, k] = 0.0
+                elif phi.min() >= 0.0:
+                    out[i, j, k] = 1.0
+                elif flat:
+                    out[i, j, k] = 1.0 - closed_fraction(phi[0], phi[4], phi[6], phi[2])
+                else:
+                    closed = 0.0
+                    for n in range(6):
+                        t = KUHN[n]
+                        closed += closed_tetrahedron(phi[t[0]], phi[t[1]], phi[t[2]], phi[t[3]])
+                    out[i, j, k] = 1.0 - closed / 6.0
+
+
+def open_parts_reference(distance: Array, ox: Array, oy: Array, oz: Array) -> Array:
+    """`open_parts` in NumPy; distances at the corners of a room's cells differ from each other."""
+    faces = ox[1:] + ox[:-1] + oy[:, 1:] + oy[:, :-1]
+    if distance.shape[2] == 2:
+        closed = face_closed_reference(distance[:, :, :1], 2)
+    else:
+        faces = faces + oz[:, :, 1:] + oz[:, :, :-1]
+        low, high = slice(None, -1), slice(1, None)
+        corner = np.stack(
+            [distance[x, y, z] for x in (low, high) for y in (low, high) for z in (low, high)],
+            axis=-1,
+        )
+        closed = closed_tetrahedron_reference(corner[..., KUHN]).mean(axis=-1)
+    return np.where(faces == 0.0, 0.0, 1.0 - closed)

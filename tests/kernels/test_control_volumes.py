@@ -1,0 +1,201 @@
+"""Guests, small and empty control volumes against NumPy; what they exchange adds up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.control_volumes import (
+    fill_empty,
+    fill_empty_reference,
+    find_hosts,
+    find_hosts_reference,
+    find_parts,
+    find_parts_reference,
+    follow_hosts,
+    follow_hosts_reference,
+    join_guests,
+    join_guests_reference,
+    level,
+    level_reference,
+    merge_guests,
+    merge_guests_reference,
+    neighbour,
+    neighbours_reference,
+)
+
+from .cut_cells import face_shape
+
+CASES = [
+    (shape, periodic, component)
+    for shape, periodic in product(
+        [(7, 6, 5), (9, 8, 1)], [(False, False, False), (True, True, False), (False, True, True)]
+    )
+    for component in range(3 if shape[2] > 1 else 2)
+    if shape[2] > 1 or not periodic[2]
+]
+ROOM_OR_SLAB = pytest.mark.parametrize(("shape", "periodic", "component"), CASES)
+
+
+@dataclass
+class Case:
+    """Random control volumes of one component, many of them small, closed or empty."""
+
+    cells: np.ndarray
+    opened: np.ndarray
+    volumes: np.ndarray
+    guests: np.ndarray
+    wraps: np.ndarray
+    last: tuple[slice, ...] | None
+
+    @property
+    def shape(self) -> np.ndarray:
+        return np.array(self.volumes.shape)
+
+    def listed(self, below: float) -> np.ndarray:
+        """Those smaller than this; none of the faces that stand twice."""
+        small = self.volumes < below
+        if self.last is not None:
+            small[self.last] = False
+        return np.flatnonzero(small)
+
+
+def case_of(shape: tuple, periodic: tuple, component: int, seed: int = 0) -> Case:
+    random = np.random.default_rng(seed)
+    cells = random.random(shape) ** 2 * (random.random(shape) > 0.4)
+    ends = [(int(axis == component),) * 2 for axis in range(3)]
+    wide = np.pad(cells, ends, mode="wrap" if periodic[component] else "constant")
+    low, high = ([slice(None)] * 3 for _ in range(2))
+    low[component], high[component] = slice(None, -1), slice(1, None)
+    volumes = 0.5 * (wide[tuple(low)] + wide[tuple(high)])
+    size = face_shape(shape, component)
+    opened = random.random(size) * (random.random(size) > 0.6)
+    ends_open, last = np.moveaxis(opened, component, 0), None
+    if periodic[component]:
+        ends_open[-1] = ends_open[0]
+        last = tuple(slice(-1, None) if a == component else slice(None) for a in range(3))
+    else:
+        ends_open[0] = -1.0
+    closed = (opened == 0.0) & (volumes > 0.0)
+    if last is not None:
+        closed[last] = False
+    wraps = np.array(shape) * np.array(periodic)
+    return Case(cells, opened, volumes, np.flatnonzero(closed), wraps, last)
+
+
+def hosts_of(case: Case, component: int) -> np.ndarray:
+    return find_hosts(case.guests, case.opened, case.volumes, case.cells, component, case.wraps)
+
+
+@ROOM_OR_SLAB
+def test_neighbours(shape: tuple, periodic: tuple, component: int) -> None:
+    case = case_of(shape, periodic, component)
+    expected = neighbours_reference(case.shape, case.wraps)
+    for f, (axis, side) in product(range(case.volumes.size), product(range(3), (-1, 1))):
+        if shape[axis] > 1:
+            found = neighbour(case.shape, case.wraps, f, axis, side)
+            assert found == expected[2 * axis + (side > 0), f]
+
+
+@ROOM_OR_SLAB
+def test_hosts(shape: tuple, periodic: tuple, component: int) -> None:
+    """Found as said; those of guests that move with one are open."""
+    for seed in range(20):
+        case = case_of(shape, periodic, component, seed)
+        hosts = hosts_of(case, component)
+        assert (hosts != case.guests).any()
+        led = hosts[hosts != case.guests]
+        assert (case.opened.ravel()[led] > 0.0).all()
+        expected = find_hosts_reference(
+            case.guests, case.opened, case.volumes, case.cells, component, case.wraps
+        )
+        np.testing.assert_array_equal(hosts, expected)
+
+
+@ROOM_OR_SLAB
+def test_guests_give_to_hosts_and_follow_them(
+    shape: tuple, periodic: tuple, component: int
+) -> None:
+    case = case_of(shape, periodic, component)
+    hosts = hosts_of(case, component)
+    amount = np.random.default_rng(1).standard_normal(case.volumes.shape)
+    merged, followed = amount.copy(), amount.copy()
+    shares = np.random.default_rng(2).uniform(size=hosts.size)
+    merge_guests(merged, case.guests, hosts, shares)
+    expected = merge_guests_reference(amount, case.guests, hosts, shares)
+    np.testing.assert_allclose(merged, expected, atol=1e-14)
+    assert merged.sum() == pytest.approx(amount.sum(), abs=1e-13 * np.abs(amount).sum())
+    follow_hosts(followed, case.guests, hosts)
+    expected = follow_hosts_reference(amount, case.guests, hosts)
+    np.testing.assert_array_equal(followed, expected)
+
+
+@ROOM_OR_SLAB
+def test_guests_bring_what_they_hold(shape: tuple, periodic: tuple, component: int) -> None:
+    """Volumes of nothing hold an amount all the same, as one that closes in a step does."""
+    case = case_of(shape, periodic, component)
+    hosts, volumes = hosts_of(case, component), case.volumes.copy()
+    volumes.reshape(-1)[case.guests[::2]] = 0.0
+    field = np.random.default_rng(1).standard_normal(volumes.shape)
+    joined, merged = field.copy(), volumes.copy()
+    shares = np.random.default_rng(2).uniform(size=hosts.size)
+    shares[::2] = 1.0
+    join_guests(joined, merged, case.guests, hosts, shares, 1e-9)
+    expected, volumes_after = join_guests_reference(
+        field, volumes, case.guests, hosts, shares, 1e-9
+    )
+    np.testing.assert_allclose(merged, volumes_after, rtol=1e-12, atol=1e-14)
+    own = np.ones(field.size, bool)
+    own[case.guests] = False
+    np.testing.assert_allclose(joined.ravel()[own], expected.ravel()[own], rtol=1e-10)
+
+
+@ROOM_OR_SLAB
+def test_empty_ones_have_the_velocity_around_them(
+    shape: tuple, periodic: tuple, component: int
+) -> None:
+    case = case_of(shape, periodic, component)
+    field, listed = np.random.default_rng(2).standard_normal(case.volumes.shape), case.listed(0.3)
+    filled = field.copy()
+    fill_empty(filled, case.volumes, listed, 0.01, case.shape, case.wraps)
+    expected = fill_empty_reference(field, case.volumes, listed, 0.01, case.wraps)
+    assert (filled != field).any()
+    np.testing.assert_allclose(filled, expected, atol=1e-14)
+    kept = case.volumes > 0.01
+    np.testing.assert_array_equal(filled[kept], field[kept])
+
+
+@ROOM_OR_SLAB
+def test_small_ones_mix_with_their_neighbours_and_keep_the_sum(
+    shape: tuple, periodic: tuple, component: int
+) -> None:
+    case = case_of(shape, periodic, component)
+    field, listed = np.random.default_rng(3).standard_normal(case.volumes.shape), case.listed(0.3)
+    if case.last is not None:
+        field[case.last] = np.take(field, [0], component)
+    mixed = field.copy()
+    level(mixed, case.volumes, listed, 0.05, 0.2, 0.01, case.shape, case.wraps)
+    expected = level_reference(field, case.volumes, listed, 0.05, 0.2, 0.01, case.wraps)
+    assert (mixed != field).any()
+    np.testing.assert_allclose(mixed, expected, atol=1e-14)
+    weights = case.volumes.copy()
+    if case.last is not None:
+        weights[case.last] = 0.0
+    before, after = (weights * field).sum(), (weights * mixed).sum()
+    assert after == pytest.approx(before, abs=1e-13 * np.abs(weights * field).sum())
+    assert mixed.min() >= field.min()
+    assert mixed.max() <= field.max()
+    assert (weights * mixed**2).sum() < (weights * field**2).sum()
+
+
+@ROOM_OR_SLAB
+def test_parts(shape: tuple, periodic: tuple, component: int) -> None:
+    """Those that are less than whole before or after."""
+    before, after = (case_of(shape, periodic, component, seed) for seed in (0, 1))
+    found = find_parts(before.volumes, after.volumes, 0.1, component, before.shape, before.wraps)
+    expected = find_parts_reference(before.volumes, after.volumes, 0.1, component, before.wraps)
+    np.testing.assert_array_equal(found, expected)
+    assert 0 < found.size < before.volumes.size
