@@ -71,8 +71,7 @@ class Case:
     def inlets(self, axis: int) -> Inlets:
         """Fluid of SPEED comes in where the rate is positive; what leaves has the fluid's own."""
         gain, loss = (
-            at_faces(np.maximum(sign * self.rate, 0.0), axis, self.grid, self.sides)
-            for sign in (1.0, -1.0)
+            at_faces(np.maximum(sign * self.rate, 0.0), axis, self.sides) for sign in (1.0, -1.0)
         )
         index = np.flatnonzero((gain != 0.0) | (loss != 0.0))
         return Inlets(index, gain[index], np.full(index.size, SPEED), loss[index])

@@ -291,8 +291,7 @@ def settle_state(
     carried: Carried,
     velocity: Faces,
     inside: Faces,
-    before: Geometry,
-    after: Geometry,
+    cut: Geometry,
     dt: float,
 ) -> None:
     """Put the new velocity into the state, and where it will be half a step on.
@@ -303,7 +302,7 @@ def settle_state(
     fluid, state = world.flow()
     grid, sides = fluid.grid, fluid.boundaries
     for axis in grid.axes:
-        closed = after.open[axis] == 0.0
+        closed = cut.open[axis] == 0.0
         velocity[axis][closed] = inside[axis][closed]
     carried.volumes.follow(velocity, grid)
     for axis in grid.axes:

@@ -35,9 +35,7 @@ def inlets_across(
             weighted += rates * (jet.skin[axis] + jet.velocity[axis])
         else:
             local -= rates
-    gains, speeds, losses = (
-        at_faces(cells, axis, grid, sides) for cells in (gain, weighted, local)
-    )
+    gains, speeds, losses = (at_faces(cells, axis, sides) for cells in (gain, weighted, local))
     index = np.flatnonzero((gains != 0.0) | (losses != 0.0))
     gains, speeds, losses = gains[index], speeds[index], losses[index]
     speeds = np.divide(speeds, gains, out=np.zeros(index.size), where=gains != 0.0)
@@ -52,7 +50,7 @@ def taken_by(
         return 0.0
     rates = np.zeros(grid.shape)
     rates.reshape(-1)[jet.cells] = -jet.rates
-    share = at_faces(rates, axis, grid, sides)[inlets.index]
+    share = at_faces(rates, axis, sides)[inlets.index]
     share = np.divide(share, inlets.loss, out=np.zeros(share.size), where=inlets.loss != 0.0)
     return float(share @ drained)
 
@@ -64,7 +62,7 @@ def after_drinking(jet: Jet, taken: Array, dt: float) -> Jet:
     return replace(jet, velocity=taken / (-jet.rate * dt) - jet.skin)
 
 
-def at_faces(cells: Array, axis: int, grid: Grid, sides: Boundaries) -> Array:
+def at_faces(cells: Array, axis: int, sides: Boundaries) -> Array:
     """(n,) half of what comes into each cell for both of its faces across `axis`; the last face
     along a periodic axis, which is the first one, has none."""
     values = means(cells, axis, sides.periodic()[axis])

@@ -107,7 +107,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     assert solved.projected is not None
     world.solid.v[:] = solved.v
     leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
-    settle_state(world, carried, solved.projected.velocity, leak_free, cut_before, cut, dt)
+    settle_state(world, carried, solved.projected.velocity, leak_free, cut, dt)
     state.pressure[:] = solved.projected.pressure
     state.scalars = carried.scalars
     advance_clock(world, dt)
