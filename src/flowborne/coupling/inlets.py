@@ -11,7 +11,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import means
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.transport import Inlets
+from flowborne.fluid.transport import NO_INLETS, Inlets
 
 
 def inlets_across(
@@ -25,6 +25,8 @@ def inlets_across(
 
     A mouth that drinks, and a source, take or bring fluid as fast as that around.
     """
+    if not jets and not sources.any():
+        return NO_INLETS
     gain, weighted, local = (np.zeros(grid.shape) for _ in range(3))
     local -= sources
     for jet in jets:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries, Boundary, BoundaryInflow, BoundaryNoSlip
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.kernels.flux import GHOSTS
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -117,6 +118,17 @@ def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: floa
                 field[layer] = 0.0
 
 
+def wrap_deep(padded: NDArray[Scalar], axis: int, period: int) -> None:
+    """Set the two layers of ghosts at both ends of a periodic axis, in place.
+
+    period  number of cells along it
+    """
+    n = padded.shape[axis]
+    for ghost in range(GHOSTS):
+        padded[edge(axis, ghost)] = padded[edge(axis, ghost + period)]
+        padded[edge(axis, n - 1 - ghost)] = padded[edge(axis, n - 1 - ghost - period)]
+
+
 def pad_deep(
     values: Array, component: int, grid: Grid, boundaries: Boundaries, time: float
 ) -> Array:
@@ -127,7 +139,7 @@ def pad_deep(
     next neighbour likewise; beyond closed sides the field is mirrored, beyond open ones it goes on.
     Corners are left alone.
     """
-    depth = [2 * (axis in grid.axes) for axis in range(3)]
+    depth = [GHOSTS * (axis in grid.axes) for axis in range(3)]
     padded = np.empty([n + 2 * d for n, d in zip(values.shape, depth, strict=True)])
     inner = [slice(d, -d) if d else slice(None) for d in depth]
     padded[tuple(inner)] = values
@@ -140,10 +152,7 @@ def pad_deep(
             return tuple(index)
 
         if boundaries.periodic()[axis]:
-            period = grid.shape[axis]
-            for ghost in (0, 1):
-                padded[at(ghost)] = padded[at(ghost + period)]
-                padded[at(n - 1 - ghost)] = padded[at(n - 1 - ghost - period)]
+            wrap_deep(padded, axis, grid.shape[axis])
             continue
         for upper, side in enumerate(boundaries.pair(axis)):
             first, second, one, two = (n - 2, n - 1, n - 3, n - 4) if upper else (1, 0, 2, 3)

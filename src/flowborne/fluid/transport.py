@@ -16,6 +16,7 @@ substeps with one carrying field.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from flowborne.fluid.control_volumes import (
     parts,
     wrapping,
 )
-from flowborne.fluid.ghosts import Scalar, edge, pad_deep
+from flowborne.fluid.ghosts import Scalar, edge, pad_deep, wrap_deep
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import fill_empty, follow_hosts, join_guests, level
@@ -81,6 +82,19 @@ class Transport:
     dt: float
     time: float
 
+    @cached_property
+    def crossing(self) -> float:
+        """Largest volume per time that crosses a cell, the axes added up, m^3/s."""
+        rates = np.zeros(self.before.cells.shape)
+        for axis, flux in enumerate(self.flux):
+            q = np.abs(flux)
+            rates += np.maximum(q[edge(axis, slice(None, -1))], q[edge(axis, slice(1, None))])
+        return float(rates.max())
+
+    def courant(self, grid: Grid) -> float:
+        """Largest part of a whole cell that crosses its faces in the step, the axes added up."""
+        return self.dt * self.crossing / grid.cell_volume
+
 
 @dataclass(frozen=True)
 class Carried:
@@ -130,46 +144,32 @@ def marks_of(listed: Integers, component: int, grid: Grid, sides: Boundaries) ->
     shape = grid.face_shape(component)
     whole = np.ones(shape, np.uint8)
     whole.reshape(-1)[listed] = 0
-    deep = tuple((GHOSTS, GHOSTS) if a in grid.axes else (0, 0) for a in range(3))
+    if sides.periodic()[component]:
+        whole[edge(component, -1)] = whole[edge(component, 0)]
+    depth = [GHOSTS * (axis in grid.axes) for axis in range(3)]
+    inner = [slice(d, d + n) for d, n in zip(depth, shape, strict=True)]
+    padded = np.pad(whole, [(d, d) for d in depth], constant_values=1)
+    wrapped = [axis for axis in grid.axes if sides.periodic()[axis]]
+    for axis in wrapped:
+        wrap_deep(padded, axis, grid.shape[axis])
     if listed.size:
         clear = whole.copy()
         for axis in grid.axes:
-            periodic = sides.periodic()[axis]
-            ends = [(GHOSTS, GHOSTS) if a == axis else (0, 0) for a in range(3)]
-            if periodic and axis == component:
-                whole[edge(axis, -1)] = whole[edge(axis, 0)]
-            wide = np.pad(whole, ends, mode="wrap" if periodic else "edge")
-            if periodic and axis == component:
-                wide[edge(axis, slice(0, 2))] = whole[edge(axis, slice(-3, -1))]
-                wide[edge(axis, slice(-2, None))] = whole[edge(axis, slice(1, 3))]
-            n = shape[axis]
             for shift in range(2 * GHOSTS + 1):
-                clear &= wide[edge(axis, slice(shift, shift + n))]
-        whole = clear
-    padded = np.zeros([n + sum(d) for n, d in zip(shape, deep, strict=True)], np.uint8)
-    padded[tuple(slice(d[0], d[0] + n) for n, d in zip(shape, deep, strict=True))] = whole
+                beside = list(inner)
+                beside[axis] = slice(shift, shift + shape[axis])
+                clear &= padded[tuple(beside)]
+        padded[tuple(inner)] = clear
     for axis in grid.axes:
-        n = padded.shape[axis]
-        if sides.periodic()[axis]:
-            period = grid.shape[axis]
-            for ghost in (0, 1):
-                padded[edge(axis, ghost)] = padded[edge(axis, ghost + period)]
-                padded[edge(axis, n - 1 - ghost)] = padded[edge(axis, n - 1 - ghost - period)]
-        elif axis == component:
-            for end, side in enumerate(sides.pair(axis)):
-                at = n - 1 - GHOSTS if end else GHOSTS
+        if axis in wrapped:
+            wrap_deep(padded, axis, grid.shape[axis])
+            continue
+        for end, side in enumerate(sides.pair(axis)):
+            padded[edge(axis, slice(-GHOSTS, None) if end else slice(GHOSTS))] = CUT
+            if axis == component:
+                at = -1 - GHOSTS if end else GHOSTS
                 padded[edge(axis, at)] = UPSTREAM if side.kind == "open" else CUT
     return padded
-
-
-def courant(transport: Transport, grid: Grid) -> float:
-    """Largest part of a whole cell that crosses its faces within the step, the axes added up."""
-    rates = np.zeros(grid.shape)
-    for axis in grid.axes:
-        q = np.abs(transport.flux[axis])
-        rates += np.maximum(q[edge(axis, slice(None, -1))], q[edge(axis, slice(1, None))])
-    most = float(rates.max())
-    return transport.dt * most / grid.cell_volume
 
 
 def carry_component(
@@ -186,7 +186,7 @@ def carry_component(
     velocity  on its faces, m/s
     along     what pressure and friction do to it, m/s^2; None for nothing
     """
-    count = min(max(1, int(np.ceil(courant(transport, grid) / COURANT))), SUBSTEPS)
+    count = min(max(1, int(np.ceil(transport.courant(grid) / COURANT))), SUBSTEPS)
     dt = transport.dt / count
     start, end = transport.before.volume[component], transport.after.volume[component]
     through = side_fluxes(transport.flux, component, grid, sides)

@@ -15,11 +15,16 @@ Integers = NDArray[np.int64]
 
 
 @njit(nogil=True, cache=True)
-def neighbour(shape: Integers, wraps: Integers, f: int, axis: int, side: int) -> int:
-    """Flat index of the control volume beside f along an axis, -1 beyond the domain.
+def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
+    """Flat index of the control volume beside f; -1 beyond the domain, and along an axis of one
+    layer.
 
     wraps  (3,) number of distinct volumes along each periodic axis, else 0
+    way    2 axis below f, 2 axis + 1 above
     """
+    axis, side = way // 2, 2 * (way % 2) - 1
+    if shape[axis] == 1:
+        return -1
     n1, n2 = shape[1], shape[2]
     at = f // (n1 * n2) if axis == 0 else ((f // n2) % n1 if axis == 1 else f % n2)
     step = n1 * n2 if axis == 0 else (n2 if axis == 1 else 1)
@@ -35,8 +40,7 @@ def neighbour(shape: Integers, wraps: Integers, f: int, axis: int, side: int) ->
 
 
 def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
-    """(6, n) `neighbour` of all control volumes: lower and upper one along each axis in turn; -1
-    along an axis of one layer too."""
+    """(6, n) `neighbour` of all control volumes: lower and upper one along each axis in turn."""
     at, found = np.indices(tuple(shape)), []
     for axis in range(3):
         for side in (-1, 1):
@@ -92,18 +96,15 @@ def find_hosts(
             outside = a < 0 or b < 0 or c < 0
             if outside or a >= cell_shape[0] or b >= cell_shape[1] or c >= cell_shape[2]:
                 continue
-            to = neighbour(shape, wraps, f, component, side)
+            to = neighbour(shape, wraps, f, 2 * component + int(side > 0))
             volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
             if to >= 0 and open_flat[to] > 0.0 and volume > most:
                 best, most = to, volume
         if best < 0:
-            for axis in range(3):
-                if shape[axis] == 1:
-                    continue
-                for side in range(-1, 2, 2):
-                    to = neighbour(shape, wraps, f, axis, side)
-                    if to >= 0 and open_flat[to] > 0.0 and volume_flat[to] > most:
-                        best, most = to, volume_flat[to]
+            for way in range(6):
+                to = neighbour(shape, wraps, f, way)
+                if to >= 0 and open_flat[to] > 0.0 and volume_flat[to] > most:
+                    best, most = to, volume_flat[to]
         if best >= 0:
             hosts[n] = best
     first = hosts.copy()
@@ -111,15 +112,12 @@ def find_hosts(
         if first[n] != guests[n]:
             continue
         best, most = -1, -1.0
-        for axis in range(3):
-            if shape[axis] == 1:
-                continue
-            for side in range(-1, 2, 2):
-                to = neighbour(shape, wraps, guests[n], axis, side)
-                at = np.searchsorted(guests, to) if to >= 0 else guests.size
-                found = at < guests.size and guests[at] == to and first[at] != to
-                if found and volume_flat[to] > most:
-                    best, most = first[at], volume_flat[to]
+        for way in range(6):
+            to = neighbour(shape, wraps, guests[n], way)
+            at = np.searchsorted(guests, to) if to >= 0 else guests.size
+            found = at < guests.size and guests[at] == to and first[at] != to
+            if found and volume_flat[to] > most:
+                best, most = first[at], volume_flat[to]
         if best >= 0:
             hosts[n] = best
     return hosts
@@ -260,14 +258,11 @@ def fill_empty(
         if volume[f] > nothing:
             continue
         total, weight = 0.0, 0.0
-        for axis in range(3):
-            if shape[axis] == 1:
-                continue
-            for side in range(-1, 2, 2):
-                to = neighbour(shape, wraps, f, axis, side)
-                if to >= 0 and volume[to] > nothing:
-                    total += volume[to] * flat[to]
-                    weight += volume[to]
+        for way in range(6):
+            to = neighbour(shape, wraps, f, way)
+            if to >= 0 and volume[to] > nothing:
+                total += volume[to] * flat[to]
+                weight += volume[to]
         if weight > 0.0:
             flat[f] = total / weight
 
@@ -309,13 +304,10 @@ def level(
         if own <= nothing or own >= small:
             continue
         best, most = -1, own
-        for axis in range(3):
-            if shape[axis] == 1:
-                continue
-            for side in range(-1, 2, 2):
-                to = neighbour(shape, wraps, f, axis, side)
-                if to >= 0 and volume[to] > most:
-                    best, most = to, volume[to]
+        for way in range(6):
+            to = neighbour(shape, wraps, f, way)
+            if to >= 0 and volume[to] > most:
+                best, most = to, volume[to]
         if best < 0:
             continue
         share = min((small - own) / (small - tiny), 1.0)
