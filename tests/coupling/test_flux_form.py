@@ -155,7 +155,7 @@ def test_a_stream_past_a_body_that_goes_with_it_stays_uniform(
         start = volumes_of(world, before_cut)
         before, pose = move_bodies(world, Drive.none(6), DT)
         cut = cut_by_bodies(world, pose)
-        carried = carry_fluid(world, before.q, before_cut, start, cut, (), DT)
+        carried = carry_fluid(world, state.velocity, before.q, before_cut, start, cut, (), DT)
         for axis in grid.axes:
             holds = carried.volumes.volume[axis] > 1e-9 * grid.cell_volume
             drift = np.abs(carried.velocity[axis][holds] - speed[axis]).max()

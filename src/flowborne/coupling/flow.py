@@ -43,10 +43,9 @@ class Carried:
     velocity  Faces u*, m/s
     scalars   name -> (nx, ny, nz)
     volumes   control volumes at the end of the step
-    start     (3,) momentum of the fluid at the start of the step, N s
     lost      (3,) momentum that advection made (or lost, when negative), N s; none in flux form
     crossed   (3,) momentum that the flow carried in through the sides, N s
-    stopped   (3,) momentum that the sides which prescribe a velocity gave to what reached them, N s
+    stopped   (3,) momentum that the sides gave to what reached them, N s
     expelled  (3,) momentum that came in through mouths and sources, N s
     jets      of the mouths, those that drink with the velocity of what they drank
     """
@@ -54,7 +53,6 @@ class Carried:
     velocity: Faces
     scalars: dict[str, Array]
     volumes: ControlVolumes
-    start: Array
     lost: Array
     crossed: Array
     stopped: Array
@@ -66,9 +64,14 @@ def volumes_of(world: World, cut: Geometry) -> ControlVolumes:
     """The control volumes of the fluid as it stands: those that the last step left in the cells, or
     those of the cut where the bodies have been put elsewhere since."""
     fluid, state = world.flow()
-    left = np.array_equal(state.pose, world.solid.q) and state.cells.shape == cut.volume.shape
-    cells = state.cells if left else cut.volume
+    cells = cut.volume if moved_since(world) else state.cells
     return control_volumes(cells, cut.open, fluid.grid, fluid.boundaries)
+
+
+def moved_since(world: World) -> bool:
+    """Whether the bodies have been put elsewhere since the last step, or there was none."""
+    _, state = world.flow()
+    return state.cells.size == 0 or not np.array_equal(state.pose, world.solid.q)
 
 
 def face_masses(volumes: ControlVolumes, density: float) -> Faces:
@@ -93,6 +96,7 @@ def kinetic_energy(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) 
 
 def carry_fluid(
     world: World,
+    velocity: Faces,
     q: Array,
     before: Geometry,
     start: ControlVolumes,
@@ -102,6 +106,7 @@ def carry_fluid(
 ) -> Carried:
     """Velocity and scalars a step later, carried by the leak-proof field.
 
+    velocity       Faces at its start, m/s
     q              (nq,) positions of the bodies at its start
     before, after  the cut grid at both ends of the step
     start          control volumes at its start
@@ -122,18 +127,22 @@ def carry_fluid(
     if fluid.advection == "semi-lagrangian":
         return carry_along_paths(world, before, start, end, paths, scalars, jets, dt)
     transport = Transport(flux, start, end, dt, world.time)
-    return carry_in_flux_form(world, transport, sources, scalars, jets)
+    return carry_in_flux_form(world, velocity, transport, after.open, sources, scalars, jets)
 
 
 def carry_in_flux_form(
     world: World,
+    velocity: Faces,
     transport: Transport,
+    opened: Faces,
     sources: Array,
     scalars: dict[str, Array],
     jets: tuple[Jet, ...],
 ) -> Carried:
     """Velocity a step later, on moving control volumes (see `transport`).
 
+    velocity Faces at the start, m/s
+    opened   Faces, open parts at the end
     sources  (nx, ny, nz) what they bring into each cell, m^3/s
     scalars  a step later
     """
@@ -144,7 +153,7 @@ def carry_in_flux_form(
     for axis in grid.axes:
         inlets = inlets_across(axis, jets, sources, grid, sides)
         along = state.acceleration[axis]
-        carried = carry_component(state.velocity[axis], along, axis, transport, inlets, grid, sides)
+        carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
         arrived[axis][:] = carried.velocity
         crossed[axis] = fluid.density * carried.crossed
         brought = dt * float(inlets.gain @ inlets.velocity)
@@ -153,13 +162,12 @@ def carry_in_flux_form(
             taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
     masses = face_masses(transport.after, fluid.density)
     reached = fluid_momentum(arrived, masses, grid, sides)
+    hold_back(arrived, opened, masses, fluid, dt)
     impose_sides(arrived, grid, sides, transport.time + dt)
-    masses_before = face_masses(transport.before, fluid.density)
     return Carried(
         arrived,
         scalars,
         transport.after,
-        fluid_momentum(state.velocity, masses_before, grid, sides),
         np.zeros(3),
         crossed,
         fluid_momentum(arrived, masses, grid, sides) - reached,
@@ -194,7 +202,7 @@ def carry_along_paths(
     crossed = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
     expelled = dt * jet_force(jets, fluid.density)
     lost = now - was - crossed - expelled
-    return Carried(arrived, scalars, end, was, lost, crossed, np.zeros(3), expelled, jets)
+    return Carried(arrived, scalars, end, lost, crossed, np.zeros(3), expelled, jets)
 
 
 def particle_paths(
@@ -268,6 +276,28 @@ def forced(
     return velocity
 
 
+def hold_back(velocity: Faces, opened: Faces, mass: Faces, fluid: Fluid, dt: float) -> None:
+    """What the rest of the fluid, still until it is drawn in, makes of the flow through open sides.
+
+    There p = 0, but for - rho (u - U)^2 / 2 where fluid comes in faster than the side as a whole,
+    U: a vortex that leaves would else draw in ever more, with energy from nowhere (Bruneau and
+    Fabrie 1996). Implicit, in place.
+    """
+    grid = fluid.grid
+    for axis in grid.axes:
+        for end, side in enumerate(fluid.boundaries.pair(axis)):
+            if side.kind != "open":
+                continue
+            layer, inward = edge(axis, -1 if end else 0), -1.0 if end else 1.0
+            area, m = grid.face_area * opened[axis][layer], mass[axis][layer]
+            coming = inward * velocity[axis][layer]
+            mean = float(np.vdot(area, coming)) / max(float(area.sum()), 1e-300)
+            excess = np.maximum(coming - max(0.0, mean), 0.0)
+            rate = np.divide(0.5 * fluid.density * area, m, out=np.zeros_like(m), where=m > 0.0)
+            lost = dt * rate * excess
+            velocity[axis][layer] -= inward * excess * lost / (1.0 + lost)
+
+
 def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
     """(nx, ny, nz) volume that appears in each cell, m^3/s; none in cells wholly inside a body."""
     grid = fluid.grid
@@ -289,6 +319,7 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
 def settle_state(
     world: World,
     carried: Carried,
+    unpressed: Faces,
     velocity: Faces,
     inside: Faces,
     cut: Geometry,
@@ -296,8 +327,9 @@ def settle_state(
 ) -> None:
     """Put the new velocity into the state, and where it will be half a step on.
 
-    velocity  Faces u after the solve
-    inside    Faces, the leak-proof field of it and of the bodies' velocity
+    unpressed  Faces before the pressure of the solve
+    velocity   Faces u after it
+    inside     Faces, the leak-proof field of it and of the bodies' velocity
     """
     fluid, state = world.flow()
     grid, sides = fluid.grid, fluid.boundaries
@@ -307,7 +339,7 @@ def settle_state(
     carried.volumes.follow(velocity, grid)
     for axis in grid.axes:
         u, was = velocity[axis], state.velocity[axis]
-        change, given = u - was, (u - carried.velocity[axis]) / dt
+        change, given = u - was, (unpressed[axis] - carried.velocity[axis]) / dt
         volume = carried.volumes.volume[axis]
         beside = parts(volume, volume, axis, grid, sides)
         change.reshape(-1)[beside], given.reshape(-1)[beside] = 0.0, 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flowborne.coupling.flesh import hydrostatic_push, skins_on
@@ -15,6 +17,7 @@ from flowborne.coupling.flow import (
     volumes_of,
 )
 from flowborne.coupling.fractions import Geometry, geometry, uncut
+from flowborne.coupling.half_kick import Kick, half_kick
 from flowborne.coupling.motion import Drive
 from flowborne.coupling.mouths import Jet, jet_wrench, jets_of
 from flowborne.coupling.operators import (
@@ -78,6 +81,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     blown = jets_at(world, cut_before, world.time)
     watch.lap("geometry")
     start = volumes_of(world, cut_before)
+    kick = half_kick(world, cut_before, start, dt)
     watch.lap("advection")
     # the bodies move with the velocity they have, driven joints as they are told
     before, pose = move_bodies(world, orders, dt)
@@ -85,7 +89,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     cut = cut_by_bodies(world, pose)
     watch.lap("geometry")
     # velocity and scalars are carried by the leak-proof field
-    carried = carry_fluid(world, before.q, cut_before, start, cut, blown, dt)
+    carried = carry_fluid(world, kick.velocity, before.q, cut_before, start, cut, blown, dt)
     blown, mass = carried.jets, face_masses(carried.volumes, fluid.density)
     velocity = forced(carried.velocity, cut.open, mass, fluid, world.time + dt, dt)
     watch.lap("advection")
@@ -93,7 +97,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     wind = winds_on(world, pose)
     buoyancy = buoyant_push(world.setup.solid, pose, fluid.density)
     reaction = jet_wrench(blown, fluid.density, len(wind))
-    push = buoyancy.copy()
+    push = buoyancy + kick.impulse / dt
     push[: wind.size] += (wind + reaction).ravel()
     driven = equations(world, before, pose, push, orders, dt)
     watch.lap("solids")
@@ -105,15 +109,21 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     watch.lap("projection")
     # the new state, with the leak-proof field of the next step (item 4)
     assert solved.projected is not None
+    assert solved.before_pressure is not None
     world.solid.v[:] = solved.v
     leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
-    settle_state(world, carried, solved.projected.velocity, leak_free, cut, dt)
-    state.pressure[:] = solved.projected.pressure
+    settle_state(
+        world, carried, solved.before_pressure, solved.projected.velocity, leak_free, cut, dt
+    )
+    state.earlier[:] = state.pressure + kick.pressure
+    state.pressure[:] = kick.pressure + solved.projected.pressure
     state.scalars = carried.scalars
     advance_clock(world, dt)
-    balance = momentum_balance(world, mass, carried, solved)
+    balance = momentum_balance(world, mass, kick, carried, solved)
     watch.lap("advection")
-    done = report(world, pose, solved, buoyancy, wind, reaction, balance, dt, watch)
+    done = report(
+        world, pose, with_kick(solved, kick), buoyancy, wind, reaction, balance, dt, watch
+    )
     done.expelled = dt * sum(jet.rate for jet in blown)
     return done
 
@@ -236,7 +246,25 @@ def advance_clock(world: World, dt: float) -> None:
     world.steps += 1
 
 
-def momentum_balance(world: World, mass: Faces, carried: Carried, solved: Solved) -> Momentum:
+def with_kick(solved: Solved, kick: Kick) -> Solved:
+    """What the pressure of the whole step did."""
+    assert solved.projected is not None
+    whole = replace(
+        solved.projected,
+        pressure=solved.projected.pressure + kick.pressure,
+        impulse=solved.projected.impulse + kick.impulse,
+    )
+    return replace(solved, projected=whole)
+
+
+def linear(push: Array, first: int) -> Array:
+    """(n, 3) the forces in a push (k,), whose wrenches on bodies end at `first`."""
+    return np.concatenate([push[:first].reshape(-1, 6)[:, :3], push[first:].reshape(-1, 3)])
+
+
+def momentum_balance(
+    world: World, mass: Faces, kick: Kick, carried: Carried, solved: Solved
+) -> Momentum:
     """Where the fluid's momentum came from and went to in a step."""
     fluid, _ = world.flow()
     projected, before = solved.projected, solved.before_pressure
@@ -247,19 +275,18 @@ def momentum_balance(world: World, mass: Faces, carried: Carried, solved: Solved
     pressed = fluid_momentum(before, mass, grid, boundaries)
     pushed = faces_of([u - b for u, b in zip(projected.velocity, before, strict=True)])
     moved = sum(float(np.vdot(mass[axis], np.abs(pushed[axis]))) for axis in grid.axes)
-    sides = dt * side_push(projected.pressure, grid, boundaries)
     first = 6 * world.setup.solid.nbody
-    forces = np.concatenate(
-        [projected.impulse[:first].reshape(-1, 6)[:, :3], projected.impulse[first:].reshape(-1, 3)]
-    )
-    exchanged = forces.sum(axis=0)
+    forces = linear(projected.impulse, first)
+    sides, exchanged = dt * side_push(projected.pressure, grid, boundaries), forces.sum(axis=0)
     scale = float(np.abs(forces).sum()) + moved
     taken = fluid_momentum(pushed, mass, grid, boundaries)
     missing = float(np.abs(exchanged + taken - sides).max())
+    sides += dt * side_push(kick.pressure, grid, boundaries)
+    exchanged += linear(kick.impulse, first).sum(axis=0)
     forces = pressed - fluid_momentum(carried.velocity, mass, grid, boundaries)
     came = carried.crossed + carried.expelled + carried.lost
     given = came + carried.stopped + forces + sides - exchanged
-    unknown = float(np.abs(after - carried.start - given).max())
+    unknown = float(np.abs(after - kick.start - given).max())
     return Momentum(
         fluid=after,
         exchanged=exchanged,

@@ -14,9 +14,10 @@ class FluidState:
     """Everything that the fluid carries from one step to the next.
 
     velocity      u on the faces, m/s; zero where a face is wholly closed
-    acceleration  (u - u after advection) / dt of the last step, away from bodies, m/s^2
+    acceleration  what friction and forces did in the last step, away from bodies, m/s^2
     carrier       u half a step on, as the last two velocities tell, m/s
     pressure      (nx, ny, nz) dynamic pressure, Pa (hydrostatic part left out)
+    earlier       (nx, ny, nz) that of the step before, Pa
     scalars       name -> (nx, ny, nz), carried for pictures
     cells         (nx, ny, nz) open volume of each cell, m^3; empty before the first step
     pose          (nq,) positions of the bodies that left these volumes
@@ -26,6 +27,7 @@ class FluidState:
     acceleration: Faces
     carrier: Faces
     pressure: Array
+    earlier: Array
     scalars: dict[str, Array] = field(default_factory=dict)
     cells: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     pose: Array = field(default_factory=lambda: np.zeros(0))
@@ -38,6 +40,7 @@ class FluidState:
             grid.zeros_faces(),
             grid.zeros_faces(),
             np.zeros(grid.shape),
+            np.zeros(grid.shape),
             {name: np.zeros(grid.shape) for name in scalars},
         )
 
@@ -46,7 +49,12 @@ class FluidState:
 
     def arrays(self) -> dict[str, Array]:
         """Every array by a name; `from_arrays` is the way back."""
-        named = {"pressure": self.pressure, "cells": self.cells, "pose": self.pose}
+        named = {
+            "pressure": self.pressure,
+            "earlier": self.earlier,
+            "cells": self.cells,
+            "pose": self.pose,
+        }
         for name in ("velocity", "acceleration", "carrier"):
             for axis, values in zip("xyz", getattr(self, name), strict=True):
                 named[f"{name}_{axis}"] = values
@@ -63,6 +71,7 @@ class FluidState:
             faces("acceleration"),
             faces("carrier"),
             arrays["pressure"],
+            arrays["earlier"],
             {
                 name.removeprefix("scalar_"): values
                 for name, values in arrays.items()

@@ -93,13 +93,12 @@ def advance(world: World, dt: float, steps: int = 1, drive: Drive | None = None)
 def start_at_once(world: World, dt: float) -> StepReport:
     """One step from a flow that does not yet know its bodies: the impulsive start.
 
-    The pressure of this step is an impulse; the acceleration that it leaves behind says nothing
-    about the next step, so it is cleared.
+    The pressure of this step is an impulse, which says nothing about the next step: it is cleared.
     """
     report = advance(world, dt)
     _, state = world.flow()
-    for values in state.acceleration:
-        values[:] = 0.0
+    state.pressure[:] = 0.0
+    state.earlier[:] = 0.0
     return report
 
 
