@@ -153,7 +153,16 @@ def carry_in_flux_form(
     for axis in grid.axes:
         inlets = inlets_across(axis, jets, sources, grid, sides)
         along = state.acceleration[axis]
-        carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
+        ahead = velocity[axis] - state.velocity[axis]
+        inlets = inlets_across(axis, jets, sources, grid, sides)
+        along = state.acceleration[axis]
+        ahead = velocity[axis] - state.velocity[axis]
+        import os
+        if os.environ.get("AH")=="0": ahead=None
+        if os.environ.get("AH")=="2":
+            v0=transport.before.volume[axis]; beside = parts(v0, transport.after.volume[axis], axis, grid, sides)
+            ahead.reshape(-1)[beside] = 0.0
+        carried = carry_component(velocity[axis], along, ahead, axis, transport, inlets, grid, sides)
         arrived[axis][:] = carried.velocity
         crossed[axis] = fluid.density * carried.crossed
         brought = dt * float(inlets.gain @ inlets.velocity)
@@ -319,7 +328,7 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
 def settle_state(
     world: World,
     carried: Carried,
-    unpressed: Faces,
+    started: Faces,
     velocity: Faces,
     inside: Faces,
     cut: Geometry,
@@ -327,9 +336,9 @@ def settle_state(
 ) -> None:
     """Put the new velocity into the state, and where it will be half a step on.
 
-    unpressed  Faces before the pressure of the solve
-    velocity   Faces u after it
-    inside     Faces, the leak-proof field of it and of the bodies' velocity
+    started   Faces at the start of the step, with what they were given then
+    velocity  Faces u after the solve
+    inside    Faces, the leak-proof field of it and of the bodies' velocity
     """
     fluid, state = world.flow()
     grid, sides = fluid.grid, fluid.boundaries
@@ -339,7 +348,8 @@ def settle_state(
     carried.volumes.follow(velocity, grid)
     for axis in grid.axes:
         u, was = velocity[axis], state.velocity[axis]
-        change, given = u - was, (unpressed[axis] - carried.velocity[axis]) / dt
+        change = u - was
+        given = (started[axis] - was + u - carried.velocity[axis]) / dt
         volume = carried.volumes.volume[axis]
         beside = parts(volume, volume, axis, grid, sides)
         change.reshape(-1)[beside], given.reshape(-1)[beside] = 0.0, 0.0

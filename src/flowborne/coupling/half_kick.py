@@ -21,7 +21,7 @@ import numpy as np
 from flowborne.coupling.flow import face_masses, fluid_momentum, moved_since
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import pressure_push
-from flowborne.coupling.world import World
+from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.projection import accelerated, push
@@ -56,7 +56,7 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     size = 6 * world.setup.solid.nbody + cut.skins.vertices.size
     if fluid.advection == "semi-lagrangian" or moved_since(world):
         return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
-    half = 0.5 * likely(level(state.pressure), level(state.earlier))
+    half = 0.5 * likely(driving(state.pressure, fluid), driving(state.earlier, fluid))
     state.pressure -= half
     velocity = faces_of([u.copy() for u in state.velocity])
     push(velocity, accelerated(cut.open, mass, grid), half, grid, sides, dt)
@@ -64,11 +64,19 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     return Kick(velocity, half, pressure_push(cut, dt * half, size), start)
 
 
-def level(pressure: Array) -> Array:
-    """With mean 0 over the cells that have any: in a closed box its level means nothing."""
+def driving(pressure: Array, fluid: Fluid) -> Array:
+    """The pressure without what balances the body force, Pa; in a box without open sides with mean
+    0 over the cells that have any, since its level means nothing there."""
     held = pressure != 0.0
-    count = np.count_nonzero(held)
-    return np.where(held, pressure - pressure.sum() / max(1, count), 0.0)
+    rest = pressure.copy()
+    for axis, x in enumerate(fluid.grid.cell_coordinates()):
+        if axis in fluid.grid.axes and not fluid.boundaries.periodic()[axis]:
+            along = [1, 1, 1]
+            along[axis] = -1
+            rest -= fluid.density * fluid.body_force[axis] * x.reshape(along)
+    if not any(side.kind == "open" for a in fluid.grid.axes for side in fluid.boundaries.pair(a)):
+        rest -= rest.sum(where=held) / max(1, np.count_nonzero(held))
+    return np.where(held, rest, 0.0)
 
 
 def likely(pressure: Array, earlier: Array) -> Array:

@@ -109,12 +109,9 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     watch.lap("projection")
     # the new state, with the leak-proof field of the next step (item 4)
     assert solved.projected is not None
-    assert solved.before_pressure is not None
     world.solid.v[:] = solved.v
     leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
-    settle_state(
-        world, carried, solved.before_pressure, solved.projected.velocity, leak_free, cut, dt
-    )
+    settle_state(world, carried, kick.velocity, solved.projected.velocity, leak_free, cut, dt)
     state.earlier[:] = state.pressure + kick.pressure
     state.pressure[:] = kick.pressure + solved.projected.pressure
     state.scalars = carried.scalars

@@ -14,7 +14,7 @@ class FluidState:
     """Everything that the fluid carries from one step to the next.
 
     velocity      u on the faces, m/s; zero where a face is wholly closed
-    acceleration  what friction and forces did in the last step, away from bodies, m/s^2
+    acceleration  what the last step gave beside what the flow carried, away from bodies, m/s^2
     carrier       u half a step on, as the last two velocities tell, m/s
     pressure      (nx, ny, nz) dynamic pressure, Pa (hydrostatic part left out)
     earlier       (nx, ny, nz) that of the step before, Pa

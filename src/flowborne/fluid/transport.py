@@ -175,6 +175,7 @@ def marks_of(listed: Integers, component: int, grid: Grid, sides: Boundaries) ->
 def carry_component(
     velocity: Array,
     along: Array | None,
+    ahead: Array | None,
     component: int,
     transport: Transport,
     inlets: Inlets,
@@ -198,9 +199,9 @@ def carry_component(
     for s in range(count):
         early, late = s / count, (s + 1) / count
         low, high = start + early * (end - start), start + late * (end - start)
-        first, came, left = flow.out(values(u, along, s * dt), transport.time + s * dt)
+        first, came, left = flow.out(values(u, along, ahead, s * dt), transport.time + s * dt)
         middle = flow.mean(flow.after(u, low, high, first, dt), transport.after)
-        later = values(middle, along, (s + 1) * dt)
+        later = values(middle, along, ahead, (s + 1) * dt)
         second, went, gone = flow.out(later, transport.time + (s + 1) * dt)
         arrived = flow.after(u, low, high, 0.5 * (first + second), dt)
         u = flow.mean(arrived, transport.after)
@@ -209,9 +210,10 @@ def carry_component(
     return Carried(arrived, crossed, drained)
 
 
-def values(u: Array, along: Array | None, time: float) -> Array:
-    """Velocity with what it has been given in `time` (s)."""
-    return u if along is None or time == 0.0 else u + time * along
+def values(u: Array, along: Array | None, ahead: Array | None, time: float) -> Array:
+    """Velocity that is carried, s after the start, of control volumes that have u."""
+    v = u if along is None or time == 0.0 else u + time * along
+    return v if ahead is None else v - ahead
 
 
 class Flow:

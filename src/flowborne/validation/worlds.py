@@ -97,8 +97,8 @@ def start_at_once(world: World, dt: float) -> StepReport:
     """
     report = advance(world, dt)
     _, state = world.flow()
-    state.pressure[:] = 0.0
-    state.earlier[:] = 0.0
+    for values in (*state.acceleration, state.pressure, state.earlier):
+        values[:] = 0.0
     return report
 
 
