@@ -21,10 +21,14 @@ from flowborne.kernels.control_volumes import (
     join_guests_reference,
     level,
     level_reference,
+    mark_cut,
+    mark_cut_reference,
     merge_guests,
     merge_guests_reference,
     neighbour,
     neighbours_reference,
+    share_velocity,
+    share_velocity_reference,
 )
 
 from .cut_cells import face_shape
@@ -197,3 +201,27 @@ def test_parts(shape: tuple, periodic: tuple, component: int) -> None:
     expected = find_parts_reference(before.volumes, after.volumes, 0.1, component, before.wraps)
     np.testing.assert_array_equal(found, expected)
     assert 0 < found.size < before.volumes.size
+
+
+@ROOM_OR_SLAB
+def test_share_velocity(shape: tuple, periodic: tuple, component: int) -> None:
+    case = case_of(shape, periodic, component)
+    random = np.random.default_rng(7)
+    guests = np.sort(random.permutation(case.volumes.size)[:20])
+    hosts, shares = random.permutation(case.volumes.size)[:20], random.random(20)
+    field = random.standard_normal(case.shape)
+    expected = share_velocity_reference(field, guests, hosts, shares)
+    share_velocity(field, guests, hosts, shares)
+    np.testing.assert_allclose(field, expected, rtol=1e-14)
+
+
+@ROOM_OR_SLAB
+def test_mark_cut(shape: tuple, periodic: tuple, component: int) -> None:
+    case = case_of(shape, periodic, component)
+    depth = np.where(case.shape > 1, 2, 0)
+    marks = np.ones(case.shape + 2 * depth, np.uint8)
+    listed = case.listed(0.002)
+    assert listed.size > 0
+    expected = mark_cut_reference(marks, listed, case.shape, case.wraps)
+    mark_cut(marks, listed, case.shape, case.wraps)
+    np.testing.assert_array_equal(marks, expected)

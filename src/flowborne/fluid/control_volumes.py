@@ -20,7 +20,13 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.control_volumes import find_hosts, find_parts, follow_hosts, merge_guests
+from flowborne.kernels.control_volumes import (
+    find_hosts,
+    find_parts,
+    follow_hosts,
+    merge_guests,
+    share_velocity,
+)
 
 WHOLE = 0.99
 """Control volumes of this part of the largest one count as uncut."""
@@ -61,9 +67,7 @@ class ControlVolumes:
     def mean_velocity(self, velocity: Array, axis: int) -> Array:
         """That of each control volume across `axis`, guests with what goes with their hosts."""
         mean = velocity.copy()
-        flat, share = mean.reshape(-1), self.shares[axis]
-        own, host = flat[self.guests[axis]], flat[self.hosts[axis]]
-        flat[self.guests[axis]] = own + share * (host - own)
+        share_velocity(mean, self.guests[axis], self.hosts[axis], self.shares[axis])
         return mean
 
 

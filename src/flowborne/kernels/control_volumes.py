@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from flowborne.kernels.arrays import Array, Integers, Marks
 
 
 @njit(nogil=True, cache=True)
@@ -336,6 +334,62 @@ def level_reference(
             mean = np.average(levelled[[f, to]], weights=volume[[f, to]])
             levelled[[f, to]] += share * (mean - levelled[[f, to]])
     return levelled.reshape(field.shape)
+
+
+@njit(nogil=True, cache=True)
+def share_velocity(field: Array, guests: Integers, hosts: Integers, shares: Array) -> None:
+    """Give guests the velocity of all that goes with them, in place: these shares of them go with
+    their hosts."""
+    flat = field.reshape(-1)
+    own = flat[guests]
+    for n in range(guests.size):
+        own[n] += shares[n] * (flat[hosts[n]] - own[n])
+    flat[guests] = own
+
+
+def share_velocity_reference(
+    field: Array, guests: Integers, hosts: Integers, shares: Array
+) -> Array:
+    """`share_velocity` in NumPy: the field after it."""
+    shared = field.ravel().copy()
+    shared[guests] += shares * (shared[hosts] - shared[guests])
+    return shared.reshape(field.shape)
+
+
+@njit(nogil=True, cache=True)
+def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -> None:
+    """Set to 0 the marks of listed control volumes, and of those along each axis that are no
+    further from them than the marks' padding is deep, in place."""
+    at, to = np.empty(3, np.int64), np.empty(3, np.int64)
+    for f in listed:
+        at[0], at[1], at[2] = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
+        for axis in range(3):
+            depth = (marks.shape[axis] - shape[axis]) // 2
+            for other in range(3):
+                to[other] = at[other] + (marks.shape[other] - shape[other]) // 2
+            for shift in range(-depth, depth + 1):
+                for image in range(-1, 2):
+                    place = at[axis] + shift + image * wraps[axis]
+                    if 0 <= place < shape[axis]:
+                        to[axis] = place + depth
+                        marks[to[0], to[1], to[2]] = 0
+
+
+def mark_cut_reference(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -> Marks:
+    """`mark_cut` in NumPy: the marks after it."""
+    cut, out = np.zeros(shape, bool), marks.copy()
+    cut.reshape(-1)[listed] = True
+    depth = (np.array(marks.shape) - shape) // 2
+    inner = out[tuple(slice(d, d + n) for d, n in zip(depth, shape, strict=True))]
+    for axis, d in enumerate(depth):
+        n, line = shape[axis], np.moveaxis(inner, axis, 0)
+        distinct = np.moveaxis(cut, axis, 0)[: wraps[axis] if wraps[axis] else n]
+        for at, here in enumerate(distinct):
+            for shift in range(-d, d + 1):
+                places = {at + shift + image * wraps[axis] for image in (-1, 0, 1)}
+                for place in places & set(range(n)):
+                    line[place][here] = 0
+    return out
 
 
 @njit(nogil=True, cache=True)

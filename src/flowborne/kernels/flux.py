@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.jit import kernel
-
-Array = NDArray[np.float64]
-Marks = NDArray[np.uint8]
 
 GHOSTS = 2
 """Layers of ghosts: what a value of third order needs."""
@@ -56,51 +53,148 @@ def line_flux(
         out[k] = g * (value if one[k] & other[k] == CLEAR else either)
 
 
-@kernel
-def net_flux(out: Array, field: Array, marks: Marks, gx: Array, gy: Array, gz: Array) -> None:
-    """Net amount of a field that leaves each control volume per time.
+@inlined
+def side_row(
+    out: Array, q: Array, component: int, i: int, j: int, place: Integers, share: Array
+) -> None:
+    """Volume per time through a row of sides of the control volumes of a component: means of what
+    flows through the faces of both their cells.
 
-    out         (n0, n1, n2)
-    field       the field, padded
-    marks       padded: CUT, CLEAR or UPSTREAM
-    gx, gy, gz  volume per time through the sides across each axis, one more than `out` along it
+    q             through the faces of the cells, across the axis of the sides
+    place, share  (n, 2) which two of them along the component's axis, and how much of each
     """
+    if component == 2:
+        line, last = q[i, j], out.size - 1
+        mean_row(out[1:last], line[: last - 1], line[1:last], 0.5, 0.5)
+        out[0] = share[0, 0] * line[place[0, 0]] + share[0, 1] * line[place[0, 1]]
+        out[last] = share[last, 0] * line[place[last, 0]] + share[last, 1] * line[place[last, 1]]
+    elif component == 1:
+        mean_row(out, q[i, place[j, 0]], q[i, place[j, 1]], share[j, 0], share[j, 1])
+    else:
+        mean_row(out, q[place[i, 0], j], q[place[i, 1], j], share[i, 0], share[i, 1])
+
+
+@inlined
+def mean_row(out: Array, one: Array, other: Array, first: float, second: float) -> None:
+    """out = first one + second other."""
+    for k in range(out.size):
+        out[k] = first * one[k] + second * other[k]
+
+
+@inlined
+def advance(
+    out: Array,
+    net: Array,
+    above: Array,
+    leaving: Array,
+    weight: float,
+    start: Array,
+    before: Array,
+    after: Array,
+    dt: float,
+    nothing: float,
+) -> None:
+    """A row of `stage`, of what leaves through the sides above and through all others."""
+    if weight < 1.0:
+        for k in range(out.size):
+            net[k] = weight * (leaving[k] + above[k]) + (1.0 - weight) * net[k]
+    else:
+        for k in range(out.size):
+            net[k] = leaving[k] + above[k]
+    for k in range(out.size):
+        amount = before[k] * start[k] - dt * net[k]
+        out[k] = amount / (after[k] if after[k] > nothing else 1.0)
+
+
+@kernel
+def stage(
+    out: Array,
+    net: Array,
+    weight: float,
+    start: Array,
+    before: Array,
+    after: Array,
+    dt: float,
+    nothing: float,
+    field: Array,
+    marks: Marks,
+    q: Faces,
+    component: int,
+    place: Integers,
+    share: Array,
+) -> None:
+    """A component after a stage: (before start - dt net) / after in each of its control volumes.
+
+    out            (n0, n1, n2); where the volume after is not above `nothing`, what is left of the
+                   amount is given in place of the value
+    net            net amount that leaves each control volume per time, of earlier stages with
+                   weight 1 - `weight`; after it of this one as well
+    start          the component at the start
+    before, after  volumes at both ends
+    field          the component that is carried along, padded
+    marks          padded: CUT, CLEAR or UPSTREAM
+    q              volume per time through the faces of the cells across each axis
+    place, share   (2, n + 1, 2) see `side_row`: across other axes, and across the component's own
+    """
+    qx, qy, qz = q
     n0, n1, n2 = out.shape
     p = GHOSTS if field.shape[0] > n0 else 0
     for block in prange((n0 + PLANES - 1) // PLANES):
         first = np.int64(block) * PLANES
         side, row, below = np.empty(n2 + 1), np.empty(n2), np.empty((n1, n2))
+        along, across, leaving = np.empty(n2 + 1), np.empty(n2), np.empty(n2)
+        x_place, x_share = place[int(component == 0)], share[int(component == 0)]
+        y_place, y_share = place[int(component == 1)], share[int(component == 1)]
+        z_place, z_share = place[int(component == 2)], share[int(component == 2)]
         for i in range(first, min(first + PLANES, n0)):
             x = i + p
             for j in range(n1 + 1):
                 y = j + GHOSTS
                 f, m = field[x], marks[x]
+                side_row(across, qy, component, i, j, y_place, y_share)
                 line_flux(
-                    row, gy[i, j], f[y - 2, 2:-2], f[y - 1, 2:-2], f[y, 2:-2], f[y + 1, 2:-2],
+                    row, across, f[y - 2, 2:-2], f[y - 1, 2:-2], f[y, 2:-2], f[y + 1, 2:-2],
                     m[y - 1, 2:-2], m[y, 2:-2],
                 )  # fmt: skip
                 if j > 0:
-                    for k in range(n2):
-                        out[i, j - 1, k] += row[k]
+                    advance(
+                        out[i, j - 1], net[i, j - 1], row, leaving, weight, start[i, j - 1],
+                        before[i, j - 1], after[i, j - 1], dt, nothing,
+                    )  # fmt: skip
                 if j == n1:
                     break
                 f, m = field[x, y], marks[x, y]
-                line_flux(side, gz[i, j], f[:-3], f[1:-2], f[2:-1], f[3:], m[1:-2], m[2:-1])
+                side_row(along, qz, component, i, j, z_place, z_share)
+                line_flux(side, along, f[:-3], f[1:-2], f[2:-1], f[3:], m[1:-2], m[2:-1])
                 for k in range(n2):
-                    out[i, j, k] = side[k + 1] - side[k] - row[k]
+                    leaving[k] = side[k + 1] - side[k] - row[k]
                 if p == 0:
                     continue
-                for q in range(x if i == first else x + 1, x + 2):
+                for z in range(x if i == first else x + 1, x + 2):
+                    side_row(across, qx, component, z - p, j, x_place, x_share)
                     line_flux(
-                        row, gx[q - p, j], field[q - 2, y, 2:-2], field[q - 1, y, 2:-2],
-                        field[q, y, 2:-2], field[q + 1, y, 2:-2], marks[q - 1, y, 2:-2],
-                        marks[q, y, 2:-2],
+                        row, across, field[z - 2, y, 2:-2], field[z - 1, y, 2:-2],
+                        field[z, y, 2:-2], field[z + 1, y, 2:-2], marks[z - 1, y, 2:-2],
+                        marks[z, y, 2:-2],
                     )  # fmt: skip
-                    if q == x:
+                    if z == x:
                         below[j] = row
                 for k in range(n2):
-                    out[i, j, k] += row[k] - below[j, k]
+                    leaving[k] += row[k] - below[j, k]
                     below[j, k] = row[k]
+
+
+def side_fluxes_reference(flux: Faces, component: int, place: Integers, share: Array) -> Faces:
+    """`side_row` in NumPy: through all sides across each axis."""
+    through = []
+    for axis, q in enumerate(flux):
+        own = int(axis == component)
+        count = q.shape[component] + 1
+        at, part = place[own, :count], share[own, :count]
+        q = np.moveaxis(q, component, -1)
+        mean = part[:, 0] * q[..., at[:, 0]] + part[:, 1] * q[..., at[:, 1]]
+        through.append(np.ascontiguousarray(np.moveaxis(mean, -1, component)))
+    return through[0], through[1], through[2]
 
 
 def line_flux_reference(
@@ -118,7 +212,7 @@ def line_flux_reference(
 
 
 def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Array) -> Array:
-    """`net_flux` in NumPy."""
+    """`net_flux` in NumPy, of the fluxes through the sides of the control volumes."""
     shape = gz.shape[0], gz.shape[1], gz.shape[2] - 1
     inner = [
         slice(GHOSTS, -GHOSTS) if n < m else slice(None)
@@ -139,25 +233,60 @@ def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Arr
     return net
 
 
+def stage_reference(
+    net: Array,
+    weight: float,
+    start: Array,
+    before: Array,
+    after: Array,
+    dt: float,
+    nothing: float,
+    field: Array,
+    marks: Marks,
+    q: Faces,
+    component: int,
+    place: Integers,
+    share: Array,
+) -> tuple[Array, Array]:
+    """`stage` in NumPy: the component after it, and the net amount."""
+    through = side_fluxes_reference(q, component, place, share)
+    leaving = weight * net_flux_reference(field, marks, *through)
+    net = leaving + ((1.0 - weight) * net if weight < 1.0 else 0.0)
+    amount = before * start - dt * net
+    return amount / np.where(after > nothing, after, 1.0), net
+
+
 @kernel
-def advance(
-    out: Array, field: Array, before: Array, net: Array, dt: float, after: Array, nothing: float
-) -> None:
-    """Value of every control volume after a step: (before field - dt net) / after.
-
-    before, after  volumes at both ends; where the volume after is not above `nothing`, what is left
-                   of the amount is given in place of the value
-    """
-    for i in prange(out.shape[0]):
-        for j in range(out.shape[1]):
-            for k in range(out.shape[2]):
-                amount = before[i, j, k] * field[i, j, k] - dt * net[i, j, k]
-                volume = after[i, j, k]
-                out[i, j, k] = amount / (volume if volume > nothing else 1.0)
+def pad_field(out: Array, values: Array, along: Array, time: float) -> None:
+    """values + time along into the inside of an array padded by GHOSTS."""
+    p = GHOSTS if out.shape[0] > values.shape[0] else 0
+    n2 = values.shape[2]
+    for i in prange(values.shape[0]):
+        for j in range(values.shape[1]):
+            inner, one, other = out[i + p, j + GHOSTS, GHOSTS:-GHOSTS], values[i, j], along[i, j]
+            for k in range(n2):
+                inner[k] = one[k] + time * other[k]
 
 
-def advance_reference(
-    field: Array, before: Array, net: Array, dt: float, after: Array, nothing: float
-) -> Array:
-    """`advance` in NumPy."""
-    return np.asarray((before * field - dt * net) / np.where(after > nothing, after, 1.0))
+@kernel
+def largest_crossing(qx: Array, qy: Array, qz: Array) -> float:
+    """Largest volume per time that crosses a cell, the axes added up."""
+    n0, n1, n2 = qy.shape[0], qx.shape[1], qx.shape[2]
+    most = np.zeros(n0)
+    for i in prange(n0):
+        for j in range(n1):
+            for k in range(n2):
+                rate = max(abs(qx[i, j, k]), abs(qx[i + 1, j, k]))
+                rate += max(abs(qy[i, j, k]), abs(qy[i, j + 1, k]))
+                rate += max(abs(qz[i, j, k]), abs(qz[i, j, k + 1]))
+                most[i] = max(most[i], rate)
+    return float(most.max())
+
+
+def largest_crossing_reference(q: Faces) -> float:
+    """`largest_crossing` in NumPy."""
+    rates = []
+    for axis, flux in enumerate(q):
+        size = np.moveaxis(np.abs(flux), axis, 0)
+        rates.append(np.moveaxis(np.maximum(size[:-1], size[1:]), 0, axis))
+    return float(sum(rates).max())
