@@ -33,6 +33,7 @@ from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.scalars import carry_scalars, cells_in
 from flowborne.fluid.transport import Transport, carry_component
+from flowborne.kernels.faces import fill_closed, gained, move_on, weighted_change
 from flowborne.solids.dynamics import kinematics
 
 
@@ -83,6 +84,20 @@ def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) 
         own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
         total[axis] = float(np.vdot(mass[axis][own], velocity[axis][own]))
     return total
+
+
+def momentum_change(
+    before: Faces, after: Faces, mass: Faces, grid: Grid, sides: Boundaries
+) -> tuple[Array, float]:
+    """(3,) what linear momentum changes by between two velocities, and the sum of its parts' sizes,
+    N s."""
+    total, size = np.zeros(3), 0.0
+    for axis in grid.axes:
+        own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
+        fields = (np.ascontiguousarray(f[axis][own]) for f in (mass, before, after))
+        total[axis], change = weighted_change(*fields)
+        size += change
+    return total, size
 
 
 def kinetic_energy(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> float:
@@ -276,13 +291,14 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
         if source.volume_rate is None or not source.active(time):
             continue
         box = cells_in(source, grid)
-        clear = np.zeros(grid.shape, bool)
-        clear[box] = True
+        clear = np.ones(rate[box].shape, bool)
         for axis in grid.axes:
-            lower = np.delete(opened[axis], -1, axis) > 0.0
-            clear &= lower | (np.delete(opened[axis], 0, axis) > 0.0)
+            wide = list(box)
+            wide[axis] = slice(box[axis].start, box[axis].stop + 1)
+            part = opened[axis][tuple(wide)] > 0.0
+            clear &= part[edge(axis, slice(None, -1))] | part[edge(axis, slice(1, None))]
         if clear.any():
-            rate[clear] += source.volume_rate / np.count_nonzero(clear)
+            rate[box][clear] += source.volume_rate / np.count_nonzero(clear)
     return rate
 
 
@@ -302,20 +318,17 @@ def settle_state(
     fluid, state = world.flow()
     grid, sides = fluid.grid, fluid.boundaries
     for axis in grid.axes:
-        closed = cut.open[axis] == 0.0
-        velocity[axis][closed] = inside[axis][closed]
+        fill_closed(velocity[axis], cut.open[axis], inside[axis])
     carried.volumes.follow(velocity, grid)
     for axis in grid.axes:
-        u, was = velocity[axis], state.velocity[axis]
-        change, given = u - was, (u - carried.velocity[axis]) / dt
+        u, given, carrier = velocity[axis], state.acceleration[axis], state.carrier[axis]
         volume = carried.volumes.volume[axis]
         beside = parts(volume, volume, axis, grid, sides)
-        change.reshape(-1)[beside], given.reshape(-1)[beside] = 0.0, 0.0
+        gained(given, u, carried.velocity[axis], dt)
+        move_on(state.velocity[axis], u, carrier)
+        given.reshape(-1)[beside], carrier.reshape(-1)[beside] = 0.0, u.reshape(-1)[beside]
         if sides.periodic()[axis]:
-            given[edge(axis, -1)] = given[edge(axis, 0)]
-            change[edge(axis, -1)] = change[edge(axis, 0)]
-        state.acceleration[axis][:] = given
-        state.carrier[axis][:] = u + 0.5 * change
-        state.velocity[axis][:] = u
+            first, last = edge(axis, 0), edge(axis, -1)
+            given[last], carrier[last] = given[first], u[last] + (carrier[first] - u[first])
     state.cells = carried.volumes.cells
     state.pose = world.solid.q.copy()

@@ -11,6 +11,7 @@ from flowborne.coupling.flow import (
     face_masses,
     fluid_momentum,
     forced,
+    momentum_change,
     settle_state,
     volumes_of,
 )
@@ -30,7 +31,7 @@ from flowborne.coupling.solve import Solved, solve_bodies, solve_together
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import Setup, World
-from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.grid import Array, Faces
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
 from flowborne.solids.flesh_dynamics import assemble_flesh
 from flowborne.solids.flesh_solve import prescribe_flesh
@@ -243,10 +244,9 @@ def momentum_balance(world: World, mass: Faces, carried: Carried, solved: Solved
     assert projected is not None
     assert before is not None
     dt, grid, boundaries = solved.driven.system.dt, fluid.grid, fluid.boundaries
-    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     pressed = fluid_momentum(before, mass, grid, boundaries)
-    pushed = faces_of([u - b for u, b in zip(projected.velocity, before, strict=True)])
-    moved = sum(float(np.vdot(mass[axis], np.abs(pushed[axis]))) for axis in grid.axes)
+    taken, moved = momentum_change(before, projected.velocity, mass, grid, boundaries)
+    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     sides = dt * side_push(projected.pressure, grid, boundaries)
     first = 6 * world.setup.solid.nbody
     forces = np.concatenate(
@@ -254,7 +254,6 @@ def momentum_balance(world: World, mass: Faces, carried: Carried, solved: Solved
     )
     exchanged = forces.sum(axis=0)
     scale = float(np.abs(forces).sum()) + moved
-    taken = fluid_momentum(pushed, mass, grid, boundaries)
     missing = float(np.abs(exchanged + taken - sides).max())
     forces = pressed - fluid_momentum(carried.velocity, mass, grid, boundaries)
     came = carried.crossed + carried.expelled + carried.lost

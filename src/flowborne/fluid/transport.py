@@ -267,10 +267,11 @@ class Flow:
         pad_field(plane(self.padded, grid), plane(u, grid), plane(given[0], grid), given[1])
         fill_ghosts(self.padded, axis, grid, self.sides, self.transport.time + time)
         later = np.empty(u.shape)
-        fields = (later, self.net, self.start, self.low, self.high, self.padded, self.marks)
-        out, net, start, low, high, padded, marks = (plane(field, grid) for field in fields)
+        fields = (self.start, self.low, self.high)
+        start, low, high = (plane(field, grid) for field in fields)
         stage(
-            out, net, weight, start, low, high, dt, self.nothing, padded, marks,
+            plane(later, grid), plane(self.net, grid), weight, start, low, high, dt, self.nothing,
+            plane(self.padded, grid), plane(self.marks, grid),
             planes(self.transport.flux, grid), axis + grid.is_slab, self.place, self.share,
         )  # fmt: skip
         left = self.exchange(later, dt, weight)
@@ -283,10 +284,8 @@ class Flow:
         at, inlets = self.inlets.index, self.inlets
         if at.size == 0:
             return np.zeros(0)
-        inside = tuple(
-            n + GHOSTS * (n_axis in self.grid.axes)
-            for n_axis, n in enumerate(np.unravel_index(at, later.shape))
-        )
+        place = np.unravel_index(at, later.shape)
+        inside = tuple(n + GHOSTS * (a in self.grid.axes) for a, n in enumerate(place))
         left = inlets.loss * self.padded[inside]
         more = weight * (left - inlets.gain * inlets.velocity)
         self.net.reshape(-1)[at] += more

@@ -394,29 +394,35 @@ def mark_cut_reference(marks: Marks, listed: Integers, shape: Integers, wraps: I
 
 @njit(nogil=True, cache=True)
 def find_parts(
-    before: Array, after: Array, whole: float, component: int, shape: Integers, wraps: Integers
+    before: Array, after: Array, whole: float, component: int, wraps: Integers
 ) -> Integers:
     """Flat indices of the control volumes that are less than whole at one of two times.
 
     The first and last ones along a component's own axis are half as large, and the last is the
     first one where that is periodic.
     """
-    one, two = before.reshape(-1), after.reshape(-1)
-    found = np.empty(one.size, np.int64)
-    count = 0
-    n1, n2 = shape[1], shape[2]
-    last = shape[component] - 1
-    for f in range(one.size):
-        at = f // (n1 * n2) if component == 0 else ((f // n2) % n1 if component == 1 else f % n2)
-        least = whole
-        if wraps[component] > 0:
-            if at == last:
+    n0, n1, n2 = before.shape
+    found, count = np.empty(before.size, np.int64), 0
+    last = before.shape[component] - 1
+    ends = 0.0 if wraps[component] > 0 else 0.5 * whole
+    for i in range(n0):
+        for j in range(n1):
+            one, two, low = before[i, j], after[i, j], 0
+            at = i if component == 0 else j
+            least = ends if component < 2 and (at == 0 or at == last) else whole
+            if wraps[component] > 0 and component < 2 and at == 0:
+                least = whole
+            for k in range(n2):
+                low += int(one[k] < least) | int(two[k] < least)
+            if low == 0:
                 continue
-        elif at == 0 or at == last:
-            least = 0.5 * whole
-        if one[f] < least or two[f] < least:
-            found[count] = f
-            count += 1
+            for k in range(n2):
+                bound = least
+                if component == 2 and (k == last or (k == 0 and wraps[2] == 0)):
+                    bound = ends
+                if one[k] < bound or two[k] < bound:
+                    found[count] = (i * n1 + j) * n2 + k
+                    count += 1
     return found[:count].copy()
 
 
@@ -431,3 +437,72 @@ def find_parts_reference(
     else:
         ends[0], ends[-1] = 0.5 * whole, 0.5 * whole
     return np.flatnonzero(np.minimum(before, after) < least)
+
+
+@njit(nogil=True, cache=True)
+def find_guests(
+    driven: Marks,
+    opened: Array,
+    volume: Array,
+    component: int,
+    prescribed: Marks,
+    periodic: bool,
+    narrow: float,
+    nothing: float,
+) -> tuple[Integers, Array]:
+    """Flat indices of the guests among the faces of a component, and which part of each is one.
+
+    A face is one with all of its volume where no pressure pushes it: where it is closed, or its
+    volume is not above `nothing`; and in part where the volume exceeds `narrow` times its opening.
+
+    driven      1 where the face may be a host: pushed and no guest; given
+    opened      open part of each face
+    prescribed  (2,) 1 where the velocity of the first or last layer is prescribed: none of either
+    periodic    whether the last layer is the first one, and counts once
+    """
+    n0, n1, n2 = opened.shape
+    own, part, count = np.empty(opened.size, np.int64), np.empty(opened.size), 0
+    last = opened.shape[component] - 1
+    for i in range(n0):
+        for j in range(n1):
+            at = i if component == 0 else j
+            one, room, mark, low = opened[i, j], volume[i, j], driven[i, j], 0
+            for k in range(n2):
+                low += int(narrow * one[k] < room[k]) | int(one[k] == 0.0) | int(room[k] <= nothing)
+                mark[k] = 1
+            for k in range(n2 if low else 0):
+                at = k if component == 2 else at
+                pushed = narrow * one[k] if room[k] > nothing else 0.0
+                guest = room[k] != 0.0 and (pushed < room[k] or pushed == 0.0)
+                mark[k] = pushed > 0.0 and not guest
+                first = at == 0 and prescribed[0]
+                if guest and not first and not (at == last and (prescribed[1] or periodic)):
+                    own[count] = (i * n1 + j) * n2 + k
+                    part[count] = 1.0 - pushed / room[k]
+                    count += 1
+            if component == 2:
+                mark[0] = 0 if prescribed[0] else mark[0]
+                mark[last] = 0 if prescribed[1] else mark[last]
+            elif (at == 0 and prescribed[0]) or (at == last and prescribed[1]):
+                mark[:] = 0
+    return own[:count].copy(), part[:count].copy()
+
+
+def find_guests_reference(
+    opened: Array,
+    volume: Array,
+    component: int,
+    prescribed: Marks,
+    periodic: bool,
+    narrow: float,
+    nothing: float,
+) -> tuple[Integers, Array, Array]:
+    """`find_guests` in NumPy: guests, parts, and which faces may be hosts."""
+    pushed = np.where(volume > nothing, narrow * opened, 0.0)
+    guest = (volume != 0.0) & ((pushed < volume) | (pushed == 0.0))
+    driven, counted = (pushed > 0.0) & ~guest, guest.copy()
+    for end, told in zip((0, -1), prescribed, strict=True):
+        np.moveaxis(driven, component, 0)[end] &= not told
+        np.moveaxis(counted, component, 0)[end] &= not told and not (periodic and end)
+    own = np.flatnonzero(counted)
+    return own, 1.0 - pushed.ravel()[own] / volume.ravel()[own], driven
