@@ -287,10 +287,10 @@ class Flow:
         place = np.unravel_index(at, later.shape)
         inside = tuple(n + GHOSTS * (a in self.grid.axes) for a, n in enumerate(place))
         left = inlets.loss * self.padded[inside]
-        more = weight * (left - inlets.gain * inlets.velocity)
+        more = left - inlets.gain * inlets.velocity
         self.net.reshape(-1)[at] += more
         volume = self.high.reshape(-1)[at]
-        later.reshape(-1)[at] -= dt * more / np.where(volume > self.nothing, volume, 1.0)
+        later.reshape(-1)[at] -= weight * dt * more / np.where(volume > self.nothing, volume, 1.0)
         return np.asarray(left)
 
     def settle(self, later: Array) -> None:

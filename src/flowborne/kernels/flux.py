@@ -31,79 +31,84 @@ inlined = njit(forceinline=True, nogil=True, cache=True)
 
 @inlined
 def line_flux(
-    out: Array, flux: Array, a: Array, b: Array, c: Array, d: Array, one: Marks, other: Marks
+    out: Array,
+    first: int,
+    end: int,
+    q: Array,
+    one: int,
+    other: int,
+    share: Array,
+    field: Array,
+    marks: Marks,
+    at: int,
+    step: int,
 ) -> None:
-    """Flux x value between b and c, of a, b, c, d in line, for a row of sides.
+    """Flux x value at a row of sides, from `first` to `end`, all arrays flat.
 
-    The upwind value of third order (Leonard 1979) lies between b and c, but for smooth extrema,
-    where second differences on both sides agree. Written without branches, so that it vectorises.
+    What flows through each side is the mean of what flows through the faces of two cells. The
+    upwind value of third order (Leonard 1979) lies between both neighbours, but for smooth extrema,
+    where second differences on both sides agree; it is taken where both are CLEAR, what is upstream
+    where one is UPSTREAM, else the mean of both. Written without branches and views, and with
+    unsigned places, so that it vectorises.
 
-    one, other  marks of b and c: of third order where both are CLEAR, what is upstream where one is
-                UPSTREAM, else the mean of both
+    one, other  where in q the rows of faces begin; share (2,) how much of each
+    at, step    where the row above the sides begins in the padded field, and what is between
+                neighbours across them
     """
-    for k in range(out.size):
-        g, p, q, r, s = flux[k], a[k], b[k], c[k], d[k]
-        low_bend, high_bend = p - 2.0 * q + r, q - 2.0 * r + s
+    s, t = share[0], share[1]
+    for k in range(first, end):
+        g = s * q[one + k] + t * q[other + k]
+        n = at + k
+        low, high = field[n - step], field[n]
+        ahead, behind = field[n + step], field[n - step - step]
+        low_bend, high_bend = behind - 2.0 * low + high, low - 2.0 * high + ahead
         room = max(min(low_bend, high_bend), 0.0) + max(min(-low_bend, -high_bend), 0.0)
-        low, high = min(q, r) - ROOM * room, max(q, r) + ROOM * room
-        value = (5.0 * q + 2.0 * r - p if g > 0.0 else 5.0 * r + 2.0 * q - s) / 6.0
-        value = min(max(value, low), high)
-        upstream = q if g > 0.0 else r
-        either = upstream if one[k] | other[k] >= UPSTREAM else 0.5 * (q + r)
-        out[k] = g * (value if one[k] & other[k] == CLEAR else either)
+        least, most = min(low, high) - ROOM * room, max(low, high) + ROOM * room
+        forward = 5.0 * low + 2.0 * high - behind
+        value = (forward if g > 0.0 else 5.0 * high + 2.0 * low - ahead) / 6.0
+        value = min(max(value, least), most)
+        upstream = low if g > 0.0 else high
+        here, there = marks[n - step], marks[n]
+        either = upstream if here | there >= UPSTREAM else 0.5 * (low + high)
+        out[k] = g * (value if here & there == CLEAR else either)
 
 
 @inlined
 def side_row(
-    out: Array, q: Array, component: int, i: int, j: int, place: Integers, share: Array
+    out: Array,
+    count: int,
+    q: Array,
+    shape: tuple[int, int, int],
+    i: int,
+    j: int,
+    component: int,
+    place: Integers,
+    share: Array,
+    field: Array,
+    marks: Marks,
+    at: int,
+    step: int,
 ) -> None:
-    """Volume per time through a row of sides of the control volumes of a component: means of what
-    flows through the faces of both their cells.
+    """Flux x value through `count` sides of the control volumes (i, j, :) of a component.
 
-    q             through the faces of the cells, across the axis of the sides
+    q             through the faces of the cells, across the axis of the sides; flat, of this shape
     place, share  (n, 2) which two of them along the component's axis, and how much of each
     """
-    if component == 2:
-        line, last = q[i, j], out.size - 1
-        mean_row(out[1:last], line[: last - 1], line[1:last], 0.5, 0.5)
-        out[0] = share[0, 0] * line[place[0, 0]] + share[0, 1] * line[place[0, 1]]
-        out[last] = share[last, 0] * line[place[last, 0]] + share[last, 1] * line[place[last, 1]]
+    n1, n2, zero, one = np.uintp(shape[1]), np.uintp(shape[2]), np.uintp(0), np.uintp(1)
+    if component == 0:
+        low, high = np.uintp(place[i, 0]), np.uintp(place[i, 1])
+        low, high = (low * n1 + j) * n2, (high * n1 + j) * n2
+        line_flux(out, zero, count, q, low, high, share[i], field, marks, at, step)
     elif component == 1:
-        mean_row(out, q[i, place[j, 0]], q[i, place[j, 1]], share[j, 0], share[j, 1])
+        low, high = np.uintp(place[j, 0]), np.uintp(place[j, 1])
+        low, high = (i * n1 + low) * n2, (i * n1 + high) * n2
+        line_flux(out, zero, count, q, low, high, share[j], field, marks, at, step)
     else:
-        mean_row(out, q[place[i, 0], j], q[place[i, 1], j], share[i, 0], share[i, 1])
-
-
-@inlined
-def mean_row(out: Array, one: Array, other: Array, first: float, second: float) -> None:
-    """out = first one + second other."""
-    for k in range(out.size):
-        out[k] = first * one[k] + second * other[k]
-
-
-@inlined
-def advance(
-    out: Array,
-    net: Array,
-    above: Array,
-    leaving: Array,
-    weight: float,
-    start: Array,
-    before: Array,
-    after: Array,
-    dt: float,
-    nothing: float,
-) -> None:
-    """A row of `stage`, of what leaves through the sides above and through all others."""
-    if weight < 1.0:
-        for k in range(out.size):
-            net[k] = weight * (leaving[k] + above[k]) + (1.0 - weight) * net[k]
-    else:
-        for k in range(out.size):
-            net[k] = leaving[k] + above[k]
-    for k in range(out.size):
-        amount = before[k] * start[k] - dt * net[k]
-        out[k] = amount / (after[k] if after[k] > nothing else 1.0)
+        row = (i * n1 + j) * n2
+        line_flux(out, one, count - one, q, row - one, row, share[1], field, marks, at, step)
+        for k in (zero, count - one):
+            low, high = row + np.uintp(place[k, 0]) - k, row + np.uintp(place[k, 1]) - k
+            line_flux(out, k, k + one, q, low, high, share[k], field, marks, at, step)
 
 
 @kernel
@@ -127,65 +132,98 @@ def stage(
 
     out            (n0, n1, n2); where the volume after is not above `nothing`, what is left of the
                    amount is given in place of the value
-    net            net amount that leaves each control volume per time, of earlier stages with
-                   weight 1 - `weight`; after it of this one as well
+    net            net amount that leaves each control volume per time: given by a stage of weight
+                   1, taken with 1 - `weight` by one of less
     start          the component at the start
     before, after  volumes at both ends
     field          the component that is carried along, padded
     marks          padded: CUT, CLEAR or UPSTREAM
     q              volume per time through the faces of the cells across each axis
-    place, share   (2, n + 1, 2) see `side_row`: across other axes, and across the component's own
+    place, share   (2, n + 1, 2) of which two faces' fluxes those through the sides are means, and
+                   how much of each: across other axes, and across the component's own
     """
-    qx, qy, qz = q
-    n0, n1, n2 = out.shape
-    p = GHOSTS if field.shape[0] > n0 else 0
-    for block in prange((n0 + PLANES - 1) // PLANES):
-        first = np.int64(block) * PLANES
-        side, row, below = np.empty(n2 + 1), np.empty(n2), np.empty((n1, n2))
-        along, across, leaving = np.empty(n2 + 1), np.empty(n2), np.empty(n2)
+    qx, qy, qz = q[0].reshape(-1), q[1].reshape(-1), q[2].reshape(-1)
+    n0, n1, n2 = np.uintp(out.shape[0]), np.uintp(out.shape[1]), np.uintp(out.shape[2])
+    values, mark = field.reshape(-1), marks.reshape(-1)
+    later, leaving = out.reshape(-1), net.reshape(-1)
+    first, low, high = start.reshape(-1), before.reshape(-1), after.reshape(-1)
+    zero, one, deep = np.uintp(0), np.uintp(1), np.uintp(GHOSTS)
+    room = field.shape[0] > out.shape[0]
+    p = deep if room else zero
+    rows, wide = np.uintp(field.shape[1]), np.uintp(field.shape[2])
+    earlier, alone = 1.0 - weight, weight == 1.0
+    planes = np.uintp(PLANES)
+    for block in prange((out.shape[0] + PLANES - 1) // PLANES):
+        bottom = np.uintp(block) * planes
+        side, row = np.empty(out.shape[2] + 1), np.empty(out.shape[2])
+        sums, below = np.empty(out.shape[2]), np.empty(out.shape[1] * out.shape[2])
         x_place, x_share = place[int(component == 0)], share[int(component == 0)]
         y_place, y_share = place[int(component == 1)], share[int(component == 1)]
         z_place, z_share = place[int(component == 2)], share[int(component == 2)]
-        for i in range(first, min(first + PLANES, n0)):
-            x = i + p
-            for j in range(n1 + 1):
-                y = j + GHOSTS
-                f, m = field[x], marks[x]
-                side_row(across, qy, component, i, j, y_place, y_share)
-                line_flux(
-                    row, across, f[y - 2, 2:-2], f[y - 1, 2:-2], f[y, 2:-2], f[y + 1, 2:-2],
-                    m[y - 1, 2:-2], m[y, 2:-2],
+        for i in range(bottom, min(bottom + planes, n0)):
+            for j in range(n1 + one):
+                at = ((i + p) * rows + j + deep) * wide + deep
+                side_row(
+                    row, n2, qy, q[1].shape, i, j, component, y_place, y_share, values, mark, at,
+                    wide,
                 )  # fmt: skip
-                if j > 0:
-                    advance(
-                        out[i, j - 1], net[i, j - 1], row, leaving, weight, start[i, j - 1],
-                        before[i, j - 1], after[i, j - 1], dt, nothing,
-                    )  # fmt: skip
+                if j > zero:
+                    n = (i * n1 + j - one) * n2
+                    for k in range(n2):
+                        sums[k] += row[k]
+                    if alone:
+                        for k in range(n2):
+                            leaving[n + k] = sums[k]
+                    else:
+                        for k in range(n2):
+                            sums[k] = weight * sums[k] + earlier * leaving[n + k]
+                    for k in range(n2):
+                        volume = high[n + k]
+                        amount = low[n + k] * first[n + k] - dt * sums[k]
+                        later[n + k] = amount / (volume if volume > nothing else 1.0)
                 if j == n1:
                     break
-                f, m = field[x, y], marks[x, y]
-                side_row(along, qz, component, i, j, z_place, z_share)
-                line_flux(side, along, f[:-3], f[1:-2], f[2:-1], f[3:], m[1:-2], m[2:-1])
+                side_row(
+                    side, n2 + one, qz, q[2].shape, i, j, component, z_place, z_share, values,
+                    mark, at, one,
+                )  # fmt: skip
                 for k in range(n2):
-                    leaving[k] = side[k + 1] - side[k] - row[k]
-                if p == 0:
+                    sums[k] = side[k + one] - side[k] - row[k]
+                if not room:
                     continue
-                for z in range(x if i == first else x + 1, x + 2):
-                    side_row(across, qx, component, z - p, j, x_place, x_share)
-                    line_flux(
-                        row, across, field[z - 2, y, 2:-2], field[z - 1, y, 2:-2],
-                        field[z, y, 2:-2], field[z + 1, y, 2:-2], marks[z - 1, y, 2:-2],
-                        marks[z, y, 2:-2],
+                n = j * n2
+                if i == bottom:
+                    side_row(
+                        row, n2, qx, q[0].shape, i, j, component, x_place, x_share, values, mark,
+                        at, rows * wide,
                     )  # fmt: skip
-                    if z == x:
-                        below[j] = row
+                    for k in range(n2):
+                        below[n + k] = row[k]
+                side_row(
+                    row, n2, qx, q[0].shape, i + one, j, component, x_place, x_share, values, mark,
+                    at + rows * wide, rows * wide,
+                )  # fmt: skip
                 for k in range(n2):
-                    leaving[k] += row[k] - below[j, k]
-                    below[j, k] = row[k]
+                    sums[k] += row[k] - below[n + k]
+                    below[n + k] = row[k]
+
+
+def line_flux_reference(
+    flux: Array, a: Array, b: Array, c: Array, d: Array, one: Marks, other: Marks
+) -> Array:
+    """`line_flux` in NumPy, of the fluxes g through the sides between b and c of a, b, c, d."""
+    forward = flux > 0.0
+    behind, upstream, downstream, ahead = np.where(forward, (a, b, c, d), (d, c, b, a))
+    bends = np.stack([behind - 2.0 * upstream + downstream, upstream - 2.0 * downstream + ahead])
+    room = np.where(bends.prod(axis=0) > 0.0, ROOM * np.abs(bends).min(axis=0), 0.0)
+    low, high = np.minimum(upstream, downstream) - room, np.maximum(upstream, downstream) + room
+    smooth = np.clip((5.0 * upstream + 2.0 * downstream - behind) / 6.0, low, high)
+    either = np.where(np.maximum(one, other) == UPSTREAM, upstream, 0.5 * (b + c))
+    return np.asarray(flux * np.where((one == CLEAR) & (other == CLEAR), smooth, either))
 
 
 def side_fluxes_reference(flux: Faces, component: int, place: Integers, share: Array) -> Faces:
-    """`side_row` in NumPy: through all sides across each axis."""
+    """Volume per time through all sides of the control volumes across each axis."""
     through = []
     for axis, q in enumerate(flux):
         own = int(axis == component)
@@ -195,20 +233,6 @@ def side_fluxes_reference(flux: Faces, component: int, place: Integers, share: A
         mean = part[:, 0] * q[..., at[:, 0]] + part[:, 1] * q[..., at[:, 1]]
         through.append(np.ascontiguousarray(np.moveaxis(mean, -1, component)))
     return through[0], through[1], through[2]
-
-
-def line_flux_reference(
-    flux: Array, a: Array, b: Array, c: Array, d: Array, one: Marks, other: Marks
-) -> Array:
-    """`line_flux` in NumPy."""
-    forward = flux > 0.0
-    behind, upstream, downstream, ahead = np.where(forward, (a, b, c, d), (d, c, b, a))
-    bends = np.stack([behind - 2.0 * upstream + downstream, upstream - 2.0 * downstream + ahead])
-    room = np.where(bends.prod(axis=0) > 0.0, ROOM * np.abs(bends).min(axis=0), 0.0)
-    low, high = np.minimum(upstream, downstream) - room, np.maximum(upstream, downstream) + room
-    smooth = np.clip((5.0 * upstream + 2.0 * downstream - behind) / 6.0, low, high)
-    either = np.where(np.maximum(one, other) == UPSTREAM, upstream, 0.5 * (b + c))
-    return np.asarray(flux * np.where((one == CLEAR) & (other == CLEAR), smooth, either))
 
 
 def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Array) -> Array:
@@ -248,12 +272,13 @@ def stage_reference(
     place: Integers,
     share: Array,
 ) -> tuple[Array, Array]:
-    """`stage` in NumPy: the component after it, and the net amount."""
+    """`stage` in NumPy: the component after it, and the net amount that left it."""
     through = side_fluxes_reference(q, component, place, share)
     leaving = weight * net_flux_reference(field, marks, *through)
-    net = leaving + ((1.0 - weight) * net if weight < 1.0 else 0.0)
-    amount = before * start - dt * net
-    return amount / np.where(after > nothing, after, 1.0), net
+    if weight < 1.0:
+        leaving += (1.0 - weight) * net
+    amount = before * start - dt * leaving
+    return amount / np.where(after > nothing, after, 1.0), leaving
 
 
 @kernel
