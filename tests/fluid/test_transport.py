@@ -69,11 +69,10 @@ class Case:
 
     def inlets(self, axis: int) -> Inlets:
         """Fluid of SPEED comes in where the rate is positive; what leaves has the fluid's own."""
-        gain, loss = (
-            at_faces(np.maximum(sign * self.rate, 0.0), axis, self.sides) for sign in (1.0, -1.0)
-        )
-        index = np.flatnonzero((gain != 0.0) | (loss != 0.0))
-        return Inlets(index, gain[index], np.full(index.size, SPEED), loss[index])
+        cells = np.flatnonzero(self.rate)
+        ways = tuple(np.maximum(sign * self.rate.reshape(-1)[cells], 0.0) for sign in (1.0, -1.0))
+        index, (gain, loss) = at_faces(cells, ways, axis, self.grid, self.sides)
+        return Inlets(index, gain, np.full(index.size, SPEED), loss)
 
     def amount(self, velocity: Array, volume: Array, axis: int) -> tuple[float, float]:
         """Sum of V u over distinct faces, m^4/s, and the sum of its parts' sizes."""

@@ -11,6 +11,8 @@ import pytest
 from flowborne.kernels.control_volumes import (
     fill_empty,
     fill_empty_reference,
+    find_guests,
+    find_guests_reference,
     find_hosts,
     find_hosts_reference,
     find_parts,
@@ -21,10 +23,14 @@ from flowborne.kernels.control_volumes import (
     join_guests_reference,
     level,
     level_reference,
+    mark_cut,
+    mark_cut_reference,
     merge_guests,
     merge_guests_reference,
     neighbour,
     neighbours_reference,
+    share_velocity,
+    share_velocity_reference,
 )
 
 from .cut_cells import face_shape
@@ -193,7 +199,48 @@ def test_small_ones_mix_with_their_neighbours_and_keep_the_sum(
 def test_parts(shape: tuple, periodic: tuple, component: int) -> None:
     """Those that are less than whole before or after."""
     before, after = (case_of(shape, periodic, component, seed) for seed in (0, 1))
-    found = find_parts(before.volumes, after.volumes, 0.1, component, before.shape, before.wraps)
+    found = find_parts(before.volumes, after.volumes, 0.1, component, before.wraps)
     expected = find_parts_reference(before.volumes, after.volumes, 0.1, component, before.wraps)
     np.testing.assert_array_equal(found, expected)
     assert 0 < found.size < before.volumes.size
+
+
+@ROOM_OR_SLAB
+def test_share_velocity(shape: tuple, periodic: tuple, component: int) -> None:
+    case = case_of(shape, periodic, component)
+    random = np.random.default_rng(7)
+    guests = np.sort(random.permutation(case.volumes.size)[:20])
+    hosts, shares = random.permutation(case.volumes.size)[:20], random.random(20)
+    field = random.standard_normal(case.shape)
+    expected = share_velocity_reference(field, guests, hosts, shares)
+    share_velocity(field, guests, hosts, shares)
+    np.testing.assert_allclose(field, expected, rtol=1e-14)
+
+
+@ROOM_OR_SLAB
+def test_mark_cut(shape: tuple, periodic: tuple, component: int) -> None:
+    case = case_of(shape, periodic, component)
+    depth = np.where(case.shape > 1, 2, 0)
+    marks = np.ones(case.shape + 2 * depth, np.uint8)
+    listed = case.listed(0.002)
+    assert listed.size > 0
+    expected = mark_cut_reference(marks, listed, case.shape, case.wraps)
+    mark_cut(marks, listed, case.shape, case.wraps)
+    np.testing.assert_array_equal(marks, expected)
+
+
+@ROOM_OR_SLAB
+@pytest.mark.parametrize("told", [(0, 0), (1, 0), (1, 1)])
+def test_find_guests(shape: tuple, periodic: tuple, component: int, told: tuple) -> None:
+    case, ring = case_of(shape, periodic, component), periodic[component]
+    prescribed = np.array((0, 0) if ring else told, np.uint8)
+    rest = case.opened, case.volumes, component, prescribed, ring, 1.5, 0.01
+    own, part, driven = find_guests_reference(*rest)
+    assert 0 < own.size < case.volumes.size
+    mark = np.full(case.shape, 7, np.uint8)
+    found, share = find_guests(mark, *rest)
+    np.testing.assert_array_equal(found, own)
+    np.testing.assert_allclose(share, part, rtol=1e-14)
+    inner = slice(None, -1 if ring else None)
+    one, other = (np.moveaxis(m, component, 0)[inner] for m in (mark, driven))
+    np.testing.assert_array_equal(one, other)

@@ -1,86 +1,134 @@
-"""What flows out of control volumes, against NumPy."""
+"""What flows out of control volumes and what is left in them, against NumPy."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from flowborne.fluid.transport import neighbours
 from flowborne.kernels.flux import (
     CLEAR,
     CUT,
     GHOSTS,
     UPSTREAM,
-    advance,
-    advance_reference,
-    net_flux,
-    net_flux_reference,
+    largest_crossing,
+    largest_crossing_reference,
+    pad_field,
+    side_fluxes_reference,
+    stage,
+    stage_reference,
 )
 
-SHAPES = [(5, 7, 6), (1, 9, 8), (3, 4, 5)]
+from .cut_cells import face_shape
+
+Shape = tuple[int, ...]
+
+CASES = [((5, 7, 6), c) for c in range(3)] + [((1, 9, 8), 1), ((1, 9, 8), 2), ((17, 4, 5), 0)]
+COMPONENTS = pytest.mark.parametrize(("cells", "component"), CASES)
+ENDS = pytest.mark.parametrize("periodic", [False, True])
 
 
-def padded(shape: tuple[int, int, int]) -> tuple[int, ...]:
+def padded(shape: Shape) -> Shape:
     return tuple(n + 2 * GHOSTS * (n > 1) for n in shape)
 
 
-def fluxes(shape: tuple[int, int, int], random: np.random.Generator) -> list[np.ndarray]:
-    """Random through all sides; none across the first of a slab."""
-    sizes = [tuple(n + (axis == d) for d, n in enumerate(shape)) for axis in range(3)]
-    return [random.standard_normal(size) * (shape[d] > 1) for d, size in enumerate(sizes)]
+def fluxes(cells: Shape, random: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """Random through all faces; none across the first axis of a slab."""
+    return tuple(random.standard_normal(face_shape(cells, a)) * (cells[a] > 1) for a in range(3))
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+def net_of(field: np.ndarray, marks: np.ndarray, q: tuple, component: int) -> np.ndarray:
+    """What leaves each control volume per time."""
+    shape = face_shape((q[1].shape[0], q[0].shape[1], q[0].shape[2]), component)
+    nothing, net = np.zeros(shape), np.full(shape, np.nan)
+    sides = neighbours(shape[component], periodic=False)
+    stage(np.empty(shape), net, 1.0, *[nothing] * 3, 1.0, 1e-9, field, marks, q, component, *sides)
+    return net
+
+
+@COMPONENTS
+@ENDS
 @pytest.mark.parametrize("marked", [(CLEAR,), (CUT,), (CUT, CLEAR, CLEAR, CLEAR, UPSTREAM)])
-def test_net_flux(shape: tuple[int, int, int], marked: tuple[int, ...]) -> None:
-    random = np.random.default_rng(1)
+@pytest.mark.parametrize("weight", [1.0, 0.5])
+def test_stage(
+    cells: Shape, component: int, periodic: bool, marked: tuple[int, ...], weight: float
+) -> None:
+    """Some volumes hold nothing afterwards, and what is left of their amount is given."""
+    random, shape = np.random.default_rng(1), face_shape(cells, component)
     field = random.standard_normal(padded(shape))
     marks = random.choice(np.array(marked, np.uint8), padded(shape))
-    through, out = fluxes(shape, random), np.full(shape, np.nan)
-    net_flux(out, field, marks, *through)
-    np.testing.assert_allclose(out, net_flux_reference(field, marks, *through), atol=1e-13)
+    start, before, after, net = random.standard_normal((4, *shape))
+    after[after < 0.3] = 0.0
+    sides = neighbours(shape[component], periodic)
+    rest = 0.3, 1e-9, field, marks, fluxes(cells, random), component, *sides
+    value, total = stage_reference(net, weight, start, before, after, *rest)
+    out = np.full(shape, np.nan)
+    stage(out, net, weight, start, before, after, *rest)
+    if weight == 1.0:
+        np.testing.assert_allclose(net, total, atol=1e-13)
+    np.testing.assert_allclose(out, value, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_a_uniform_field_leaves_with_the_volume(shape: tuple[int, int, int]) -> None:
-    random = np.random.default_rng(2)
+@COMPONENTS
+@ENDS
+def test_sides_of_a_control_volume(cells: Shape, component: int, periodic: bool) -> None:
+    """What flows into them is half of what flows into both their cells."""
+    q = fluxes(cells, np.random.default_rng(2))
+    if periodic:
+        np.moveaxis(q[component], component, 0)[-1] = np.moveaxis(q[component], component, 0)[0]
+    sides = neighbours(cells[component] + 1, periodic)
+    through = side_fluxes_reference(q, component, *sides)
+    inward = sum(np.diff(flux, axis=axis) for axis, flux in enumerate(q))
+    ends = [(int(axis == component),) * 2 for axis in range(3)]
+    wide = np.moveaxis(np.pad(inward, ends, mode="wrap" if periodic else "constant"), component, 0)
+    found = sum(np.diff(flux, axis=axis) for axis, flux in enumerate(through))
+    expected = np.moveaxis(0.5 * (wide[1:] + wide[:-1]), 0, component)
+    np.testing.assert_allclose(found, expected, atol=1e-13)
+
+
+@COMPONENTS
+def test_a_uniform_field_leaves_with_the_volume(cells: Shape, component: int) -> None:
+    random, shape = np.random.default_rng(2), face_shape(cells, component)
     marks = random.integers(0, 3, padded(shape)).astype(np.uint8)
-    through, out = fluxes(shape, random), np.empty(shape)
-    net_flux(out, np.full(padded(shape), 0.7), marks, *through)
+    q = fluxes(cells, random)
+    net = net_of(np.full(padded(shape), 0.7), marks, q, component)
+    through = side_fluxes_reference(q, component, *neighbours(shape[component], periodic=False))
     volume = sum(np.diff(g, axis=axis) for axis, g in enumerate(through))
-    np.testing.assert_allclose(out, 0.7 * volume, atol=1e-13)
+    np.testing.assert_allclose(net, 0.7 * volume, atol=1e-13)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_means_of_a_parabola_are_carried_exactly(sign: float) -> None:
     """Third order: where nothing limits it, the value at a side is that of the parabola."""
-    shape, edges = (1, 4, 12), np.arange(-2.0, 15.0)
+    edges = np.arange(-2.0, 15.0)
     whole = 1.3 + 4.0 * edges + 0.2 * edges**3 / 3.0
-    field = np.broadcast_to(np.diff(whole), padded(shape)).copy()
-    out, through = np.empty(shape), [np.zeros((2, 4, 12)), np.zeros((1, 5, 12))]
-    through.append(np.full((1, 4, 13), sign))
-    net_flux(out, field, np.full(padded(shape), CLEAR, np.uint8), *through)
+    field = np.broadcast_to(np.diff(whole), padded((1, 4, 12))).copy()
+    q = np.zeros((2, 3, 12)), np.zeros((1, 4, 12)), np.full((1, 3, 13), sign)
+    net = net_of(field, np.full(field.shape, CLEAR, np.uint8), q, 1)
     value = 4.0 + 0.2 * edges[2:-2] ** 2
-    np.testing.assert_allclose(out[0, 1], sign * np.diff(value), atol=1e-12)
+    np.testing.assert_allclose(net[0, 1], sign * np.diff(value), atol=1e-12)
 
 
 def test_a_value_between_two_never_leaves_them_at_a_jump() -> None:
     """A step of the field carried along stays within its two values."""
-    shape, through = (1, 1, 20), [np.zeros((2, 1, 20)), np.zeros((1, 2, 20)), np.ones((1, 1, 21))]
-    marks = np.full((1, 5, 24), CLEAR, np.uint8)
-    field = np.tile((np.arange(24) > 11).astype(float), (1, 5, 1))
-    out = np.empty(shape)
-    net_flux(out, np.ascontiguousarray(field), marks[:, :, :], *through)
-    assert out.sum() == pytest.approx(1.0)
-    assert out.min() > -1e-14
+    q = np.zeros((2, 2, 20)), np.zeros((1, 3, 20)), np.ones((1, 2, 21))
+    field = np.tile((np.arange(24) > 11).astype(float), (1, 7, 1))
+    net = net_of(field, np.full(field.shape, CLEAR, np.uint8), q, 1)[0, 1]
+    assert net.sum() == pytest.approx(1.0)
+    assert net.min() > -1e-14
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_advance(shape: tuple[int, int, int]) -> None:
-    """Some volumes hold nothing afterwards, and what is left of their amount is given."""
-    field, before, after, net, out = np.random.default_rng(3).standard_normal((5, *shape))
-    after[after < 0.3] = 0.0
-    advance(out, field, before, net, 0.3, after, 1e-9)
-    expected = advance_reference(field, before, net, 0.3, after, 1e-9)
-    np.testing.assert_allclose(out, expected, rtol=1e-14)
-    left = (before * field - 0.3 * net)[after == 0.0]
-    np.testing.assert_allclose(out[after == 0.0], left, atol=1e-15)
+@pytest.mark.parametrize("shape", [(5, 7, 6), (1, 9, 8)])
+def test_pad_field(shape: Shape) -> None:
+    values, along = np.random.default_rng(3).standard_normal((2, *shape))
+    out = np.full(padded(shape), np.nan)
+    pad_field(out, values, along, 0.3)
+    inside = np.isfinite(out)
+    np.testing.assert_array_equal(out[inside].reshape(shape), values + 0.3 * along)
+    assert not inside[:, :GHOSTS].any()
+
+
+@pytest.mark.parametrize("cells", [(5, 7, 6), (9, 8, 1)])
+def test_largest_crossing(cells: Shape) -> None:
+    q = fluxes(cells, np.random.default_rng(4))
+    assert largest_crossing(*q) == pytest.approx(largest_crossing_reference(q), rel=1e-14)

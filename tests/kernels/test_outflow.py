@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from flowborne.kernels.outflow import outflow, outflow_reference
+from flowborne.kernels.outflow import net_out, outflow, outflow_reference
 from flowborne.kernels.pressure_gradient import push_faces, push_faces_reference
 from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
@@ -26,6 +26,8 @@ def faces(shape: tuple[int, int, int], seed: int) -> list[np.ndarray]:
 def test_outflow(shape: tuple[int, int, int]) -> None:
     velocity, opened, out = faces(shape, 0), faces(shape, 1), np.empty(shape)
     outflow(out, *velocity, *opened)
+    np.testing.assert_allclose(out, outflow_reference(velocity, opened), atol=1e-14)
+    net_out(out, *(a * u for a, u in zip(opened, velocity, strict=True)))
     np.testing.assert_allclose(out, outflow_reference(velocity, opened), atol=1e-14)
 
 

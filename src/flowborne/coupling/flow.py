@@ -33,6 +33,13 @@ from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.scalars import carry_scalars, cells_in
 from flowborne.fluid.transport import Transport, carry_component
+from flowborne.kernels.faces import (
+    fill_empty_faces,
+    gained,
+    move_on,
+    still_to_come,
+    weighted_change,
+)
 from flowborne.solids.dynamics import kinematics
 
 
@@ -86,6 +93,20 @@ def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) 
         own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
         total[axis] = float(np.vdot(mass[axis][own], velocity[axis][own]))
     return total
+
+
+def momentum_change(
+    before: Faces, after: Faces, mass: Faces, grid: Grid, sides: Boundaries
+) -> tuple[Array, float]:
+    """(3,) what linear momentum changes by between two velocities, and the sum of its parts' sizes,
+    N s."""
+    total, size = np.zeros(3), 0.0
+    for axis in grid.axes:
+        own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
+        fields = (np.ascontiguousarray(f[axis][own]) for f in (mass, before, after))
+        total[axis], change = weighted_change(*fields)
+        size += change
+    return total, size
 
 
 def kinetic_energy(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> float:
@@ -152,17 +173,9 @@ def carry_in_flux_form(
     drunk = [np.zeros(3) for _ in jets]
     for axis in grid.axes:
         inlets = inlets_across(axis, jets, sources, grid, sides)
-        along = state.acceleration[axis]
-        ahead = velocity[axis] - state.velocity[axis]
-        inlets = inlets_across(axis, jets, sources, grid, sides)
-        along = state.acceleration[axis]
-        ahead = velocity[axis] - state.velocity[axis]
-        import os
-        if os.environ.get("AH")=="0": ahead=None
-        if os.environ.get("AH")=="2":
-            v0=transport.before.volume[axis]; beside = parts(v0, transport.after.volume[axis], axis, grid, sides)
-            ahead.reshape(-1)[beside] = 0.0
-        carried = carry_component(velocity[axis], along, ahead, axis, transport, inlets, grid, sides)
+        along = np.empty_like(arrived[axis])
+        still_to_come(along, state.acceleration[axis], velocity[axis], state.velocity[axis], dt)
+        carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
         arrived[axis][:] = carried.velocity
         crossed[axis] = fluid.density * carried.crossed
         brought = dt * float(inlets.gain @ inlets.velocity)
@@ -315,13 +328,14 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
         if source.volume_rate is None or not source.active(time):
             continue
         box = cells_in(source, grid)
-        clear = np.zeros(grid.shape, bool)
-        clear[box] = True
+        clear = np.ones(rate[box].shape, bool)
         for axis in grid.axes:
-            lower = np.delete(opened[axis], -1, axis) > 0.0
-            clear &= lower | (np.delete(opened[axis], 0, axis) > 0.0)
+            wide = list(box)
+            wide[axis] = slice(box[axis].start, box[axis].stop + 1)
+            part = opened[axis][tuple(wide)] > 0.0
+            clear &= part[edge(axis, slice(None, -1))] | part[edge(axis, slice(1, None))]
         if clear.any():
-            rate[clear] += source.volume_rate / np.count_nonzero(clear)
+            rate[box][clear] += source.volume_rate / np.count_nonzero(clear)
     return rate
 
 
@@ -343,21 +357,17 @@ def settle_state(
     fluid, state = world.flow()
     grid, sides = fluid.grid, fluid.boundaries
     for axis in grid.axes:
-        closed = cut.open[axis] == 0.0
-        velocity[axis][closed] = inside[axis][closed]
+        fill_empty_faces(velocity[axis], carried.volumes.merged[axis], inside[axis])
     carried.volumes.follow(velocity, grid)
     for axis in grid.axes:
-        u, was = velocity[axis], state.velocity[axis]
-        change = u - was
-        given = (started[axis] - was + u - carried.velocity[axis]) / dt
+        u, given, carrier = velocity[axis], state.acceleration[axis], state.carrier[axis]
         volume = carried.volumes.volume[axis]
         beside = parts(volume, volume, axis, grid, sides)
-        change.reshape(-1)[beside], given.reshape(-1)[beside] = 0.0, 0.0
+        gained(given, u, carried.velocity[axis], started[axis], state.velocity[axis], dt)
+        move_on(state.velocity[axis], u, carrier)
+        given.reshape(-1)[beside], carrier.reshape(-1)[beside] = 0.0, u.reshape(-1)[beside]
         if sides.periodic()[axis]:
-            given[edge(axis, -1)] = given[edge(axis, 0)]
-            change[edge(axis, -1)] = change[edge(axis, 0)]
-        state.acceleration[axis][:] = given
-        state.carrier[axis][:] = u + 0.5 * change
-        state.velocity[axis][:] = u
+            first, last = edge(axis, 0), edge(axis, -1)
+            given[last], carrier[last] = given[first], u[last] + (carrier[first] - u[first])
     state.cells = carried.volumes.cells
     state.pose = world.solid.q.copy()

@@ -56,37 +56,40 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     size = 6 * world.setup.solid.nbody + cut.skins.vertices.size
     if fluid.advection == "semi-lagrangian" or moved_since(world):
         return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
-    half = 0.5 * likely(driving(state.pressure, fluid), driving(state.earlier, fluid))
+    pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
+    rate, still = accelerated(cut.open, mass, grid), faces_of([np.zeros_like(m) for m in mass])
+    kick, before = still, faces_of([k.copy() for k in still])
+    push(kick, rate, pressure, grid, sides, dt)
+    push(before, rate, earlier, grid, sides, dt)
+    both = sum(float((m * k * b).sum()) for m, k, b in zip(mass, kick, before, strict=True))
+    square = sum(float((m * k * k).sum()) for m, k in zip(mass, kick, strict=True))
+    part = 0.5 * likely(both / square) if square > 0.0 else 0.0
+    half = part * pressure
     state.pressure -= half
-    velocity = faces_of([u.copy() for u in state.velocity])
-    push(velocity, accelerated(cut.open, mass, grid), half, grid, sides, dt)
+    velocity = faces_of([u + part * k for u, k in zip(state.velocity, kick, strict=True)])
     volumes.follow(velocity, grid)
     return Kick(velocity, half, pressure_push(cut, dt * half, size), start)
 
 
-def driving(pressure: Array, fluid: Fluid) -> Array:
-    """The pressure without what balances the body force, Pa; in a box without open sides with mean
-    0 over the cells that have any, since its level means nothing there."""
-    held = pressure != 0.0
-    rest = pressure.copy()
-    for axis, x in enumerate(fluid.grid.cell_coordinates()):
-        if axis in fluid.grid.axes and not fluid.boundaries.periodic()[axis]:
-            along = [1, 1, 1]
-            along[axis] = -1
-            rest -= fluid.density * fluid.body_force[axis] * x.reshape(along)
-    if not any(side.kind == "open" for a in fluid.grid.axes for side in fluid.boundaries.pair(a)):
-        rest -= rest.sum(where=held) / max(1, np.count_nonzero(held))
-    return np.where(held, rest, 0.0)
+def likely(earlier: float) -> float:
+    """What part of a pressure the next one has at least, when the one before had `earlier` of it.
 
-
-def likely(pressure: Array, earlier: Array) -> Array:
-    """What the pressure of the next step is at least, as the last two tell.
-
-    The last one, or what the straight line through both comes to where it falls; no more than
-    twice the earlier one, and 0 where they differ in sign. A sudden impulse, or one that has just
-    ended, is not taken for what goes on.
+    All of it, or what the straight line through both comes to where it falls; no more than twice
+    what it had. A sudden impulse, or one that has just ended, is not taken for what goes on.
     """
-    ahead = 2.0 * pressure - earlier
-    least = np.minimum(np.abs(pressure), np.minimum(np.abs(ahead), 2.0 * np.abs(earlier)))
-    same = (pressure * earlier > 0.0) & (pressure * ahead > 0.0)
-    return np.where(same, np.copysign(least, pressure), 0.0)
+    return max(0.0, min(1.0, 2.0 - earlier, 2.0 * earlier))
+
+
+def driving(pressure: Array, fluid: Fluid) -> Array:
+    """The pressure without what balances the body force, which moves nothing, Pa."""
+    grid, held = fluid.grid, pressure != 0.0
+    rest = pressure
+    for axis in grid.axes:
+        low, high = (side.kind for side in fluid.boundaries.pair(axis))
+        slope = fluid.density * fluid.body_force[axis]
+        if slope == 0.0 or low == "periodic" or low == high == "open":
+            continue
+        x = grid.cell_coordinates()[axis] - (grid.upper if high == "open" else grid.origin)[axis]
+        along = [-1 if a == axis else 1 for a in range(3)]
+        rest = rest - np.where(held, slope * x.reshape(along), 0.0)
+    return rest

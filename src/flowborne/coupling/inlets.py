@@ -8,10 +8,9 @@ import numpy as np
 
 from flowborne.coupling.mouths import Jet
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.control_volumes import means
-from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.transport import NO_INLETS, Inlets
+from flowborne.kernels.arrays import Integers
 
 
 def inlets_across(
@@ -25,21 +24,22 @@ def inlets_across(
 
     A mouth that drinks, and a source, take or bring fluid as fast as that around.
     """
-    if not jets and not sources.any():
-        return NO_INLETS
-    gain, weighted, local = (np.zeros(grid.shape) for _ in range(3))
-    local -= sources
+    cells = np.flatnonzero(sources)
     for jet in jets:
-        rates = np.zeros(grid.shape)
-        rates.reshape(-1)[jet.cells] = jet.rates
+        cells = np.union1d(cells, jet.cells)
+    if cells.size == 0:
+        return NO_INLETS
+    gain, weighted, local = np.zeros(cells.size), np.zeros(cells.size), -sources.reshape(-1)[cells]
+    for jet in jets:
+        at = np.searchsorted(cells, jet.cells)
         if jet.rate > 0.0:
-            gain += rates
-            weighted += rates * (jet.skin[axis] + jet.velocity[axis])
+            gain[at] += jet.rates
+            weighted[at] += jet.rates * (jet.skin[axis] + jet.velocity[axis])
         else:
-            local -= rates
-    gains, speeds, losses = (at_faces(cells, axis, sides) for cells in (gain, weighted, local))
-    index = np.flatnonzero((gains != 0.0) | (losses != 0.0))
-    gains, speeds, losses = gains[index], speeds[index], losses[index]
+            local[at] -= jet.rates
+    index, (gains, speeds, losses) = at_faces(cells, (gain, weighted, local), axis, grid, sides)
+    used = (gains != 0.0) | (losses != 0.0)
+    index, gains, speeds, losses = index[used], gains[used], speeds[used], losses[used]
     speeds = np.divide(speeds, gains, out=np.zeros(index.size), where=gains != 0.0)
     return Inlets(index, gains, speeds, losses)
 
@@ -50,9 +50,10 @@ def taken_by(
     """What a mouth that drinks took of volume times velocity across `axis` in a step, m^4/s."""
     if jet.rate >= 0.0:
         return 0.0
-    rates = np.zeros(grid.shape)
-    rates.reshape(-1)[jet.cells] = -jet.rates
-    share = at_faces(rates, axis, sides)[inlets.index]
+    index, (rates,) = at_faces(jet.cells, (-jet.rates,), axis, grid, sides)
+    share, at = np.zeros(inlets.index.size), np.searchsorted(inlets.index, index)
+    known = (at < inlets.index.size) & (inlets.index[at.clip(0, inlets.index.size - 1)] == index)
+    share[at[known]] = rates[known]
     share = np.divide(share, inlets.loss, out=np.zeros(share.size), where=inlets.loss != 0.0)
     return float(share @ drained)
 
@@ -64,10 +65,18 @@ def after_drinking(jet: Jet, taken: Array, dt: float) -> Jet:
     return replace(jet, velocity=taken / (-jet.rate * dt) - jet.skin)
 
 
-def at_faces(cells: Array, axis: int, sides: Boundaries) -> Array:
-    """(n,) half of what comes into each cell for both of its faces across `axis`; the last face
-    along a periodic axis, which is the first one, has none."""
-    values = means(cells, axis, sides.periodic()[axis])
+def at_faces(
+    cells: Integers, values: tuple[Array, ...], axis: int, grid: Grid, sides: Boundaries
+) -> tuple[Integers, list[Array]]:
+    """Half of what comes into each of some cells for both of its faces across `axis`: the faces,
+    flat and ascending, and the sums on them. The last face along a periodic axis is the first."""
+    at = np.stack(np.unravel_index(cells, grid.shape))
+    above = at.copy()
+    above[axis] += 1
     if sides.periodic()[axis]:
-        values[edge(axis, -1)] = 0.0
-    return values.reshape(-1)
+        above[axis] %= grid.shape[axis]
+    shape = grid.face_shape(axis)
+    both = [np.ravel_multi_index(tuple(place), shape) for place in (at, above)]
+    index, which = np.unique(np.concatenate(both), return_inverse=True)
+    sums = [np.bincount(which, np.tile(v, 2), index.size) for v in values]
+    return index, [np.asarray(0.5 * total, float) for total in sums]

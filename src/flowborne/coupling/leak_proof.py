@@ -19,15 +19,21 @@ import numpy as np
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.world import Fluid
+from flowborne.fluid.boundary import Boundaries, BoundaryInflow
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import Array, Faces, faces_of
-from flowborne.fluid.projection import accelerated, face_weights, push
-from flowborne.kernels.outflow import outflow
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.projection import push
+from flowborne.kernels.faces import mean_flux
+from flowborne.kernels.outflow import net_out
 from flowborne.solvers.pressure import PressureSystem
 
 TOLERANCE = 1e-9
-"""Relative residual of the solve, of hypothetical steps too: what is left of it stays in the
-volumes until the next step, and the smallest of them must not feel it."""
+"""Relative residual at which the solve ends, of hypothetical steps too: what is left of it stays in
+the volumes until the next step, and the smallest of them must not feel it."""
+
+LEFT = 1e-10
+"""Parts of a whole cell that may be left of the volume of all cells (the root of the sum of their
+squares), where that is reached first."""
 
 MOST = 2.0
 """Factor on the volumes of a closed region beyond which it is a pocket that bodies crush or open,
@@ -53,32 +59,40 @@ def leak_proof_flux(
     time           s at the middle of the step
     """
     grid, sides = fluid.grid, fluid.boundaries
-    opened = faces_of([0.5 * (a + b) for a, b in zip(before.open, after.open, strict=True)])
-    mass = unit_mass(opened, fluid)
-    system = PressureSystem(face_weights(opened, mass, grid, sides), sides.periodic())
-    u = faces_of([values.copy() for values in velocity])
-    impose_sides(u, grid, sides, time)
-    rhs = volume_rates(system, cells, after.volume, rate, dt)
-    net = np.empty(grid.shape)
-    outflow(net, *u, *opened)
-    rhs += grid.face_area * net
-    solution = system.solve(-rhs, None, tolerance=TOLERANCE)
-    push(u, accelerated(opened, mass, grid), solution.pressure, grid, sides, 1.0)
-    flux = faces_of([grid.face_area * a * v for a, v in zip(opened, u, strict=True)])
-    outflow(net, *u, *opened)
-    return flux, cells + dt * (rate - grid.face_area * net)
+    flux, weights = grid.zeros_faces(), grid.zeros_faces()
+    for axis in grid.axes:
+        ends = before.open[axis], after.open[axis]
+        mean_flux(flux[axis], weights[axis], velocity[axis], *ends, grid.face_area, stiffness(grid))
+    drive_sides(flux, weights, grid, sides, time)
+    system = PressureSystem(weights, sides.periodic())
+    rhs, net = volume_rates(system, cells, after.volume, rate, dt), np.empty(grid.shape)
+    net_out(net, *flux)
+    rhs += net
+    left = LEFT * grid.cell_volume / dt
+    solution = system.solve(-rhs, None, tolerance=TOLERANCE, absolute=left)
+    push(flux, weights, solution.pressure, grid, sides, 1.0)
+    net_out(net, *flux)
+    return flux, cells + dt * (rate - net)
 
 
-def unit_mass(opened: Faces, fluid: Fluid) -> Faces:
-    """a V of every face, half of it on the sides of the domain."""
-    masses = []
-    for axis in range(3):
-        mass = fluid.grid.cell_volume * opened[axis]
-        if not fluid.boundaries.periodic()[axis]:
-            mass[edge(axis, 0)] *= 0.5
-            mass[edge(axis, -1)] *= 0.5
-        masses.append(mass)
-    return faces_of(masses)
+def stiffness(grid: Grid) -> float:
+    """Weight of a wholly open face, (a A)^2 / (a V): of unit density."""
+    return grid.face_area**2 / grid.cell_volume
+
+
+def drive_sides(flux: Faces, weights: Faces, grid: Grid, sides: Boundaries, time: float) -> None:
+    """Set what the sides of the domain let through, and the weights there, in place.
+
+    Half a control volume belongs to a face on a side; one whose flux is prescribed has no weight.
+    """
+    impose_sides(flux, grid, sides, time)
+    for axis in grid.axes:
+        for end, side in enumerate(sides.pair(axis)):
+            layer = edge(axis, -end)
+            if isinstance(side, BoundaryInflow):
+                flux[axis][layer] *= weights[axis][layer] * (grid.face_area / stiffness(grid))
+            if side.kind != "periodic":
+                weights[axis][layer] *= 2.0 if side.kind == "open" else 0.0
 
 
 def volume_rates(

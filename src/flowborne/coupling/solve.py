@@ -34,9 +34,10 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import accelerated, face_weights, push
 from flowborne.kernels.arrays import Integers
+from flowborne.kernels.faces import largest_open
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import Driven, within_limits
@@ -161,7 +162,8 @@ def solve_together(
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    weights = face_weights(cut.open, mass, fluid.grid, fluid.boundaries)
+    moved_by = accelerated(cut.open, mass, fluid.grid)
+    weights = face_weights(cut.open, moved_by, fluid.grid, fluid.boundaries)
     mobility = response(pose, driven)
     yielding = give_way(cut, mobility, fluid.grid)
     matrix = PressureSystem(weights, fluid.boundaries.periodic(), reaction=yielding)
@@ -203,7 +205,8 @@ def solve_together(
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
-    after = subtract_pressure_gradient(smooth, solution.pressure, mass, cut, fluid)
+    after = faces_of([u.copy() for u in smooth])
+    push(after, moved_by, solution.pressure, fluid.grid, fluid.boundaries, 1.0)
     moved = start + term.response.times(on_solids)
     projected = Projected(
         after,
@@ -212,7 +215,7 @@ def solve_together(
         iterations,
         solution.residual,
         largest_divergence(after, cut, moved, rate, fluid),
-        max(largest_speed(after[axis], cut.open[axis]) for axis in fluid.grid.axes),
+        max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes),
     )
     left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
@@ -264,16 +267,6 @@ def net_outflow(velocity: Faces, cut: Geometry, rate: Array, fluid: Fluid) -> Ar
     return net
 
 
-def subtract_pressure_gradient(
-    velocity: Faces, pressure: Array, mass: Faces, cut: Geometry, fluid: Fluid
-) -> Faces:
-    """u - (1/rho) G p^ for p^ (nx, ny, nz), Pa s, and the mass (kg) of each face."""
-    after = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
-    rate = accelerated(cut.open, mass, fluid.grid)
-    push(after, rate, pressure, fluid.grid, fluid.boundaries, 1.0)
-    return after
-
-
 def largest_divergence(
     velocity: Faces, cut: Geometry, moving: Array, rate: Array, fluid: Fluid
 ) -> float:
@@ -287,8 +280,3 @@ def rounding_floor(velocity: Faces, grid: Grid) -> float:
     """Norm over all cells of what rounding leaves of the net outflow, m^3/s."""
     fastest = max(max(float(u.max()), -float(u.min())) for u in velocity)
     return float(ROUNDING * grid.face_area * fastest * np.sqrt(np.prod(grid.shape)))
-
-
-def largest_speed(velocity: Array, opened: Array) -> float:
-    """Largest |velocity|, m/s, on the faces across an axis that are not wholly closed."""
-    return float(np.abs(velocity).max(where=opened > 0.0, initial=0.0))

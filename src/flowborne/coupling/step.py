@@ -13,6 +13,7 @@ from flowborne.coupling.flow import (
     face_masses,
     fluid_momentum,
     forced,
+    momentum_change,
     settle_state,
     volumes_of,
 )
@@ -33,7 +34,7 @@ from flowborne.coupling.solve import Solved, solve_bodies, solve_together
 from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import Setup, World
-from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.grid import Array, Faces
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
 from flowborne.solids.flesh_dynamics import assemble_flesh
 from flowborne.solids.flesh_solve import prescribe_flesh
@@ -268,15 +269,13 @@ def momentum_balance(
     assert projected is not None
     assert before is not None
     dt, grid, boundaries = solved.driven.system.dt, fluid.grid, fluid.boundaries
-    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     pressed = fluid_momentum(before, mass, grid, boundaries)
-    pushed = faces_of([u - b for u, b in zip(projected.velocity, before, strict=True)])
-    moved = sum(float(np.vdot(mass[axis], np.abs(pushed[axis]))) for axis in grid.axes)
+    taken, moved = momentum_change(before, projected.velocity, mass, grid, boundaries)
+    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     first = 6 * world.setup.solid.nbody
     forces = linear(projected.impulse, first)
     sides, exchanged = dt * side_push(projected.pressure, grid, boundaries), forces.sum(axis=0)
     scale = float(np.abs(forces).sum()) + moved
-    taken = fluid_momentum(pushed, mass, grid, boundaries)
     missing = float(np.abs(exchanged + taken - sides).max())
     sides += dt * side_push(kick.pressure, grid, boundaries)
     exchanged += linear(kick.impulse, first).sum(axis=0)

@@ -19,8 +19,16 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers
-from flowborne.kernels.control_volumes import find_hosts, find_parts, follow_hosts, merge_guests
+from flowborne.kernels.arrays import Integers, Marks
+from flowborne.kernels.control_volumes import (
+    find_guests,
+    find_hosts,
+    find_parts,
+    follow_hosts,
+    merge_guests,
+    share_velocity,
+)
+from flowborne.kernels.faces import face_means
 
 WHOLE = 0.99
 """Control volumes of this part of the largest one count as uncut."""
@@ -61,17 +69,15 @@ class ControlVolumes:
     def mean_velocity(self, velocity: Array, axis: int) -> Array:
         """That of each control volume across `axis`, guests with what goes with their hosts."""
         mean = velocity.copy()
-        flat, share = mean.reshape(-1), self.shares[axis]
-        own, host = flat[self.guests[axis]], flat[self.hosts[axis]]
-        flat[self.guests[axis]] = own + share * (host - own)
+        share_velocity(mean, self.guests[axis], self.hosts[axis], self.shares[axis])
         return mean
 
 
 def means(cells: Array, axis: int, periodic: bool) -> Array:
     """Mean of both cells of each face across `axis`; 0 beyond the sides of the domain."""
-    ends = [(int(a == axis), int(a == axis)) for a in range(3)]
-    wide = np.pad(cells, ends, mode="wrap" if periodic else "constant")
-    return np.asarray(0.5 * (wide[edge(axis, slice(None, -1))] + wide[edge(axis, slice(1, None))]))
+    out = np.empty([n + int(a == axis) for a, n in enumerate(cells.shape)])
+    face_means(out, np.ascontiguousarray(cells), axis, periodic)
+    return out
 
 
 def wrapping(component: int, grid: Grid, boundaries: Boundaries) -> Integers:
@@ -80,31 +86,10 @@ def wrapping(component: int, grid: Grid, boundaries: Boundaries) -> Integers:
     return counts * np.array(boundaries.periodic(), np.int64)
 
 
-def prescribed_layers(component: int, boundaries: Boundaries) -> list[tuple[int | slice, ...]]:
-    """Index of each layer of faces whose normal velocity a side of the domain prescribes."""
-    pair = boundaries.pair(component)
-    return [
-        edge(component, -1 if end else 0)
-        for end, side in enumerate(pair)
-        if side.kind not in ("open", "periodic")
-    ]
-
-
-def find_guests(
-    opened: Array, volume: Array, axis: int, periodic: bool, grid: Grid
-) -> tuple[Integers, Array]:
-    """Flat indices of the guests among the faces across `axis`, and which part of each is one.
-
-    opened  open part of each face, below 0 where a side of the domain prescribes the velocity
-    """
-    pushed = NARROW * grid.cell_volume * opened
-    guest = (opened >= 0.0) & (volume != 0.0) & ((pushed < volume) | (pushed == 0.0))
-    if periodic:
-        guest[edge(axis, -1)] = False
-    own = np.flatnonzero(guest)
-    closed = pushed.reshape(-1)[own] == 0.0
-    ratio = pushed.reshape(-1)[own] / np.where(closed, 1.0, volume.reshape(-1)[own])
-    return own, np.where(closed, 1.0, 1.0 - ratio)
+def prescribed_ends(component: int, boundaries: Boundaries) -> Marks:
+    """(2,) 1 where the lower or upper side across an axis prescribes the normal velocity."""
+    kinds = [side.kind for side in boundaries.pair(component)]
+    return np.array([kind not in ("open", "periodic") for kind in kinds], np.uint8)
 
 
 def settled(guests: Integers, hosts: Integers, shares: Array) -> tuple[Integers, Integers, Array]:
@@ -125,13 +110,10 @@ def control_volumes(
         total, none = volume.copy(), np.zeros(0, np.int64)
         own, host, part = none, none, np.zeros(0)
         if axis in grid.axes:
-            driven = opened[axis].copy()
-            for layer in prescribed_layers(axis, boundaries):
-                driven[layer] = -1.0
-            wraps = wrapping(axis, grid, boundaries)
-            driven[(volume <= NOTHING * grid.cell_volume) & (driven > 0.0)] = 0.0
-            own, part = find_guests(driven, volume, axis, periodic[axis], grid)
-            driven.reshape(-1)[own] = 0.0
+            wraps, driven = wrapping(axis, grid, boundaries), np.empty(volume.shape, np.uint8)
+            narrow, nothing = NARROW * grid.cell_volume, NOTHING * grid.cell_volume
+            told, ring = prescribed_ends(axis, boundaries), periodic[axis]
+            own, part = find_guests(driven, opened[axis], volume, axis, told, ring, narrow, nothing)
             host = find_hosts(own, driven, volume, cells, axis, wraps)
             own, host, part = settled(own, host, part)
             merge_guests(total, own, host, part)
@@ -155,4 +137,4 @@ def parts(before: Array, after: Array, component: int, grid: Grid, sides: Bounda
     """Flat indices of the control volumes that are cut at one of two times."""
     whole = WHOLE * max(float(before.max()), float(after.max()))
     wraps = wrapping(component, grid, sides)
-    return np.asarray(find_parts(before, after, whole, component, np.array(before.shape), wraps))
+    return np.asarray(find_parts(before, after, whole, component, wraps))

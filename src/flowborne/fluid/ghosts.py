@@ -129,20 +129,18 @@ def wrap_deep(padded: NDArray[Scalar], axis: int, period: int) -> None:
         padded[edge(axis, n - 1 - ghost)] = padded[edge(axis, n - 1 - ghost - period)]
 
 
-def pad_deep(
-    values: Array, component: int, grid: Grid, boundaries: Boundaries, time: float
-) -> Array:
-    """One face field with two layers of ghosts that carry the boundary conditions.
+def fill_ghosts(
+    padded: Array, component: int, grid: Grid, boundaries: Boundaries, time: float
+) -> None:
+    """Set the two layers of ghosts around a face field such that they carry the boundary
+    conditions, in place.
 
     Along the component's own axis they hold what the side's faces do. Along the others the mean of
     the first ghost and its neighbour is what the side prescribes, and the second mirrors the
     next neighbour likewise; beyond closed sides the field is mirrored, beyond open ones it goes on.
     Corners are left alone.
     """
-    depth = [GHOSTS * (axis in grid.axes) for axis in range(3)]
-    padded = np.empty([n + 2 * d for n, d in zip(values.shape, depth, strict=True)])
-    inner = [slice(d, -d) if d else slice(None) for d in depth]
-    padded[tuple(inner)] = values
+    inner = [slice(GHOSTS, -GHOSTS) if a in grid.axes else slice(None) for a in range(3)]
     for axis in grid.axes:
         own, n = component == axis, padded.shape[axis]
 
@@ -164,4 +162,3 @@ def pad_deep(
                 padded[at(second)] = 2.0 * wall - padded[at(two)]
             else:
                 padded[at(first)], padded[at(second)] = padded[at(one)], padded[at(two)]
-    return padded

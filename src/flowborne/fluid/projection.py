@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.kernels.faces import accelerate, weigh
 from flowborne.kernels.pressure_gradient import push_faces
 from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
@@ -30,32 +31,26 @@ def side_codes(boundaries: Boundaries) -> NDArray[np.int64]:
     )
 
 
-def face_weights(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) -> Faces:
-    """Weights w = (a A)^2 / m of the pressure matrix; see the module.
+def accelerated(opened: Faces, mass: Faces, grid: Grid) -> Faces:
+    """a A / m of each face: what a difference of pressures accelerates it by, 1/(kg/m^2).
 
     mass  of each face, kg; 0 where no pressure acts
     """
-    weights = []
-    codes = side_codes(boundaries)
+    rates = faces_of([np.empty(o.shape) for o in opened])
+    for rate, part, m in zip(rates, opened, mass, strict=True):
+        accelerate(rate, part, m, grid.face_area)
+    return rates
+
+
+def face_weights(opened: Faces, rate: Faces, grid: Grid, boundaries: Boundaries) -> Faces:
+    """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
+    codes, weights = side_codes(boundaries), faces_of([np.empty(o.shape) for o in opened])
     for axis in range(3):
-        area = grid.face_area * opened[axis]
-        weight = np.divide(
-            area * area, mass[axis], out=np.zeros(area.shape), where=mass[axis] > 0.0
-        )
-        for end, layer in ((0, 0), (1, -1)):
+        weigh(weights[axis], opened[axis], rate[axis], grid.face_area)
+        for end in (0, 1):
             if codes[axis, end] == CLOSED:
-                weight[edge(axis, layer)] = 0.0
-        weights.append(weight)
-    return weights[0], weights[1], weights[2]
-
-
-def accelerated(opened: Faces, mass: Faces, grid: Grid) -> Faces:
-    """a A / m of each face: what a difference of pressures accelerates it by, 1/(kg/m^2)."""
-    rates = []
-    for axis in range(3):
-        area = grid.face_area * opened[axis]
-        rates.append(np.divide(area, mass[axis], out=np.zeros(area.shape), where=mass[axis] > 0.0))
-    return rates[0], rates[1], rates[2]
+                weights[axis][edge(axis, -end)] = 0.0
+    return weights
 
 
 def push(

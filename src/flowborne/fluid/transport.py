@@ -7,10 +7,10 @@ With the volume fluxes q of a leak-proof field through the faces of the cells, V
 
 keeps sum V_f u_f and a uniform flow to rounding (Verstappen and Veldman 2003; Droege and
 Verstappen 2005). Values at the sides are of third order, held between their neighbours; beside
-bodies they are the means of both, which neither gain nor lose energy. Two stages (Heun); what
-pressure and friction did to the flow in the last step goes along in the values, not in the
-amounts, so that a steady flow stays as it is. A step of a Courant number above COURANT is done in
-substeps with one carrying field.
+bodies they are the means of both, which neither gain nor lose energy. Two stages (Heun); what else
+the flow is given in a step goes along in the values, away from bodies, and not in the amounts, so
+that a steady flow stays as it is. A step of a Courant number above COURANT is done in substeps with
+one carrying field.
 """
 
 from __future__ import annotations
@@ -25,14 +25,30 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import (
     NOTHING,
     ControlVolumes,
+    means,
     parts,
     wrapping,
 )
-from flowborne.fluid.ghosts import Scalar, edge, pad_deep, wrap_deep
+from flowborne.fluid.ghosts import Scalar, edge, fill_ghosts, wrap_deep
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
-from flowborne.kernels.control_volumes import fill_empty, follow_hosts, join_guests, level
-from flowborne.kernels.flux import CUT, GHOSTS, UPSTREAM, advance, net_flux
+from flowborne.kernels.control_volumes import (
+    fill_empty,
+    follow_hosts,
+    join_guests,
+    level,
+    mark_cut,
+    share_velocity,
+)
+from flowborne.kernels.flux import (
+    CLEAR,
+    CUT,
+    GHOSTS,
+    UPSTREAM,
+    largest_crossing,
+    pad_field,
+    stage,
+)
 
 COURANT = 0.8
 """Cells that the flow may cross in a substep, the axes added up: Heun's method with values of third
@@ -85,11 +101,7 @@ class Transport:
     @cached_property
     def crossing(self) -> float:
         """Largest volume per time that crosses a cell, the axes added up, m^3/s."""
-        rates = np.zeros(self.before.cells.shape)
-        for axis, flux in enumerate(self.flux):
-            q = np.abs(flux)
-            rates += np.maximum(q[edge(axis, slice(None, -1))], q[edge(axis, slice(1, None))])
-        return float(rates.max())
+        return float(largest_crossing(*self.flux))
 
     def courant(self, grid: Grid) -> float:
         """Largest part of a whole cell that crosses its faces in the step, the axes added up."""
@@ -110,25 +122,21 @@ class Carried:
     drained: Array
 
 
-def side_fluxes(flux: Faces, component: int, grid: Grid, sides: Boundaries) -> Faces:
-    """Volume per time through the lower sides of the control volumes of a component, and the upper
-    one of the last, across each axis: means of those of its two cells; m^3/s."""
-    through = []
-    for axis in range(3):
-        q, periodic = flux[axis], sides.periodic()[component]
-        ends = [(int(a == component), int(a == component)) for a in range(3)]
-        if axis == component:
-            mean = 0.5 * (q[edge(axis, slice(1, None))] + q[edge(axis, slice(None, -1))])
-            wide = np.pad(mean, ends, mode="wrap" if periodic else "constant")
-            if not periodic:
-                wide[edge(axis, 0)] = q[edge(axis, 0)]
-                wide[edge(axis, -1)] = q[edge(axis, -1)]
-            through.append(wide)
-            continue
-        wide = np.pad(q, ends, mode="wrap" if periodic else "constant")
-        below, above = edge(component, slice(None, -1)), edge(component, slice(1, None))
-        through.append(0.5 * (wide[below] + wide[above]))
-    return through[0], through[1], through[2]
+def neighbours(count: int, periodic: bool) -> tuple[Integers, Array]:
+    """(2, n + 1, 2) which two cells' or faces' fluxes make those through the sides of the n control
+    volumes of a component, and how much of each: across other axes, and across its own.
+
+    count  n, one more than the cells along the component's axis
+    """
+    at = np.arange(count + 1)[:, None] + np.array([-1, 0])
+    cells, faces, part = at.copy(), at.copy(), np.full((2, count + 1, 2), 0.5)
+    if periodic:
+        cells %= count - 1
+        faces[0], faces[-1] = (count - 2, count - 1), (0, 1)
+    else:
+        part[0, 0, 0], part[0, count - 1, 1] = 0.0, 0.0
+        cells, faces = cells.clip(0, count - 2), faces.clip(0, count - 1)
+    return np.stack([cells, faces]), part
 
 
 def plane(values: NDArray[Scalar], grid: Grid) -> NDArray[Scalar]:
@@ -141,27 +149,12 @@ def plane(values: NDArray[Scalar], grid: Grid) -> NDArray[Scalar]:
 def marks_of(listed: Integers, component: int, grid: Grid, sides: Boundaries) -> Marks:
     """Padded marks of the control volumes: CLEAR where no cut one is among the next two along an
     axis, UPSTREAM on an open side of the domain, where means would draw in ever more, else CUT."""
-    shape = grid.face_shape(component)
-    whole = np.ones(shape, np.uint8)
-    whole.reshape(-1)[listed] = 0
-    if sides.periodic()[component]:
-        whole[edge(component, -1)] = whole[edge(component, 0)]
     depth = [GHOSTS * (axis in grid.axes) for axis in range(3)]
-    inner = [slice(d, d + n) for d, n in zip(depth, shape, strict=True)]
-    padded = np.pad(whole, [(d, d) for d in depth], constant_values=1)
-    wrapped = [axis for axis in grid.axes if sides.periodic()[axis]]
-    for axis in wrapped:
-        wrap_deep(padded, axis, grid.shape[axis])
-    if listed.size:
-        clear = whole.copy()
-        for axis in grid.axes:
-            for shift in range(2 * GHOSTS + 1):
-                beside = list(inner)
-                beside[axis] = slice(shift, shift + shape[axis])
-                clear &= padded[tuple(beside)]
-        padded[tuple(inner)] = clear
+    shape = grid.face_shape(component)
+    padded = np.full([n + 2 * d for n, d in zip(shape, depth, strict=True)], CLEAR, np.uint8)
+    mark_cut(padded, listed, np.array(shape), wrapping(component, grid, sides))
     for axis in grid.axes:
-        if axis in wrapped:
+        if sides.periodic()[axis]:
             wrap_deep(padded, axis, grid.shape[axis])
             continue
         for end, side in enumerate(sides.pair(axis)):
@@ -175,7 +168,6 @@ def marks_of(listed: Integers, component: int, grid: Grid, sides: Boundaries) ->
 def carry_component(
     velocity: Array,
     along: Array | None,
-    ahead: Array | None,
     component: int,
     transport: Transport,
     inlets: Inlets,
@@ -185,141 +177,178 @@ def carry_component(
     """One component a step later.
 
     velocity  on its faces, m/s
-    along     what pressure and friction do to it, m/s^2; None for nothing
+    along     what else it is given in the step, m/s^2; beside bodies it is set to 0; None for
+              nothing
     """
     count = min(max(1, int(np.ceil(transport.courant(grid) / COURANT))), SUBSTEPS)
     dt = transport.dt / count
-    start, end = transport.before.volume[component], transport.after.volume[component]
-    through = side_fluxes(transport.flux, component, grid, sides)
-    listed = parts(start, end, component, grid, sides)
-    flow = Flow(component, transport, through, listed, inlets, grid, sides)
-    u = flow.mean(velocity, transport.before)
-    flow.fill(u, start)
+    flow = Flow(component, transport, inlets, grid, sides)
+    if along is not None:
+        along.reshape(-1)[flow.listed] = 0.0
+        flow.join(along)
+    u = transport.before.mean_velocity(velocity, component)
+    flow.fill(u)
     crossed, drained = 0.0, np.zeros(inlets.index.size)
     for s in range(count):
-        early, late = s / count, (s + 1) / count
-        low, high = start + early * (end - start), start + late * (end - start)
-        first, came, left = flow.out(values(u, along, ahead, s * dt), transport.time + s * dt)
-        middle = flow.mean(flow.after(u, low, high, first, dt), transport.after)
-        later = values(middle, along, ahead, (s + 1) * dt)
-        second, went, gone = flow.out(later, transport.time + (s + 1) * dt)
-        arrived = flow.after(u, low, high, 0.5 * (first + second), dt)
-        u = flow.mean(arrived, transport.after)
+        time = s * dt
+        flow.begin(u, s / count, (s + 1) / count)
+        middle, came, left = flow.stage(u, along, time, dt, 1.0)
+        flow.mean(middle)
+        arrived, went, gone = flow.stage(middle, along, time + dt, dt, 0.5)
+        if s < count - 1:
+            u = arrived.copy()
+            flow.mean(u)
         crossed += 0.5 * dt * (came + went)
         drained += 0.5 * dt * (left + gone)
     return Carried(arrived, crossed, drained)
 
 
-def values(u: Array, along: Array | None, ahead: Array | None, time: float) -> Array:
-    """Velocity that is carried, s after the start, of control volumes that have u."""
-    v = u if along is None or time == 0.0 else u + time * along
-    return v if ahead is None else v - ahead
-
-
 class Flow:
-    """One component's sides and lists, the same for every stage of a step."""
+    """One component's sides, lists and scratch, the same for every stage of a step."""
 
     def __init__(
         self,
         component: int,
         transport: Transport,
-        through: Faces,
-        listed: Integers,
         inlets: Inlets,
         grid: Grid,
         sides: Boundaries,
     ) -> None:
         self.component, self.grid, self.sides = component, grid, sides
-        self.through, self.listed, self.inlets = through, listed, inlets
-        self.marks = marks_of(listed, component, grid, sides)
+        self.transport, self.inlets = transport, inlets
+        self.ends = transport.before.volume[component], transport.after.volume[component]
+        self.listed = parts(*self.ends, component, grid, sides)
+        self.marks = marks_of(self.listed, component, grid, sides)
         self.guests = transport.after.guests[component]
         self.hosts = transport.after.hosts[component]
         self.shares = transport.after.shares[component]
         alone = self.shares == 1.0
         self.whole, self.their_hosts = self.guests[alone], self.hosts[alone]
         self.wraps = wrapping(component, grid, sides)
-        self.shape = np.array(grid.face_shape(component))
+        shape = grid.face_shape(component)
+        self.shape = np.array(shape)
         self.nothing = NOTHING * grid.cell_volume
+        self.padded = np.empty([n + 2 * GHOSTS * (a in grid.axes) for a, n in enumerate(shape)])
+        self.net, self.merged = np.zeros(shape), np.empty(shape)
+        periodic = sides.periodic()[component]
+        self.place, self.share = neighbours(shape[component], periodic)
+        self.through = through_sides(transport.flux, component, grid, sides)
 
-    def fill(self, u: Array, volume: Array) -> None:
+    def fill(self, u: Array) -> None:
         """Give control volumes that hold nothing yet the velocity around them, in place."""
         if self.listed.size:
-            fill_empty(u, volume, self.listed, self.nothing, self.shape, self.wraps)
-            self.join(u)
+            fill_empty(u, self.ends[0], self.listed, self.nothing, self.shape, self.wraps)
+        self.join(u)
 
-    def mean(self, u: Array, volumes: ControlVolumes) -> Array:
-        """Velocity of whole control volumes, guests with what goes with their hosts."""
-        mean = volumes.mean_velocity(u, self.component)
-        self.join(mean)
-        return mean
+    def mean(self, u: Array) -> None:
+        """Give guests what goes with their hosts, in place."""
+        share_velocity(u, self.guests, self.hosts, self.shares)
+        self.join(u)
 
     def join(self, u: Array) -> None:
         """Make the last faces along a periodic axis the first ones, in place."""
         if self.wraps[self.component] > 0:
             u[edge(self.component, -1)] = u[edge(self.component, 0)]
 
-    def out(self, u: Array, time: float) -> tuple[Array, float, Array]:
-        """Net amount that leaves each control volume per time, what comes in through the sides, and
-        what leaves at the inlets with the fluid's own velocity."""
-        padded = pad_deep(u, self.component, self.grid, self.sides, time)
-        net = np.empty(u.shape)
-        net_flux(
-            plane(net, self.grid),
-            plane(padded, self.grid),
-            plane(self.marks, self.grid),
-            *across(self.through, self.grid),
-        )
-        left = self.inlets.loss * u.reshape(-1)[self.inlets.index]
-        net.reshape(-1)[self.inlets.index] += left - self.inlets.gain * self.inlets.velocity
-        return net, self.came_in(padded), left
+    def begin(self, u: Array, early: float, late: float) -> None:
+        """Begin a part of the step, from `early` to `late` of it, at the velocity u."""
+        start, end = self.ends
+        self.start = u
+        self.low = start if early == 0.0 else start + early * (end - start)
+        self.high = end if late == 1.0 else start + late * (end - start)
 
-    def came_in(self, padded: Array) -> float:
-        """What comes in through the sides of the domain per time."""
-        total = 0.0
-        inner = [slice(GHOSTS, -GHOSTS) if a in self.grid.axes else slice(None) for a in range(3)]
-        own = edge(self.component, slice(None, -1 if self.wraps[self.component] > 0 else None))
-        if self.wraps[self.component] > 0:  # the last faces are the first ones
-            inner[self.component] = slice(GHOSTS, -GHOSTS - 1)
-        for axis in self.grid.axes:
-            if self.sides.periodic()[axis]:
-                continue
-            for end, sign in ((0, 1.0), (-1, -1.0)):
-                near, far = list(inner), list(inner)
-                near[axis] = slice(GHOSTS, GHOSTS + 1) if end == 0 else slice(-3, -2)
-                far[axis] = slice(1, 2) if end == 0 else slice(-2, -1)
-                mean = 0.5 * (padded[tuple(near)] + padded[tuple(far)])
-                through = self.through[axis][
-                    edge(axis, slice(0, 1) if end == 0 else slice(-1, None))
-                ]
-                total += sign * float(np.vdot(through[own], mean))
-        return total
+    def stage(
+        self, u: Array, along: Array | None, time: float, dt: float, weight: float
+    ) -> tuple[Array, float, Array]:
+        """Velocity after a stage in which u is carried along, what came in through the sides per
+        time, and what left at the inlets with the fluid's own velocity.
 
-    def after(self, u: Array, low: Array, high: Array, net: Array, dt: float) -> Array:
-        """Velocity after a stage: of the volumes `low` before it and `high` after it."""
-        later, merged = np.empty(u.shape), high
-        advance(later, u, low, net, dt, high, self.nothing)
+        time    s since the step began
+        weight  of what this stage carries, beside the one before
+        """
+        grid, axis = self.grid, self.component
+        given = (u, 0.0) if along is None else (along, time)
+        pad_field(plane(self.padded, grid), plane(u, grid), plane(given[0], grid), given[1])
+        fill_ghosts(self.padded, axis, grid, self.sides, self.transport.time + time)
+        later = np.empty(u.shape)
+        fields = (self.start, self.low, self.high)
+        start, low, high = (plane(field, grid) for field in fields)
+        stage(
+            plane(later, grid), plane(self.net, grid), weight, start, low, high, dt, self.nothing,
+            plane(self.padded, grid), plane(self.marks, grid),
+            planes(self.transport.flux, grid), axis + grid.is_slab, self.place, self.share,
+        )  # fmt: skip
+        left = self.exchange(later, dt, weight)
+        self.settle(later)
+        return later, self.came_in(), left
+
+    def exchange(self, later: Array, dt: float, weight: float) -> Array:
+        """Let through the inlets what a stage brings, in place; gives what leaves with the fluid's
+        own velocity per time."""
+        at, inlets = self.inlets.index, self.inlets
+        if at.size == 0:
+            return np.zeros(0)
+        place = np.unravel_index(at, later.shape)
+        inside = tuple(n + GHOSTS * (a in self.grid.axes) for a, n in enumerate(place))
+        left = inlets.loss * self.padded[inside]
+        more = left - inlets.gain * inlets.velocity
+        self.net.reshape(-1)[at] += more
+        volume = self.high.reshape(-1)[at]
+        later.reshape(-1)[at] -= weight * dt * more / np.where(volume > self.nothing, volume, 1.0)
+        return np.asarray(left)
+
+    def settle(self, later: Array) -> None:
+        """Share amounts between small control volumes and those beside them, in place."""
+        merged, cell = self.high, self.grid.cell_volume
         if self.guests.size:
-            merged = high.copy()
+            merged = self.merged
+            np.copyto(merged, self.high)
             join_guests(later, merged, self.guests, self.hosts, self.shares, self.nothing)
         if self.listed.size:
-            self.level(later, merged)
+            limits = TINY * cell, SMALL * cell, self.nothing
+            level(later, merged, self.listed, *limits, self.shape, self.wraps)
             follow_hosts(later, self.whole, self.their_hosts)
-            fill_empty(later, high, self.listed, self.nothing, self.shape, self.wraps)
+            fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)
         self.join(later)
-        return later
 
-    def level(self, u: Array, volume: Array) -> None:
-        """Mix small control volumes with their neighbours, in place."""
-        cell = self.grid.cell_volume
-        level(
-            u, volume, self.listed, TINY * cell, SMALL * cell, self.nothing, self.shape, self.wraps
-        )
+    def came_in(self) -> float:
+        """What comes in through the sides of the domain per time."""
+        total, own = 0.0, self.component
+        inner = [slice(GHOSTS, -GHOSTS) if a in self.grid.axes else slice(None) for a in range(3)]
+        if self.wraps[own] > 0:  # the last faces are the first ones
+            inner[own] = slice(GHOSTS, -GHOSTS - 1)
+        for (axis, end), through in self.through.items():
+            near, far = list(inner), list(inner)
+            near[axis] = slice(-3, -2) if end else slice(GHOSTS, GHOSTS + 1)
+            far[axis] = slice(-2, -1) if end else slice(1, 2)
+            mean = 0.5 * (self.padded[tuple(near)] + self.padded[tuple(far)])
+            total += (-1.0 if end else 1.0) * float(np.vdot(through, mean))
+        return total
 
 
-def across(through: Faces, grid: Grid) -> Faces:
+def planes(flux: Faces, grid: Grid) -> Faces:
     """Fluxes in the order of the kernel's axes; of a slab none across its first."""
-    x, y, z = (np.ascontiguousarray(t) for t in through)
     if not grid.is_slab:
-        return x, y, z
-    none = np.zeros((2, *x.shape[:2]))
-    return none, x.reshape(1, *x.shape[:2]), y.reshape(1, *y.shape[:2])
+        return flux
+    x, y, _ = flux
+    return np.zeros((2, *grid.shape[:2])), plane(x, grid), plane(y, grid)
+
+
+def through_sides(
+    flux: Faces, component: int, grid: Grid, sides: Boundaries
+) -> dict[tuple[int, int], Array]:
+    """Volume per time through the sides of the domain, by axis and end: of the control volumes of a
+    component; none of axes that are periodic."""
+    through = {}
+    periodic = sides.periodic()
+    for axis in grid.axes:
+        for end in (0, 1):
+            if periodic[axis]:
+                continue
+            layer = flux[axis][edge(axis, slice(-1, None) if end else slice(1))]
+            if axis != component:
+                layer = means(layer, component, periodic[component])
+                if periodic[component]:
+                    layer = layer[edge(component, slice(-1))]
+            through[axis, end] = layer
+    return through

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from flowborne.kernels.arrays import Array, Integers, Marks
 
 
 @njit(nogil=True, cache=True)
@@ -67,7 +65,8 @@ def find_hosts(
 
     A face that is wholly closed has a control volume where a cell beside it is open in part. It
     goes along with the opposite face of the larger of its two cells, else with that of the other,
-    else with the neighbour that has the largest volume, else with the host of a neighbour.
+    else with the neighbour that has the largest volume, else with the host of a neighbour, which
+    may have it from another.
 
     guests   (n,) closed faces with a volume
     opened   open part of each face
@@ -107,19 +106,21 @@ def find_hosts(
                     best, most = to, volume_flat[to]
         if best >= 0:
             hosts[n] = best
-    first = hosts.copy()
-    for n in range(guests.size):
-        if first[n] != guests[n]:
-            continue
-        best, most = -1, -1.0
-        for way in range(6):
-            to = neighbour(shape, wraps, guests[n], way)
-            at = np.searchsorted(guests, to) if to >= 0 else guests.size
-            found = at < guests.size and guests[at] == to and first[at] != to
-            if found and volume_flat[to] > most:
-                best, most = first[at], volume_flat[to]
-        if best >= 0:
-            hosts[n] = best
+    led = True
+    while led:
+        led, first = False, hosts.copy()
+        for n in range(guests.size):
+            if first[n] != guests[n]:
+                continue
+            best, most = -1, -1.0
+            for way in range(6):
+                to = neighbour(shape, wraps, guests[n], way)
+                at = np.searchsorted(guests, to) if to >= 0 else guests.size
+                found = at < guests.size and guests[at] == to and first[at] != to
+                if found and volume_flat[to] > most:
+                    best, most = first[at], volume_flat[to]
+            if best >= 0:
+                hosts[n], led = best, True
     return hosts
 
 
@@ -154,13 +155,17 @@ def find_hosts_reference(
     far, reached = largest_reference(beside[opposite], np.where(driven[opposite], cell, 0.0), 0.0)
     near, touched = largest_reference(beside, volume, 0.0)
     first = np.where(reached, far, np.where(touched, near, guests))
-    host = np.arange(opened.size)
-    host[guests] = first
-    led = (beside >= 0) & np.isin(beside, guests[first != guests])
-    after, joined = largest_reference(
-        host[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
-    )
-    return np.where((first == guests) & joined, after, first)
+    while True:
+        host = np.arange(opened.size)
+        host[guests] = first
+        led = (beside >= 0) & np.isin(beside, guests[first != guests])
+        after, joined = largest_reference(
+            host[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
+        )
+        new = (first == guests) & joined
+        if not new.any():
+            return first
+        first = np.where(new, after, first)
 
 
 @njit(nogil=True, cache=True)
@@ -339,30 +344,92 @@ def level_reference(
 
 
 @njit(nogil=True, cache=True)
+def share_velocity(field: Array, guests: Integers, hosts: Integers, shares: Array) -> None:
+    """Give guests the velocity of all that goes with them, in place: these shares of them go with
+    their hosts."""
+    flat = field.reshape(-1)
+    own = flat[guests]
+    for n in range(guests.size):
+        own[n] += shares[n] * (flat[hosts[n]] - own[n])
+    flat[guests] = own
+
+
+def share_velocity_reference(
+    field: Array, guests: Integers, hosts: Integers, shares: Array
+) -> Array:
+    """`share_velocity` in NumPy: the field after it."""
+    shared = field.ravel().copy()
+    shared[guests] += shares * (shared[hosts] - shared[guests])
+    return shared.reshape(field.shape)
+
+
+@njit(nogil=True, cache=True)
+def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -> None:
+    """Set to 0 the marks of listed control volumes, and of those along each axis that are no
+    further from them than the marks' padding is deep, in place."""
+    at, to = np.empty(3, np.int64), np.empty(3, np.int64)
+    for f in listed:
+        at[0], at[1], at[2] = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
+        for axis in range(3):
+            depth = (marks.shape[axis] - shape[axis]) // 2
+            for other in range(3):
+                to[other] = at[other] + (marks.shape[other] - shape[other]) // 2
+            for shift in range(-depth, depth + 1):
+                for image in range(-1, 2):
+                    place = at[axis] + shift + image * wraps[axis]
+                    if 0 <= place < shape[axis]:
+                        to[axis] = place + depth
+                        marks[to[0], to[1], to[2]] = 0
+
+
+def mark_cut_reference(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -> Marks:
+    """`mark_cut` in NumPy: the marks after it."""
+    cut, out = np.zeros(shape, bool), marks.copy()
+    cut.reshape(-1)[listed] = True
+    depth = (np.array(marks.shape) - shape) // 2
+    inner = out[tuple(slice(d, d + n) for d, n in zip(depth, shape, strict=True))]
+    for axis, d in enumerate(depth):
+        n, line = shape[axis], np.moveaxis(inner, axis, 0)
+        distinct = np.moveaxis(cut, axis, 0)[: wraps[axis] if wraps[axis] else n]
+        for at, here in enumerate(distinct):
+            for shift in range(-d, d + 1):
+                places = {at + shift + image * wraps[axis] for image in (-1, 0, 1)}
+                for place in places & set(range(n)):
+                    line[place][here] = 0
+    return out
+
+
+@njit(nogil=True, cache=True)
 def find_parts(
-    before: Array, after: Array, whole: float, component: int, shape: Integers, wraps: Integers
+    before: Array, after: Array, whole: float, component: int, wraps: Integers
 ) -> Integers:
     """Flat indices of the control volumes that are less than whole at one of two times.
 
     The first and last ones along a component's own axis are half as large, and the last is the
     first one where that is periodic.
     """
-    one, two = before.reshape(-1), after.reshape(-1)
-    found = np.empty(one.size, np.int64)
-    count = 0
-    n1, n2 = shape[1], shape[2]
-    last = shape[component] - 1
-    for f in range(one.size):
-        at = f // (n1 * n2) if component == 0 else ((f // n2) % n1 if component == 1 else f % n2)
-        least = whole
-        if wraps[component] > 0:
-            if at == last:
+    n0, n1, n2 = before.shape
+    found, count = np.empty(before.size, np.int64), 0
+    last = before.shape[component] - 1
+    ends = 0.0 if wraps[component] > 0 else 0.5 * whole
+    for i in range(n0):
+        for j in range(n1):
+            one, two, low = before[i, j], after[i, j], 0
+            at = i if component == 0 else j
+            least = ends if component < 2 and (at == 0 or at == last) else whole
+            if wraps[component] > 0 and component < 2 and at == 0:
+                least = whole
+            for k in range(n2):
+                low += int(one[k] < least) | int(two[k] < least)
+            if low == 0:
                 continue
-        elif at == 0 or at == last:
-            least = 0.5 * whole
-        if one[f] < least or two[f] < least:
-            found[count] = f
-            count += 1
+            for k in range(n2):
+                bound = least
+                if component == 2 and (k == last or (k == 0 and wraps[2] == 0)):
+                    bound = ends
+                if one[k] < bound or two[k] < bound:
+                    found[count] = (i * n1 + j) * n2 + k
+                    count += 1
     return found[:count].copy()
 
 
@@ -377,3 +444,72 @@ def find_parts_reference(
     else:
         ends[0], ends[-1] = 0.5 * whole, 0.5 * whole
     return np.flatnonzero(np.minimum(before, after) < least)
+
+
+@njit(nogil=True, cache=True)
+def find_guests(
+    driven: Marks,
+    opened: Array,
+    volume: Array,
+    component: int,
+    prescribed: Marks,
+    periodic: bool,
+    narrow: float,
+    nothing: float,
+) -> tuple[Integers, Array]:
+    """Flat indices of the guests among the faces of a component, and which part of each is one.
+
+    A face is one with all of its volume where no pressure pushes it: where it is closed, or its
+    volume is not above `nothing`; and in part where the volume exceeds `narrow` times its opening.
+
+    driven      1 where the face may be a host: pushed and no guest; given
+    opened      open part of each face
+    prescribed  (2,) 1 where the velocity of the first or last layer is prescribed: none of either
+    periodic    whether the last layer is the first one, and counts once
+    """
+    n0, n1, n2 = opened.shape
+    own, part, count = np.empty(opened.size, np.int64), np.empty(opened.size), 0
+    last = opened.shape[component] - 1
+    for i in range(n0):
+        for j in range(n1):
+            at = i if component == 0 else j
+            one, room, mark, low = opened[i, j], volume[i, j], driven[i, j], 0
+            for k in range(n2):
+                low += int(narrow * one[k] < room[k]) | int(one[k] == 0.0) | int(room[k] <= nothing)
+                mark[k] = 1
+            for k in range(n2 if low else 0):
+                at = k if component == 2 else at
+                pushed = narrow * one[k] if room[k] > nothing else 0.0
+                guest = room[k] != 0.0 and (pushed < room[k] or pushed == 0.0)
+                mark[k] = pushed > 0.0 and not guest
+                first = at == 0 and prescribed[0]
+                if guest and not first and not (at == last and (prescribed[1] or periodic)):
+                    own[count] = (i * n1 + j) * n2 + k
+                    part[count] = 1.0 - pushed / room[k]
+                    count += 1
+            if component == 2:
+                mark[0] = 0 if prescribed[0] else mark[0]
+                mark[last] = 0 if prescribed[1] else mark[last]
+            elif (at == 0 and prescribed[0]) or (at == last and prescribed[1]):
+                mark[:] = 0
+    return own[:count].copy(), part[:count].copy()
+
+
+def find_guests_reference(
+    opened: Array,
+    volume: Array,
+    component: int,
+    prescribed: Marks,
+    periodic: bool,
+    narrow: float,
+    nothing: float,
+) -> tuple[Integers, Array, Array]:
+    """`find_guests` in NumPy: guests, parts, and which faces may be hosts."""
+    pushed = np.where(volume > nothing, narrow * opened, 0.0)
+    guest = (volume != 0.0) & ((pushed < volume) | (pushed == 0.0))
+    driven, counted = (pushed > 0.0) & ~guest, guest.copy()
+    for end, told in zip((0, -1), prescribed, strict=True):
+        np.moveaxis(driven, component, 0)[end] &= not told
+        np.moveaxis(counted, component, 0)[end] &= not told and not (periodic and end)
+    own = np.flatnonzero(counted)
+    return own, 1.0 - pushed.ravel()[own] / volume.ravel()[own], driven

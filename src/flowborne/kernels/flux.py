@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.jit import kernel
-
-Array = NDArray[np.float64]
-Marks = NDArray[np.uint8]
 
 GHOSTS = 2
 """Layers of ghosts: what a value of third order needs."""
@@ -34,79 +31,187 @@ inlined = njit(forceinline=True, nogil=True, cache=True)
 
 @inlined
 def line_flux(
-    out: Array, flux: Array, a: Array, b: Array, c: Array, d: Array, one: Marks, other: Marks
+    out: Array,
+    first: int,
+    end: int,
+    q: Array,
+    one: int,
+    other: int,
+    share: Array,
+    field: Array,
+    marks: Marks,
+    at: int,
+    step: int,
 ) -> None:
-    """Flux x value between b and c, of a, b, c, d in line, for a row of sides.
+    """Flux x value at a row of sides, from `first` to `end`, all arrays flat.
 
-    The upwind value of third order (Leonard 1979) lies between b and c, but for smooth extrema,
-    where second differences on both sides agree. Written without branches, so that it vectorises.
+    What flows through each side is the mean of what flows through the faces of two cells. The
+    upwind value of third order (Leonard 1979) lies between both neighbours, but for smooth extrema,
+    where second differences on both sides agree; it is taken where both are CLEAR, what is upstream
+    where one is UPSTREAM, else the mean of both. Written without branches and views, and with
+    unsigned places, so that it vectorises.
 
-    one, other  marks of b and c: of third order where both are CLEAR, what is upstream where one is
-                UPSTREAM, else the mean of both
+    one, other  where in q the rows of faces begin; share (2,) how much of each
+    at, step    where the row above the sides begins in the padded field, and what is between
+                neighbours across them
     """
-    for k in range(out.size):
-        g, p, q, r, s = flux[k], a[k], b[k], c[k], d[k]
-        low_bend, high_bend = p - 2.0 * q + r, q - 2.0 * r + s
+    s, t = share[0], share[1]
+    for k in range(first, end):
+        g = s * q[one + k] + t * q[other + k]
+        n = at + k
+        low, high = field[n - step], field[n]
+        ahead, behind = field[n + step], field[n - step - step]
+        low_bend, high_bend = behind - 2.0 * low + high, low - 2.0 * high + ahead
         room = max(min(low_bend, high_bend), 0.0) + max(min(-low_bend, -high_bend), 0.0)
-        low, high = min(q, r) - ROOM * room, max(q, r) + ROOM * room
-        value = (5.0 * q + 2.0 * r - p if g > 0.0 else 5.0 * r + 2.0 * q - s) / 6.0
-        value = min(max(value, low), high)
-        upstream = q if g > 0.0 else r
-        either = upstream if one[k] | other[k] >= UPSTREAM else 0.5 * (q + r)
-        out[k] = g * (value if one[k] & other[k] == CLEAR else either)
+        least, most = min(low, high) - ROOM * room, max(low, high) + ROOM * room
+        forward = 5.0 * low + 2.0 * high - behind
+        value = (forward if g > 0.0 else 5.0 * high + 2.0 * low - ahead) / 6.0
+        value = min(max(value, least), most)
+        upstream = low if g > 0.0 else high
+        here, there = marks[n - step], marks[n]
+        either = upstream if here | there >= UPSTREAM else 0.5 * (low + high)
+        out[k] = g * (value if here & there == CLEAR else either)
+
+
+@inlined
+def side_row(
+    out: Array,
+    count: int,
+    q: Array,
+    shape: tuple[int, int, int],
+    i: int,
+    j: int,
+    component: int,
+    place: Integers,
+    share: Array,
+    field: Array,
+    marks: Marks,
+    at: int,
+    step: int,
+) -> None:
+    """Flux x value through `count` sides of the control volumes (i, j, :) of a component.
+
+    q             through the faces of the cells, across the axis of the sides; flat, of this shape
+    place, share  (n, 2) which two of them along the component's axis, and how much of each
+    """
+    n1, n2, zero, one = np.uintp(shape[1]), np.uintp(shape[2]), np.uintp(0), np.uintp(1)
+    if component == 0:
+        low, high = np.uintp(place[i, 0]), np.uintp(place[i, 1])
+        low, high = (low * n1 + j) * n2, (high * n1 + j) * n2
+        line_flux(out, zero, count, q, low, high, share[i], field, marks, at, step)
+    elif component == 1:
+        low, high = np.uintp(place[j, 0]), np.uintp(place[j, 1])
+        low, high = (i * n1 + low) * n2, (i * n1 + high) * n2
+        line_flux(out, zero, count, q, low, high, share[j], field, marks, at, step)
+    else:
+        row = (i * n1 + j) * n2
+        line_flux(out, one, count - one, q, row - one, row, share[1], field, marks, at, step)
+        for k in (zero, count - one):
+            low, high = row + np.uintp(place[k, 0]) - k, row + np.uintp(place[k, 1]) - k
+            line_flux(out, k, k + one, q, low, high, share[k], field, marks, at, step)
 
 
 @kernel
-def net_flux(out: Array, field: Array, marks: Marks, gx: Array, gy: Array, gz: Array) -> None:
-    """Net amount of a field that leaves each control volume per time.
+def stage(
+    out: Array,
+    net: Array,
+    weight: float,
+    start: Array,
+    before: Array,
+    after: Array,
+    dt: float,
+    nothing: float,
+    field: Array,
+    marks: Marks,
+    q: Faces,
+    component: int,
+    place: Integers,
+    share: Array,
+) -> None:
+    """A component after a stage: (before start - dt net) / after in each of its control volumes.
 
-    out         (n0, n1, n2)
-    field       the field, padded
-    marks       padded: CUT, CLEAR or UPSTREAM
-    gx, gy, gz  volume per time through the sides across each axis, one more than `out` along it
+    out            (n0, n1, n2); where the volume after is not above `nothing`, what is left of the
+                   amount is given in place of the value
+    net            net amount that leaves each control volume per time: given by a stage of weight
+                   1, taken with 1 - `weight` by one of less
+    start          the component at the start
+    before, after  volumes at both ends
+    field          the component that is carried along, padded
+    marks          padded: CUT, CLEAR or UPSTREAM
+    q              volume per time through the faces of the cells across each axis
+    place, share   (2, n + 1, 2) of which two faces' fluxes those through the sides are means, and
+                   how much of each: across other axes, and across the component's own
     """
-    n0, n1, n2 = out.shape
-    p = GHOSTS if field.shape[0] > n0 else 0
-    for block in prange((n0 + PLANES - 1) // PLANES):
-        first = np.int64(block) * PLANES
-        side, row, below = np.empty(n2 + 1), np.empty(n2), np.empty((n1, n2))
-        for i in range(first, min(first + PLANES, n0)):
-            x = i + p
-            for j in range(n1 + 1):
-                y = j + GHOSTS
-                f, m = field[x], marks[x]
-                line_flux(
-                    row, gy[i, j], f[y - 2, 2:-2], f[y - 1, 2:-2], f[y, 2:-2], f[y + 1, 2:-2],
-                    m[y - 1, 2:-2], m[y, 2:-2],
+    qx, qy, qz = q[0].reshape(-1), q[1].reshape(-1), q[2].reshape(-1)
+    n0, n1, n2 = np.uintp(out.shape[0]), np.uintp(out.shape[1]), np.uintp(out.shape[2])
+    values, mark = field.reshape(-1), marks.reshape(-1)
+    later, leaving = out.reshape(-1), net.reshape(-1)
+    first, low, high = start.reshape(-1), before.reshape(-1), after.reshape(-1)
+    zero, one, deep = np.uintp(0), np.uintp(1), np.uintp(GHOSTS)
+    room = field.shape[0] > out.shape[0]
+    p = deep if room else zero
+    rows, wide = np.uintp(field.shape[1]), np.uintp(field.shape[2])
+    earlier, alone = 1.0 - weight, weight == 1.0
+    planes = np.uintp(PLANES)
+    for block in prange((out.shape[0] + PLANES - 1) // PLANES):
+        bottom = np.uintp(block) * planes
+        side, row = np.empty(out.shape[2] + 1), np.empty(out.shape[2])
+        sums, below = np.empty(out.shape[2]), np.empty(out.shape[1] * out.shape[2])
+        x_place, x_share = place[int(component == 0)], share[int(component == 0)]
+        y_place, y_share = place[int(component == 1)], share[int(component == 1)]
+        z_place, z_share = place[int(component == 2)], share[int(component == 2)]
+        for i in range(bottom, min(bottom + planes, n0)):
+            for j in range(n1 + one):
+                at = ((i + p) * rows + j + deep) * wide + deep
+                side_row(
+                    row, n2, qy, q[1].shape, i, j, component, y_place, y_share, values, mark, at,
+                    wide,
                 )  # fmt: skip
-                if j > 0:
+                if j > zero:
+                    n = (i * n1 + j - one) * n2
                     for k in range(n2):
-                        out[i, j - 1, k] += row[k]
+                        sums[k] += row[k]
+                    if alone:
+                        for k in range(n2):
+                            leaving[n + k] = sums[k]
+                    else:
+                        for k in range(n2):
+                            sums[k] = weight * sums[k] + earlier * leaving[n + k]
+                    for k in range(n2):
+                        volume = high[n + k]
+                        amount = low[n + k] * first[n + k] - dt * sums[k]
+                        later[n + k] = amount / (volume if volume > nothing else 1.0)
                 if j == n1:
                     break
-                f, m = field[x, y], marks[x, y]
-                line_flux(side, gz[i, j], f[:-3], f[1:-2], f[2:-1], f[3:], m[1:-2], m[2:-1])
+                side_row(
+                    side, n2 + one, qz, q[2].shape, i, j, component, z_place, z_share, values,
+                    mark, at, one,
+                )  # fmt: skip
                 for k in range(n2):
-                    out[i, j, k] = side[k + 1] - side[k] - row[k]
-                if p == 0:
+                    sums[k] = side[k + one] - side[k] - row[k]
+                if not room:
                     continue
-                for q in range(x if i == first else x + 1, x + 2):
-                    line_flux(
-                        row, gx[q - p, j], field[q - 2, y, 2:-2], field[q - 1, y, 2:-2],
-                        field[q, y, 2:-2], field[q + 1, y, 2:-2], marks[q - 1, y, 2:-2],
-                        marks[q, y, 2:-2],
+                n = j * n2
+                if i == bottom:
+                    side_row(
+                        row, n2, qx, q[0].shape, i, j, component, x_place, x_share, values, mark,
+                        at, rows * wide,
                     )  # fmt: skip
-                    if q == x:
-                        below[j] = row
+                    for k in range(n2):
+                        below[n + k] = row[k]
+                side_row(
+                    row, n2, qx, q[0].shape, i + one, j, component, x_place, x_share, values, mark,
+                    at + rows * wide, rows * wide,
+                )  # fmt: skip
                 for k in range(n2):
-                    out[i, j, k] += row[k] - below[j, k]
-                    below[j, k] = row[k]
+                    sums[k] += row[k] - below[n + k]
+                    below[n + k] = row[k]
 
 
 def line_flux_reference(
     flux: Array, a: Array, b: Array, c: Array, d: Array, one: Marks, other: Marks
 ) -> Array:
-    """`line_flux` in NumPy."""
+    """`line_flux` in NumPy, of the fluxes g through the sides between b and c of a, b, c, d."""
     forward = flux > 0.0
     behind, upstream, downstream, ahead = np.where(forward, (a, b, c, d), (d, c, b, a))
     bends = np.stack([behind - 2.0 * upstream + downstream, upstream - 2.0 * downstream + ahead])
@@ -117,8 +222,21 @@ def line_flux_reference(
     return np.asarray(flux * np.where((one == CLEAR) & (other == CLEAR), smooth, either))
 
 
+def side_fluxes_reference(flux: Faces, component: int, place: Integers, share: Array) -> Faces:
+    """Volume per time through all sides of the control volumes across each axis."""
+    through = []
+    for axis, q in enumerate(flux):
+        own = int(axis == component)
+        count = q.shape[component] + 1
+        at, part = place[own, :count], share[own, :count]
+        q = np.moveaxis(q, component, -1)
+        mean = part[:, 0] * q[..., at[:, 0]] + part[:, 1] * q[..., at[:, 1]]
+        through.append(np.ascontiguousarray(np.moveaxis(mean, -1, component)))
+    return through[0], through[1], through[2]
+
+
 def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Array) -> Array:
-    """`net_flux` in NumPy."""
+    """`net_flux` in NumPy, of the fluxes through the sides of the control volumes."""
     shape = gz.shape[0], gz.shape[1], gz.shape[2] - 1
     inner = [
         slice(GHOSTS, -GHOSTS) if n < m else slice(None)
@@ -139,25 +257,61 @@ def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Arr
     return net
 
 
+def stage_reference(
+    net: Array,
+    weight: float,
+    start: Array,
+    before: Array,
+    after: Array,
+    dt: float,
+    nothing: float,
+    field: Array,
+    marks: Marks,
+    q: Faces,
+    component: int,
+    place: Integers,
+    share: Array,
+) -> tuple[Array, Array]:
+    """`stage` in NumPy: the component after it, and the net amount that left it."""
+    through = side_fluxes_reference(q, component, place, share)
+    leaving = weight * net_flux_reference(field, marks, *through)
+    if weight < 1.0:
+        leaving += (1.0 - weight) * net
+    amount = before * start - dt * leaving
+    return amount / np.where(after > nothing, after, 1.0), leaving
+
+
 @kernel
-def advance(
-    out: Array, field: Array, before: Array, net: Array, dt: float, after: Array, nothing: float
-) -> None:
-    """Value of every control volume after a step: (before field - dt net) / after.
-
-    before, after  volumes at both ends; where the volume after is not above `nothing`, what is left
-                   of the amount is given in place of the value
-    """
-    for i in prange(out.shape[0]):
-        for j in range(out.shape[1]):
-            for k in range(out.shape[2]):
-                amount = before[i, j, k] * field[i, j, k] - dt * net[i, j, k]
-                volume = after[i, j, k]
-                out[i, j, k] = amount / (volume if volume > nothing else 1.0)
+def pad_field(out: Array, values: Array, along: Array, time: float) -> None:
+    """values + time along into the inside of an array padded by GHOSTS."""
+    p = GHOSTS if out.shape[0] > values.shape[0] else 0
+    n2 = values.shape[2]
+    for i in prange(values.shape[0]):
+        for j in range(values.shape[1]):
+            inner, one, other = out[i + p, j + GHOSTS, GHOSTS:-GHOSTS], values[i, j], along[i, j]
+            for k in range(n2):
+                inner[k] = one[k] + time * other[k]
 
 
-def advance_reference(
-    field: Array, before: Array, net: Array, dt: float, after: Array, nothing: float
-) -> Array:
-    """`advance` in NumPy."""
-    return np.asarray((before * field - dt * net) / np.where(after > nothing, after, 1.0))
+@kernel
+def largest_crossing(qx: Array, qy: Array, qz: Array) -> float:
+    """Largest volume per time that crosses a cell, the axes added up."""
+    n0, n1, n2 = qy.shape[0], qx.shape[1], qx.shape[2]
+    most = np.zeros(n0)
+    for i in prange(n0):
+        for j in range(n1):
+            for k in range(n2):
+                rate = max(abs(qx[i, j, k]), abs(qx[i + 1, j, k]))
+                rate += max(abs(qy[i, j, k]), abs(qy[i, j + 1, k]))
+                rate += max(abs(qz[i, j, k]), abs(qz[i, j, k + 1]))
+                most[i] = max(most[i], rate)
+    return float(most.max())
+
+
+def largest_crossing_reference(q: Faces) -> float:
+    """`largest_crossing` in NumPy."""
+    rates = []
+    for axis, flux in enumerate(q):
+        size = np.moveaxis(np.abs(flux), axis, 0)
+        rates.append(np.moveaxis(np.maximum(size[:-1], size[1:]), 0, axis))
+    return float(sum(rates).max())

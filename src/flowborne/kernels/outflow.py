@@ -29,3 +29,19 @@ def outflow_reference(velocity: Faces, opened: Faces) -> Array:
     """`outflow` in NumPy."""
     parts = [np.diff(a * u, axis=n) for n, (a, u) in enumerate(zip(opened, velocity, strict=True))]
     return parts[0] + parts[1] + parts[2]
+
+
+@kernel
+def net_out(out: Array, qx: Array, qy: Array, qz: Array) -> None:
+    """Net volume that leaves each cell per time, of the volume per time through its faces."""
+    for i in prange(out.shape[0]):
+        for j in range(out.shape[1]):
+            for k in range(out.shape[2]):
+                out[i, j, k] = (
+                    qx[i + 1, j, k]
+                    - qx[i, j, k]
+                    + qy[i, j + 1, k]
+                    - qy[i, j, k]
+                    + qz[i, j, k + 1]
+                    - qz[i, j, k]
+                )

@@ -53,6 +53,25 @@ def closed_tetrahedron_reference(corners: Array) -> Array:
 
 
 @njit(nogil=True, cache=True)
+def is_clear(distance: Array, ox: Array, oy: Array, oz: Array, i: int, j: int) -> bool:
+    """Whether no body touches a row of cells: outside of bodies at all corners, all faces open."""
+    touched = 0
+    for a in range(2):
+        for b in range(2):
+            row = distance[i + a, j + b]
+            for k in range(row.size):
+                touched += int(row[k] < 0.0)
+        one, other = ox[i + a, j], oy[i, j + a]
+        for k in range(one.size):
+            touched += int(one[k] == 0.0) | int(other[k] == 0.0)
+    if oz.shape[2] > 2:
+        row = oz[i, j]
+        for k in range(row.size):
+            touched += int(row[k] == 0.0)
+    return touched == 0
+
+
+@njit(nogil=True, cache=True)
 def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> None:
     """Open part of every cell; 0 where all its faces are closed.
 
@@ -65,6 +84,9 @@ def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> 
     phi = np.empty(8)
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
+            if is_clear(distance, ox, oy, oz, i, j):
+                out[i, j] = 1.0
+                continue
             for k in range(out.shape[2]):
                 for corner in range(8):
                     phi[corner] = distance[i + corner // 4, j + (corner // 2) % 2, k + corner % 2]

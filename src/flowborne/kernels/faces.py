@@ -1,0 +1,175 @@
+"""Whole fields on the faces across one axis, in one pass each.
+
+Sums and maxima run plane after plane, so that they do not depend on how many threads there are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from flowborne.kernels.arrays import Array
+from flowborne.kernels.jit import kernel
+
+LANES = 64
+"""Partial sums that a plane is added up in, so that the compiler makes vector code of it."""
+
+
+@kernel
+def face_means(out: Array, cells: Array, axis: int, periodic: bool) -> None:
+    """Mean of both cells of each face across `axis`; 0 beyond the ends of an axis that is not
+    periodic."""
+    n = cells.shape[axis]
+    for i in prange(out.shape[0]):
+        for j in range(out.shape[1]):
+            if axis == 2:
+                line, row = cells[i, j], out[i, j]
+                low, high = (line[n - 1], line[0]) if periodic else (0.0, 0.0)
+                row[0] = 0.5 * (low + line[0])
+                for k in range(1, n):
+                    row[k] = 0.5 * (line[k - 1] + line[k])
+                row[n] = 0.5 * (line[n - 1] + high)
+                continue
+            at = i if axis == 0 else j
+            below, above = (at - 1) % n, at % n
+            one, other = (
+                (cells[below, j], cells[above, j])
+                if axis == 0
+                else (cells[i, below], cells[i, above])
+            )
+            first = 0.5 if periodic or at > 0 else 0.0
+            second = 0.5 if periodic or at < n else 0.0
+            for k in range(out.shape[2]):
+                out[i, j, k] = first * one[k] + second * other[k]
+
+
+def face_means_reference(cells: Array, axis: int, periodic: bool) -> Array:
+    """`face_means` in NumPy."""
+    ends = [(int(a == axis),) * 2 for a in range(3)]
+    wide = np.moveaxis(np.pad(cells, ends, mode="wrap" if periodic else "constant"), axis, 0)
+    return np.moveaxis(0.5 * (wide[:-1] + wide[1:]), 0, axis)
+
+
+@njit(forceinline=True, nogil=True, cache=True)
+def flat(values: Array) -> Array:
+    """The same field with its planes in line, so that a slab's rows are long as well."""
+    return values.reshape((values.shape[0], values.shape[1] * values.shape[2]))
+
+
+@kernel
+def accelerate(out: Array, opened: Array, mass: Array, area: float) -> None:
+    """a A / m: what a difference of pressures accelerates a face by; 0 where there is no mass."""
+    rate, part, masses = flat(out), flat(opened), flat(mass)
+    for i in prange(rate.shape[0]):
+        for k in range(rate.shape[1]):
+            m = masses[i, k]
+            rate[i, k] = area * part[i, k] / m if m > 0.0 else 0.0
+
+
+def accelerate_reference(opened: Array, mass: Array, area: float) -> Array:
+    """`accelerate` in NumPy."""
+    return np.where(mass > 0.0, area * opened / np.where(mass > 0.0, mass, 1.0), 0.0)
+
+
+@kernel
+def weigh(out: Array, opened: Array, rate: Array, area: float) -> None:
+    """a A rate."""
+    weight, part, rates = flat(out), flat(opened), flat(rate)
+    for i in prange(weight.shape[0]):
+        for k in range(weight.shape[1]):
+            weight[i, k] = area * part[i, k] * rates[i, k]
+
+
+@kernel
+def mean_flux(
+    flux: Array,
+    weight: Array,
+    velocity: Array,
+    before: Array,
+    after: Array,
+    area: float,
+    whole: float,
+) -> None:
+    """Volume per time through the mean open part of each face, and its weight.
+
+    before, after  open parts at both ends of a step
+    whole          weight of a face that is wholly open
+    """
+    q, w, u, one, other = flat(flux), flat(weight), flat(velocity), flat(before), flat(after)
+    for i in prange(q.shape[0]):
+        for k in range(q.shape[1]):
+            mean = 0.5 * (one[i, k] + other[i, k])
+            w[i, k] = whole * mean
+            q[i, k] = area * mean * u[i, k]
+
+
+@kernel
+def fill_empty_faces(field: Array, volume: Array, inside: Array) -> None:
+    """Give faces whose control volume holds nothing the value of another field, in place."""
+    values, part, given = flat(field), flat(volume), flat(inside)
+    for i in prange(values.shape[0]):
+        for k in range(values.shape[1]):
+            value = values[i, k]
+            values[i, k] = given[i, k] if part[i, k] == 0.0 else value
+
+
+@kernel
+def gained(out: Array, a: Array, b: Array, c: Array, d: Array, dt: float) -> None:
+    """(a - b + c - d) / dt."""
+    rate, one, two, three, four = flat(out), flat(a), flat(b), flat(c), flat(d)
+    for i in prange(rate.shape[0]):
+        for k in range(rate.shape[1]):
+            rate[i, k] = (one[i, k] - two[i, k] + three[i, k] - four[i, k]) / dt
+
+
+@kernel
+def still_to_come(out: Array, rate: Array, now: Array, was: Array, dt: float) -> None:
+    """rate - 2 (now - was) / dt: of what goes along with a flow in dt, without the half, now - was,
+    that is there already, and the other one."""
+    left, whole, one, other = flat(out), flat(rate), flat(now), flat(was)
+    for i in prange(left.shape[0]):
+        for k in range(left.shape[1]):
+            left[i, k] = whole[i, k] - 2.0 * (one[i, k] - other[i, k]) / dt
+
+
+@kernel
+def move_on(was: Array, now: Array, later: Array) -> None:
+    """Where a velocity will be half a step on, from the last two: now + (now - was) / 2; then the
+    last one becomes the present one, in place."""
+    last, u, ahead = flat(was), flat(now), flat(later)
+    for i in prange(u.shape[0]):
+        for k in range(u.shape[1]):
+            value = u[i, k]
+            ahead[i, k] = value + 0.5 * (value - last[i, k])
+            last[i, k] = value
+
+
+@kernel
+def weighted_change(weight: Array, before: Array, after: Array) -> tuple[float, float]:
+    """Sum of weight x (after - before), and of its sizes."""
+    mass, one, other = flat(weight), flat(before), flat(after)
+    planes, parts = one.shape[0], np.zeros((2, one.shape[0]))
+    for i in prange(planes):
+        row, sizes = np.zeros(LANES), np.zeros(LANES)
+        for first in range(0, one.shape[1], LANES):
+            last = min(first + LANES, one.shape[1])
+            a, b, m = one[i, first:last], other[i, first:last], mass[i, first:last]
+            for k in range(last - first):
+                change = m[k] * (b[k] - a[k])
+                row[k] += change
+                sizes[k] += abs(change)
+        parts[0, i], parts[1, i] = row.sum(), sizes.sum()
+    return float(parts[0].sum()), float(parts[1].sum())
+
+
+@kernel
+def largest_open(field: Array, opened: Array) -> float:
+    """Largest size of a field on faces that are not wholly closed."""
+    values, part, most = flat(field), flat(opened), np.zeros(field.shape[0])
+    for i in prange(values.shape[0]):
+        found = 0.0
+        for k in range(values.shape[1]):
+            size = abs(values[i, k]) if part[i, k] > 0.0 else 0.0
+            found = size if size > found else found
+        most[i] = found
+    return float(most.max())

@@ -1,0 +1,93 @@
+"""Whole fields on the faces, against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.faces import (
+    accelerate,
+    accelerate_reference,
+    face_means,
+    face_means_reference,
+    fill_empty_faces,
+    gained,
+    largest_open,
+    mean_flux,
+    move_on,
+    still_to_come,
+    weigh,
+    weighted_change,
+)
+
+from .cut_cells import face_shape
+
+Shape = tuple[int, int, int]
+
+SHAPES = pytest.mark.parametrize("shape", [(9, 8, 77), (9, 8, 1), (1, 2, 3)])
+
+
+def fields(shape: Shape, count: int) -> np.ndarray:
+    """(count, shape) random values, a third of them 0."""
+    random = np.random.default_rng(5)
+    return random.standard_normal((count, *shape)) * (random.random((count, *shape)) > 1 / 3)
+
+
+@SHAPES
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_face_means(shape: Shape, axis: int, periodic: bool) -> None:
+    (cells,), out = fields(shape, 1), np.empty(face_shape(shape, axis))
+    face_means(out, cells, axis, periodic)
+    np.testing.assert_allclose(out, face_means_reference(cells, axis, periodic), rtol=1e-15)
+
+
+@SHAPES
+def test_rates_and_weights(shape: Shape) -> None:
+    opened, mass = np.abs(fields(shape, 2))
+    rate, weight = np.empty(shape), np.empty(shape)
+    accelerate(rate, opened, mass, 0.3)
+    np.testing.assert_allclose(rate, accelerate_reference(opened, mass, 0.3), rtol=1e-14)
+    weigh(weight, opened, rate, 0.3)
+    np.testing.assert_allclose(weight, 0.3 * opened * rate, rtol=1e-14)
+
+
+@SHAPES
+def test_mean_flux(shape: Shape) -> None:
+    u, before, after = fields(shape, 3)
+    flux, weight = np.empty(shape), np.empty(shape)
+    mean_flux(flux, weight, u, before, after, 0.3, 7.0)
+    np.testing.assert_allclose(weight, 3.5 * (before + after), rtol=1e-14, atol=1e-16)
+    np.testing.assert_allclose(flux, 0.15 * (before + after) * u, rtol=1e-14, atol=1e-16)
+
+
+@SHAPES
+def test_a_velocity_goes_on(shape: Shape) -> None:
+    """Closed faces take what is inside; then half a step is looked ahead."""
+    u, opened, inside, was = fields(shape, 4)
+    filled = np.where(opened == 0.0, inside, u)
+    fill_empty_faces(u, opened, inside)
+    np.testing.assert_array_equal(u, filled)
+    rate, later, last = np.empty(shape), np.empty(shape), was.copy()
+    gained(rate, u, was, opened, inside, 0.1)
+    np.testing.assert_allclose(rate, (u - was + opened - inside) / 0.1, rtol=1e-14)
+    still_to_come(rate, opened, u, was, 0.1)
+    np.testing.assert_allclose(rate, opened - 2.0 * (u - was) / 0.1, rtol=1e-14, atol=1e-14)
+    move_on(was, u, later)
+    np.testing.assert_allclose(later, u + 0.5 * (u - last), rtol=1e-14, atol=1e-16)
+    np.testing.assert_array_equal(was, u)
+
+
+@SHAPES
+def test_weighted_change(shape: Shape) -> None:
+    mass, before, after = fields(shape, 3)
+    change = mass * (after - before)
+    expected = change.sum(), np.abs(change).sum()
+    assert weighted_change(mass, before, after) == pytest.approx(expected, rel=1e-12)
+
+
+@SHAPES
+def test_largest_open(shape: Shape) -> None:
+    field, opened = fields(shape, 2)
+    expected = np.abs(field).max(where=opened > 0.0, initial=0.0)
+    assert largest_open(field, opened) == expected
