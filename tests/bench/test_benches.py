@@ -90,6 +90,7 @@ def test_growth_names_time_and_memory_of_every_size():
     assert "10 x 10 x 9 cells" in result.lines[0]
     assert "bytes a cell" in result.lines[1]
     assert "projection" in result.lines[1]
+    assert "GB/s" in result.lines[2]
 
 
 def test_a_human_is_timed_in_every_way():

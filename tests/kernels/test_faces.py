@@ -42,6 +42,19 @@ def test_face_means(shape: Shape, axis: int, periodic: bool) -> None:
     np.testing.assert_allclose(out, face_means_reference(cells, axis, periodic), rtol=1e-15)
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_threads_change_no_bit(axis: int) -> None:
+    """Of what is not one operation for each face."""
+    shape = (40, 33, 37)
+    cells, before, after = fields(shape, 3)
+    assert weighted_change.parallel(cells, before, after) == weighted_change(cells, before, after)
+    assert largest_open.parallel(cells, after) == largest_open(cells, after)
+    one, other = np.empty((2, *face_shape(shape, axis)))
+    face_means(one, cells, axis, True)
+    face_means.parallel(other, cells, axis, True)
+    np.testing.assert_array_equal(one, other)
+
+
 @SHAPES
 def test_rates_and_weights(shape: Shape) -> None:
     opened, mass = np.abs(fields(shape, 2))

@@ -67,6 +67,9 @@ def test_stage(
     if weight == 1.0:
         np.testing.assert_allclose(net, total, atol=1e-13)
     np.testing.assert_allclose(out, value, rtol=1e-12, atol=1e-12)
+    again = np.full(shape, np.nan)
+    stage.parallel(again, net if weight < 1.0 else total, weight, start, before, after, *rest)
+    np.testing.assert_array_equal(again, out)
 
 
 @COMPONENTS
@@ -131,4 +134,5 @@ def test_pad_field(shape: Shape) -> None:
 @pytest.mark.parametrize("cells", [(5, 7, 6), (9, 8, 1)])
 def test_largest_crossing(cells: Shape) -> None:
     q = fluxes(cells, np.random.default_rng(4))
+    assert largest_crossing.parallel(*q) == largest_crossing(*q)
     assert largest_crossing(*q) == pytest.approx(largest_crossing_reference(q), rel=1e-14)

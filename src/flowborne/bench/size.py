@@ -1,4 +1,8 @@
-"""What a frame in three dimensions costs, and how that grows with the number of cells."""
+"""What a step in three dimensions costs, and how a frame grows with the number of cells.
+
+Of the largest part, the pressure's iterations, what they move through memory is set against what
+p = z + s p moves in the same run (after the triad of McCalpin 1995).
+"""
 
 from __future__ import annotations
 
@@ -10,12 +14,15 @@ from math import prod
 import numpy as np
 
 from flowborne.bench.memory import held
-from flowborne.bench.result import Result
+from flowborne.bench.result import Result, timed
+from flowborne.fluid.grid import faces_of
 from flowborne.frame_report import PARTS
 from flowborne.kernels.jit import kernel_threads
+from flowborne.kernels.vectors import turn
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.simulation import Simulation
+from flowborne.solvers.pressure import PressureSystem
 
 NAME = "size"
 SCENES = {"flyer-base": (32, 64, 96), "swimmer-jet-only": (72, 120, 168)}
@@ -23,6 +30,13 @@ SCENES = {"flyer-base": (32, 64, 96), "swimmer-jet-only": (72, 120, 168)}
 
 FRAMES = 4
 """How many are timed, after a first one."""
+
+MOVED = 196
+"""Bytes that an iteration moves for each cell if nothing stays in cache between two passes: 116 in
+conjugate gradients, 70 on the finest level of the cycle, and a seventh of those on the others."""
+
+STREAM = (100, 100, 1000)
+"""Shape of arrays that fit into no cache."""
 
 
 def measure() -> Iterator[Result]:
@@ -35,16 +49,19 @@ def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     """Power of the number of cells with which the time of a frame grows, over all scenes."""
     cells, seconds, lines = [], [], []
     for scene in scenes:
-        shape, spent = parts_of(scene, frames)
+        shape, steps, spent = parts_of(scene, frames)
         with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as executor:
             (memory,) = executor.submit(held, scene, (2,)).result()
         cells.append(prod(shape))
         seconds.append(sum(spent.values()))
-        shares = ", ".join(f"{part} {100.0 * s / seconds[-1]:.0f} %" for part, s in spent.items())
+        unit = 1e9 / cells[-1] / steps
+        shares = ", ".join(f"{part} {unit * s:.0f}" for part, s in spent.items())
         lines.append(
             f"{' x '.join(map(str, shape))} cells: {seconds[-1]:.3g} s a frame, "
-            f"{memory.most / 1e6:.0f} MB ({memory.most / cells[-1]:.0f} bytes a cell); {shares}"
+            f"{memory.most / 1e6:.0f} MB ({memory.most / cells[-1]:.0f} bytes a cell); "
+            f"{unit * seconds[-1]:.0f} ns a cell and step: {shares}"
         )
+    lines.append(iterations_against_memory(shape))
     power = float(np.polyfit(np.log(cells), np.log(seconds), 1)[0]) if len(cells) > 1 else np.nan
     return Result(
         NAME,
@@ -56,11 +73,29 @@ def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     )
 
 
-def parts_of(scene: Scene, frames: int) -> tuple[tuple[int, int, int], dict[str, float]]:
-    """Cells along each axis, and median seconds of each part of a frame on one thread."""
+def parts_of(scene: Scene, frames: int) -> tuple[tuple[int, int, int], int, dict[str, float]]:
+    """Cells along each axis, steps and median seconds of each part of a frame on one thread."""
     with Simulation(scene, 1, "serial") as simulation, kernel_threads(1):
         simulation.advance_frame()
-        spent = [simulation.advance_frame().seconds for _ in range(frames)]
+        reports = [simulation.advance_frame() for _ in range(frames)]
         shape = simulation.world.flow()[0].grid.shape
+    spent = [report.seconds for report in reports]
     means = {part: float(np.median([seconds[part] for seconds in spent])) for part in PARTS}
-    return shape, {part: s for part, s in means.items() if s > 0.0}
+    return shape, len(reports[-1].steps), {part: s for part, s in means.items() if s > 0.0}
+
+
+def iterations_against_memory(shape: tuple[int, int, int]) -> str:
+    """What iterations of the pressure solve in an empty room take and move, in words."""
+    sizes = [tuple(n + (axis == a) for a, n in enumerate(shape)) for axis in range(3)]
+    ones = [np.ones(size) for size in sizes]
+    rhs = np.random.default_rng(0).standard_normal(shape)
+    p, z = np.ones(STREAM), np.ones(STREAM)
+    with kernel_threads(1):
+        system = PressureSystem(faces_of(ones))
+        solution, took = timed(lambda: system.solve(rhs), 3)
+        _, moving = timed(lambda: turn(p, z, 0.5), 5)
+    each = 1e9 * took / solution.iterations / rhs.size
+    return (
+        f"pressure: {each:.1f} ns a cell and iteration, {MOVED / each:.0f} GB/s if nothing stays "
+        f"in cache; p = z + s p moves {24e-9 * p.size / moving:.0f} GB/s"
+    )

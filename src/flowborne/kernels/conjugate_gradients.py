@@ -20,13 +20,13 @@ from flowborne.kernels.arrays import (
 )
 from flowborne.kernels.deflation import deflated, mode_strengths
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.laplacian import apply_laplacian
+from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
 from flowborne.kernels.levels import at_level, wrap_ghosts
 from flowborne.kernels.regions import remove_null
 from flowborne.kernels.response import respond
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
-from flowborne.kernels.vectors import descend, dot, scaled, true_residual, turn
+from flowborne.kernels.vectors import descend_on, dot, scaled, scaled_dot, true_residual, turn
 
 LIMIT = 500
 """Most iterations."""
@@ -83,6 +83,7 @@ def solve(
     goal = max(tolerance * norm, absolute, 1e-15 * norm0)
     residual, last = 0.0, np.inf
     z, b = at_level(cycle[0], table, 0), at_level(cycle[1], table, 0)
+    ring = periodic.any()
     iterations = 0
     converged = False
     if not norm > goal:
@@ -103,18 +104,29 @@ def solve(
         last = residual
         p[:] = 0.0
         product = 0.0
+        scale = 1.0 / np.sqrt(square)
+        scaled(r, b, scale)
         while np.sqrt(square) > goal and iterations < LIMIT:
-            scale = 1.0 / np.sqrt(square)
-            scaled(r, b, scale)
             v_cycle(hierarchy, cycle[0], cycle[1], cycle[2])
-            strength = mode_strengths(z, rows, amounts, 1.0 / scale)
-            before, product = product, deflated(q, z, r, 1.0 / scale, strength, fields)
-            turn(p, q, product / before if before > 0.0 else 0.0)
-            wrap_ghosts(p, periodic)
-            curvature = apply_laplacian(q, p, finest)
+            before = product
+            if amounts.size == 0 and not ring:
+                product = scaled_dot(z, r, 1.0 / scale)
+                beta = product / before if before > 0.0 else 0.0
+                curvature = turn_and_apply(q, p, z, 1.0 / scale, beta, finest)
+            else:
+                strength = mode_strengths(z, rows, amounts, 1.0 / scale)
+                product = deflated(q, z, r, 1.0 / scale, strength, fields)
+                beta = product / before if before > 0.0 else 0.0
+                if ring:
+                    turn(p, q, beta)
+                    wrap_ghosts(p, periodic)
+                    curvature = apply_laplacian(q, p, finest)
+                else:
+                    curvature = turn_and_apply(q, p, q, 1.0, beta, finest)
             curvature += apply_low_rank(q, p, rows, response)
             if not (curvature > 0.0 and product > 0.0):
                 break
-            square = descend(x, r, p, q, product / curvature)
+            scale = 1.0 / np.sqrt(square)
+            square = descend_on(x, r, p, q, product / curvature, b, scale)
             iterations += 1
     return iterations, residual / norm, converged

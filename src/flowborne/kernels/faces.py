@@ -30,7 +30,7 @@ def face_means(out: Array, cells: Array, axis: int, periodic: bool) -> None:
                     row[k] = 0.5 * (line[k - 1] + line[k])
                 row[n] = 0.5 * (line[n - 1] + high)
                 continue
-            at = i if axis == 0 else j
+            at = np.int64(i) if axis == 0 else np.int64(j)
             below, above = (at - 1) % n, at % n
             one, other = (
                 (cells[below, j], cells[above, j])
@@ -158,8 +158,14 @@ def weighted_change(weight: Array, before: Array, after: Array) -> tuple[float, 
                 change = m[k] * (b[k] - a[k])
                 row[k] += change
                 sizes[k] += abs(change)
-        parts[0, i], parts[1, i] = row.sum(), sizes.sum()
-    return float(parts[0].sum()), float(parts[1].sum())
+        for k in range(LANES):
+            parts[0, i] += row[k]
+            parts[1, i] += sizes[k]
+    total, size = 0.0, 0.0
+    for i in range(planes):
+        total += parts[0, i]
+        size += parts[1, i]
+    return total, size
 
 
 @kernel

@@ -6,32 +6,85 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Array, Finest, Real, Triple
+from flowborne.kernels.blocks import BLOCK, inlined, reach
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.vectors import cells_of
 
 
-@kernel
-def apply_laplacian(out: Array, p: Array, finest: Finest) -> float:
-    """out = K p; returns p . K p.  Ghosts of p hold what lies beyond the sides."""
-    w0, w1, w2, diagonal = finest
+@inlined
+def apply_plane(out: Array, p: Array, finest: Finest, m: int) -> float:
+    """`apply_laplacian` on plane m."""
+    w0, w1, w2, _ = finest
     d = 1 if p.shape[0] > 1 else 0
     n2 = p.shape[2] - 2
+    row = np.zeros(n2 + 2)
+    for j in range(1, p.shape[1] - 1):
+        for k in range(1, n2 + 1):
+            own = p[m, j, k]
+            total = w1[m, j, k] * (own - p[m, j - 1, k])
+            total += w1[m, j + 1, k] * (own - p[m, j + 1, k])
+            low, high = own - p[m, j, k - 1], own - p[m, j, k + 1]
+            total += w2[m, j, k] * low + w2[m, j, k + 1] * high
+            if d:
+                low, high = own - p[m - 1, j, k], own - p[m + 1, j, k]
+                total += w0[m, j, k] * low + w0[m + 1, j, k] * high
+            out[m, j, k] = total
+            row[k] += total * own
+    energy = 0.0
+    for k in range(n2 + 2):
+        energy += row[k]
+    return energy
+
+
+@kernel
+def apply_laplacian(out: Array, p: Array, finest: Finest) -> float:
+    """out = K p; returns p . K p.  Ghosts of p hold what lies beyond the sides.
+
+    Of differences, so that the diagonal need not be read.
+    """
+    d = 1 if p.shape[0] > 1 else 0
     planes = p.shape[0] - 2 * d
     parts = np.zeros(planes)
     for i in prange(planes):
-        m = i + d
-        row = np.zeros(n2 + 2)
-        for j in range(1, p.shape[1] - 1):
-            for k in range(1, n2 + 1):
-                total = diagonal[m, j, k] * p[m, j, k] - w1[m, j, k] * p[m, j - 1, k]
-                total -= w1[m, j + 1, k] * p[m, j + 1, k]
-                total -= w2[m, j, k] * p[m, j, k - 1] + w2[m, j, k + 1] * p[m, j, k + 1]
-                if d:
-                    total -= w0[m, j, k] * p[m - 1, j, k] + w0[m + 1, j, k] * p[m + 1, j, k]
-                out[m, j, k] = total
-                row[k] += total * p[m, j, k]
-        for k in range(n2 + 2):
-            parts[i] += row[k]
+        parts[i] = apply_plane(out, p, finest, i + d)
+    total = 0.0
+    for i in range(planes):
+        total += parts[i]
+    return total
+
+
+@inlined
+def turn_plane(p: Array, z: Real, scale: float, beta: float, m: int) -> None:
+    """p = scale z + beta p in the cells of plane m."""
+    for j in range(1, p.shape[1] - 1):
+        for k in range(1, p.shape[2] - 1):
+            p[m, j, k] = scale * z[m, j, k] + beta * p[m, j, k]
+
+
+@kernel
+def turn_and_apply(
+    out: Array, p: Array, z: Real, scale: float, beta: float, finest: Finest
+) -> float:
+    """p = scale z + beta p in the cells, then out = K p; returns p . K p. Without periodic axes.
+
+    z  may be `out`
+    """
+    d = 1 if p.shape[0] > 1 else 0
+    planes = p.shape[0] - 2 * d
+    parts = np.zeros(planes)
+    blocks = max(1, planes // BLOCK)
+    for block in prange(blocks):
+        start, end = reach(block, blocks, planes, 0)
+        one, two = reach(block, blocks, planes, 1)
+        for i in range(start, end + 1):
+            if i < end:
+                turn_plane(p, z, scale, beta, i + d)
+            if one <= i - 1 < two:
+                parts[i - 1] = apply_plane(out, p, finest, i - 1 + d)
+    for between in prange(blocks - 1):
+        i = planes * (between + 1) // blocks
+        for m in range(i - 1, i + 1):
+            parts[m] = apply_plane(out, p, finest, m + d)
     total = 0.0
     for i in range(planes):
         total += parts[i]
@@ -50,8 +103,7 @@ def neighbour_sum(x: Real, w: Triple) -> Array:
 
 def apply_laplacian_reference(p: Array, finest: Finest) -> Array:
     """`apply_laplacian` in NumPy, K p with ghosts 0."""
-    *w, diagonal = finest
-    out = np.zeros_like(p)
-    inside = cells_of(p)
-    out[inside] = (diagonal * p - neighbour_sum(p, (w[0], w[1], w[2])))[inside]
+    w0, w1, w2, _ = finest
+    w, out, inside = (w0, w1, w2), np.zeros_like(p), cells_of(p)
+    out[inside] = (neighbour_sum(np.ones_like(p), w) * p - neighbour_sum(p, w))[inside]
     return out

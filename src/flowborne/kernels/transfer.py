@@ -18,6 +18,7 @@ from numba import prange
 
 from flowborne.kernels.aggregates import OWN
 from flowborne.kernels.arrays import Array, Integers, Marks, Periodic, Places, Real, Triple
+from flowborne.kernels.blocks import inlined
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.vectors import cells_of
 
@@ -73,12 +74,12 @@ def interpolate(
         fine[guests[g]] += wide[host[guests[g]]]
 
 
-@kernel
-def add_leaning(row: Real, r: Real, marks: Marks, mark: int, fraction: float) -> None:
-    """row += fraction * r where the cells have this mark."""
-    part = row.dtype.type(fraction)
+@inlined
+def add_leaning(row: Real, r: Real, marks: Marks, m: int, j: int, mark: int, part: float) -> None:
+    """row += part * r of the row (m, j) where the cells have this mark."""
+    share, none = row.dtype.type(part), row.dtype.type(0)
     for k in range(1, row.size - 1):
-        row[k] += part * r[k] if marks[k] & mark else row.dtype.type(0)
+        row[k] += share * r[m, j, k] if marks[m, j, k] & mark else none
 
 
 @kernel
@@ -111,16 +112,16 @@ def restrict(b: Real, r: Real, marks: Marks, lean: Triple, guests: Places, hosts
                         keep -= part0 * value if mark & 1 else none
                         row[k] += keep
                 if lean1[first1 - 1] > 0.0:
-                    add_leaning(row, r[m, first1 - 1], marks[m, first1 - 1], 2, lean1[first1 - 1])
+                    add_leaning(row, r, marks, m, first1 - 1, 2, lean1[first1 - 1])
                 if lean1[end1] < 0.0:
-                    add_leaning(row, r[m, end1], marks[m, end1], 2, -lean1[end1])
+                    add_leaning(row, r, marks, m, end1, 2, -lean1[end1])
             if d:
                 low, high = lean0[first0 - 1], lean0[end0]
                 for j in range(first1, end1):
                     if low > 0.0:
-                        add_leaning(row, r[first0 - 1, j], marks[first0 - 1, j], 1, low)
+                        add_leaning(row, r, marks, first0 - 1, j, 1, low)
                     if high < 0.0:
-                        add_leaning(row, r[end0, j], marks[end0, j], 1, -high)
+                        add_leaning(row, r, marks, end0, j, 1, -high)
             across[0], across[n2 + 1] = across[n2], across[1]
             for c in range(1, b.shape[2] - 1):
                 k, last = h2 * (c - 1) + 1, min(h2 * c, n2)

@@ -23,7 +23,9 @@ from flowborne.kernels.smoothing import (
     defect_reference,
     first_smooth,
     smooth,
+    smooth_down,
     smooth_reference,
+    smooth_up,
 )
 from flowborne.kernels.transfer import (
     interpolate,
@@ -47,10 +49,9 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
     coarsest = table.shape[0] - 2
     w, a = weights_at(weights, table, level), at_level(inverse, table, level)
     xl, bl = at_level(x, table, level), at_level(b, table, level)
-    if down:
-        first_smooth(xl, bl, a)
-        sweeps = 1 if level < coarsest else 4 * COARSEST_SWEEPS - 1
-    else:
+    rl = at_level(r, table, level)
+    fine = not periodic.any() and level < coarsest
+    if not down:
         interpolate(
             xl,
             at_level(x, table, level + 1),
@@ -59,16 +60,23 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
             guests_at(guests, table, level),
             at_level(hosts, table, level),
         )
-        sweeps = 2
-    for n in range(sweeps):
+    if fine and down:
+        smooth_down(xl, rl, bl, w, a)
+    elif fine:
+        smooth_up(xl, bl, w, a)
+    else:
+        if down:
+            first_smooth(xl, bl, a)
+        sweeps = 2 if not down else (1 if level < coarsest else 4 * COARSEST_SWEEPS - 1)
+        for n in range(sweeps):
+            wrap_ghosts(xl, periodic)
+            mirrored = n > 2 * COARSEST_SWEEPS - 2
+            smooth(xl, bl, w, a, n % 2 if mirrored else 1 - n % 2)
         wrap_ghosts(xl, periodic)
-        mirrored = n > 2 * COARSEST_SWEEPS - 2
-        smooth(xl, bl, w, a, n % 2 if mirrored else 1 - n % 2)
-    wrap_ghosts(xl, periodic)
+        if down and level < coarsest:
+            defect(rl, xl, bl, w, a)
+            wrap_ghosts(rl, periodic)
     if down and level < coarsest:
-        rl = at_level(r, table, level)
-        defect(rl, xl, bl, w, a)
-        wrap_ghosts(rl, periodic)
         restrict(
             at_level(b, table, level + 1),
             rl,

@@ -88,6 +88,48 @@ def descend(x: Array, r: Array, p: Array, q: Array, alpha: float) -> float:
 
 
 @kernel
+def descend_on(
+    x: Array, r: Array, p: Array, q: Array, alpha: float, b: Real, scale: float
+) -> float:
+    """`descend`, and b = scale x r in b's precision."""
+    planes, size = r.shape[0], r.shape[2]
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        row = np.zeros(size)
+        for j in range(r.shape[1]):
+            for k in range(size):
+                x[i, j, k] += alpha * p[i, j, k]
+                value = r[i, j, k] - alpha * q[i, j, k]
+                r[i, j, k] = value
+                b[i, j, k] = scale * value
+                row[k] += value * value
+        for k in range(size):
+            parts[i] += row[k]
+    total = 0.0
+    for i in range(planes):
+        total += parts[i]
+    return total
+
+
+@kernel
+def scaled_dot(z: Real, r: Array, scale: float) -> float:
+    """Sum of scale x z x r, planes in order."""
+    planes, size = r.shape[0], r.shape[2]
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        row = np.zeros(size)
+        for j in range(r.shape[1]):
+            for k in range(size):
+                row[k] += scale * z[i, j, k] * r[i, j, k]
+        for k in range(size):
+            parts[i] += row[k]
+    total = 0.0
+    for i in range(planes):
+        total += parts[i]
+    return total
+
+
+@kernel
 def turn(p: Array, z: Array, beta: float) -> None:
     """p = z + beta p."""
     for i in prange(p.shape[0]):

@@ -1,0 +1,77 @@
+"""Operations that go through blocks of planes together, against one after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.blocks import BLOCK
+from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
+from flowborne.kernels.smoothing import defect, first_smooth, smooth, smooth_down, smooth_up
+from flowborne.kernels.vectors import cells_of, descend, descend_on, dot, scaled_dot
+
+SHAPES = pytest.mark.parametrize(
+    "shape", [(3 * BLOCK + 7, 6, 9), (2 * BLOCK, 5, 4), (4, 5, 6), (1, 9, 8)]
+)
+THREADS = pytest.mark.parametrize("threads", ["serial", "parallel"])
+
+
+def system(shape: tuple[int, int, int], kind: type) -> tuple[tuple, np.ndarray, list[np.ndarray]]:
+    """Padded weights, their sum in every cell, and three fields; ghosts 0."""
+    random = np.random.default_rng(0)
+    padded = tuple(n + 2 * (n > 1) for n in shape)
+    weights, inside = [], cells_of(np.empty(padded))
+    for axis in range(3):
+        w = np.zeros(padded, kind)
+        if shape[axis] > 1:
+            w[inside] = random.random(shape)
+            np.moveaxis(w, axis, 0)[1] = 0.0
+        weights.append(w)
+    diagonal = np.zeros(padded, kind)
+    for axis, w in enumerate(weights):
+        diagonal += w + np.roll(w, -1, axis)
+    fields = [np.zeros(padded, kind) for _ in range(3)]
+    for values in fields:
+        values[inside] = random.standard_normal(shape)
+    return tuple(weights), diagonal, fields
+
+
+@SHAPES
+@THREADS
+def test_smoothing_on_the_way_down_and_up(shape: tuple[int, int, int], threads: str) -> None:
+    w, diagonal, (x, b, r) = system(shape, np.float32)
+    inverse = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
+    expected, left = x.copy(), r.copy()
+    first_smooth(expected, b, inverse)
+    smooth(expected, b, w, inverse, 1)
+    defect(left, expected, b, w, inverse)
+    getattr(smooth_down, threads)(x, r, b, w, inverse)
+    np.testing.assert_array_equal(x, expected)
+    np.testing.assert_array_equal(r, left)
+    for colour in (1, 0):
+        smooth(expected, b, w, inverse, colour)
+    getattr(smooth_up, threads)(x, b, w, inverse)
+    np.testing.assert_array_equal(x, expected)
+
+
+@SHAPES
+@THREADS
+def test_turn_and_apply(shape: tuple[int, int, int], threads: str) -> None:
+    w, diagonal, (p, z, _) = system(shape, np.float64)
+    turned, out = 0.3 * z + 0.7 * p, np.zeros_like(p)
+    energy = apply_laplacian(out, turned, (*w, diagonal))
+    assert getattr(turn_and_apply, threads)(z, p, z, 0.3, 0.7, (*w, diagonal)) == energy
+    np.testing.assert_array_equal(p, turned)
+    np.testing.assert_array_equal(z, out)
+
+
+@SHAPES
+@THREADS
+def test_descend_on(shape: tuple[int, int, int], threads: str) -> None:
+    _, x, (r, p, q) = system(shape, np.float64)
+    b, one, other = np.zeros(x.shape, np.float32), x.copy(), r.copy()
+    square = descend(one, other, p, q, 0.3)
+    assert getattr(descend_on, threads)(x, r, p, q, 0.3, b, 2.0) == square
+    for found, expected in ((x, one), (r, other), (b, (2.0 * other).astype(np.float32))):
+        np.testing.assert_array_equal(found, expected)
+    assert getattr(scaled_dot, threads)(p, r, 0.5) == pytest.approx(0.5 * dot(p, r), rel=1e-12)
