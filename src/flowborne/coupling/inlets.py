@@ -9,6 +9,7 @@ import numpy as np
 from flowborne.coupling.mouths import Jet
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import means
+from flowborne.fluid.dye import Brought
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.transport import NO_INLETS, Inlets
@@ -71,3 +72,21 @@ def at_faces(cells: Array, axis: int, sides: Boundaries) -> Array:
     if sides.periodic()[axis]:
         values[edge(axis, -1)] = 0.0
     return values.reshape(-1)
+
+
+def brought_by(jets: tuple[Jet, ...], rate: Array, names: tuple[str, ...]) -> Brought:
+    """What mouths and sources bring into the cells: mouths their own dye, none that they do not
+    name; sources, and mouths that drink, the fluid that is there.
+
+    rate   (nx, ny, nz) what all of them bring, m^3/s
+    names  of the scalars
+    """
+    blown = [jet for jet in jets if jet.rate > 0.0]
+    gain, dye = np.zeros(rate.shape), {name: np.zeros(rate.shape) for name in names}
+    for jet in blown:
+        gain.reshape(-1)[jet.cells] += jet.rates
+        for name in names:
+            dye[name].reshape(-1)[jet.cells] += jet.mouth.scalars.get(name, 0.0) * jet.rates
+    cells = np.flatnonzero(gain)
+    amounts = {name: dye[name].reshape(-1)[cells] for name in names}
+    return Brought(rate, cells, gain.reshape(-1)[cells], amounts)

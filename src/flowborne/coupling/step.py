@@ -109,12 +109,12 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
     settle_state(world, carried, solved.projected.velocity, leak_free, cut, dt)
     state.pressure[:] = solved.projected.pressure
-    state.scalars = carried.scalars
+    state.scalars = carried.dyed.scalars
     advance_clock(world, dt)
     balance = momentum_balance(world, mass, carried, solved)
     watch.lap("advection")
     done = report(world, pose, solved, buoyancy, wind, reaction, balance, dt, watch)
-    done.expelled = dt * sum(jet.rate for jet in blown)
+    done.expelled, done.dye_error = dt * sum(jet.rate for jet in blown), carried.dyed.error
     return done
 
 
