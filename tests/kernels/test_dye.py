@@ -11,8 +11,8 @@ from flowborne.kernels.cut_dye import (
     WHOLE,
     beside_reference,
     list_flows,
-    mix,
-    mix_reference,
+    pass_on,
+    pass_on_reference,
     sort_cells,
     sort_cells_reference,
 )
@@ -106,19 +106,23 @@ def test_fluxes_of_cut_cells_are_listed_and_taken_out() -> None:
     assert left.min() > 0
 
 
-def test_mix() -> None:
+def test_pass_on() -> None:
     random = np.random.default_rng(5)
     tables, _, _ = sample()
     n = tables["listed"].size
     field, volume = random.random(ROOM), np.ones(ROOM)
     volume.ravel()[tables["listed"]] = random.choice([0.0, 1e-6, 0.3, 0.7], n)
     gain = random.random(n) * (random.random(n) < 0.2)
-    given = random.random((n, 6)), gain, gain * random.random(n), 1.5 * gain
-    expected = mix_reference(field, volume, *tables.values(), *given)
-    crossed = mix(field, volume, *tables.values(), *given, *NEVER)
-    assert crossed == pytest.approx(expected[2], abs=1e-13)
-    np.testing.assert_allclose(field, expected[0], atol=1e-12)
+    local = random.uniform(-0.1, 0.1, n) * (random.random(n) < 0.2)
+    short = volume.ravel()[tables["listed"]] + gain + local - tables["out"].sum(axis=1)
+    volume.ravel()[tables["listed"]] -= np.minimum(short, 0.0)
+    given = random.random((n, 6)), gain, gain * random.random(n), local
+    expected = pass_on_reference(field, volume, *tables.values(), *given)
+    gained = pass_on(field, volume, *tables.values(), *given, *NEVER)
+    assert gained == pytest.approx(expected[2], abs=1e-13)
     np.testing.assert_allclose(volume, expected[1], atol=1e-14)
+    filled = volume > 1e-9
+    np.testing.assert_allclose(field[filled], expected[0][filled], atol=1e-12)
     assert 0.0 <= field.min() < field.max() <= 1.0
 
 

@@ -22,7 +22,7 @@ from flowborne.fluid.ghosts import Scalar, edge
 from flowborne.fluid.grid import Array, Grid, faces_of
 from flowborne.fluid.transport import SUBSTEPS, Transport
 from flowborne.kernels.arrays import Integers, Marks
-from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, mix, sort_cells
+from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, pass_on, sort_cells
 from flowborne.kernels.dye import sweep
 
 REACH = 2
@@ -133,7 +133,7 @@ class Passage:
         for s in range(self.count):
             volume = start + (s / self.count) * (end - start)
             if self.listed.size:
-                gained += self.mix(name, field, volume, bounds)
+                gained += self.pass_on(name, field, volume, bounds)
             order = self.grid.axes if (s % 2 == 0) != self.backwards else self.grid.axes[::-1]
             for axis in order:
                 ends = np.stack([self.beyond(name, field, axis, upper) for upper in (0, 1)])
@@ -172,7 +172,7 @@ class Passage:
             values = np.broadcast_to(given, shape)[edge(axis, 0)]
         return values.T if self.grid.is_slab else values
 
-    def mix(self, name: str, field: Array, volume: Array, bounds: tuple[float, float]) -> float:
+    def pass_on(self, name: str, field: Array, volume: Array, bounds: tuple[float, float]) -> float:
         """Carry a scalar through the faces of the cut cells, in place; gives what came in."""
         n, dt = self.listed.size, self.dt
         entering, gain, dye = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
@@ -188,11 +188,9 @@ class Passage:
         gain[self.expelled] = dt * self.brought.gain
         if self.brought.cells.size:
             dye[self.expelled] = dt * self.brought.dye[name]
-        grown = dt * self.brought.rate.reshape(-1)[self.listed]
+        local = dt * self.brought.rate.reshape(-1)[self.listed] - gain
         tables = self.listed, self.beside, self.row, dt * self.out
-        crossed = mix(field, volume, *tables, entering, gain, dye, grown, *bounds)
-        local = (grown - gain) @ field.reshape(-1)[self.listed]
-        return crossed + float(dye.sum() + local)
+        return pass_on(field, volume, *tables, entering, gain, dye, local, *bounds)
 
 
 def far_from_cut(whole: NDArray[np.bool_], grid: Grid, sides: Boundaries) -> Marks:

@@ -1,9 +1,10 @@
-"""Dye in cut cells: what is in one and what comes in is mixed, and the mixture leaves.
+"""Dye in cut cells: what is in one leaves first, then what comes in, well mixed.
 
-No cell is too small for that (implicit upwind; May and Berger 2017 join it to an explicit scheme):
-one that a body leaves takes what flows in, one that a body takes up gives what it has to where its
-fluid goes, and nothing passes a closed face. Lists are of the cut cells, in ascending order; `way`
-is 2 axis for the lower and 2 axis + 1 for the upper face across an axis.
+So no cell is too small: where more flows through it in a step than it holds, it passes on what
+comes in (implicit upwind values; May and Berger 2017 join them to an explicit scheme). One that a
+body leaves takes what flows in, one that a body takes up gives what it has to where its fluid
+goes, and nothing passes a closed face. Lists are of the cut cells, in ascending order; `way` is
+2 axis for the lower and 2 axis + 1 for the upper face across an axis.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ WHOLE, CUT, EMPTY = range(3)
 """What a cell is in a step: nothing but fluid, in part or for some time, or never any."""
 
 SWEEPS = 500
-"""Most times that the mixtures of all cut cells are worked out, one after the other."""
+"""Most times that what leaves all cut cells is worked out, one after the other."""
 
 SETTLED = 1e-15
-"""Change of a mixture, relative to the largest, at which they are done."""
+"""Change of what leaves a cell, relative to the largest, at which that is done."""
 
 
 @kernel
@@ -118,7 +119,7 @@ def list_flows(
 
 
 @njit(nogil=True, cache=True)
-def mix(
+def pass_on(
     field: Array,
     volume: Array,
     listed: Integers,
@@ -128,70 +129,81 @@ def mix(
     entering: Array,
     gain: Array,
     brought: Array,
-    grown: Array,
+    local: Array,
     least: float,
     most: float,
 ) -> float:
-    """Carry a field through the faces of cut cells, in place; gives what came in through sides.
+    """Carry a field through the faces of cut cells, in place; gives the amount that came in through
+    sides of the domain, mouths and sources.
 
     volume    (nx, ny, nz) of the cells, in place
     out       (n, 6) volume that leaves through each face in the step
     entering  (n, 6) value of what comes in through sides of the domain
-    gain      (n,) volume that mouths and sources bring with
+    gain      (n,) volume that mouths bring with
     brought   (n,) amount
-    grown     (n,) volume that they bring in all: less what they take
+    local     (n,) volume that comes in with the value that is there; negative leaves
     least, most  bounds of all values, which a volume below 0 would break by as little as it is
     """
     values, volumes = field.reshape(-1), volume.reshape(-1)
     count = listed.size
-    held, weight, mixture = brought.copy(), gain.copy(), np.empty(count)
-    was, crossed, scale = np.zeros((count, 6)), 0.0, 0.0
+    came, known = gain.copy(), brought.copy()
+    old, mixed, leaving = np.empty(count), np.empty(count), np.empty(count)
+    share, was, gained = np.ones(count), np.zeros((count, 6)), 0.0
     for n in range(count):
         own = listed[n]
-        held[n] += volumes[own] * values[own]
-        weight[n] += volumes[own]
-        mixture[n] = values[own]
+        old[n] = mixed[n] = leaving[n] = values[own]
+        gone = max(-local[n], 0.0)
         for way in range(6):
-            came = max(-out[n, way], 0.0)
-            weight[n] += came
+            gone += max(out[n, way], 0.0)
+            arrives = max(-out[n, way], 0.0)
+            came[n] += arrives
             if beside[n, way] < 0:
-                held[n] += came * entering[n, way]
-                crossed += came * entering[n, way]
+                known[n] += arrives * entering[n, way]
+                gained += arrives * entering[n, way]
             elif row[n, way] < 0:
                 was[n, way] = values[beside[n, way]]
-                held[n] += came * was[n, way]
+                known[n] += arrives * was[n, way]
+        held = max(volumes[own] + max(local[n], 0.0), 0.0)
+        if gone > held and came[n] > 0.0:
+            share[n] = held / gone
+        gained += brought[n] + max(local[n], 0.0) * old[n]
+        volumes[own] += gain[n] + local[n]
+        for way in range(6):
+            volumes[own] -= out[n, way]
     for sweep in range(SWEEPS):
-        change = 0.0
+        change, scale = 0.0, 0.0
         for step in range(count):
             n = step if sweep % 2 == 0 else count - 1 - step
-            total = held[n]
-            for way in range(6):
-                if row[n, way] >= 0 and out[n, way] < 0.0:
-                    total -= out[n, way] * mixture[row[n, way]]
-            mixed = mixture[n]
-            if weight[n] > 0.0:
-                mixed = min(max(total / weight[n], least), most)
-            change = max(change, abs(mixed - mixture[n]))
-            scale = max(scale, abs(mixed))
-            mixture[n] = mixed
+            if came[n] > 0.0:
+                total = known[n]
+                for way in range(6):
+                    if row[n, way] >= 0 and out[n, way] < 0.0:
+                        total -= out[n, way] * leaving[row[n, way]]
+                mixed[n] = min(max(total / came[n], least), most)
+            now = share[n] * old[n] + (1.0 - share[n]) * mixed[n]
+            change = max(change, abs(now - leaving[n]))
+            scale = max(scale, abs(now))
+            leaving[n] = now
         if change <= SETTLED * scale:
             break
     for n in range(count):
         own = listed[n]
-        values[own] = mixture[n]
-        volumes[own] += grown[n]
+        values[own] = mixed[n]
+        if share[n] == 1.0 and volumes[own] > 0.0:
+            part = min(came[n] / volumes[own], 1.0)
+            values[own] = old[n] + part * (mixed[n] - old[n])
+        gained -= max(-local[n], 0.0) * leaving[n]
         for way in range(6):
-            volumes[own] -= out[n, way]
             if beside[n, way] < 0:
-                crossed -= max(out[n, way], 0.0) * mixture[n]
+                gained -= max(out[n, way], 0.0) * leaving[n]
             elif row[n, way] < 0:
                 volumes[beside[n, way]] += out[n, way]
     for n in range(count):
         for way in range(6):
             if beside[n, way] >= 0 and row[n, way] < 0 and out[n, way] > 0.0:
                 to = beside[n, way]
-                values[to] += out[n, way] * (mixture[n] - was[n, way]) / volumes[to]
-    return crossed
+                values[to] += out[n, way] * (leaving[n] - was[n, way]) / volumes[to]
+    return gained
 
 
 def beside_reference(
@@ -203,7 +215,7 @@ def beside_reference(
     return beside, np.where((beside >= 0) & (listed[at] == beside), at, -1)
 
 
-def mix_reference(
+def pass_on_reference(
     field: Array,
     volume: Array,
     listed: Integers,
@@ -213,27 +225,37 @@ def mix_reference(
     entering: Array,
     gain: Array,
     brought: Array,
-    grown: Array,
+    local: Array,
 ) -> tuple[Array, Array, float]:
-    """`mix` in NumPy, as one system of equations: field and volumes after it, and what came in."""
+    """`pass_on` in NumPy, as one system of equations: field and volumes after it, what came in."""
     c, v, n = field.ravel(), volume.ravel(), np.arange(listed.size)
     came, gone = np.maximum(-out, 0.0), np.maximum(out, 0.0)
+    taken, given = np.maximum(-local, 0.0), np.maximum(local, 0.0)
+    arrived, left = gain + came.sum(axis=1), gone.sum(axis=1) + taken
     among, beyond = row >= 0, beside < 0
-    given = np.where(beyond, entering, c[beside])
-    system = np.diag(v[listed] + gain + came.sum(axis=1))
-    np.subtract.at(system, (np.repeat(n, 6)[among.ravel()], row[among]), came[among])
-    held = v[listed] * c[listed] + brought + (came * given * ~among).sum(axis=1)
-    mixture = np.linalg.solve(system, held)
-    amount, later, through = v * c, v.copy(), gone * mixture[:, None]
-    amount[listed] = 0.0
-    later[listed] += grown - out.sum(axis=1)
+    known = brought + (came * np.where(beyond, entering, c[beside]) * ~among).sum(axis=1)
+    share = np.ones(n.size)
+    swift = (left > v[listed] + given) & (arrived > 0.0)
+    share[swift] = (v[listed] + given)[swift] / left[swift]
+    # leaving = share c + (1 - share) (known + what others pass on) / arrived
+    passed = (1.0 - share) / np.where(arrived > 0.0, arrived, 1.0)
+    system = np.eye(n.size)
+    np.subtract.at(
+        system, (np.repeat(n, 6)[among.ravel()], row[among]), (passed[:, None] * came)[among]
+    )
+    leaving = np.linalg.solve(system, share * c[listed] + passed * known)
+    later, through = v.copy(), gone * leaving[:, None]
+    later[listed] += gain + local - out.sum(axis=1)
+    arriving = known + (came * leaving[row] * among).sum(axis=1)
+    amount = v * c
+    amount[listed] += arriving + given * c[listed] - taken * leaving - through.sum(axis=1)
     apart = ~among & ~beyond
     np.add.at(later, beside[apart], out[apart])
-    np.add.at(amount, beside[apart], (through - came * given)[apart])
+    np.add.at(amount, beside[apart], (through - came * c[beside])[apart])
+    gained = (came * entering - through)[beyond].sum() + brought.sum()
+    gained += given @ c[listed] - taken @ leaving
     values = amount / np.where(later > 0.0, later, 1.0)
-    values[listed] = mixture
-    crossed = float((came * entering - through)[beyond].sum())
-    return values.reshape(field.shape), later.reshape(field.shape), crossed
+    return values.reshape(field.shape), later.reshape(field.shape), float(gained)
 
 
 def sort_cells_reference(
