@@ -49,6 +49,7 @@ class Brought:
 
 
 def nothing_brought(grid: Grid) -> Brought:
+    """What comes into cells where there are neither mouths nor sources."""
     return Brought(np.zeros(grid.shape), np.zeros(0, np.int64), np.zeros(0), {})
 
 
@@ -107,7 +108,7 @@ class Passage:
         filled.reshape(-1)[brought.cells] += brought.gain
         sort_cells(kind, fullest, start, end, filled, *transport.flux, uncut)
         flowing = transport.dt * float(fullest.max())
-        self.count = min(max(1, int(np.ceil(flowing - SLACK))), SUBSTEPS)
+        self.count = int(min(max(1.0, np.ceil(flowing - SLACK)), SUBSTEPS))
         self.dt = transport.dt / self.count
         self.clear = far_from_cut(kind == WHOLE, grid, sides)
         self.flux, self.listed = transport.flux, np.flatnonzero(kind == CUT)
