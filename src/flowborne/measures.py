@@ -68,6 +68,7 @@ class Measures:
         self._model = setup.solid
         self._controller = controller
         self._blows = bool(setup.mouths)
+        self._dyed = setup.fluid is not None and bool(setup.fluid.scalars)
         self._along, self._across = _axes(stream)
         self._joints = _scalar_joints(setup.solid)
         places = (
@@ -115,6 +116,7 @@ class Measures:
             names += [f"momentum_{part}_{axis}_Ns" for axis in "xyz"]
         names += ["expelled_m3"] if self._blows else []
         names += ["momentum_exchange_error", "momentum_budget_error", "divergence_1/s"]
+        names += ["dye_budget_error"] if self._dyed else []
         return (*names, "solver_iterations", "residual", "contacts", "fastest_m/s")
 
     def _of_frame(self, report: FrameReport) -> dict[str, float]:
@@ -136,6 +138,8 @@ class Measures:
                 values[f"momentum_{part}_{axis}_Ns"] = float(component)
         for error in ("exchange_error", "budget_error"):
             values[f"momentum_{error}"] = max(getattr(step.momentum, error) for step in steps)
+        if self._dyed:
+            values["dye_budget_error"] = max(step.dye_error for step in steps)
         values["divergence_1/s"] = max(step.divergence for step in steps)
         values["solver_iterations"] = max(step.iterations for step in steps)
         values["residual"] = max(step.residual for step in steps)

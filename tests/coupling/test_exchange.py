@@ -180,4 +180,5 @@ def test_the_budget_of_a_flow_closes() -> None:
             assert (np.linalg.norm(momentum.forces) > 0.0) == bool(settings)
             row = simulation.measure()
     assert row["momentum_budget_error"] < 1e-10
+    assert 0.0 < row["dye_budget_error"] < 1e-12
     assert row["momentum_forces_x_Ns"] == pytest.approx(momentum.forces[0])

@@ -17,7 +17,9 @@ from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.step import cut_by_bodies, move_bodies, step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.fluid.dye import Passage
 from flowborne.fluid.grid import Array, Grid
+from flowborne.kernels.jit import kernel_threads
 from flowborne.scenes.inflow import FactorSteady
 from flowborne.scenes.tracks import MotionSinusoid
 from flowborne.solids.model import SolidModel
@@ -217,3 +219,56 @@ def test_a_saved_state_goes_on_to_the_same_bits(name: str) -> None:
         taken(other)
     for key, values in world.arrays().items():
         np.testing.assert_array_equal(other.arrays()[key], values, err_msg=key)
+
+
+def with_dye(world: World) -> World:
+    """The same with a dye that fills the right half, and one that is everywhere."""
+    fluid, state = world.flow()
+    fluid = replace(fluid, scalars=("half", "even"))
+    x, _, _ = np.meshgrid(*fluid.grid.cell_coordinates(), indexing="ij")
+    state.scalars = {"half": (x > 0.45).astype(float), "even": np.full(fluid.grid.shape, 0.7)}
+    mouths = [replace(m, scalars={"half": 0.9, "even": 0.7}) for m in world.setup.mouths]
+    world.setup = replace(world.setup, fluid=fluid, mouths=tuple(mouths))
+    return world
+
+
+@EACH
+def test_dye_keeps_its_amount_and_its_bounds(name: str) -> None:
+    world = with_dye(WORLDS[name]())
+    for _ in range(12):
+        assert taken(world).dye_error < 1e-12
+        for values in world.flow()[1].scalars.values():
+            assert values.min() >= 0.0
+            assert values.max() <= 1.0
+
+
+@EACH
+def test_dye_that_is_everywhere_stays_so(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also without the bounds that would hold it there."""
+    monkeypatch.setattr(Passage, "bounds", lambda *_: (-1e9, 1e9))
+    world = with_dye(WORLDS[name]())
+    fluid, state = world.flow()
+    for _ in range(12):
+        taken(world)
+        filled = state.cells > 1e-6 * fluid.grid.cell_volume
+        assert np.abs(state.scalars["even"][filled] - 0.7).max() < 1e-12
+
+
+@pytest.mark.parametrize("advection", ["flux", "semi-lagrangian"])
+def test_dye_goes_with_the_same_fluxes_in_either_scheme(advection: str) -> None:
+    world = with_dye(free(SQUARE))
+    fluid, _ = world.flow()
+    world.setup = replace(world.setup, fluid=replace(fluid, advection=advection))
+    for _ in range(5):
+        assert taken(world).dye_error < 1e-12
+
+
+def test_dye_is_the_same_on_any_number_of_threads() -> None:
+    found = []
+    for threads in (1, 2):
+        world = with_dye(free(Grid((48, 48, 48), 1.0 / 48, (0.0, 0.0, 0.0))))
+        with kernel_threads(threads):
+            for _ in range(2):
+                taken(world)
+        found.append(world.flow()[1].scalars["half"])
+    np.testing.assert_array_equal(*found)

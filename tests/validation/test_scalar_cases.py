@@ -22,8 +22,8 @@ def test_F4_orders_and_falling_errors(found):
 
 def test_F4_final_errors(found):
     largest = {
-        "order of MacCormack, blob after a turn": 0.03,
-        "order of MacCormack, blob in the swirl": 0.003,
+        "order of the flux form, blob after a turn": 0.03,
+        "order of the flux form, blob in the swirl": 0.003,
         "order of semi-Lagrangian, blob after a turn": 0.075,
         "order of semi-Lagrangian, blob in the swirl": 0.065,
         "peak of the blob after a turn": 0.007,
@@ -34,11 +34,11 @@ def test_F4_final_errors(found):
 
 
 @pytest.mark.parametrize(("flow", "blob"), [(Turn(0.5, 1.0), Blob(0.7, 0.1))])
-def test_F4_maccormack_keeps_more_than_semi_lagrangian(flow, blob):
+def test_F4_flux_form_keeps_more_than_semi_lagrangian(flow, blob):
     peaks = []
-    for maccormack in (True, False):
+    for flux_form in (True, False):
         grid = Grid.slab(48, 48, 1.0 / 48.0, (0.0, 0.0))
-        before, after = carried_back(flow, blob, 1.0, grid, 2.0, maccormack)
+        before, after = carried_back(flow, blob, 1.0, grid, 2.0, flux_form)
         peaks.append(after.max() / before.max())
         assert after.sum() == pytest.approx(before.sum(), rel=0.02)
     assert peaks[0] > 0.85 > 0.5 > peaks[1]

@@ -13,25 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.inlets import after_drinking, inlets_across, taken_by
+from flowborne.coupling.inlets import after_drinking, brought_by, inlets_across, taken_by
 from flowborne.coupling.leak_proof import leak_proof_flux
 from flowborne.coupling.mouths import (
     Jet,
     add_closed_slip,
     add_rates,
-    colour,
     fill_mouths,
     jet_force,
 )
 from flowborne.coupling.operators import carried_in, leak_proof, motion
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.advection import OFFSETS, carry, cells_per_step
-from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.boundary import Boundaries, cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, parts
+from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides, pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import accelerated
-from flowborne.fluid.scalars import carry_scalars, cells_in
 from flowborne.fluid.transport import Transport, carry_component
 from flowborne.kernels.faces import (
     fill_empty_faces,
@@ -48,7 +47,7 @@ class Carried:
     """What advection gave.
 
     velocity  Faces u*, m/s
-    scalars   name -> (nx, ny, nz)
+    dyed      the scalars
     volumes   control volumes at the end of the step
     lost      (3,) momentum that advection made (or lost, when negative), N s; none in flux form
     crossed   (3,) momentum that the flow carried in through the sides, N s
@@ -58,7 +57,7 @@ class Carried:
     """
 
     velocity: Faces
-    scalars: dict[str, Array]
+    dyed: Dyed
     volumes: ControlVolumes
     lost: Array
     crossed: Array
@@ -143,12 +142,16 @@ def carry_fluid(
         state.carrier, before, after, start.cells, rate, fluid, middle, dt
     )
     end = control_volumes(cells, after.open, fluid.grid, sides)
-    paths = particle_paths(world, q, before, jets, dt)
-    scalars = carry_dye(world, paths, before, after, jets, dt)
-    if fluid.advection == "semi-lagrangian":
-        return carry_along_paths(world, before, start, end, paths, scalars, jets, dt)
     transport = Transport(flux, start, end, dt, world.time)
-    return carry_in_flux_form(world, velocity, transport, after.open, sources, scalars, jets)
+    dyed = Dyed({}, 0.0)
+    if state.scalars:
+        brought = brought_by(jets, rate, tuple(state.scalars))
+        passage = Passage(transport, brought, fluid.grid, sides, world.steps % 2 == 1)
+        dyed = carry_dye(state.scalars, passage, fluid.sources)
+    if fluid.advection == "semi-lagrangian":
+        paths = particle_paths(world, q, before, jets, dt)
+        return carry_along_paths(world, before, transport, paths, dyed, jets)
+    return carry_in_flux_form(world, velocity, transport, after.open, sources, dyed, jets)
 
 
 def carry_in_flux_form(
@@ -157,7 +160,7 @@ def carry_in_flux_form(
     transport: Transport,
     opened: Faces,
     sources: Array,
-    scalars: dict[str, Array],
+    dyed: Dyed,
     jets: tuple[Jet, ...],
 ) -> Carried:
     """Velocity a step later, on moving control volumes (see `transport`).
@@ -165,7 +168,7 @@ def carry_in_flux_form(
     velocity Faces at the start, m/s
     opened   Faces, open parts at the end
     sources  (nx, ny, nz) what they bring into each cell, m^3/s
-    scalars  a step later
+    dyed     the scalars a step later
     """
     fluid, state = world.flow()
     grid, sides, dt = fluid.grid, fluid.boundaries, transport.dt
@@ -188,7 +191,7 @@ def carry_in_flux_form(
     impose_sides(arrived, grid, sides, transport.time + dt)
     return Carried(
         arrived,
-        scalars,
+        dyed,
         transport.after,
         np.zeros(3),
         crossed,
@@ -201,75 +204,44 @@ def carry_in_flux_form(
 def carry_along_paths(
     world: World,
     before: Geometry,
-    start: ControlVolumes,
-    end: ControlVolumes,
+    transport: Transport,
     paths: Faces,
-    scalars: dict[str, Array],
+    dyed: Dyed,
     jets: tuple[Jet, ...],
-    dt: float,
 ) -> Carried:
     """Velocity a step later by the paper's scheme: semi-Lagrangian, with what it loses."""
     fluid, state = world.flow()
-    grid, sides = fluid.grid, fluid.boundaries
+    grid, sides, dt = fluid.grid, fluid.boundaries, transport.dt
+    start, end = transport.before, transport.after
     carried = faces_of([u.copy() for u in state.velocity])
     fill_mouths(carried, jets, grid)
     field, arrived = pad_faces(carried, grid, sides, world.time), grid.zeros_faces()
     counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
     for axis in grid.axes:
-        everywhere = np.ones(field[axis].shape, np.uint8)
-        carry(arrived[axis], field[axis], everywhere, *paths, OFFSETS[axis], counts, periodic)
+        carry(arrived[axis], field[axis], *paths, OFFSETS[axis], counts, periodic)
     end.follow(arrived, grid)
     was = fluid_momentum(state.velocity, face_masses(start, fluid.density), grid, sides)
     now = fluid_momentum(arrived, face_masses(end, fluid.density), grid, sides)
     crossed = dt * carried_in(state.velocity, before.open, grid, sides, fluid.density)
     expelled = dt * jet_force(jets, fluid.density)
     lost = now - was - crossed - expelled
-    return Carried(arrived, scalars, end, lost, crossed, np.zeros(3), expelled, jets)
+    return Carried(arrived, dyed, end, lost, crossed, np.zeros(3), expelled, jets)
 
 
 def particle_paths(
     world: World, q: Array, before: Geometry, jets: tuple[Jet, ...], dt: float
 ) -> Faces:
-    """Padded Faces, cells per step, along which dye goes and, in the paper's scheme, velocity: that
-    of the fluid through the open and of the bodies through the closed part of each face. Empty
-    where nothing goes along them.
+    """Padded Faces, cells per step, along which velocity goes in the paper's scheme: that of the
+    fluid through the open and of the bodies through the closed part of each face.
 
     q  (nq,) positions of the bodies in the grid `before`
     """
     fluid, state = world.flow()
-    if not state.scalars and fluid.advection != "semi-lagrangian":
-        return faces_of([np.zeros((0, 0, 0))] * 3)
     pose = kinematics(world.setup.solid, q)
     field = leak_proof(state.carrier, before, motion(pose, world.solid.v), fluid.grid)
     add_closed_slip(field, jets, fluid.grid)
     padded = pad_faces(field, fluid.grid, fluid.boundaries, world.time)
     return cells_per_step(padded, dt, fluid.grid.spacing)
-
-
-def carry_dye(
-    world: World,
-    paths: Faces,
-    before: Geometry,
-    after: Geometry,
-    jets: tuple[Jet, ...],
-    dt: float,
-) -> dict[str, Array]:
-    """The scalars a step later, along particle paths."""
-    fluid, state = world.flow()
-    if not state.scalars:
-        return {}
-    scalars = carry_scalars(
-        state.scalars,
-        paths,
-        before.distance,
-        after.distance,
-        fluid.grid,
-        fluid.boundaries,
-        fluid.sources,
-        world.time + dt,
-    )
-    colour(scalars, jets, after, fluid.grid, dt)
-    return scalars
 
 
 def forced(

@@ -8,6 +8,7 @@ import numpy as np
 
 from flowborne.coupling.mouths import Jet
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.dye import Brought
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.transport import NO_INLETS, Inlets
 from flowborne.kernels.arrays import Integers
@@ -80,3 +81,21 @@ def at_faces(
     index, which = np.unique(np.concatenate(both), return_inverse=True)
     sums = [np.bincount(which, np.tile(v, 2), index.size) for v in values]
     return index, [np.asarray(0.5 * total, float) for total in sums]
+
+
+def brought_by(jets: tuple[Jet, ...], rate: Array, names: tuple[str, ...]) -> Brought:
+    """What mouths and sources bring into the cells: mouths their own dye, none that they do not
+    name; sources, and mouths that drink, the fluid that is there.
+
+    rate   (nx, ny, nz) what all of them bring, m^3/s
+    names  of the scalars
+    """
+    blown = [jet for jet in jets if jet.rate > 0.0]
+    gain, dye = np.zeros(rate.shape), {name: np.zeros(rate.shape) for name in names}
+    for jet in blown:
+        gain.reshape(-1)[jet.cells] += jet.rates
+        for name in names:
+            dye[name].reshape(-1)[jet.cells] += jet.mouth.scalars.get(name, 0.0) * jet.rates
+    cells = np.flatnonzero(gain)
+    amounts = {name: dye[name].reshape(-1)[cells] for name in names}
+    return Brought(rate, cells, gain.reshape(-1)[cells], amounts)

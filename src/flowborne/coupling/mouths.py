@@ -237,42 +237,6 @@ def fill_mouths(carried: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
             values[at] += part * (jet.skin[axis] + jet.velocity[axis] - values[at])
 
 
-def colour(
-    scalars: dict[str, Array], jets: tuple[Jet, ...], cut: Geometry, grid: Grid, dt: float
-) -> None:
-    """Let dye leave with the jets: into the layer of cells before each mouth, in place."""
-    for jet in jets:
-        names = scalars.keys() & jet.mouth.scalars.keys()
-        if jet.rate <= 0.0 or not names:
-            continue
-        box, x = cells_around(jet, grid)
-        outside = distance_at(x, cut, grid) > 0.0
-        outside &= distance_at(x - grid.spacing * jet.along, cut, grid) <= 0.0
-        part = outside * covered(x, jet.mouth, jet.centre, jet.along, grid)
-        part *= min(1.0, float(np.linalg.norm(jet.velocity)) * dt / grid.spacing)
-        for name in names:
-            values = scalars[name][box]
-            values += part.reshape(values.shape) * (jet.mouth.scalars[name] - values)
-
-
-def cells_around(jet: Jet, grid: Grid) -> tuple[tuple[slice, slice, slice], Array]:
-    """The block of cells that a jet's mouth may cover, and (n, 3) their centres, m."""
-    reach = jet.mouth.radius + (DEPTH + 1.0) * grid.spacing
-    x, y, z = grid.cell_coordinates()
-    near = [
-        slice(*np.searchsorted(x, (middle - reach, middle + reach)))
-        for x, middle in zip((x, y, z), jet.centre, strict=True)
-    ]
-    box = near[0], near[1], near[2]
-    return box, block((x, y, z), box)
-
-
-def block(coordinates: tuple[Array, Array, Array], ranges: tuple[slice, ...]) -> Array:
-    """(n, 3) all places with coordinates (along x, y and z) in ranges of them, m."""
-    along = (c[chosen] for c, chosen in zip(coordinates, ranges, strict=True))
-    return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
-
-
 def jet_force(jets: tuple[Jet, ...], density: float) -> Array:
     """(3,) momentum per time that comes into the fluid with the jets, N."""
     force = np.zeros(3)

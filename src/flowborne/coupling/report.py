@@ -72,6 +72,8 @@ class StepReport:
     momentum         the budget
     work             of the drives, J
     expelled         volume that mouths expelled, less what they took in, m^3
+    dye_error        |change of the amount of a dye less what was brought| relative to it, the
+                     largest of all dyes
     seconds          where the time went: advection, viscosity, projection, geometry, solids
     contacts         number of active contacts
     limited          (k,) dofs whose torque limit was reached
@@ -94,6 +96,7 @@ class StepReport:
     momentum: Momentum = field(default_factory=Momentum)
     work: float = 0.0
     expelled: float = 0.0
+    dye_error: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)
     contacts: int = 0
     limited: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))

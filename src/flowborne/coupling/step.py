@@ -115,14 +115,14 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     settle_state(world, carried, kick.velocity, solved.projected.velocity, leak_free, cut, dt)
     state.earlier[:] = state.pressure + kick.pressure
     state.pressure[:] = kick.pressure + solved.projected.pressure
-    state.scalars = carried.scalars
+    state.scalars = carried.dyed.scalars
     advance_clock(world, dt)
     balance = momentum_balance(world, mass, kick, carried, solved)
     watch.lap("advection")
     done = report(
         world, pose, with_kick(solved, kick), buoyancy, wind, reaction, balance, dt, watch
     )
-    done.expelled = dt * sum(jet.rate for jet in blown)
+    done.expelled, done.dye_error = dt * sum(jet.rate for jet in blown), carried.dyed.error
     return done
 
 

@@ -129,3 +129,16 @@ class Boundaries:
             raise ValueError(
                 "a two-dimensional domain has no sides in z: leave z_min and z_max closed"
             )
+
+
+def cells_in(source: Source, grid: Grid) -> tuple[slice, slice, slice]:
+    """Cells whose centres lie inside a source's box; all layers of a slab."""
+    ranges = []
+    for axis, centres in enumerate(grid.cell_coordinates()):
+        if axis not in grid.axes:
+            ranges.append(slice(None))
+            continue
+        low = int(np.searchsorted(centres, source.lower[axis], side="left"))
+        high = int(np.searchsorted(centres, source.upper[axis], side="right"))
+        ranges.append(slice(low, high))
+    return ranges[0], ranges[1], ranges[2]

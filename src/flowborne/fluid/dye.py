@@ -1,0 +1,218 @@
+"""Dye and smoke, carried by the fluxes that carry momentum: their amount is kept exactly.
+
+With the volume fluxes q of a leak-proof field, V^{n+1} - V^n = dt (rate - sum q) in every cell, and
+
+    V^{n+1} c^{n+1} = V^n c^n - dt sum q c_face + what is brought
+
+Whole cells pass it on along one axis after the other, in an order that turns about (Strang 1968);
+see `kernels.dye`. Cut cells, and those that mouths and sources fill, come first; see
+`kernels.cut_dye`. No value leaves the bounds of what there is and what is brought.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.fluid.boundary import Boundaries, BoundaryInflow, Source, cells_in
+from flowborne.fluid.control_volumes import WHOLE as UNCUT
+from flowborne.fluid.ghosts import Scalar, edge
+from flowborne.fluid.grid import Array, Grid, faces_of
+from flowborne.fluid.transport import SUBSTEPS, Transport
+from flowborne.kernels.arrays import Integers, Marks
+from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, pass_on, sort_cells
+from flowborne.kernels.dye import sweep
+
+REACH = 2
+"""Cells on both sides that the parabola in a cell is made from."""
+
+SLACK = 1e-9
+"""Part of a whole cell by which more than all of it may flow out in a substep."""
+
+
+@dataclass(frozen=True)
+class Brought:
+    """What mouths and sources bring into cells.
+
+    rate   (nx, ny, nz) m^3/s; negative is taken
+    cells  (n,) flat indices of the cells into which mouths expel, each once
+    gain   (n,) m^3/s that they expel there
+    dye    name -> (n,) its amount per time; the rest of `rate` comes in as the fluid that is there
+    """
+
+    rate: Array
+    cells: Integers
+    gain: Array
+    dye: dict[str, Array]
+
+
+def nothing_brought(grid: Grid) -> Brought:
+    """What comes into cells where there are neither mouths nor sources."""
+    return Brought(np.zeros(grid.shape), np.zeros(0, np.int64), np.zeros(0), {})
+
+
+@dataclass(frozen=True)
+class Dyed:
+    """The scalars after a step.
+
+    scalars  name -> (nx, ny, nz)
+    error    of the amount of any: what it has changed by less what was brought, relative to it
+    """
+
+    scalars: dict[str, Array]
+    error: float
+
+
+def carry_dye(
+    scalars: dict[str, Array],
+    passage: Passage,
+    sources: tuple[Source, ...],
+) -> Dyed:
+    """The scalars a step later."""
+    time, later, error = passage.transport.time + passage.transport.dt, {}, 0.0
+    for name, values in scalars.items():
+        later[name], gained = passage.carry(name, values, passage.bounds(name, values))
+        before = float(np.vdot(passage.transport.before.cells, values))
+        after = float(np.vdot(passage.transport.after.cells, later[name]))
+        scale = max(abs(before), abs(after))
+        if scale > 0.0:
+            error = max(error, abs(after - before - gained) / scale)
+    for source in sources:
+        if source.active(time):
+            for name in later.keys() & source.scalars.keys():
+                later[name][cells_in(source, passage.grid)] = source.scalars[name]
+    return Dyed(later, error)
+
+
+class Passage:
+    """What carries dye through a step, the same for every scalar.
+
+    backwards  whether the last axis comes first; to be turned about from step to step
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        brought: Brought,
+        grid: Grid,
+        sides: Boundaries,
+        backwards: bool,
+    ) -> None:
+        self.transport, self.brought, self.backwards = transport, brought, backwards
+        self.grid, self.sides = grid, sides
+        start, end = transport.before.cells, transport.after.cells
+        kind, fullest = np.empty(grid.shape, np.uint8), np.empty(grid.shape[0])
+        filled, uncut = np.abs(brought.rate), UNCUT * grid.cell_volume
+        filled.reshape(-1)[brought.cells] += brought.gain
+        sort_cells(kind, fullest, start, end, filled, *transport.flux, uncut)
+        flowing = transport.dt * float(fullest.max())
+        self.count = int(min(max(1.0, np.ceil(flowing - SLACK)), SUBSTEPS))
+        self.dt = transport.dt / self.count
+        self.clear = far_from_cut(kind == WHOLE, grid, sides)
+        self.flux, self.listed = transport.flux, np.flatnonzero(kind == CUT)
+        n = self.listed.size
+        self.beside, self.row = np.full((n, 6), -1), np.full((n, 6), -1)
+        self.out = np.zeros((n, 6))
+        if n:
+            self.flux = faces_of([q.copy() for q in transport.flux])
+            shape = np.array(grid.shape)
+            wraps = shape * np.array(sides.periodic())
+            tables = self.beside, self.row, self.out
+            for axis in grid.axes:
+                list_flows(self.listed, axis, self.flux[axis], wraps, shape, *tables)
+        self.expelled = np.searchsorted(self.listed, brought.cells)
+
+    def carry(self, name: str, values: Array, bounds: tuple[float, float]) -> tuple[Array, float]:
+        """A scalar a step later, and the amount that came in through sides, mouths and sources.
+
+        bounds  least and largest value that it may take
+        """
+        start, end = self.transport.before.cells, self.transport.after.cells
+        field, gained = values.copy(), 0.0
+        for s in range(self.count):
+            volume = start + (s / self.count) * (end - start)
+            if self.listed.size:
+                gained += self.pass_on(name, field, volume, bounds)
+            order = self.grid.axes if (s % 2 == 0) != self.backwards else self.grid.axes[::-1]
+            for axis in order:
+                ends = np.stack([self.beyond(name, field, axis, upper) for upper in (0, 1)])
+                crossed = np.zeros(ends.shape)
+                wraps = self.sides.periodic()[axis]
+                sweep(
+                    along(field, axis, self.grid),
+                    along(volume, axis, self.grid),
+                    along(self.flux[axis], axis, self.grid),
+                    along(self.clear, axis, self.grid),
+                    ends, wraps, self.dt, *bounds, crossed,
+                )  # fmt: skip
+                gained += float(crossed[0].sum() - crossed[1].sum())
+        return field, gained
+
+    def bounds(self, name: str, values: Array) -> tuple[float, float]:
+        """Least and largest value that there is or comes in."""
+        found = [values]
+        for axis in self.grid.axes:
+            found += [self.beyond(name, values, axis, upper) for upper in (0, 1)]
+        if self.brought.cells.size:
+            found.append(self.brought.dye[name] / self.brought.gain)
+        return min(float(a.min()) for a in found), max(float(a.max()) for a in found)
+
+    def beyond(self, name: str, field: Array, axis: int, upper: int) -> Array:
+        """Values that come in through a side across `axis`, in the order of `along`: what an inflow
+        prescribes, elsewhere those beside it."""
+        side, layer = self.sides.pair(axis)[upper], edge(axis, -1 if upper else 0)
+        values = field[layer]
+        if isinstance(side, BoundaryInflow) and name in side.scalars:
+            x, y, z = np.meshgrid(*self.grid.cell_coordinates(), indexing="ij", sparse=True)
+            at = np.full((1, 1, 1), self.grid.upper[axis] if upper else self.grid.origin[axis])
+            x, y, z = (at if a == axis else place for a, place in enumerate((x, y, z)))
+            given = side.scalars[name](x, y, z, self.transport.time + self.transport.dt)
+            shape = [1 if a == axis else n for a, n in enumerate(self.grid.shape)]
+            values = np.broadcast_to(given, shape)[edge(axis, 0)]
+        return values.T if self.grid.is_slab else values
+
+    def pass_on(self, name: str, field: Array, volume: Array, bounds: tuple[float, float]) -> float:
+        """Carry a scalar through the faces of the cut cells, in place; gives what came in."""
+        n, dt = self.listed.size, self.dt
+        entering, gain, dye = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
+        at = np.unravel_index(self.listed, self.grid.shape)
+        for axis in self.grid.axes:
+            for upper in (0, 1):
+                rows = np.flatnonzero(self.beside[:, 2 * axis + upper] < 0)
+                if rows.size:
+                    layer = self.beyond(name, field, axis, upper)
+                    layer = layer.T if self.grid.is_slab else layer
+                    others = tuple(at[a][rows] for a in range(3) if a != axis)
+                    entering[rows, 2 * axis + upper] = layer[others]
+        gain[self.expelled] = dt * self.brought.gain
+        if self.brought.cells.size:
+            dye[self.expelled] = dt * self.brought.dye[name]
+        local = dt * self.brought.rate.reshape(-1)[self.listed] - gain
+        tables = self.listed, self.beside, self.row, dt * self.out
+        return pass_on(field, volume, *tables, entering, gain, dye, local, *bounds)
+
+
+def far_from_cut(whole: NDArray[np.bool_], grid: Grid, sides: Boundaries) -> Marks:
+    """(nx, ny, nz) 1 in whole cells with none but whole ones among the next REACH along an axis."""
+    clear = whole.copy()
+    if whole.all():
+        return clear.view(np.uint8)
+    for axis in grid.axes:
+        for shift in range(1, REACH + 1):
+            low, high = edge(axis, slice(None, -shift)), edge(axis, slice(shift, None))
+            clear[low] &= whole[high]
+            clear[high] &= whole[low]
+            if sides.periodic()[axis]:
+                first, last = edge(axis, slice(None, shift)), edge(axis, slice(-shift, None))
+                clear[first] &= whole[last]
+                clear[last] &= whole[first]
+    return clear.view(np.uint8)
+
+
+def along(values: NDArray[Scalar], axis: int, grid: Grid) -> NDArray[Scalar]:
+    """View of a field with `axis` as its second one, and a slab's depth as the first."""
+    if grid.is_slab:
+        return values.transpose(2, axis, 1 - axis)
+    return values.transpose([(1, 0, 2), (0, 1, 2), (0, 2, 1)][axis])

@@ -1,0 +1,139 @@
+"""Dye carried through the faces of whole and of cut cells, against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.kernels.cut_dye import (
+    CUT,
+    EMPTY,
+    WHOLE,
+    beside_reference,
+    list_flows,
+    pass_on,
+    pass_on_reference,
+    sort_cells,
+    sort_cells_reference,
+)
+from flowborne.kernels.dye import bend_reference, sweep, sweep_reference
+
+SHAPES = [(3, 9, 5), (1, 12, 80), (2, 4, 3)]
+ROOM = (5, 4, 6)
+NEVER = -1e9, 1e9
+"""Bounds that hold nothing."""
+
+
+def flows(shape: tuple[int, int, int], random: np.random.Generator) -> list[np.ndarray]:
+    """Random fluxes of which no more leaves a cell than it holds in a step of 1."""
+    sizes = [tuple(n + (axis == d) for d, n in enumerate(shape)) for axis in range(3)]
+    return [random.uniform(-0.15, 0.15, size) for size in sizes]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("wraps", [False, True])
+@pytest.mark.parametrize("bounds", [NEVER, (0.2, 0.8)])
+def test_sweep(shape: tuple[int, int, int], wraps: bool, bounds: tuple[float, float]) -> None:
+    random = np.random.default_rng(1)
+    flux = random.uniform(-0.5, 0.5, (shape[0], shape[1] + 1, shape[2]))
+    if wraps:
+        flux[:, -1] = flux[:, 0]
+    field, volume = random.uniform(*np.clip(bounds, 0.0, 1.0), shape), random.uniform(1, 1.2, shape)
+    ends = random.uniform(0.3, 0.7, (2, shape[0], shape[2]))
+    clear = (random.random(shape) < 0.8).astype(np.uint8)
+    expected = sweep_reference(field, volume, flux, clear, ends, wraps, 0.9, *bounds)
+    crossed = np.zeros(ends.shape)
+    sweep(field, volume, flux, clear, ends, wraps, 0.9, *bounds, crossed)
+    for given, value in zip((field, volume, crossed), expected, strict=True):
+        np.testing.assert_allclose(given, value, atol=1e-14)
+
+
+@pytest.mark.parametrize("courant", [0.1, 0.5, 0.9, -0.4])
+def test_means_of_a_parabola_are_carried_exactly(courant: float) -> None:
+    """Where nothing limits it, what crosses a face is the mean of the parabola over what flows."""
+    x = np.arange(13.0)
+    whole = 2.0 * x + 3.0 * x**2 + 0.1 * x**3 / 3.0
+    field = np.diff(whole).reshape(1, 12, 1)
+    flux, crossed = np.full((1, 13, 1), courant), np.zeros((2, 1, 1))
+    clear, ends = np.ones(field.shape, np.uint8), np.zeros(crossed.shape)
+    sweep(field, np.ones(field.shape), flux, clear, ends, False, 1.0, *NEVER, crossed)
+    moved = x[3:10] - courant
+    exact = np.diff(2.0 * moved + 3.0 * moved**2 + 0.1 * moved**3 / 3.0)
+    np.testing.assert_allclose(field[0, 3:9, 0], exact, rtol=1e-13)
+
+
+def test_parabolas_stay_between_their_neighbours_but_for_smooth_extrema() -> None:
+    rough = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.2, 0.1, 0.9])
+    low, high = bend_reference(rough, np.ones(6), 0.0, 1.0)
+    assert not low[[0, 1, 2, 4]].any()
+    assert not high[[0, 1, 2, 4]].any()
+    smooth = 1.0 - 0.01 * (np.arange(9.0) - 4.2) ** 2
+    low, high = bend_reference(smooth, np.ones(5), *NEVER)
+    np.testing.assert_allclose(low + high, 0.5 * (smooth[3:-1] - smooth[1:-3]), atol=1e-14)
+    low, high = bend_reference(smooth, np.ones(5), 0.0, smooth.max())
+    assert low[2] == high[2] == 0.0
+
+
+def sample() -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """A room that is periodic along x with some cut cells: its tables, its fluxes and volumes."""
+    random = np.random.default_rng(4)
+    fluxes = flows(ROOM, random)
+    fluxes[0][-1] = fluxes[0][0]
+    listed = np.flatnonzero(random.random(ROOM) < 0.3)
+    wraps, shape = np.array([ROOM[0], 0, 0]), np.array(ROOM)
+    tables = {
+        "listed": listed,
+        "beside": np.full((listed.size, 6), -1),
+        "row": np.full((listed.size, 6), -1),
+        "out": np.zeros((listed.size, 6)),
+    }
+    kept = [flux.copy() for flux in fluxes]
+    for axis in range(3):
+        rest = (tables[name] for name in ("beside", "row", "out"))
+        list_flows(listed, axis, fluxes[axis], wraps, shape, *rest)
+    beside, row = beside_reference(listed, shape, wraps)
+    np.testing.assert_array_equal(tables["beside"], beside)
+    np.testing.assert_array_equal(tables["row"], row)
+    gone = (np.diff(was - q, axis=a) for a, (was, q) in enumerate(zip(kept, fluxes, strict=True)))
+    net = sum(gone, np.zeros(ROOM))
+    return tables, net, np.array([np.count_nonzero(q) for q in fluxes])
+
+
+def test_fluxes_of_cut_cells_are_listed_and_taken_out() -> None:
+    """What leaves through all faces of a cut cell is what its fluxes were."""
+    tables, net, left = sample()
+    np.testing.assert_allclose(tables["out"].sum(axis=1), net.ravel()[tables["listed"]], atol=1e-15)
+    assert left.min() > 0
+
+
+def test_pass_on() -> None:
+    random = np.random.default_rng(5)
+    tables, _, _ = sample()
+    n = tables["listed"].size
+    field, volume = random.random(ROOM), np.ones(ROOM)
+    volume.ravel()[tables["listed"]] = random.choice([0.0, 1e-6, 0.3, 0.7], n)
+    gain = random.random(n) * (random.random(n) < 0.2)
+    local = random.uniform(-0.1, 0.1, n) * (random.random(n) < 0.2)
+    short = volume.ravel()[tables["listed"]] + gain + local - tables["out"].sum(axis=1)
+    volume.ravel()[tables["listed"]] -= np.minimum(short, 0.0)
+    given = random.random((n, 6)), gain, gain * random.random(n), local
+    expected = pass_on_reference(field, volume, *tables.values(), *given)
+    gained = pass_on(field, volume, *tables.values(), *given, *NEVER)
+    assert gained == pytest.approx(expected[2], abs=1e-13)
+    np.testing.assert_allclose(volume, expected[1], atol=1e-14)
+    filled = volume > 1e-9
+    np.testing.assert_allclose(field[filled], expected[0][filled], atol=1e-12)
+    assert 0.0 <= field.min() < field.max() <= 1.0
+
+
+def test_sort_cells() -> None:
+    random = np.random.default_rng(6)
+    before, after = random.choice([0.0, 0.4, 0.995, 1.0], (2, *ROOM))
+    rate = random.random(ROOM) * (random.random(ROOM) < 0.1)
+    fluxes = [q * (random.random(q.shape) < 0.3) for q in flows(ROOM, random)]
+    kind, fullest = np.empty(ROOM, np.uint8), np.empty(ROOM[0])
+    sort_cells(kind, fullest, before, after, rate, *fluxes, 0.99)
+    expected = sort_cells_reference(before, after, rate, *fluxes, 0.99)
+    np.testing.assert_array_equal(kind, expected[0])
+    np.testing.assert_allclose(fullest, expected[1], atol=1e-15)
+    assert {WHOLE, CUT, EMPTY} == set(kind.ravel().tolist())
