@@ -14,22 +14,19 @@ from flowborne.kernels.vectors import cells_of
 @inlined
 def apply_plane(out: Array, p: Array, finest: Finest, m: int) -> float:
     """`apply_laplacian` on plane m."""
-    w0, w1, w2, _ = finest
+    w0, w1, w2, diagonal = finest
     d = 1 if p.shape[0] > 1 else 0
     n2 = p.shape[2] - 2
     row = np.zeros(n2 + 2)
     for j in range(1, p.shape[1] - 1):
         for k in range(1, n2 + 1):
-            own = p[m, j, k]
-            total = w1[m, j, k] * (own - p[m, j - 1, k])
-            total += w1[m, j + 1, k] * (own - p[m, j + 1, k])
-            low, high = own - p[m, j, k - 1], own - p[m, j, k + 1]
-            total += w2[m, j, k] * low + w2[m, j, k + 1] * high
+            total = diagonal[m, j, k] * p[m, j, k] - w1[m, j, k] * p[m, j - 1, k]
+            total -= w1[m, j + 1, k] * p[m, j + 1, k]
+            total -= w2[m, j, k] * p[m, j, k - 1] + w2[m, j, k + 1] * p[m, j, k + 1]
             if d:
-                low, high = own - p[m - 1, j, k], own - p[m + 1, j, k]
-                total += w0[m, j, k] * low + w0[m + 1, j, k] * high
+                total -= w0[m, j, k] * p[m - 1, j, k] + w0[m + 1, j, k] * p[m + 1, j, k]
             out[m, j, k] = total
-            row[k] += total * own
+            row[k] += total * p[m, j, k]
     energy = 0.0
     for k in range(n2 + 2):
         energy += row[k]
@@ -38,10 +35,7 @@ def apply_plane(out: Array, p: Array, finest: Finest, m: int) -> float:
 
 @kernel
 def apply_laplacian(out: Array, p: Array, finest: Finest) -> float:
-    """out = K p; returns p . K p.  Ghosts of p hold what lies beyond the sides.
-
-    Of differences, so that the diagonal need not be read.
-    """
+    """out = K p; returns p . K p.  Ghosts of p hold what lies beyond the sides."""
     d = 1 if p.shape[0] > 1 else 0
     planes = p.shape[0] - 2 * d
     parts = np.zeros(planes)
@@ -103,7 +97,8 @@ def neighbour_sum(x: Real, w: Triple) -> Array:
 
 def apply_laplacian_reference(p: Array, finest: Finest) -> Array:
     """`apply_laplacian` in NumPy, K p with ghosts 0."""
-    w0, w1, w2, _ = finest
-    w, out, inside = (w0, w1, w2), np.zeros_like(p), cells_of(p)
-    out[inside] = (neighbour_sum(np.ones_like(p), w) * p - neighbour_sum(p, w))[inside]
+    *w, diagonal = finest
+    out = np.zeros_like(p)
+    inside = cells_of(p)
+    out[inside] = (diagonal * p - neighbour_sum(p, (w[0], w[1], w[2])))[inside]
     return out
