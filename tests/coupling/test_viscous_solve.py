@@ -15,7 +15,7 @@ from flowborne.coupling.viscous_solve import Answer, ViscousSystem, walls_of
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries, BoundaryNoSlip
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.viscosity import assemble_viscosity
+from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
 from flowborne.solvers.conjugate_gradients import spread
 from flowborne.validation.viscous import measured
@@ -52,6 +52,20 @@ class Case:
             masses[axis][:] = np.where(counts, part.mass * self.system.dt, 0.0)
         return masses
 
+    def places(self, axis: int) -> Array:
+        """(3, ...) where the velocity of each face across `axis` is: the centre of its open part,
+        m."""
+        places = np.array(np.meshgrid(*self.grid.face_coordinates(axis), indexing="ij"))
+        places[[d for d in range(3) if d != axis]] += self.system.systems[axis].centre
+        return places
+
+    def of(self, field: object) -> Faces:
+        """A velocity field (x, y, z) -> (u, v, w) on the faces."""
+        velocity = self.grid.zeros_faces()
+        for axis in self.grid.axes:
+            velocity[axis][:] = field(*self.places(axis))[axis]  # type: ignore[operator]
+        return velocity
+
     def momentum(self, velocity: Faces) -> Array:
         """(3,) N s."""
         return np.array([float((m * u).sum()) for m, u in zip(self.mass(), velocity, strict=True)])
@@ -72,7 +86,14 @@ def case_of(
     whole = unit_mass(cut.open, Fluid(grid, DENSITY, boundaries=boundaries))
     masses = faces_of([DENSITY * mass for mass in whole])
     parts = assemble_viscosity(
-        cut.distance, cut.open, still, masses, grid, boundaries, viscosity, dt, 0.0
+        OpenParts(cut.facets, cut.open, cut.volume),
+        still,
+        masses,
+        grid,
+        boundaries,
+        viscosity,
+        dt,
+        0.0,
     )
     size = 6 * world.setup.solid.nbody
     mobility = np.zeros((size, size)) if response is None else response
@@ -128,15 +149,6 @@ def noise(grid: Grid, seed: int = 0) -> Faces:
     return velocity
 
 
-def of(grid: Grid, field: object) -> Faces:
-    """A velocity field (x, y, z) -> (u, v, w) on the faces."""
-    velocity = grid.zeros_faces()
-    for axis in grid.axes:
-        x, y, z = np.meshgrid(*grid.face_coordinates(axis), indexing="ij")
-        velocity[axis][:] = field(x, y, z)[axis]  # type: ignore[operator]
-    return velocity
-
-
 @pytest.mark.parametrize("along", [0, 1, 2])
 def test_shear_wave_decays_at_second_order_to_the_analytic_rate(along: int) -> None:
     """The factor by which a wave of one component decays in a time, with dt as h^2."""
@@ -184,8 +196,8 @@ def test_couette_flow_between_plates_and_its_wall_force_are_exact() -> None:
     np.testing.assert_allclose(force, [0.0, stress, -stress], atol=1e-8)
     torque = impulse.reshape(3, 6)[:, 5] / 1e7
     np.testing.assert_allclose(torque, [0.0, -BOTTOM * stress, TOP * stress], atol=1e-8)
-    y = SQUARE.face_coordinates(0)[1]
-    between = (y > BOTTOM) & (y < TOP)
+    y = case.places(0)[1, 5, :, 0]
+    between = case.cut.open[0][5, :, 0] > 0.0
     exact = 2.0 * (y[between] - BOTTOM) / (TOP - BOTTOM)
     np.testing.assert_allclose(velocity[0][5, between, 0], exact, atol=1e-7)
 
@@ -230,8 +242,8 @@ def test_poiseuille_flow_between_plates_pushes_them_with_all_that_drives_it() ->
         velocity, impulse = driven(case, drive, 3)
         force = impulse.reshape(3, 6)[1:, 0].sum() / dt
         assert force == pytest.approx(drive * (TOP - BOTTOM), rel=1e-9)
-        y = grid.face_coordinates(0)[1]
-        inside = (y > BOTTOM) & (y < TOP)
+        y = case.places(0)[1, 5, :, 0]
+        inside = case.cut.open[0][5, :, 0] > 0.0
         exact = 0.5 * drive / VISCOSITY * (y - BOTTOM) * (TOP - y)
         errors.append(np.abs(velocity[0][5, :, 0] - exact)[inside].max())
     assert errors[0] < 0.01 * 0.125 * drive / VISCOSITY * (TOP - BOTTOM) ** 2
@@ -262,12 +274,12 @@ def test_linear_shear_along_an_oblique_wall_stays(angle: float) -> None:
         away = np.maximum((x - wall[0]) * n[0] + (y - wall[1]) * n[1], 0.0)
         return away * t[0], away * t[1], 0.0 * z
 
-    start = of(SQUARE, shear)
+    start = case.of(shear)
     after, _, converged = case.system.solve(start, np.zeros(12), 1e-13)
     assert converged
     assert max(part.wall.size for part in case.system.systems) > 20
     for axis, part in zip(SQUARE.axes, case.system.systems, strict=True):
-        x, y, _ = np.meshgrid(*SQUARE.face_coordinates(axis), indexing="ij")
+        x, y, _ = case.places(axis)
         inner = (np.abs(x - 0.5) < 0.3) & (np.abs(y - 0.5) < 0.3) & (part.kind == UNKNOWN)
         np.testing.assert_allclose(after[axis][inner], start[axis][inner], atol=1e-10)
 
@@ -281,11 +293,11 @@ def test_rigid_rotation_of_fluid_and_disc_stays() -> None:
     case = case_of(SQUARE, disc, boundaries=Boundaries(), dt=dt)
     twist = np.zeros(12)
     twist[6:] = [y0, -x0, 0.0, 0.0, 0.0, 1.0]
-    start = of(SQUARE, lambda x, y, z: (y0 - y, x - x0, 0.0 * z))
+    start = case.of(lambda x, y, z: (y0 - y, x - x0, 0.0 * z))
     after, impulse, converged = case.system.solve(start, twist, 1e-13)
     assert converged
     for axis, part in zip(SQUARE.axes, case.system.systems, strict=True):
-        x, y, _ = np.meshgrid(*SQUARE.face_coordinates(axis), indexing="ij")
+        x, y, _ = case.places(axis)
         inner = (np.hypot(x - x0, y - y0) < 0.3) & (part.kind == UNKNOWN)
         np.testing.assert_allclose(after[axis][inner], start[axis][inner], atol=1e-10)
     force = impulse[6:8] / dt
