@@ -121,7 +121,8 @@ def carry_fluid(
     scalars = carry_dye(world, paths, before, after, jets, dt)
     if fluid.advection == "semi-lagrangian":
         return carry_along_paths(world, before, start, end, paths, scalars, jets, dt)
-    transport = Transport(flux, start, end, dt, world.time)
+    held = fluid.viscosity / fluid.density
+    transport = Transport(flux, start, end, dt, world.time, held)
     return carry_in_flux_form(world, transport, sources, scalars, jets)
 
 

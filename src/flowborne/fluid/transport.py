@@ -69,11 +69,12 @@ NO_INLETS = Inlets(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0))
 class Transport:
     """What carries the momentum through a step.
 
-    flux    Faces, volume per time through each face of the leak-proof field, m^3/s
-    before  control volumes at the start,
-    after   and at the end of the step
-    dt      s
-    time    s, at the start
+    flux       Faces, volume per time through each face of the leak-proof field, m^3/s
+    before     control volumes at the start,
+    after      and at the end of the step
+    dt         s
+    time       s, at the start
+    viscosity  kinematic; where it holds small control volumes they are mixed less, m^2/s
     """
 
     flux: Faces
@@ -81,6 +82,7 @@ class Transport:
     after: ControlVolumes
     dt: float
     time: float
+    viscosity: float = 0.0
 
     @cached_property
     def crossing(self) -> float:
@@ -238,6 +240,8 @@ class Flow:
         self.wraps = wrapping(component, grid, sides)
         self.shape = np.array(grid.face_shape(component))
         self.nothing = NOTHING * grid.cell_volume
+        # friction 2 mu A / d over the depth d = V / A of a small control volume, dt / m times
+        self.held = 2.0 * transport.viscosity * transport.dt * grid.face_area**2
 
     def fill(self, u: Array, volume: Array) -> None:
         """Give control volumes that hold nothing yet the velocity around them, in place."""
@@ -309,9 +313,8 @@ class Flow:
     def level(self, u: Array, volume: Array) -> None:
         """Mix small control volumes with their neighbours, in place."""
         cell = self.grid.cell_volume
-        level(
-            u, volume, self.listed, TINY * cell, SMALL * cell, self.nothing, self.shape, self.wraps
-        )
+        limits = TINY * cell, SMALL * cell, self.held, self.nothing
+        level(u, volume, self.listed, *limits, self.shape, self.wraps)
 
 
 def across(through: Faces, grid: Grid) -> Faces:
