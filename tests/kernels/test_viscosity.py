@@ -82,11 +82,23 @@ def test_links(shape: tuple, codes: np.ndarray, axis: int) -> None:
         periodic = bool(codes[d, 0] == PERIODIC)
         grid = made.distance, made.opened[axis], centre, parts
         found = [np.zeros(kind.shape) for _ in range(3)]
-        link_faces(axis, d, kind, *grid, velocity, 0.7, *found, periodic)
+        near = np.full(kind.shape, -1.0)
+        link_faces(axis, d, kind, near, *grid, velocity, 0.7, *found, periodic)
         expected = link_faces_reference(axis, d, kind, *grid, velocity, 0.7, periodic)
         for one, other in zip(found, expected, strict=True):
             assert other.any()
             np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14)
+
+
+def test_links_of_uncut_faces_need_no_geometry() -> None:
+    shape, nothing = (5, 4, 3), np.full((6, 5, 4), np.nan)
+    kind, away = np.full((6, 4, 3), UNKNOWN, np.uint8), np.full((6, 4, 3), 0.1)
+    cuts = nothing, nothing, np.full((2, 6, 4, 3), np.nan), np.full(shape, np.nan)
+    for d in range(3):
+        diagonal, link, given = (np.zeros(kind.shape) for _ in range(3))
+        link_faces(0, d, kind, away, *cuts, away, 0.7, diagonal, link, given, False)
+        assert set(np.unique(link)) == {0.0, 0.7}
+        np.testing.assert_array_equal(np.moveaxis(link, d, 0)[:-1], 0.7)
 
 
 @pytest.mark.parametrize(("shape", "codes", "axis"), CASES)

@@ -124,10 +124,11 @@ def assemble_viscosity(
     systems = []
     for axis in grid.axes:
         shape, opened = grid.face_shape(axis), cut.faces[axis]
-        kind, phi = np.empty(shape, np.uint8), np.empty(shape)
-        face_distances(facets, axis, phi)
+        kind, away = np.empty(shape, np.uint8), np.empty(shape)
+        face_distances(facets, axis, away)
+        away -= NEAR * h
         classify(kind, opened, axis, codes, TOUCHING)
-        near = np.flatnonzero((kind != INACTIVE) & (phi < NEAR * h))
+        near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
         centre = np.zeros((2, *shape))
         find_centres(facets, axis, near, centre)
         mass = masses[axis] / dt
@@ -140,6 +141,7 @@ def assemble_viscosity(
                 axis,
                 d,
                 kind,
+                away,
                 facets,
                 opened,
                 centre,

@@ -207,6 +207,7 @@ def link_faces(
     axis: int,
     d: int,
     kind: NDArray[np.uint8],
+    away: Array,
     distance: Array,
     opened: Array,
     centre: Array,
@@ -220,6 +221,7 @@ def link_faces(
 ) -> None:
     """Add the links along d to the system of the faces across `axis`.
 
+    away       distance to bodies at each face; above 0 where it and its neighbours are uncut
     distance   to the bodies at the nodes
     opened     open part of each face
     parts      of each cell
@@ -239,7 +241,9 @@ def link_faces(
                 known = kind[i, j, k] == GIVEN or kind[g] == GIVEN
                 if not ((here and there) or (known and (here or there))):
                     continue
-                if d == axis:
+                if away[i, j, k] > 0.0:
+                    coefficient = stiffness
+                elif d == axis:
                     coefficient = stiffness * along(opened[i, j, k], opened[g], parts[i, j, k])
                 else:
                     coefficient = stiffness * across(distance, centre, axis, d, i, j, k, g)
