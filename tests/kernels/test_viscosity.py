@@ -17,6 +17,8 @@ from flowborne.kernels.viscosity import (
     classify_reference,
     face_distances,
     face_distances_reference,
+    find_centres,
+    find_centres_reference,
     link_faces,
     link_faces_reference,
     meet_walls,
@@ -24,7 +26,7 @@ from flowborne.kernels.viscosity import (
 )
 from flowborne.kernels.viscous_operator import apply_component, apply_component_reference
 
-from .cut_cells import SHAPES, H, cut, face_shape
+from .cut_cells import SHAPES, cut, face_shape
 
 CODES = [
     np.full((3, 2), CLOSED),
@@ -39,13 +41,14 @@ CASES = [
 
 
 def kinds(shape: tuple[int, int, int], codes: np.ndarray, axis: int) -> tuple:
-    """Open fractions, distance at the faces and kinds; some open faces inside are prescribed."""
+    """The cut grid, centres, open parts of the cells and kinds; some open faces inside are
+    prescribed."""
     made = cut(shape)
-    phi = face_distances_reference(made.distance, axis)
-    kind = classify_reference(made.opened[axis], phi, axis, codes, 0.3)
-    random = np.random.default_rng(1).random(kind.shape)
-    kind[(kind == UNKNOWN) & (random < 0.1)] = GIVEN
-    return made, phi, kind
+    kind = classify_reference(made.opened[axis], axis, codes, 0.3)
+    random = np.random.default_rng(1)
+    kind[(kind == UNKNOWN) & (random.random(kind.shape) < 0.1)] = GIVEN
+    parts = random.random(shape) * (random.random(shape) < 0.9)
+    return made, find_centres_reference(made.distance, axis), parts, kind
 
 
 @pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
@@ -55,38 +58,64 @@ def test_distances_and_kinds(shape: tuple, codes: np.ndarray, axis: int) -> None
     face_distances(made.distance, axis, phi)
     np.testing.assert_allclose(phi, face_distances_reference(made.distance, axis), atol=1e-15)
     kind = np.empty(phi.shape, np.uint8)
-    classify(kind, made.opened[axis], phi, axis, codes, 0.3)
-    expected = classify_reference(made.opened[axis], phi, axis, codes, 0.3)
+    classify(kind, made.opened[axis], axis, codes, 0.3)
+    expected = classify_reference(made.opened[axis], axis, codes, 0.3)
     assert {INACTIVE, UNKNOWN, TIED} <= set(np.unique(expected))
     np.testing.assert_array_equal(kind, expected)
 
 
 @pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
+def test_centres(shape: tuple, codes: np.ndarray, axis: int) -> None:
+    made = cut(shape)
+    centre = np.zeros((2, *face_shape(shape, axis)))
+    find_centres(made.distance, axis, np.arange(centre[0].size), centre)
+    expected = find_centres_reference(made.distance, axis)
+    assert expected.any()
+    np.testing.assert_allclose(centre, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
 def test_links(shape: tuple, codes: np.ndarray, axis: int) -> None:
-    made, _, kind = kinds(shape, codes, axis)
+    made, centre, parts, kind = kinds(shape, codes, axis)
     velocity = np.random.default_rng(2).standard_normal(kind.shape)
     for d in range(2 if made.flat else 3):
         periodic = bool(codes[d, 0] == PERIODIC)
-        across = made.opened[axis], made.opened[d]
+        grid = made.distance, made.opened[axis], centre, parts
         found = [np.zeros(kind.shape) for _ in range(3)]
-        link_faces(axis, d, kind, *across, velocity, 0.7, *found, periodic)
-        expected = link_faces_reference(axis, d, kind, *across, velocity, 0.7, periodic)
+        near = np.full(kind.shape, -1.0)
+        link_faces(axis, d, kind, near, *grid, velocity, 0.7, *found, periodic)
+        expected = link_faces_reference(axis, d, kind, *grid, velocity, 0.7, periodic)
         for one, other in zip(found, expected, strict=True):
             assert other.any()
-            np.testing.assert_allclose(one, other, atol=1e-14)
+            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14)
+
+
+def test_links_of_uncut_faces_need_no_geometry() -> None:
+    shape, nothing = (5, 4, 3), np.full((6, 5, 4), np.nan)
+    kind, away = np.full((6, 4, 3), UNKNOWN, np.uint8), np.full((6, 4, 3), 0.1)
+    cuts = nothing, nothing, np.full((2, 6, 4, 3), np.nan), np.full(shape, np.nan)
+    for d in range(3):
+        diagonal, link, given = (np.zeros(kind.shape) for _ in range(3))
+        link_faces(0, d, kind, away, *cuts, away, 0.7, diagonal, link, given, False)
+        assert set(np.unique(link)) == {0.0, 0.7}
+        np.testing.assert_array_equal(np.moveaxis(link, d, 0)[:-1], 0.7)
 
 
 @pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
 def test_walls(shape: tuple, codes: np.ndarray, axis: int) -> None:
-    made, phi, kind = kinds(shape, codes, axis)
-    beside = np.flatnonzero((kind == UNKNOWN) & (phi < 2.0 * H))
-    wall, gap = np.zeros(beside.size), np.zeros((beside.size, 3))
-    opened = tuple(made.opened)
-    meet_walls(axis, kind, opened, phi, 0.7, H, codes, beside, wall, gap)
-    expected = meet_walls_reference(axis, kind, opened, phi, 0.7, H, codes, beside)
-    assert wall.any()
-    np.testing.assert_allclose(wall, expected[0], rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(gap, expected[1], rtol=1e-12, atol=1e-13)
+    made, centre, parts, kind = kinds(shape, codes, axis)
+    beside = np.flatnonzero(kind == UNKNOWN)
+    grid = made.distance, made.opened[axis], centre, parts
+    wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
+    gap, place = np.zeros((2, beside.size, 3, 3))
+    meet_walls(axis, kind, *grid, 0.7, codes, beside, wall, gap, place, node)
+    expected = meet_walls_reference(axis, kind, *grid, 0.7, codes, beside)
+    assert (np.abs(wall) > 0.0).any(axis=0).all()
+    np.testing.assert_allclose(wall, expected[0], rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(gap, expected[1], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(place, expected[2], rtol=1e-9, atol=1e-12)
+    there = wall != 0.0
+    np.testing.assert_array_equal(node[there], expected[3][there])
 
 
 @pytest.mark.parametrize(("shape", "codes", "axis"), CASES)

@@ -142,7 +142,8 @@ def carry_fluid(
         state.carrier, before, after, start.cells, rate, fluid, middle, dt
     )
     end = control_volumes(cells, after.open, fluid.grid, sides)
-    transport = Transport(flux, start, end, dt, world.time)
+    held = fluid.viscosity / fluid.density
+    transport = Transport(flux, start, end, dt, world.time, held)
     dyed = Dyed({}, 0.0)
     if state.scalars:
         brought = brought_by(jets, rate, tuple(state.scalars))

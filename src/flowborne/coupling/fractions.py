@@ -39,6 +39,7 @@ class Geometry:
     the twist of every body and then the velocity of every vertex of flesh.
 
     distance   (nx+1, ny+1, nz+1) to the nearest body at the nodes, m, at most BAND cells
+    facets     (nx+1, ny+1, nz+1) the same, such that facets leave curved bodies their size
     nearest    (nx+1, ny+1, nz+1) that body
     open       open fraction of each face
     volume     (nx, ny, nz) open volume of each cell, m^3
@@ -59,6 +60,7 @@ class Geometry:
     """
 
     distance: Array
+    facets: Array
     nearest: Integers
     open: Faces
     volume: Array
@@ -220,6 +222,7 @@ def geometry(
         columns, values = np.append(columns, more_columns), np.append(values, more_values)
     return Geometry(
         distance,
+        of_all,
         nearest,
         (ox, oy, oz),
         volume,
@@ -249,9 +252,11 @@ def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
     if grid.is_slab:
         opened[2][:] = 0.0
     none = np.zeros(0, np.int64)
+    far = np.full((nx + 1, ny + 1, nz + 1), BAND * grid.spacing)
     return Geometry(
-        np.full((nx + 1, ny + 1, nz + 1), BAND * grid.spacing),
-        np.zeros((nx + 1, ny + 1, nz + 1), np.int64),
+        far,
+        far,
+        np.zeros(far.shape, np.int64),
         (opened[0], opened[1], opened[2]),
         np.full(grid.shape, grid.cell_volume),
         none,

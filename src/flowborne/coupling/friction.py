@@ -21,7 +21,7 @@ from flowborne.coupling.viscous_solve import Answer, Answering, ViscousSystem, W
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import accelerated, push
-from flowborne.fluid.viscosity import assemble_viscosity
+from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh_solve import PrescribedFlesh, symmetric_factor
 from flowborne.solids.prescribed import Driven, PrescribedSystem
@@ -59,8 +59,7 @@ def diffuse(
     earlier = pressure_push(cut, dt * state.pressure, size)
     moving = motion(pose, driven.after(generalised(pose, earlier)))
     parts = assemble_viscosity(
-        cut.distance,
-        cut.open,
+        OpenParts(cut.facets, cut.open, cut.volume),
         velocity,
         mass,
         grid,

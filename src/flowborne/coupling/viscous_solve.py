@@ -42,17 +42,17 @@ for a domain of MOST cells."""
 
 @dataclass(frozen=True)
 class Walls:
-    """Faces beside bodies and faces tied to one, listed over all components.
+    """Pieces of wall beside faces, and faces tied to a body, listed over all components.
 
-    index   (n,) position among the concatenated faces
+    index   (n,) position among the concatenated faces; a face may have several pieces
     tied    (n,) whether the face moves with the body
     weight  (n,) W, or m/dt of tied faces, kg/s
     body    (n,) the body
     columns (n, m) entries of the motion that move the point, the twist of its body unless told
     arm     (n, m) velocity of the point along the face's axis for each of them
     across  (n, 3) unit vector of the axis that the face is across
-    point   (n, 3) wall point, or centre of the tied face, m
-    gap     (n, 3) from there to the centre of the face, m
+    point   (n, 3) middle of the piece, or centre of the tied face's open part, m
+    gap     (n, 3) from there to the centre of the face's open part, m
     """
 
     index: Integers
@@ -84,7 +84,7 @@ class Walls:
 
 
 def walls_of(systems: list[ViscousFaces], distance: Array, nearest: Integers, grid: Grid) -> Walls:
-    """The wall faces of all components.
+    """The walls of all components.
 
     distance  (nx+1, ny+1, nz+1) to the nearest body at the nodes, m
     nearest   (nx+1, ny+1, nz+1) that body
@@ -101,7 +101,8 @@ def walls_of(systems: list[ViscousFaces], distance: Array, nearest: Integers, gr
 def walls_across(
     axis: int, first: int, system: ViscousFaces, distance: Array, nearest: Integers, grid: Grid
 ) -> Walls:
-    """The wall faces across `axis`; each belongs to the body nearest to one of its corners.
+    """The pieces of wall of the faces across `axis`, and the tied ones; each belongs to the body
+    nearest to one of its nodes.
 
     first  position of the component among the concatenated faces
     """
@@ -109,15 +110,18 @@ def walls_across(
     index = np.concatenate([system.beside, moved])
     at = np.stack(np.unravel_index(index, system.kind.shape), axis=1)
     coordinates = grid.face_coordinates(axis)
-    centre = np.stack([coordinates[d][at[:, d]] for d in range(3)], axis=1)
+    point = np.stack([coordinates[d][at[:, d]] for d in range(3)], axis=1)
     if grid.is_slab:
-        centre[:, 2] = 0.0
-    gap = np.concatenate([system.gap, np.zeros((moved.size, 3))])
+        point[:, 2] = 0.0
+    point[: system.beside.size] += system.place
+    others = [d for d in range(3) if d != axis]
+    point[system.beside.size :, others] += system.centre.reshape(2, -1)[:, moved].T
     one, other = np.delete(np.eye(3, dtype=np.int64), axis, 0)
-    corners = np.stack([at, at + one, at + other, at + one + other])
+    low = at[system.beside.size :]
+    corners = np.stack([low, low + one, low + other, low + one + other])
     which = np.argmin(distance[tuple(np.moveaxis(corners, -1, 0))], axis=0)
-    corner = corners[which, np.arange(index.size)]
-    body, point = nearest[tuple(corner.T)], centre - gap
+    corner = corners[which, np.arange(moved.size)]
+    body = np.concatenate([nearest.reshape(-1)[system.node], nearest[tuple(corner.T)]])
     across = np.tile(np.eye(3)[axis], (index.size, 1))
     return Walls(
         index=first + index,
@@ -128,7 +132,7 @@ def walls_across(
         arm=np.concatenate([across, np.cross(point, across)], axis=1),
         across=across,
         point=point,
-        gap=gap,
+        gap=np.concatenate([system.gap, np.zeros((moved.size, 3))]),
     )
 
 
@@ -174,6 +178,7 @@ class ViscousSystem:
         unknown = self.diagonal > 0.0
         self.scale = np.where(unknown, 1.0 / np.sqrt(np.where(unknown, self.diagonal, 1.0)), 0.0)
         self.most = MOST * max(MOST, *grid.shape)
+        self.faces, self.face = np.unique(walls.index, return_inverse=True)
         count, entries = walls.arm.shape
         row = np.repeat(np.arange(count), entries)
         arms = csr_array((walls.arm.ravel(), (row, walls.columns.ravel())), shape=(count, size))
@@ -184,17 +189,18 @@ class ViscousSystem:
         drag = arms.T @ (diags_array(walls.weight) @ arms) + self.couple
         self.answer = answering(csr_array(dt * drag))
 
-    def force(self, velocity: Array, twist: Array, tied: bool = True) -> Array:
+    def force(self, relative: Array, size: int) -> Array:
         """(k,) push B^T W (u - B s) on every body, N and N m.
 
-        velocity  over the concatenated faces, m/s;  twist  (k,) s
-        tied      whether tied faces count
+        relative  (n,) u - B s at the walls, m/s;  size  k
         """
         walls = self.walls
-        relative = velocity[walls.index] - self.at_walls(twist)
-        pull = walls.weight * relative * (tied | ~walls.tied)
-        wrench = (pull[:, None] * walls.arm).ravel()
-        return np.asarray(np.bincount(walls.columns.ravel(), wrench, minlength=twist.size), float)
+        wrench = ((walls.weight * relative)[:, None] * walls.arm).ravel()
+        return np.asarray(np.bincount(walls.columns.ravel(), wrench, minlength=size), float)
+
+    def on_faces(self, force: Array) -> Array:
+        """Sums over the walls of each of the `faces` of a force (n,) on them, N."""
+        return np.asarray(np.bincount(self.face, force, minlength=self.faces.size), float)
 
     def at_walls(self, twist: Array) -> Array:
         """(n,) B s: velocity of the bodies at the wall faces, m/s."""
@@ -215,10 +221,10 @@ class ViscousSystem:
             apply_component(product[part], given[part], self.scale[part], system.links, self.wraps)
             first += system.kind.size
         if self.answer.yields:
-            still = np.zeros(self.couple.shape[0])
-            wrench = self.force(self.scale * given[: self.scale.size], still, tied=False)
-            at = self.walls.index
-            product[at] -= self.scale[at] * self.drawn(self.answer.change(self.dt * wrench))
+            walls = self.walls
+            moved = np.where(walls.tied, 0.0, self.scale[walls.index] * given[walls.index])
+            change = self.answer.change(self.dt * self.force(moved, self.couple.shape[0]))
+            product[self.faces] -= self.scale[self.faces] * self.on_faces(self.drawn(change))
         return out
 
     def solve(
@@ -229,31 +235,34 @@ class ViscousSystem:
         velocity   Faces u*, m/s
         twist      (k,) s*: the bodies' motion without this impulse
         tolerance  relative residual
-        slip       (n,) velocity of the skin relative to the body at each wall face, along the
+        slip       (n,) velocity of the skin relative to the body at each wall, along the
                    face's axis, m/s; none unless given
         returns    Faces; (k,) impulse, N s and N m s; whether the residual was reached
         """
         start = np.concatenate([velocity[axis].ravel() for axis in self.grid.axes])
         mass = np.concatenate([system.mass.ravel() for system in self.systems])
-        walls, blown = self.walls, np.zeros_like(start)
-        if slip is not None:
-            blown[walls.index] = slip
+        walls = self.walls
+        blown = np.zeros(walls.index.size) if slip is None else slip
         given = np.concatenate([system.given.ravel() for system in self.systems])
         unknown = self.diagonal > 0.0
         rhs = np.where(unknown, mass * start + given, 0.0)
-        known = self.answer.to(self.push(np.where(unknown, 0.0, start) - blown, twist))[0]
-        rhs[walls.index] += self.drawn(twist + known)
-        rhs[walls.index] += np.where(walls.tied, 0.0, walls.weight * blown[walls.index])
+        known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist, blown))[0]
+        drawn = self.drawn(twist + known) + np.where(walls.tied, 0.0, walls.weight * blown)
+        rhs[self.faces] += self.on_faces(drawn)
         x, converged = self._conjugate_gradients(rhs, np.where(unknown, start, 0.0), tolerance)
         result = np.where(unknown, x, start)
-        change, impulse = self.answer.to(self.push(result - blown, twist))
-        tied = walls.index[walls.tied]
-        result[tied] = self.at_walls(twist + change)[walls.tied] + blown[tied]
+        change, impulse = self.answer.to(self.push(result, twist, blown))
+        skin = self.at_walls(twist + change) + blown
+        result[walls.index[walls.tied]] = skin[walls.tied]
         return self._split(result, velocity), impulse, converged
 
-    def push(self, velocity: Array, twist: Array) -> Array:
-        """(k,) impulse on bodies that keep their motion, dt (B^T W (u - B s) - C s)."""
-        return np.asarray(self.dt * (self.force(velocity, twist) - self.couple @ twist))
+    def push(self, velocity: Array, twist: Array, slip: Array) -> Array:
+        """(k,) impulse on bodies that keep their motion, dt (B^T W (u - slip - B s) - C s).
+
+        velocity  over the concatenated faces, m/s;  twist  (k,) s;  slip  (n,) as in `solve`
+        """
+        relative = velocity[self.walls.index] - self.at_walls(twist) - slip
+        return np.asarray(self.dt * (self.force(relative, twist.size) - self.couple @ twist))
 
     def _conjugate_gradients(self, rhs: Array, x: Array, tolerance: float) -> tuple[Array, bool]:
         """Solution from the guess x, and whether the residual is within the tolerance."""

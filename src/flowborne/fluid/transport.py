@@ -85,11 +85,12 @@ NO_INLETS = Inlets(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0))
 class Transport:
     """What carries the momentum through a step.
 
-    flux    Faces, volume per time through each face of the leak-proof field, m^3/s
-    before  control volumes at the start,
-    after   and at the end of the step
-    dt      s
-    time    s, at the start
+    flux       Faces, volume per time through each face of the leak-proof field, m^3/s
+    before     control volumes at the start,
+    after      and at the end of the step
+    dt         s
+    time       s, at the start
+    viscosity  kinematic; where it holds small control volumes they are mixed less, m^2/s
     """
 
     flux: Faces
@@ -97,6 +98,7 @@ class Transport:
     after: ControlVolumes
     dt: float
     time: float
+    viscosity: float = 0.0
 
     @cached_property
     def crossing(self) -> float:
@@ -233,6 +235,8 @@ class Flow:
         periodic = sides.periodic()[component]
         self.place, self.share = neighbours(shape[component], periodic)
         self.through = through_sides(transport.flux, component, grid, sides)
+        # friction 2 mu A / d over the depth d = V / A of a small control volume, dt / m times
+        self.held = 2.0 * transport.viscosity * transport.dt * grid.face_area**2
 
     def fill(self, u: Array) -> None:
         """Give control volumes that hold nothing yet the velocity around them, in place."""
@@ -305,7 +309,7 @@ class Flow:
             np.copyto(merged, self.high)
             join_guests(later, merged, self.guests, self.hosts, self.shares, self.nothing)
         if self.listed.size:
-            limits = TINY * cell, SMALL * cell, self.nothing
+            limits = TINY * cell, SMALL * cell, self.held, self.nothing
             level(later, merged, self.listed, *limits, self.shape, self.wraps)
             follow_hosts(later, self.whole, self.their_hosts)
             fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)

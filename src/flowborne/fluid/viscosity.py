@@ -1,19 +1,26 @@
 """Implicit viscosity on cut cells, with no-slip bodies that may move freely.
 
-Finite volumes around every face f: with mass m, links k = mu A_open / h to its
-neighbours g, and a wall coefficient W where a body closes a part of the links,
+The velocity u_f of a face is the mean over its open part a_f, that at the centre of this. In a cell
+of open part v between two faces, Gauss's theorem gives the derivative across them, of one at a
+wall that moves with b,
 
-    m (u+ - u*) / dt = sum_g k (u_g - u_f) - W (u_f - b)        b = velocity of the body at x_w
+    v h du/dx = a_E (u_E - b) - a_W (u_W - b)
 
-The open links leave  n = sum_g k (x_g - x_f)  behind, mu times the wall's area along its normal.
-W = sum_g k (d_g - d_f) / d_f with the distance d to the wall makes a linear shear exact, and the
-wall point  x_w = x_f - n / W  makes a rigid rotation of body and fluid together exact; n / W is
-the distance along the normal, and the wall's friction acts on the body at x_w.
+and in the plane of the faces du/dy is the difference of two over the distance of their centres,
+or at a wall u_f - b over that of f's centre from it (Cheny and Botella 2010). What  mu v h^d
+(du/dx)^2 / 2  and the like dissipate, links k and wall coefficients W follow from,
+
+    m (u+ - u*) / dt = sum_g k (u_g - u_f) - sum W (u_f - b)
+
+symmetric and positive definite, though one W of the two faces of a cut cell is below 0. Along any
+plane wall in a slab a linear shear is exact, and so are the force that each cut cell and each cut
+face feels, and a rigid rotation of fluid and body together: b is taken at the middle of the wall's
+piece. In rooms the links in the plane of the faces leave out that centres may be apart askew.
 
 That friction belongs to the stress mu grad u. What mu (grad u)^T adds sums up to a couple on each
 body that the fluid does not feel: on a no-slip wall the whole stress is mu times the normal
 derivative of the velocity relative to the body, its rotation taken off, or  W (u_f - b_f)  with
-the body's velocity at x_f. A body of volume V and spin w feels  -2 mu V w  besides.
+the body's velocity at the face. A body of volume V and spin w feels  -2 mu V w  besides.
 """
 
 from __future__ import annotations
@@ -28,10 +35,21 @@ from flowborne.fluid.ghosts import edge, wall_velocity
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import side_codes
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.viscosity import UNKNOWN, classify, face_distances, link_faces, meet_walls
+from flowborne.kernels.viscosity import (
+    INACTIVE,
+    UNKNOWN,
+    classify,
+    face_distances,
+    find_centres,
+    link_faces,
+    meet_walls,
+)
 
 TOUCHING = 1e-3
-"""Faces whose centres are not farther than this from a body move with it, cells."""
+"""Faces of which no more than this part is open move with the body beside them."""
+
+NEAR = 2.0
+"""Mean distance of a face's corners from bodies beyond which it is not beside one, cells."""
 
 SIDE_MASS = 0.75
 """Part of the mass of the faces along a no-slip or inflow side that its friction slows down: what
@@ -47,9 +65,12 @@ class ViscousFaces:
     diagonal  m / dt + sum of links + W of unknowns, else 0, kg/s
     links     (3, ...) k to the next face along each axis, between unknowns, kg/s
     given     force of neighbours and sides with prescribed velocity, N
-    beside    (n,) flat indices of the unknowns beside a body
+    centre    (2, ...) of each face's open part from that of the whole along the two other axes, m
+    beside    (n,) flat indices of the unknowns beside a body, once for each piece of wall
     wall      (n,) W, kg/s
-    gap       (n, 3) x_f - x_w of each, m
+    gap       (n, 3) from the middle of the piece to the centre of the face's open part, m
+    place     (n, 3) from the centre of the whole face to the middle of the piece, m
+    node      (n,) flat index of the node there that is nearest to a body
     """
 
     kind: NDArray[np.uint8]
@@ -57,14 +78,30 @@ class ViscousFaces:
     diagonal: Array
     links: Array
     given: Array
+    centre: Array
     beside: Integers
     wall: Array
     gap: Array
+    place: Array
+    node: Integers
+
+
+@dataclass(frozen=True)
+class OpenParts:
+    """What bodies leave open of the grid.
+
+    facets  (nx+1, ny+1, nz+1) distance to the nearest body at the nodes, m, as faces are cut by it
+    faces   open part of each face
+    cells   (nx, ny, nz) open volume of each, m^3
+    """
+
+    facets: Array
+    faces: Faces
+    cells: Array
 
 
 def assemble_viscosity(
-    distance: Array,
-    opened: Faces,
+    cut: OpenParts,
     velocity: Faces,
     masses: Faces,
     grid: Grid,
@@ -75,7 +112,6 @@ def assemble_viscosity(
 ) -> list[ViscousFaces]:
     """The viscous system of each component.
 
-    distance  (nx+1, ny+1, nz+1) to the nearest body at the nodes, m
     velocity  Faces; used where a side prescribes it
     masses    Faces, of the fluid that belongs to each face, kg
     time      s, of the sides' prescribed velocities
@@ -84,12 +120,17 @@ def assemble_viscosity(
     periodic = boundaries.periodic()
     h = grid.spacing
     stiffness = viscosity * grid.face_area / h
+    facets, parts = cut.facets, cut.cells / grid.cell_volume
     systems = []
     for axis in grid.axes:
-        shape = grid.face_shape(axis)
-        kind, phi = np.empty(shape, np.uint8), np.empty(shape)
-        face_distances(distance, axis, phi)
-        classify(kind, opened[axis], phi, axis, codes, TOUCHING * h)
+        shape, opened = grid.face_shape(axis), cut.faces[axis]
+        kind, away = np.empty(shape, np.uint8), np.empty(shape)
+        face_distances(facets, axis, away)
+        away -= NEAR * h
+        classify(kind, opened, axis, codes, TOUCHING)
+        near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
+        centre = np.zeros((2, *shape))
+        find_centres(facets, axis, near, centre)
         mass = masses[axis] / dt
         friction, given = stick_to_sides(kind, stiffness, grid, boundaries, axis, time)
         mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
@@ -100,8 +141,11 @@ def assemble_viscosity(
                 axis,
                 d,
                 kind,
-                opened[axis],
-                opened[d],
+                away,
+                facets,
+                opened,
+                centre,
+                parts,
                 velocity[axis],
                 stiffness,
                 diagonal,
@@ -109,13 +153,18 @@ def assemble_viscosity(
                 given,
                 periodic[d],
             )
-        beside = np.flatnonzero((kind == UNKNOWN) & (phi < 2.0 * h))
-        wall, gap = np.zeros(beside.size), np.zeros((beside.size, 3))
-        meet_walls(axis, kind, opened, phi, stiffness, h, codes, beside, wall, gap)
-        cut = wall > 0.0
-        beside, wall, gap = beside[cut], wall[cut], gap[cut]
-        diagonal.reshape(-1)[beside] += wall
-        systems.append(ViscousFaces(kind, mass, diagonal, links, given, beside, wall, gap))
+        beside = near[kind.reshape(-1)[near] == UNKNOWN]
+        wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
+        gap, place = np.zeros((beside.size, 3, 3)), np.zeros((beside.size, 3, 3))
+        meet_walls(
+            axis, kind, facets, opened, centre, parts, stiffness, codes, beside,
+            wall, gap, place, node,
+        )  # fmt: skip
+        diagonal.reshape(-1)[beside] += wall.sum(axis=1)
+        met = wall != 0.0
+        beside = np.repeat(beside, met.sum(axis=1))
+        pieces = beside, wall[met], h * gap[met], h * place[met], node[met]
+        systems.append(ViscousFaces(kind, mass, diagonal, links, given, h * centre, *pieces))
     return systems
 
 

@@ -293,6 +293,7 @@ def level(
     listed: Integers,
     tiny: float,
     small: float,
+    held: float,
     nothing: float,
     shape: Integers,
     wraps: Integers,
@@ -300,7 +301,8 @@ def level(
     """Mix small control volumes with the largest one beside them, in place.
 
     The exchange V_i V_t/(V_i + V_t) (u_t - u_i) levels both out and keeps their sum (Hu et al.
-    2006): all of it below the volume `tiny`, none above `small`, linear between.
+    2006): all of it below the volume `tiny`, none above `small`, linear between; and less where
+    friction holds them, by what that slows them down in a step, 1 + held / V_i^2.
     """
     flat, volume = field.reshape(-1), volumes.reshape(-1)
     for n in range(listed.size):
@@ -315,7 +317,7 @@ def level(
                 best, most = to, volume[to]
         if best < 0:
             continue
-        share = min((small - own) / (small - tiny), 1.0)
+        share = min((small - own) / (small - tiny), 1.0) / (1.0 + held / own**2)
         exchange = share * (flat[best] - flat[f]) / (own + most)
         flat[f] += most * exchange
         flat[best] -= own * exchange
@@ -327,6 +329,7 @@ def level_reference(
     listed: Integers,
     tiny: float,
     small: float,
+    held: float,
     nothing: float,
     wraps: Integers,
 ) -> Array:
@@ -338,6 +341,7 @@ def level_reference(
         to = around[np.argmax(volume[around])]
         if volume[to] > volume[f]:
             share = np.clip((small - volume[f]) / (small - tiny), 0.0, 1.0)
+            share /= 1.0 + held / volume[f] ** 2
             mean = np.average(levelled[[f, to]], weights=volume[[f, to]])
             levelled[[f, to]] += share * (mean - levelled[[f, to]])
     return levelled.reshape(field.shape)

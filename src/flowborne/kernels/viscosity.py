@@ -1,20 +1,37 @@
-"""Finite volumes of the viscous system around the faces across one axis (see `fluid.viscosity`)."""
+"""Finite volumes of the viscous system around the faces across one axis (see `fluid.viscosity`).
+
+The velocity of a face is that at the centre of its open part; `centre` holds how far that is from
+the centre of the whole face along the two other axes, in cells.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
+from numba import njit, prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.jit import kernel
+from flowborne.kernels.open_faces import (
+    open_edge,
+    open_edge_reference,
+    open_polygon,
+    open_polygon_reference,
+)
 from flowborne.kernels.sides import CLOSED, PERIODIC
 
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
 
-OBLIQUE = 0.5
-"""Least cosine between a wall's area and its normal: bounds x_w where the cells are too coarse."""
+LEAST = 1e-3
+"""Least distance from a wall and between two faces, and least open part of a cell over that of its
+faces: bounds friction where they are smaller."""
+
+SAME = 1e-12
+"""Open parts of two faces that differ by less are the same."""
+
+TINY = 1e-300
+"""Above 0, where nothing is divided by nothing."""
 
 
 @kernel
@@ -42,14 +59,9 @@ def face_distances_reference(distance: Array, axis: int) -> Array:
 
 @kernel
 def classify(
-    kind: NDArray[np.uint8],
-    opened: Array,
-    distance: Array,
-    axis: int,
-    codes: Integers,
-    touching: float,
+    kind: NDArray[np.uint8], opened: Array, axis: int, codes: Integers, touching: float
 ) -> None:
-    """Kind of every face across `axis`; `distance` is at the faces."""
+    """Kind of every face across `axis` from its open part."""
     last = kind.shape[axis] - 1
     for i in prange(kind.shape[0]):
         for j in range(kind.shape[1]):
@@ -64,15 +76,15 @@ def classify(
                     kind[i, j, k] = GIVEN
                 elif at == last and codes[axis, 1] == PERIODIC:
                     kind[i, j, k] = INACTIVE
-                elif distance[i, j, k] <= touching:
+                elif opened[i, j, k] <= touching:
                     kind[i, j, k] = TIED
 
 
 def classify_reference(
-    opened: Array, distance: Array, axis: int, codes: Integers, touching: float
+    opened: Array, axis: int, codes: Integers, touching: float
 ) -> NDArray[np.uint8]:
     """`classify` in NumPy: the kinds."""
-    kind = np.where(distance <= touching, TIED, UNKNOWN).astype(np.uint8)
+    kind = np.where(opened <= touching, TIED, UNKNOWN).astype(np.uint8)
     ends = np.moveaxis(kind, axis, 0)
     if codes[axis, 0] == CLOSED:
         ends[0] = GIVEN
@@ -84,41 +96,76 @@ def classify_reference(
     return kind
 
 
+@njit(nogil=True, cache=True)
+def other_axes(axis: int) -> tuple[int, int]:
+    """The two others in their order, those of `centre`."""
+    return int(axis == 0), 2 - int(axis == 2)
+
+
 @kernel
-def aperture(
-    opened: Array, across: Array, axis: int, d: int, i: int, j: int, k: int, last: int
-) -> float:
-    """Open part of the side between the control volume of a face and the next one along d.
+def find_centres(distance: Array, axis: int, near: Integers, centre: Array) -> None:
+    """Centres of the open parts of the faces `near` (flat indices), in place.
 
-    opened   open fractions of the faces across `axis`
-    across   open fractions of the faces across d
-    last     index of the last face across `axis`
+    centre  (2, ...) from the centre of each face across `axis`, along the other axes, cells
     """
-    ei, ej, ek = int(d == 0), int(d == 1), int(d == 2)
-    if d == axis:
-        return 0.5 * (opened[i, j, k] + opened[i + ei, j + ej, k + ek])
-    at = i if axis == 0 else (j if axis == 1 else k)
-    li, lj, lk = int(axis == 0), int(axis == 1), int(axis == 2)
-    total, count = 0.0, 0
-    if at > 0:
-        total += across[i - li + ei, j - lj + ej, k - lk + ek]
-        count += 1
-    if at < last:
-        total += across[i + ei, j + ej, k + ek]
-        count += 1
-    return total / count
+    s, t = other_axes(axis)
+    si, sj, ti, tj, tk = int(s == 0), int(s == 1), int(t == 0), int(t == 1), int(t == 2)
+    _, _, nj, nk = centre.shape
+    for n in range(near.size):
+        f = near[n]
+        i, j, k = f // (nj * nk), (f // nk) % nj, f % nk
+        area, x, y = open_polygon(
+            distance[i, j, k],
+            distance[i + si, j + sj, k],
+            distance[i + si + ti, j + sj + tj, k + tk],
+            distance[i + ti, j + tj, k + tk],
+        )
+        if area > 0.0:
+            centre[0, i, j, k] = x
+            centre[1, i, j, k] = y
 
 
-def aperture_reference(opened: Array, across: Array, axis: int, d: int) -> Array:
-    """`aperture` in NumPy, between all faces across `axis` and the next ones along d; for d other
-    than `axis` those at the upper side of the domain come last."""
-    if d == axis:
-        return 0.5 * (np.delete(opened, -1, axis) + np.delete(opened, 0, axis))
-    sides = np.delete(across, 0, d)
-    ends = [(int(n == axis),) * 2 for n in range(3)]
-    total, count = np.pad(sides, ends), np.pad(np.ones_like(sides), ends)
-    both = [np.delete(values, 0, axis) + np.delete(values, -1, axis) for values in (total, count)]
-    return np.asarray(both[0] / both[1])
+def face_corners_reference(distance: Array, axis: int) -> Array:
+    """(4, ...) distances at the corners of all faces across `axis`, in turn."""
+    p = np.moveaxis(distance, axis, 0)
+    corners = np.stack([p[:, :-1, :-1], p[:, 1:, :-1], p[:, 1:, 1:], p[:, :-1, 1:]])
+    return np.moveaxis(corners, 1, 1 + axis)
+
+
+def find_centres_reference(distance: Array, axis: int) -> Array:
+    """`find_centres` in NumPy, of all faces."""
+    return np.stack(open_polygon_reference(face_corners_reference(distance, axis))[1:])
+
+
+@njit(nogil=True, cache=True)
+def along(one: float, other: float, part: float) -> float:
+    """Link between two faces across the axis they are apart along, over that of open ones.
+
+    one, other  open parts of the faces;  part  that of the cell between them
+    """
+    return one * other / max(part, LEAST * max(one, other))
+
+
+@njit(nogil=True, cache=True)
+def across(
+    distance: Array, centre: Array, axis: int, d: int, i: int, j: int, k: int,
+    g: tuple[int, int, int],
+) -> float:  # fmt: skip
+    """Link between a face across `axis` and the next one along d, over that of open ones: the open
+    part of the edge between them over the distance of the centres of their open parts.
+
+    g  the next face
+    """
+    n = int(d == other_axes(axis)[1])
+    part = edge_beside(distance, axis, d, i + int(d == 0), j + int(d == 1), k + int(d == 2))
+    return part / max(1.0 + centre[n, g[0], g[1], g[2]] - centre[n, i, j, k], LEAST)
+
+
+@njit(nogil=True, cache=True)
+def edge_beside(distance: Array, axis: int, d: int, i: int, j: int, k: int) -> float:
+    """Open part of the edge at the lower side along d of face (i, j, k) across `axis`."""
+    e = 3 - axis - d
+    return open_edge(distance[i, j, k], distance[i + int(e == 0), j + int(e == 1), k + int(e == 2)])
 
 
 @kernel
@@ -129,13 +176,42 @@ def following(at: int, count: int, periodic: bool) -> int:
     return 0 if periodic else -1
 
 
+@njit(nogil=True, cache=True)
+def opened_area(distance: Array, axis: int, i: int, j: int, k: int) -> float:
+    """Open part of face (i, j, k) across `axis` from the distances at its corners."""
+    s, t = other_axes(axis)
+    si, sj, ti, tj, tk = int(s == 0), int(s == 1), int(t == 0), int(t == 1), int(t == 2)
+    return open_polygon(
+        distance[i, j, k],
+        distance[i + si, j + sj, k],
+        distance[i + si + ti, j + sj + tj, k + tk],
+        distance[i + ti, j + tj, k + tk],
+    )[0]
+
+
+@njit(nogil=True, cache=True)
+def nearest_node(distance: Array, i: int, j: int, k: int, ni: int, nj: int, nk: int) -> int:
+    """Flat index of the node nearest to a body among those up to (ni, nj, nk) above (i, j, k)."""
+    best, least = 0, np.inf
+    for a in range(i, i + ni + 1):
+        for b in range(j, j + nj + 1):
+            for c in range(k, k + nk + 1):
+                if distance[a, b, c] < least:
+                    least = distance[a, b, c]
+                    best = (a * distance.shape[1] + b) * distance.shape[2] + c
+    return best
+
+
 @kernel
 def link_faces(
     axis: int,
     d: int,
     kind: NDArray[np.uint8],
+    away: Array,
+    distance: Array,
     opened: Array,
-    across: Array,
+    centre: Array,
+    parts: Array,
     velocity: Array,
     stiffness: float,
     diagonal: Array,
@@ -145,10 +221,13 @@ def link_faces(
 ) -> None:
     """Add the links along d to the system of the faces across `axis`.
 
+    away       distance to bodies at each face; above 0 where it and its neighbours are uncut
+    distance   to the bodies at the nodes
+    opened     open part of each face
+    parts      of each cell
     stiffness  mu A / h, kg/s
     periodic   whether the domain is along d
     """
-    last = kind.shape[axis] - 1
     count = kind.shape[d] - int(periodic and d == axis)
     for i in range(kind.shape[0]):
         for j in range(kind.shape[1]):
@@ -162,7 +241,12 @@ def link_faces(
                 known = kind[i, j, k] == GIVEN or kind[g] == GIVEN
                 if not ((here and there) or (known and (here or there))):
                     continue
-                coefficient = stiffness * aperture(opened, across, axis, d, i, j, k, last)
+                if away[i, j, k] > 0.0:
+                    coefficient = stiffness
+                elif d == axis:
+                    coefficient = stiffness * along(opened[i, j, k], opened[g], parts[i, j, k])
+                else:
+                    coefficient = stiffness * across(distance, centre, axis, d, i, j, k, g)
                 if here:
                     diagonal[i, j, k] += coefficient
                 if there:
@@ -175,19 +259,40 @@ def link_faces(
                     given[g] += coefficient * velocity[i, j, k]
 
 
+def links_reference(
+    axis: int, d: int, distance: Array, opened: Array, centre: Array, parts: Array, periodic: bool
+) -> Array:
+    """Links over those of open faces in NumPy, between all faces across `axis` and the next ones
+    along d, that first; the first one stands for the next of the last where periodic."""
+    if d == axis:
+        a, v = np.moveaxis(opened, d, 0), np.moveaxis(parts, d, 0)
+        one = a[:-1]
+        other = np.concatenate([a[1:-1], a[:1] if periodic else a[-1:]])
+        least = np.maximum(LEAST * np.maximum(one, other), TINY)
+        return one * other / np.maximum(v, least)
+    e = 3 - axis - d
+    nodes = np.moveaxis(distance, (d, e), (0, 1))[1:]
+    part = open_edge_reference(nodes[:, :-1], nodes[:, 1:])
+    place = np.moveaxis(centre[int(d > e)], (d, e), (0, 1))
+    away = 1.0 + np.roll(place, -1, axis=0) - place
+    return np.moveaxis(part / np.maximum(away, LEAST), 1, 1 if e < axis else 2)
+
+
 def link_faces_reference(
     axis: int,
     d: int,
     kind: NDArray[np.uint8],
+    distance: Array,
     opened: Array,
-    across: Array,
+    centre: Array,
+    parts: Array,
     velocity: Array,
     stiffness: float,
     periodic: bool,
 ) -> tuple[Array, Array, Array]:
     """`link_faces` in NumPy: what it adds to the diagonal, the links, what it adds to the force."""
     faces = kind.shape[d] - int(periodic and d == axis)
-    between = np.moveaxis(aperture_reference(opened, across, axis, d), d, 0)
+    between = links_reference(axis, d, distance, opened, centre, parts, periodic)
     links = faces if periodic else faces - 1
     distinct = np.moveaxis(kind, d, 0)[:faces]
     here, there = distinct[:links], np.roll(distinct, -1, axis=0)[:links]
@@ -211,78 +316,195 @@ def link_faces_reference(
 def meet_walls(
     axis: int,
     kind: NDArray[np.uint8],
-    opened: Faces,
-    phi: Array,
+    distance: Array,
+    opened: Array,
+    centre: Array,
+    parts: Array,
     stiffness: float,
-    spacing: float,
     codes: Integers,
     beside: Integers,
     wall: Array,
     gap: Array,
+    place: Array,
+    node: Integers,
 ) -> None:
-    """Wall coefficient and x_f - x_w of the faces `beside`; both 0 where no link is cut.
+    """What walls do to the faces `beside` (n,), flat indices of unknown ones across `axis`.
 
-    beside  (n,) flat indices of unknown faces across `axis`
+    Three walls each: in the plane of the face, in the cell below it and in that above it.
+
+    wall   (n, 3) W, kg/s; 0 where there is none
+    gap    (n, 3, 3) from the wall point to the centre of the face's open part, cells
+    place  (n, 3, 3) from the centre of the face to the wall point, cells
+    node   (n, 3) flat index of the node nearest to a body
     """
-    last = kind.shape[axis] - 1
-    area = np.zeros(3)
+    flat = parts.shape[2] == 1
+    others = other_axes(axis)
+    count = kind.shape[axis] - int(codes[axis, 0] == PERIODIC)
+    step = (int(axis == 0), int(axis == 1), int(axis == 2))
+    total, pull = np.zeros(2), np.zeros(2)
     for n in range(beside.size):
         f = beside[n]
         i = f // (kind.shape[1] * kind.shape[2])
         j, k = (f // kind.shape[2]) % kind.shape[1], f % kind.shape[2]
-        slope = 0.0
-        area[:] = 0.0
-        for d in range(2 if opened[0].shape[2] == 1 else 3):
+        # in the plane: the wall that closes a part of the face, and closed faces beside it
+        area, moment, stuck = opened_area(distance, axis, i, j, k), 0.0, 0.0
+        total[:], pull[:] = 0.0, 0.0
+        for m in range(1 if flat else 2):
+            d = others[m]
             periodic = codes[d, 0] == PERIODIC
-            count = kind.shape[d] - int(periodic and d == axis)
             at = i if d == 0 else (j if d == 1 else k)
             for side in (-1, 1):
+                upper = int(side > 0)
+                part = edge_beside(
+                    distance, axis, d,
+                    i + upper * int(d == 0), j + upper * int(d == 1), k + upper * int(d == 2),
+                )  # fmt: skip
+                away = max(0.5 - side * centre[m, i, j, k], LEAST)
+                total[m] -= side * part
+                moment += part * away
                 to = at + side
-                if to < 0 or to >= count:
-                    if not periodic:
-                        continue
-                    to = (to + count) % count
+                if periodic:
+                    to = (to + kind.shape[d]) % kind.shape[d]
+                elif to < 0 or to >= kind.shape[d]:
+                    continue
                 g = to if d == 0 else i, to if d == 1 else j, to if d == 2 else k
-                link = 0.0
-                if kind[g] == UNKNOWN or kind[g] == GIVEN:
-                    low = g if side < 0 else (i, j, k)
-                    link = stiffness * aperture(
-                        opened[axis], opened[d], axis, d, low[0], low[1], low[2], last
-                    )
-                area[d] -= side * spacing * (stiffness - link)
-                slope += link * (phi[g] - phi[i, j, k])
-        size = np.sqrt((area**2).sum())
-        if size > 0.0:
-            wall[n] = max(slope, OBLIQUE * size) / phi[i, j, k]
-            gap[n] = area / wall[n]
+                if kind[g] != UNKNOWN and kind[g] != GIVEN:
+                    stuck += part / away
+                    pull[m] -= side * part
+        size = np.sqrt((total**2).sum())
+        cut = 0.0
+        if size > SAME:
+            reach = max(((1.0 if flat else 2.0) * area - moment) / size, LEAST)
+            cut = size / reach
+            pull -= total
+        elif area == 0.0:
+            cut = 1.0 / LEAST
+        node[n, 0] = nearest_node(distance, i, j, k, 1 - step[0], 1 - step[1], 1 - step[2])
+        if cut + stuck > 0.0:
+            wall[n, 0] = stiffness * (cut + stuck)
+            for m in range(1 if flat else 2):
+                gap[n, 0, others[m]] = pull[m] / (cut + stuck)
+                place[n, 0, others[m]] = centre[m, i, j, k] - gap[n, 0, others[m]]
+        # in the cells: the wall that makes one of two faces smaller than the other
+        at = i if axis == 0 else (j if axis == 1 else k)
+        for side in (-1, 1):
+            to, entry = at + side, 1 + int(side > 0)
+            if codes[axis, 0] == PERIODIC:
+                to = (to + count) % count
+            elif to < 0 or to >= count:
+                continue
+            g = to if axis == 0 else i, to if axis == 1 else j, to if axis == 2 else k
+            below = at if side > 0 else (at - 1 + count) % count
+            c = below if axis == 0 else i, below if axis == 1 else j, below if axis == 2 else k
+            active = kind[g] == UNKNOWN or kind[g] == GIVEN
+            own, other = opened[i, j, k], opened[g] if active else 0.0
+            if abs(own - other) < SAME:
+                continue
+            node[n, entry] = nearest_node(distance, c[0], c[1], c[2], 1, 1, 1)
+            weight = own * (own - other) / max(parts[c], LEAST * max(own, other))
+            wall[n, entry] = stiffness * weight
+            place[n, entry, axis] = 0.5 * side
+            gap[n, entry, axis] = -0.5 * side
+            for m in range(1 if flat else 2):
+                mine, yours = own * centre[m, i, j, k], other * centre[m, g[0], g[1], g[2]]
+                where = min(max((mine - yours) / (own - other), -0.5), 0.5)
+                place[n, entry, others[m]] = where
+                gap[n, entry, others[m]] = centre[m, i, j, k] - where
+
+
+def beside_reference(values: Array, d: int, side: int, periodic: bool, missing: float) -> Array:
+    """Values of the next faces along d on one side; `missing` beyond the domain."""
+    moved = np.moveaxis(np.roll(values, -side, axis=d), d, 0).copy()
+    if not periodic:
+        moved[-1 if side > 0 else 0] = missing
+    return np.moveaxis(moved, 0, d)
 
 
 def meet_walls_reference(
     axis: int,
     kind: NDArray[np.uint8],
-    opened: Faces,
-    phi: Array,
+    distance: Array,
+    opened: Array,
+    centre: Array,
+    parts: Array,
     stiffness: float,
-    spacing: float,
     codes: Integers,
     beside: Integers,
-) -> tuple[Array, Array]:
-    """`meet_walls` in NumPy: W and x_f - x_w."""
-    slope, area = np.zeros(kind.shape), np.zeros((3, *kind.shape))
-    for d in range(2 if opened[0].shape[2] == 1 else 3):
+) -> tuple[Array, Array, Array, Integers]:
+    """`meet_walls` in NumPy: W, gap, place and node."""
+    others = [d for d in range(2 if parts.shape[2] == 1 else 3) if d != axis]
+    active = np.where((kind == UNKNOWN) | (kind == GIVEN), opened, 0.0)
+    wall = np.zeros((3, *kind.shape))
+    gap, place = np.zeros((3, 3, *kind.shape)), np.zeros((3, 3, *kind.shape))
+    area = open_polygon_reference(face_corners_reference(distance, axis))[0]
+    moment, stuck = np.zeros(kind.shape), np.zeros(kind.shape)
+    total, pull = np.zeros((2, 3, *kind.shape))
+    for m, d in enumerate(others):
+        e = 3 - axis - d
+        ends = np.moveaxis(distance, (d, e), (0, 1))
+        edges = open_edge_reference(ends[:, :-1], ends[:, 1:])
         periodic = bool(codes[d, 0] == PERIODIC)
-        faces = kind.shape[d] - int(periodic and d == axis)
-        between = np.moveaxis(aperture_reference(opened[axis], opened[d], axis, d), d, 0)
-        known = np.moveaxis((kind == UNKNOWN) | (kind == GIVEN), d, 0)
-        p, rise, gain = (np.moveaxis(values, d, 0) for values in (phi, slope, area[d]))
-        low = np.arange(faces if periodic else faces - 1)
-        high = (low + 1) % faces
-        for side, here, there in ((1, low, high), (-1, high, low)):
-            link = stiffness * between[low] * known[there]
-            gain[here] -= side * spacing * (stiffness - link)
-            rise[here] += link * (p[there] - p[here])
-    area, slope = area.reshape(3, -1)[:, beside], slope.ravel()[beside]
-    size = np.linalg.norm(area, axis=0)
-    cut = size > 0.0
-    wall = np.where(cut, np.maximum(slope, OBLIQUE * size) / phi.ravel()[beside], 0.0)
-    return wall, np.divide(area.T, wall[:, None], np.zeros_like(area.T), where=cut[:, None])
+        for side, part in ((-1, edges[:-1]), (1, edges[1:])):
+            part = np.moveaxis(part, (0, 1), (d, e))
+            away = np.maximum(0.5 - side * centre[m], LEAST)
+            total[d] -= side * part
+            moment += part * away
+            shut = beside_reference(active, d, side, periodic, 1.0) == 0.0
+            stuck += shut * part / away
+            pull[d] -= shut * side * part
+    size = np.sqrt((total**2).sum(axis=0))
+    cut, one = size > SAME, np.where(size > SAME, size, 1.0)
+    reach = np.maximum((len(others) * area - moment) / one, LEAST)
+    closed = np.where(cut, size / reach, np.where(area == 0.0, 1.0 / LEAST, 0.0))
+    wall[0] = closed + stuck
+    pull = pull - total * cut
+    gap[0] = np.divide(pull, wall[0], np.zeros_like(pull), where=wall[0] > 0.0)
+    for m, d in enumerate(others):
+        place[0, d] = np.where(wall[0] > 0.0, centre[m], 0.0) - gap[0, d]
+    faces = kind.shape[axis] - int(codes[axis, 0] == PERIODIC)
+    periodic = bool(codes[axis, 0] == PERIODIC)
+    distinct = [np.take(values, range(faces), axis) for values in (active, opened, *centre)]
+    cells = np.moveaxis(parts, axis, 0)
+    for entry, side in ((1, -1), (2, 1)):
+        a = np.moveaxis(distinct[1], axis, 0)
+        b = np.moveaxis(beside_reference(distinct[0], axis, side, periodic, np.nan), axis, 0)
+        index = (np.arange(faces) + (side - 1) // 2) % cells.shape[0]
+        v = np.maximum(cells[index], np.maximum(LEAST * np.maximum(a, b), TINY))
+        met = (np.abs(a - b) >= SAME) & (a > 0.0)
+        apart = np.where(met, a - b, 1.0)
+        np.moveaxis(wall[entry], axis, 0)[:faces] = np.where(met, a * (a - b) / v, 0.0)
+        np.moveaxis(place[entry, axis], axis, 0)[:faces] = np.where(met, 0.5 * side, 0.0)
+        np.moveaxis(gap[entry, axis], axis, 0)[:faces] = np.where(met, -0.5 * side, 0.0)
+        for m, d in enumerate(others):
+            own = np.moveaxis(distinct[2 + m], axis, 0)
+            there = beside_reference(distinct[2 + m], axis, side, periodic, 0.0)
+            middle = np.clip((a * own - b * np.moveaxis(there, axis, 0)) / apart, -0.5, 0.5)
+            np.moveaxis(place[entry, d], axis, 0)[:faces] = np.where(met, middle, 0.0)
+            np.moveaxis(gap[entry, d], axis, 0)[:faces] = np.where(met, own - middle, 0.0)
+    node = nearest_nodes_reference(axis, distance, faces, kind.shape)
+    return (
+        stiffness * wall.reshape(3, -1)[:, beside].T,
+        np.moveaxis(gap.reshape(3, 3, -1)[..., beside], -1, 0),
+        np.moveaxis(place.reshape(3, 3, -1)[..., beside], -1, 0),
+        node.reshape(3, -1)[:, beside].T,
+    )
+
+
+def nearest_nodes_reference(
+    axis: int, distance: Array, faces: int, shape: tuple[int, ...]
+) -> Integers:
+    """(3, ...) flat index of the node nearest to a body at each face across `axis`, and around the
+    cells below and above it."""
+    found = np.zeros((3, *shape), np.int64)
+    for f in np.ndindex(*shape):
+        if f[axis] >= faces:
+            continue
+        for entry, shift in ((0, None), (1, -1), (2, 0)):
+            low = list(f)
+            if shift is not None:
+                low[axis] = (f[axis] + shift) % (distance.shape[axis] - 1)
+            block = [slice(at, at + 1 + (entry > 0 or d != axis)) for d, at in enumerate(low)]
+            part = distance[tuple(block)]
+            at = np.add(np.unravel_index(np.argmin(part), part.shape), low)
+            found[(entry, *f)] = np.ravel_multi_index(tuple(at), distance.shape)
+    return found
