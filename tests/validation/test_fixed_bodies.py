@@ -17,11 +17,11 @@ from flowborne.validation.worlds import set_velocity
 
 
 def test_B1_on_ten_cells_across_D():
-    """Ten cells give the drag to a tenth, and the two lengths that depend on the whole flow."""
-    drag, _, drop, length = case("B1").run(quick=True)
-    assert drag.value == pytest.approx(drag.reference, rel=0.10)
-    assert drop.value == pytest.approx(drop.reference, rel=0.03)
-    assert length.value == pytest.approx(length.reference, rel=0.15)
+    """Ten cells give the drag and the length of the backflow to a fiftieth; the pressure between
+    the two ends, which is read in the cells beside them, is in the report."""
+    drag, _, _, length = case("B1").run(quick=True)
+    assert drag.value == pytest.approx(drag.reference, rel=0.02)
+    assert length.value == pytest.approx(length.reference, rel=0.02)
 
 
 def test_B1_figures_of_a_known_flow():

@@ -51,7 +51,7 @@ class Carried:
     volumes   control volumes at the end of the step
     lost      (3,) momentum that advection made (or lost, when negative), N s; none in flux form
     crossed   (3,) momentum that the flow carried in through the sides, N s
-    stopped   (3,) momentum that the sides gave to what reached them, N s
+    stopped   (3,) momentum that the sides which prescribe a velocity gave to what reached them, N s
     expelled  (3,) momentum that came in through mouths and sources, N s
     jets      of the mouths, those that drink with the velocity of what they drank
     """
@@ -152,14 +152,13 @@ def carry_fluid(
     if fluid.advection == "semi-lagrangian":
         paths = particle_paths(world, q, before, jets, dt)
         return carry_along_paths(world, before, transport, paths, dyed, jets)
-    return carry_in_flux_form(world, velocity, transport, after.open, sources, dyed, jets)
+    return carry_in_flux_form(world, velocity, transport, sources, dyed, jets)
 
 
 def carry_in_flux_form(
     world: World,
     velocity: Faces,
     transport: Transport,
-    opened: Faces,
     sources: Array,
     dyed: Dyed,
     jets: tuple[Jet, ...],
@@ -167,7 +166,6 @@ def carry_in_flux_form(
     """Velocity a step later, on moving control volumes (see `transport`).
 
     velocity Faces at the start, m/s
-    opened   Faces, open parts at the end
     sources  (nx, ny, nz) what they bring into each cell, m^3/s
     dyed     the scalars a step later
     """
@@ -188,7 +186,6 @@ def carry_in_flux_form(
             taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
     masses = face_masses(transport.after, fluid.density)
     reached = fluid_momentum(arrived, masses, grid, sides)
-    hold_back(arrived, opened, masses, fluid, dt)
     impose_sides(arrived, grid, sides, transport.time + dt)
     return Carried(
         arrived,
@@ -269,28 +266,6 @@ def forced(
                 velocity[axis][tuple(box)] = source.velocity[axis]
     impose_sides(velocity, grid, fluid.boundaries, time)
     return velocity
-
-
-def hold_back(velocity: Faces, opened: Faces, mass: Faces, fluid: Fluid, dt: float) -> None:
-    """What the rest of the fluid, still until it is drawn in, makes of the flow through open sides.
-
-    There p = 0, but for - rho (u - U)^2 / 2 where fluid comes in faster than the side as a whole,
-    U: a vortex that leaves would else draw in ever more, with energy from nowhere (Bruneau and
-    Fabrie 1996). Implicit, in place.
-    """
-    grid = fluid.grid
-    for axis in grid.axes:
-        for end, side in enumerate(fluid.boundaries.pair(axis)):
-            if side.kind != "open":
-                continue
-            layer, inward = edge(axis, -1 if end else 0), -1.0 if end else 1.0
-            area, m = grid.face_area * opened[axis][layer], mass[axis][layer]
-            coming = inward * velocity[axis][layer]
-            mean = float(np.vdot(area, coming)) / max(float(area.sum()), 1e-300)
-            excess = np.maximum(coming - max(0.0, mean), 0.0)
-            rate = np.divide(0.5 * fluid.density * area, m, out=np.zeros_like(m), where=m > 0.0)
-            lost = dt * rate * excess
-            velocity[axis][layer] -= inward * excess * lost / (1.0 + lost)
 
 
 def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:

@@ -44,8 +44,11 @@ class Kick:
 
 
 def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -> Kick:
-    """Half of the last pressure, on the grid `cut` and its control volumes; none of it where the
-    bodies have been put elsewhere since, and in the paper's own scheme.
+    """Half of the last pressure, on the grid `cut` and its control volumes.
+
+    None of it where the bodies have been put elsewhere since, in the paper's own scheme, and in a
+    domain with an open side: what comes in there brings energy of its own, which the plain step
+    damps and this one does not.
 
     What is left of it stays in the state, as what the solve is expected to find.
     """
@@ -54,7 +57,8 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     mass = face_masses(volumes, fluid.density)
     start = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + cut.skins.vertices.size
-    if fluid.advection == "semi-lagrangian" or moved_since(world):
+    plain = fluid.advection == "semi-lagrangian" or has_open_side(fluid)
+    if plain or moved_since(world):
         return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
     pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
     rate, still = accelerated(cut.open, mass, grid), faces_of([np.zeros_like(m) for m in mass])
@@ -80,16 +84,18 @@ def likely(earlier: float) -> float:
     return max(0.0, min(1.0, 2.0 - earlier, 2.0 * earlier))
 
 
+def has_open_side(fluid: Fluid) -> bool:
+    sides = (side for axis in fluid.grid.axes for side in fluid.boundaries.pair(axis))
+    return any(side.kind == "open" for side in sides)
+
+
 def driving(pressure: Array, fluid: Fluid) -> Array:
     """The pressure without what balances the body force, which moves nothing, Pa."""
     grid, held = fluid.grid, pressure != 0.0
     rest = pressure
     for axis in grid.axes:
-        low, high = (side.kind for side in fluid.boundaries.pair(axis))
         slope = fluid.density * fluid.body_force[axis]
-        if slope == 0.0 or low == "periodic" or low == high == "open":
-            continue
-        x = grid.cell_coordinates()[axis] - (grid.upper if high == "open" else grid.origin)[axis]
-        along = [-1 if a == axis else 1 for a in range(3)]
-        rest = rest - np.where(held, slope * x.reshape(along), 0.0)
+        if slope != 0.0 and not fluid.boundaries.periodic()[axis]:
+            along = [-1 if a == axis else 1 for a in range(3)]
+            rest = rest - np.where(held, slope * grid.cell_coordinates()[axis].reshape(along), 0.0)
     return rest
