@@ -39,8 +39,8 @@ LEFT = 1e-10
 squares), where that is reached first."""
 
 MOST = 2.0
-"""Factor on the volumes of a closed region beyond which it is a pocket that bodies crush or open,
-and is left to them."""
+"""Factor on the volumes of a closed region beyond which it is a pocket that bodies crush, and is
+left to them. One that they open holds nothing until it is reached."""
 
 
 def leak_proof_flux(
@@ -115,6 +115,6 @@ def volume_rates(
         held = np.bincount(number, cells[inside] + dt * rate[inside], system.regions)
         wanted = np.bincount(number, later[inside], system.regions)
         factor = np.divide(held, wanted, out=np.ones(system.regions), where=wanted > 0.0)
-        factor[(factor > MOST) | (factor * MOST < 1.0)] = 1.0
+        factor[factor > MOST] = 1.0
         target[inside] *= factor[number]
     return (target - cells) / dt - rate

@@ -21,7 +21,7 @@ CYCLE = 1.75
 CYCLES = {True: 1, False: 3}
 """Cycles that are followed, by quick."""
 
-COARSE = {"domain.resolution": "72", "time.steps_per_frame": "1"}
+COARSE = {"domain.resolution": "72"}
 """Settings of the quick runs: legs of 1.4 cells."""
 
 STILL = 0.2
