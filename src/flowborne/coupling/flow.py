@@ -293,7 +293,6 @@ def settle_state(
     started: Faces,
     velocity: Faces,
     inside: Faces,
-    cut: Geometry,
     dt: float,
 ) -> None:
     """Put the new velocity into the state, and where it will be half a step on.

@@ -61,8 +61,8 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     if plain or moved_since(world):
         return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
     pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
-    rate, still = accelerated(cut.open, mass, grid), faces_of([np.zeros_like(m) for m in mass])
-    kick, before = still, faces_of([k.copy() for k in still])
+    rate = accelerated(cut.open, mass, grid)
+    kick, before = grid.zeros_faces(), grid.zeros_faces()
     push(kick, rate, pressure, grid, sides, dt)
     push(before, rate, earlier, grid, sides, dt)
     both = sum(float((m * k * b).sum()) for m, k, b in zip(mass, kick, before, strict=True))

@@ -112,7 +112,7 @@ def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> S
     assert solved.projected is not None
     world.solid.v[:] = solved.v
     leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
-    settle_state(world, carried, kick.velocity, solved.projected.velocity, leak_free, cut, dt)
+    settle_state(world, carried, kick.velocity, solved.projected.velocity, leak_free, dt)
     state.earlier[:] = state.pressure + kick.pressure
     state.pressure[:] = kick.pressure + solved.projected.pressure
     state.scalars = carried.dyed.scalars

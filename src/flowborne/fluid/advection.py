@@ -11,12 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Faces
-from flowborne.kernels.jit import kernel, njit, prange
+from flowborne.kernels.jit import inlined, kernel, prange
 
 Mask = NDArray[np.uint8]
-
-inlined = njit(forceinline=True, nogil=True, cache=True)
-"""For what is called at every face: inlined by LLVM, which compiles far sooner than by Numba."""
 
 
 @inlined

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from numba import njit
+from flowborne.kernels.jit import inlined
 
 BLOCK = 16
 """Fewest planes of a block: more than an operation leaves to when all blocks are done."""
-
-inlined = njit(forceinline=True, nogil=True, cache=True)
 
 
 @inlined

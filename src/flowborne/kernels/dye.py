@@ -10,10 +10,10 @@ cell than is in it.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.uint8]
@@ -25,8 +25,6 @@ ALIKE = 1.25
 """Second differences of a parabola per smallest one around it above which it is not smooth."""
 
 TINY = 1e-300
-
-inlined = njit(forceinline=True, nogil=True, cache=True)
 
 
 @inlined

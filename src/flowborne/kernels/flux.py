@@ -7,10 +7,10 @@ layer thick along its first axis, which nothing moves along.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 GHOSTS = 2
 """Layers of ghosts: what a value of third order needs."""
@@ -25,8 +25,6 @@ order, or what is upstream."""
 
 PLANES = 8
 """Planes that one thread goes through at a time: what leaves one comes into the next."""
-
-inlined = njit(forceinline=True, nogil=True, cache=True)
 
 
 @inlined

@@ -38,6 +38,10 @@ from numba import prange as prange
 P = ParamSpec("P")
 R = TypeVar("R")
 
+inlined = njit(forceinline=True, nogil=True, cache=True)
+"""For what is called at every cell or face: inlined by LLVM, which compiles far sooner than by
+Numba."""
+
 ONLY_PRANGE = {
     "comprehension": False,
     "reduction": False,

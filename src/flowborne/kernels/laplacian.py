@@ -6,9 +6,9 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Array, Finest, Real, Triple
-from flowborne.kernels.blocks import BLOCK, inlined, reach
-from flowborne.kernels.jit import kernel
-from flowborne.kernels.vectors import cells_of
+from flowborne.kernels.blocks import BLOCK, reach
+from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.vectors import cells_of, in_order
 
 
 @inlined
@@ -27,10 +27,7 @@ def apply_plane(out: Array, p: Array, finest: Finest, m: int) -> float:
                 total -= w0[m, j, k] * p[m - 1, j, k] + w0[m + 1, j, k] * p[m + 1, j, k]
             out[m, j, k] = total
             row[k] += total * p[m, j, k]
-    energy = 0.0
-    for k in range(n2 + 2):
-        energy += row[k]
-    return energy
+    return in_order(row)
 
 
 @kernel
@@ -41,10 +38,7 @@ def apply_laplacian(out: Array, p: Array, finest: Finest) -> float:
     parts = np.zeros(planes)
     for i in prange(planes):
         parts[i] = apply_plane(out, p, finest, i + d)
-    total = 0.0
-    for i in range(planes):
-        total += parts[i]
-    return total
+    return in_order(parts)
 
 
 @inlined
@@ -79,10 +73,7 @@ def turn_and_apply(
         i = planes * (between + 1) // blocks
         for m in range(i - 1, i + 1):
             parts[m] = apply_plane(out, p, finest, m + d)
-    total = 0.0
-    for i in range(planes):
-        total += parts[i]
-    return total
+    return in_order(parts)
 
 
 def neighbour_sum(x: Real, w: Triple) -> Array:

@@ -9,8 +9,8 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Array, Real, Triple
-from flowborne.kernels.blocks import BLOCK, inlined, reach
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.blocks import BLOCK, reach
+from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.laplacian import neighbour_sum
 from flowborne.kernels.vectors import cells_of
 

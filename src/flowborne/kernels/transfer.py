@@ -18,8 +18,7 @@ from numba import prange
 
 from flowborne.kernels.aggregates import OWN
 from flowborne.kernels.arrays import Array, Integers, Marks, Periodic, Places, Real, Triple
-from flowborne.kernels.blocks import inlined
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.vectors import cells_of
 
 

@@ -12,7 +12,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Real
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 
 def cells_of(padded: NDArray[Any]) -> tuple[slice, slice, slice]:
@@ -48,6 +48,15 @@ def scaled_cells(source: Real, target: Real, scale: float) -> None:
                 target[i + d, j, k] = scale * source[i + d, j, k]
 
 
+@inlined
+def in_order(parts: Array) -> float:
+    """Sum, first to last."""
+    total = 0.0
+    for i in range(parts.size):
+        total += parts[i]
+    return total
+
+
 @kernel
 def dot(a: Array, b: Array) -> float:
     """Sum of a x b, planes in order."""
@@ -58,12 +67,8 @@ def dot(a: Array, b: Array) -> float:
         for j in range(a.shape[1]):
             for k in range(size):
                 row[k] += a[i, j, k] * b[i, j, k]
-        for k in range(size):
-            parts[i] += row[k]
-    total = 0.0
-    for i in range(planes):
-        total += parts[i]
-    return total
+        parts[i] = in_order(row)
+    return in_order(parts)
 
 
 @kernel
@@ -79,12 +84,8 @@ def descend(x: Array, r: Array, p: Array, q: Array, alpha: float) -> float:
                 value = r[i, j, k] - alpha * q[i, j, k]
                 r[i, j, k] = value
                 row[k] += value * value
-        for k in range(size):
-            parts[i] += row[k]
-    total = 0.0
-    for i in range(planes):
-        total += parts[i]
-    return total
+        parts[i] = in_order(row)
+    return in_order(parts)
 
 
 @kernel
@@ -103,12 +104,8 @@ def descend_on(
                 r[i, j, k] = value
                 b[i, j, k] = scale * value
                 row[k] += value * value
-        for k in range(size):
-            parts[i] += row[k]
-    total = 0.0
-    for i in range(planes):
-        total += parts[i]
-    return total
+        parts[i] = in_order(row)
+    return in_order(parts)
 
 
 @kernel
@@ -121,12 +118,8 @@ def scaled_dot(z: Real, r: Array, scale: float) -> float:
         for j in range(r.shape[1]):
             for k in range(size):
                 row[k] += scale * z[i, j, k] * r[i, j, k]
-        for k in range(size):
-            parts[i] += row[k]
-    total = 0.0
-    for i in range(planes):
-        total += parts[i]
-    return total
+        parts[i] = in_order(row)
+    return in_order(parts)
 
 
 @kernel
