@@ -22,11 +22,12 @@ import os
 import sys
 import threading
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from types import FunctionType
-from typing import Any, Generic, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # read when Numba loads OpenMP
 
@@ -57,11 +58,13 @@ ONLY_PRANGE = {
 LARGE = 100_000
 """Fewest elements of a kernel's largest array for which threads are started."""
 
-GAIN = 1.2
-"""Least factor by which threads must shorten a call to be used in the next ones."""
+TURNS = (True, False, True, False, False, True)
+"""With threads or without: the calls by which a kernel compares its versions. The first two, which
+may have to compile, are not timed; the others are in an order that favours neither version where
+every second call does more."""
 
-PAUSE = 10.0
-"""Times as long as a call in which they did not, they are left out."""
+AGAIN = 400
+"""Calls from one comparison to the next."""
 
 _thread = threading.local()
 _workqueue = threading.Lock()
@@ -99,15 +102,15 @@ def kernel_threads(most: int | None = None) -> Iterator[None]:
             _thread.most = before
 
 
-def is_large(arguments: tuple[Any, ...]) -> bool:
-    """Whether one of the arrays, or of those in tuples, has at least LARGE elements."""
+def largest_size(arguments: tuple[Any, ...]) -> int:
+    """Elements of the largest of the arrays, those in tuples included."""
+    most = 0
     for given in arguments:
         if isinstance(given, np.ndarray):
-            if given.size >= LARGE:
-                return True
-        elif isinstance(given, tuple) and is_large(given):
-            return True
-    return False
+            most = max(most, given.size)
+        elif isinstance(given, tuple):
+            most = max(most, largest_size(given))
+    return most
 
 
 def numba_thread_count() -> int:
@@ -127,29 +130,27 @@ def numba_layer() -> str:
     return str(numba.threading_layer())
 
 
-class Pause:
-    """When threads may be tried again, on the clock of time.monotonic()."""
+class Comparison:
+    """Which version of a kernel is the faster one for arrays of about one size."""
 
     def __init__(self) -> None:
-        self.end = 0.0
-
-    def is_over(self) -> bool:
-        return time.monotonic() >= self.end
+        self.calls = 0
+        self.seconds = {True: 0.0, False: 0.0}
 
     @contextmanager
-    def unless_worth(self, count: int) -> Iterator[None]:
-        """Begin a pause where what runs within has not gained from `count` threads.
-
-        The calling thread has an equal share of the work, and waits for the others to end theirs.
-        """
-        began, worked = time.monotonic(), time.thread_time()
-        yield
-        took, worked = time.monotonic() - began, time.thread_time() - worked
-        if count * worked < GAIN * took:
-            self.end = time.monotonic() + PAUSE * took
-
-
-_pause = Pause()
+    def timed(self) -> Iterator[bool]:
+        """Around the next call; yields whether it takes threads."""
+        turn = self.calls % AGAIN
+        self.calls += 1
+        comparing = turn < len(TURNS)
+        threads = TURNS[turn] if comparing else self.seconds[True] < self.seconds[False]
+        began = time.perf_counter()
+        yield threads
+        took = time.perf_counter() - began
+        if turn == 0:
+            self.seconds = {True: 0.0, False: 0.0}
+        elif comparing and turn > 1:
+            self.seconds[threads] += took
 
 
 @contextmanager
@@ -183,16 +184,19 @@ class Kernel(Generic[P, R]):
         self.__wrapped__ = function
         self.serial: Any = njit(nogil=True, cache=True)(function)
         self._twin: Any = None
+        self._faster: defaultdict[int, Comparison] = defaultdict(Comparison)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        result: R
-        threads = allowed_threads()
-        if threads > 1 and _pause.is_over() and is_large(args) and self.parallel is not self.serial:
-            with numba_threads(threads) as free, _pause.unless_worth(threads):
-                result = (self.parallel if free else self.serial)(*args, **kwargs)
-        else:
-            result = self.serial(*args, **kwargs)
-        return result
+        count = allowed_threads()
+        size = largest_size(args) if count > 1 else 0
+        if size < LARGE or self.parallel is self.serial:
+            return cast(R, self.serial(*args, **kwargs))
+        with self._faster[size.bit_length()].timed() as threads:
+            if not threads:
+                return cast(R, self.serial(*args, **kwargs))
+            with numba_threads(count) as free:
+                version = self.parallel if free else self.serial
+                return cast(R, version(*args, **kwargs))
 
     @property
     def _numba_type_(self) -> Any:
