@@ -24,6 +24,8 @@ class FrameReport:
     steps      reports of its steps, in order
     objective  the controller's objective after it (weighted sum); nan without a controller
     terms      name -> value of each term of the objective
+    tried      the objective in the last decision's trials: as the hypothesis has it, at rest where
+               that removes velocities; nan without a controller
     gradient   (n,) of the last decision, objective per rad or m; empty without a controller
     targets    (n,) where the controlled dofs are going, rad or m; nan for ball joints
     decided    whether the controller decided anew in this frame
@@ -35,6 +37,7 @@ class FrameReport:
     steps: tuple[StepReport, ...]
     objective: float
     terms: dict[str, float]
+    tried: float
     gradient: Array
     targets: Array
     decided: bool

@@ -171,12 +171,14 @@ class Simulation:
         seconds = dict.fromkeys(PARTS, 0.0)
         nothing = np.zeros(0)
         gradient, targets, terms, decided = nothing, nothing, {"objective": np.nan}, False
+        tried = np.nan
         reports = []
         number = 1
         try:
             if controller is not None:
                 decision = controller.decide(world, self.frame_time, self._step)
                 gradient, decided = decision.gradient, decision.decided
+                tried = decision.objective
                 seconds["control"] = perf_counter() - started
             for number in range(1, self.steps_per_frame + 1):
                 drive = None if controller is None else controller.drive(world, end, dt)
@@ -198,6 +200,7 @@ class Simulation:
             steps=tuple(reports),
             objective=terms["objective"],
             terms={name: value for name, value in terms.items() if name != "objective"},
+            tried=tried,
             gradient=gradient,
             targets=targets,
             decided=decided,

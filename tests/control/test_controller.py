@@ -241,9 +241,8 @@ def test_decision_touches_nothing_but_memory(make_world: MakeWorld, step: Step) 
     controller_of((0.3, 0.4), iterations=3, rule=GoldenSection()).decide(world, FRAME, step)
     after = world.arrays()
     assert {name: after[name].tobytes() for name in before} == before
-    assert set(after) - set(before) == {
-        f"memory/{name}" for name in ("target", "displacement", "gradient", "objective", "schedule")
-    }
+    names = ("target", "displacement", "gradient", "objective", "pace", "schedule")
+    assert set(after) - set(before) == {f"memory/{name}" for name in names}
 
 
 def test_memory_is_all_that_the_controller_remembers(make_world: MakeWorld, step: Step) -> None:

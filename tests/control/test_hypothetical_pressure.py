@@ -27,7 +27,8 @@ def gradient(controller: Controller, world: World) -> np.ndarray:
     for places, wanted in controller.objective.shared_out(controller.dofs):
         if wanted.active(world.time):
             trials = controller.trials(world, step, None, wanted, places)
-            parts.append(controller.gradient.of(places).estimate(trials).gradient)
+            estimate = controller.gradient.of(places, np.ones(places.size)).estimate(trials)
+            parts.append(estimate.gradient)
     return np.concatenate(parts)
 
 

@@ -59,8 +59,8 @@ class Controller:
     """Gradient descent on an objective over the controlled joints, within the creature's strength.
 
     Its own state is in the world's memory: "target" (nq,), "displacement" (n,), "gradient" (n,),
-    "objective" (1,), and "schedule" (2,): frames left after this one until the next decision, and
-    the frame time in s.
+    "objective" (1,), "pace" (2, n): that of the rule and the gradient that it came from, and
+    "schedule" (2,): frames left after this one until the next decision, and the frame time in s.
 
     dofs        (n,) controlled dofs, indices into v
     objective   what to minimise
@@ -213,6 +213,7 @@ class Controller:
         n = self.dofs.size
         model, state = creature.parts(world)
         pose, value, gradient, evaluations = state.q.copy(), 0.0, np.zeros(n), 0
+        pace, slope = world.memory.get("pace", np.array([np.ones(n), np.zeros(n)])).copy()
         limit = np.broadcast_to(np.asarray(self.strength), (n,)) * (self.every * frame_time)
         groups = [
             (places, wanted)
@@ -223,15 +224,18 @@ class Controller:
             displacement = np.zeros(model.nv)
             for places, wanted in groups:
                 trials = self.trials(world, step, pose, wanted, places)
-                estimate = self.gradient.of(places).estimate(trials)
+                estimate = self.gradient.of(places, pace[places]).estimate(trials)
                 if iteration == 0:
                     value, gradient[places] = value + estimate.value, estimate.gradient
-                move = self.rule.step(trials, estimate.gradient, limit[places])
+                pace[places] = self.rule.pace(pace[places], slope[places], estimate.gradient)
+                slope[places] = estimate.gradient
+                move = pace[places] * self.rule.step(trials, estimate.gradient, limit[places])
                 displacement[self.dofs[places]] = trials.within_range(move)
                 evaluations += trials.evaluations
             if not displacement.any():
                 break
             pose = creature.moved(model, pose, displacement)
+        world.memory["pace"] = np.array([pace, slope])
         return pose, value, gradient, evaluations
 
     def _decision(self, world: World, decided: bool, evaluations: int, started: float) -> Decision:

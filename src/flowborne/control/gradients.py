@@ -44,8 +44,8 @@ class Estimate:
 class Gradient(Protocol):
     """Estimates the gradient of the objective."""
 
-    def of(self, places: NDArray[np.int64]) -> Gradient:
-        """The same for some of the dofs."""
+    def of(self, places: NDArray[np.int64], pace: Array) -> Gradient:
+        """The same for some of the dofs, with these parts (m,) of their displacements."""
         ...
 
     def estimate(self, poses: Poses) -> Estimate:
@@ -77,10 +77,10 @@ class FiniteDifference:
         if not 0.0 <= self.resolution < 1.0:
             raise ValueError(f"resolution is {self.resolution}: give a number from 0 to below 1")
 
-    def of(self, places: NDArray[np.int64]) -> Self:
-        """The same for the dofs at some places (m,) of all that have a displacement."""
+    def of(self, places: NDArray[np.int64], pace: Array) -> Self:
+        """The same for the dofs at some places (m,) of all, with parts (m,) of their d."""
         d = np.asarray(self.displacement, dtype=np.float64)
-        return replace(self, displacement=tuple(d[places].tolist())) if d.ndim else self
+        return replace(self, displacement=tuple((pace * (d[places] if d.ndim else d)).tolist()))
 
     def displacements(self, count: int) -> Array:
         """(n,) d of each dof. Raises ValueError when there are not as many as dofs."""

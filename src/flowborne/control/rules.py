@@ -18,6 +18,15 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 class Rule(Protocol):
     """Turns a gradient into a displacement of the controlled dofs."""
 
+    def pace(self, pace: Array, before: Array, gradient: Array) -> Array:
+        """(n,) part of strength and probe that a decision uses, above 0 and at most 1.
+
+        pace      (n,) of the last decision; 1 before the first
+        before    (n,) gradient of the last decision, per rad or m
+        gradient  (n,) of this one, found with probes of the last pace
+        """
+        ...
+
     def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
         """(n,) displacement, rad or m, each at most `limit` (n,), what strength allows."""
         ...
@@ -40,8 +49,15 @@ def descent(gradient: Array, limit: Array) -> Array:
     return -limit * (demand / largest)
 
 
+class WholePace:
+    """The whole of strength and probe, always."""
+
+    def pace(self, pace: Array, before: Array, gradient: Array) -> Array:
+        return np.ones_like(pace)
+
+
 @dataclass(frozen=True)
-class FixedStep:
+class FixedStep(WholePace):
     """One step as long as strength allows, whatever the size of the gradient.
 
     So the frames to an optimum are the distance over strength times frame time, rounded up, and
@@ -55,7 +71,44 @@ class FixedStep:
 
 
 @dataclass(frozen=True)
-class GoldenSection:
+class ResilientStep:
+    """Steps and probes that shorten where the descent turns back, and grow where it goes on.
+
+    Far from an optimum the step is that of `FixedStep`. A dof whose gradient changes its sign has
+    gone past the optimum: its next step and probe are half as long. So the chatter dies away, and
+    a probe wider than a kink no longer moves it. Where the sign stays they grow again, to no more
+    than strength and the scene's probe: an optimum that moves is followed.
+
+    shorten, lengthen  factors on the pace after a change of sign, and after none
+    least              pace below which nothing shortens
+    raises             ValueError unless 0 < shorten < 1 < lengthen and 0 < least <= 1
+    source             Riedmiller and Braun 1993 (RPROP), without a step back
+    """
+
+    shorten: float = 0.5
+    lengthen: float = 1.2
+    least: float = 1.0 / 64.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.shorten < 1.0 < self.lengthen < np.inf:
+            raise ValueError(
+                f"shorten is {self.shorten} and lengthen {self.lengthen}: "
+                "give one between 0 and 1 and one above 1"
+            )
+        if not 0.0 < self.least <= 1.0:
+            raise ValueError(f"least pace is {self.least}: give a number above 0, at most 1")
+
+    def pace(self, pace: Array, before: Array, gradient: Array) -> Array:
+        way = np.sign(before) * np.sign(gradient)
+        factor = np.where(way < 0.0, self.shorten, np.where(way > 0.0, self.lengthen, 1.0))
+        return np.clip(pace * factor, self.least, 1.0)
+
+    def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
+        return descent(gradient, limit)
+
+
+@dataclass(frozen=True)
+class GoldenSection(WholePace):
     """Search for the least objective along -gradient; the step then goes there, within strength.
 
     reach      rad or m, travel at the far end of the search of the dof that moves most; None: as

@@ -23,7 +23,7 @@ from flowborne.control.objectives import (
     WeightedObjective,
 )
 from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseTrack
-from flowborne.control.rules import FixedStep, GoldenSection, Rule
+from flowborne.control.rules import FixedStep, GoldenSection, ResilientStep, Rule
 from flowborne.control.servo import Servo, ServoExact, ServoPD
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Motion
@@ -92,11 +92,11 @@ def _gradient(kind: str, probe: tuple[float, ...]) -> Gradient:
     return GradientCentral(probe) if kind == "central" else GradientOneSided(probe)
 
 
-def _rule(
-    table: tables.RuleFixed | tables.RuleGoldenSection, scene: Scene, model: SolidModel
-) -> Rule:
+def _rule(table: tables.AnyRule, scene: Scene, model: SolidModel) -> Rule:
     if isinstance(table, tables.RuleFixed):
         return FixedStep()
+    if isinstance(table, tables.RuleResilient):
+        return ResilientStep()
     unit = joint_unit(model, scene.controlled_joints()[0])
     reach = None if table.reach is None else unit * table.reach
     return GoldenSection(reach, table.tolerance)

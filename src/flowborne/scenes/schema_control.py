@@ -204,6 +204,12 @@ class RuleFixed(Table):
     kind: Literal["fixed"]
 
 
+class RuleResilient(Table):
+    """Steps and probes that halve where the descent turns back, and grow again where it goes on."""
+
+    kind: Literal["resilient"]
+
+
 class RuleGoldenSection(Table):
     """Golden-section search along the gradient.
 
@@ -215,6 +221,9 @@ class RuleGoldenSection(Table):
     kind: Literal["golden-section"]
     reach: Positive | None = None
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.02
+
+
+AnyRule = Annotated[RuleFixed | RuleResilient | RuleGoldenSection, *ByKind]
 
 
 class ServoExact(Table):
@@ -239,7 +248,7 @@ class ControllerTable(Table):
     hypothetical_steps steps over which a trial makes its displacement
     hypothetical_time  s of one such step; the time of a frame unless given
     settle_steps       further steps of a trial in the fixed pose
-    rule               "fixed", or "golden-section" with its options
+    rule               "fixed", "resilient", or "golden-section" with its options
     every              frames between decisions
     iterations         descent steps per decision, in the flow as it is then
     servo              "exact", or "pd" with its frequency
@@ -250,7 +259,7 @@ class ControllerTable(Table):
     hypothetical_steps: Count = 1
     hypothetical_time: Positive | None = None
     settle_steps: WholeNumber = 0
-    rule: Annotated[RuleFixed | RuleGoldenSection, *ByKind] = RuleFixed(kind="fixed")
+    rule: AnyRule = RuleFixed(kind="fixed")
     every: Count = 1
     iterations: Count = 1
     servo: Annotated[ServoExact | ServoPD, *ByKind] = ServoExact(kind="exact")
