@@ -290,7 +290,7 @@ def test_threads_do_not_change_a_bit(monkeypatch):
     serial = PressureSystem(weights, periodic).solve(rhs, None, term)
     assert serial.converged
     monkeypatch.setattr(jit, "cores", lambda: 3)
-    monkeypatch.setattr(jit, "GAIN", 0.0)
+    monkeypatch.setattr(jit, "AGAIN", 1)
     for threads in (2, 3):
         with kernel_threads(threads):
             parallel = PressureSystem(weights, periodic).solve(rhs, None, term)
