@@ -43,14 +43,16 @@ def test_smoothing_on_the_way_down_and_up(shape: tuple[int, int, int], threads: 
     inverse = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
     expected, left = x.copy(), r.copy()
     first_smooth(expected, b, inverse)
-    smooth(expected, b, w, inverse, 1)
+    smooth(left, expected, b, w, inverse, 1)
+    smooth(expected, left, b, w, inverse, 2)
     defect(left, expected, b, w, inverse)
     getattr(smooth_down, threads)(x, r, b, w, inverse)
     np.testing.assert_array_equal(x, expected)
     np.testing.assert_array_equal(r, left)
-    for colour in (1, 0):
-        smooth(expected, b, w, inverse, colour)
-    getattr(smooth_up, threads)(x, b, w, inverse)
+    smooth(expected, left, b, w, inverse, 2)
+    smooth(left, expected, b, w, inverse, 1)
+    smooth(expected, left, b, w, inverse, 0)
+    getattr(smooth_up, threads)(x, r, b, w, inverse)
     np.testing.assert_array_equal(x, expected)
 
 

@@ -24,9 +24,9 @@ from flowborne.kernels.vectors import cells_of
 
 @kernel
 def interpolate(
-    x: Real, coarse: Real, marks: Marks, lean: Triple, guests: Places, hosts: Places
+    out: Real, x: Real, coarse: Real, marks: Marks, lean: Triple, guests: Places, hosts: Places
 ) -> None:
-    """x += P coarse; ghosts of `coarse` hold what lies beyond."""
+    """out = x + P coarse; ghosts of `coarse` hold what lies beyond."""
     lean0, lean1, lean2 = lean
     d = 1 if x.shape[0] > 1 else 0
     h0 = 2 if x.shape[0] > coarse.shape[0] else 1
@@ -58,8 +58,8 @@ def interpolate(
                 second += along1 if mark & 2 else none
                 second += high if mark & 4 else none
                 second += along0 if mark & 1 else none
-                x[m, j, k] += first
-                x[m, j, k + 1] += second
+                out[m, j, k] = x[m, j, k] + first
+                out[m, j, k + 1] = x[m, j, k + 1] + second
             for k in range(2 * pairs + 1, n2 + 1):
                 c = (k - 1) // h2 + 1
                 own = coarse[c0, c1, c]
@@ -67,8 +67,8 @@ def interpolate(
                 value = own if mark & OWN else none
                 value += abs(lean1[j]) * (coarse[c0, next1, c] - own) if mark & 2 else none
                 value += abs(lean0[i + 1]) * (coarse[next0, c1, c] - own) if mark & 1 else none
-                x[m, j, k] += value
-    fine, wide, host = x.reshape(-1), coarse.reshape(-1), hosts.reshape(-1)
+                out[m, j, k] = x[m, j, k] + value
+    fine, wide, host = out.reshape(-1), coarse.reshape(-1), hosts.reshape(-1)
     for g in range(guests.size):
         fine[guests[g]] += wide[host[guests[g]]]
 

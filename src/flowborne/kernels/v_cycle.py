@@ -1,6 +1,6 @@
 """One symmetric V-cycle on K: the preconditioner of the pressure solve.
 
-Red first on the way down and black first on the way up, so that the cycle is a symmetric positive
+Both ways it smooths by the same polynomial in D^-1 K, so that the cycle is a symmetric positive
 definite operator.
 """
 
@@ -19,6 +19,7 @@ from flowborne.kernels.levels import (
     wrap_ghosts,
 )
 from flowborne.kernels.smoothing import (
+    STEPS,
     defect,
     defect_reference,
     first_smooth,
@@ -34,8 +35,8 @@ from flowborne.kernels.transfer import (
     restrict_reference,
 )
 
-COARSEST_SWEEPS = 8
-"""Symmetric sweeps on the coarsest level, of at most 4 cells along an axis."""
+COARSEST = 15
+"""Times that all steps are made on the coarsest level, of at most 4 cells along an axis; odd."""
 
 SERIAL = 40_000
 """Cells of a level, ghosts included, below which threads would cost more than they save."""
@@ -53,6 +54,7 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
     fine = not periodic.any() and level < coarsest
     if not down:
         interpolate(
+            rl,
             xl,
             at_level(x, table, level + 1),
             at_level(marks, table, level),
@@ -63,15 +65,16 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
     if fine and down:
         smooth_down(xl, rl, bl, w, a)
     elif fine:
-        smooth_up(xl, bl, w, a)
+        smooth_up(xl, rl, bl, w, a)
     else:
         if down:
             first_smooth(xl, bl, a)
-        sweeps = 2 if not down else (1 if level < coarsest else 4 * COARSEST_SWEEPS - 1)
-        for n in range(sweeps):
-            wrap_ghosts(xl, periodic)
-            mirrored = n > 2 * COARSEST_SWEEPS - 2
-            smooth(xl, bl, w, a, n % 2 if mirrored else 1 - n % 2)
+        here, there = (xl, rl) if down else (rl, xl)
+        steps = STEPS * COARSEST if level == coarsest else STEPS
+        for n in range(1 if down else 0, steps):
+            wrap_ghosts(here, periodic)
+            smooth(there, here, bl, w, a, n % STEPS if down else STEPS - 1 - n)
+            here, there = there, here
         wrap_ghosts(xl, periodic)
         if down and level < coarsest:
             defect(rl, xl, bl, w, a)
@@ -112,16 +115,12 @@ def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
     """`v_cycle` in NumPy: x of a level for its b, both padded, ghosts of x as the sides have it."""
     table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
     w, a = weights_at(weights, table, level), at_level(inverse, table, level)
-    x = smooth_reference(np.zeros(b.shape), b, w, a, 0)
-    colours = [1]
-    if level == table.shape[0] - 2:
-        there = [1, 0] * COARSEST_SWEEPS
-        colours = [*there[:-1], *there]
-    for colour in colours:
+    coarsest = level == table.shape[0] - 2
+    x = np.zeros(b.shape)
+    for step in [*range(STEPS)] * (COARSEST if coarsest else 1):
+        x = smooth_reference(x, b, w, a, step)
         wrap_ghosts(x, periodic)
-        x = smooth_reference(x, b, w, a, colour)
-    wrap_ghosts(x, periodic)
-    if level == table.shape[0] - 2:
+    if coarsest:
         return x
     parts = (
         at_level(marks, table, level),
@@ -134,8 +133,8 @@ def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
     wrap_ghosts(r, periodic)
     coarse = restrict_reference(coarse, r, *parts, periodic)
     x = interpolate_reference(x, v_cycle_reference(hierarchy, coarse, level + 1), *parts)
-    for colour in (1, 0):
+    for step in reversed(range(STEPS)):
         wrap_ghosts(x, periodic)
-        x = smooth_reference(x, b, w, a, colour)
+        x = smooth_reference(x, b, w, a, step)
     wrap_ghosts(x, periodic)
     return x
