@@ -90,6 +90,7 @@ def restrict(b: Real, r: Real, marks: Marks, lean: Triple, guests: Places, hosts
     h0 = 2 if r.shape[0] > b.shape[0] else 1
     h1 = 2 if r.shape[1] > b.shape[1] else 1
     h2 = 2 if r.shape[2] > b.shape[2] else 1
+    pairs = n2 // 2 if h2 == 2 else 0
     none = r.dtype.type(0)
     for plane in prange(b.shape[0] - 2 * d):
         first0, end0 = h0 * plane + d, min(h0 * plane + h0, n0) + d
@@ -121,17 +122,14 @@ def restrict(b: Real, r: Real, marks: Marks, lean: Triple, guests: Places, hosts
                         add_leaning(row, r, marks, first0 - 1, j, 1, low)
                     if high < 0.0:
                         add_leaning(row, r, marks, end0, j, 1, -high)
-            across[0], across[n2 + 1] = across[n2], across[1]
-            for c in range(1, b.shape[2] - 1):
-                k, last = h2 * (c - 1) + 1, min(h2 * c, n2)
-                total = row[k]
-                if last > k:
-                    total += row[last]
-                if lean2[k - 1] > 0.0:
-                    total += across[k - 1]
-                if lean2[last + 1] < 0.0:
-                    total += across[last + 1]
-                b[plane + d, c1, c] = total
+            across[0] = across[n2] if lean2[0] > 0.0 else none
+            across[n2 + 1] = across[1] if lean2[n2 + 1] < 0.0 else none
+            for c in range(1, pairs + 1):
+                total = row[2 * c - 1] + row[2 * c]
+                b[plane + d, c1, c] = total + across[2 * c - 2] + across[2 * c + 1]
+            for c in range(pairs + 1, b.shape[2] - 1):
+                k = h2 * (c - 1) + 1
+                b[plane + d, c1, c] = row[k] + across[k - 1] + across[k + 1]
     wide, fine, host = b.reshape(-1), r.reshape(-1), hosts.reshape(-1)
     for g in range(guests.size):
         wide[host[guests[g]]] += fine[guests[g]]
