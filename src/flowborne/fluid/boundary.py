@@ -4,7 +4,8 @@ The six sides are named x_min, x_max, y_min, y_max, z_min, z_max. Each is one of
 
   closed    free slip: nothing crosses, nothing sticks
   no-slip   the wall's own velocity (a lid may slide)
-  open      dynamic pressure 0 at the side, velocity continues with zero gradient
+  open      dynamic pressure 0 at the side; what leaves has its own velocity, what comes in the mean
+            of the side
   inflow    a given velocity, in space and time
   periodic  joined to the opposite side
 """

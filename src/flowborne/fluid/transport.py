@@ -25,10 +25,10 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import (
     NOTHING,
     ControlVolumes,
-    means,
     parts,
     wrapping,
 )
+from flowborne.fluid.crossing import crossings
 from flowborne.fluid.ghosts import Scalar, edge, fill_ghosts, wrap_deep
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
@@ -234,7 +234,7 @@ class Flow:
         self.net, self.merged = np.zeros(shape), np.empty(shape)
         periodic = sides.periodic()[component]
         self.place, self.share = neighbours(shape[component], periodic)
-        self.through = through_sides(transport.flux, component, grid, sides)
+        self.crossings = crossings(transport.flux, self.ends[0], self.marks, component, grid, sides)
         # friction 2 mu A / d over the depth d = V / A of a small control volume, dt / m times
         self.held = 2.0 * transport.viscosity * transport.dt * grid.face_area**2
 
@@ -274,6 +274,8 @@ class Flow:
         given = (u, 0.0) if along is None else (along, time)
         pad_field(plane(self.padded, grid), plane(u, grid), plane(given[0], grid), given[1])
         fill_ghosts(self.padded, axis, grid, self.sides, self.transport.time + time)
+        for crossing in self.crossings:
+            crossing.draw_in(self.padded)
         later = np.empty(u.shape)
         fields = (self.start, self.low, self.high)
         start, low, high = (plane(field, grid) for field in fields)
@@ -284,7 +286,8 @@ class Flow:
         )  # fmt: skip
         left = self.exchange(later, dt, weight)
         self.settle(later)
-        return later, self.came_in(), left
+        came_in = sum(crossing.came_in(self.padded) for crossing in self.crossings)
+        return later, came_in, left
 
     def exchange(self, later: Array, dt: float, weight: float) -> Array:
         """Let through the inlets what a stage brings, in place; gives what leaves with the fluid's
@@ -315,20 +318,6 @@ class Flow:
             fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)
         self.join(later)
 
-    def came_in(self) -> float:
-        """What comes in through the sides of the domain per time."""
-        total, own = 0.0, self.component
-        inner = [slice(GHOSTS, -GHOSTS) if a in self.grid.axes else slice(None) for a in range(3)]
-        if self.wraps[own] > 0:  # the last faces are the first ones
-            inner[own] = slice(GHOSTS, -GHOSTS - 1)
-        for (axis, end), through in self.through.items():
-            near, far = list(inner), list(inner)
-            near[axis] = slice(-3, -2) if end else slice(GHOSTS, GHOSTS + 1)
-            far[axis] = slice(-2, -1) if end else slice(1, 2)
-            mean = 0.5 * (self.padded[tuple(near)] + self.padded[tuple(far)])
-            total += (-1.0 if end else 1.0) * float(np.vdot(through, mean))
-        return total
-
 
 def planes(flux: Faces, grid: Grid) -> Faces:
     """Fluxes in the order of the kernel's axes; of a slab none across its first."""
@@ -336,23 +325,3 @@ def planes(flux: Faces, grid: Grid) -> Faces:
         return flux
     x, y, _ = flux
     return np.zeros((2, *grid.shape[:2])), plane(x, grid), plane(y, grid)
-
-
-def through_sides(
-    flux: Faces, component: int, grid: Grid, sides: Boundaries
-) -> dict[tuple[int, int], Array]:
-    """Volume per time through the sides of the domain, by axis and end: of the control volumes of a
-    component; none of axes that are periodic."""
-    through = {}
-    periodic = sides.periodic()
-    for axis in grid.axes:
-        for end in (0, 1):
-            if periodic[axis]:
-                continue
-            layer = flux[axis][edge(axis, slice(-1, None) if end else slice(1))]
-            if axis != component:
-                layer = means(layer, component, periodic[component])
-                if periodic[component]:
-                    layer = layer[edge(component, slice(-1))]
-            through[axis, end] = layer
-    return through

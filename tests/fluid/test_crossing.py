@@ -1,0 +1,60 @@
+"""What crosses the sides of the domain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.coupling.step import step
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.fluid.control_volumes import means
+from flowborne.fluid.crossing import crossings
+from flowborne.fluid.ghosts import fill_ghosts
+from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.transport import marks_of
+from flowborne.kernels.flux import GHOSTS
+from flowborne.solids.model import SolidModel
+
+OPEN = BoundaryOpen()
+
+
+@pytest.mark.parametrize("component", [0, 1])
+@pytest.mark.parametrize("end", [0, 1])
+def test_what_comes_in_has_the_mean_velocity_and_what_leaves_its_own(
+    component: int, end: int
+) -> None:
+    """Of a side that is open, with control volumes of all sizes; nothing crosses the others."""
+    grid, random = Grid.slab(7, 6, 0.1, (0.0, 0.0)), np.random.default_rng(5)
+    sides = Boundaries(x_max=OPEN) if end else Boundaries(x_min=OPEN)
+    flux = grid.zeros_faces()
+    flux[0][-end] = random.normal(size=flux[0][-end].shape)
+    u, volume = random.normal(size=(2, *grid.face_shape(component)))
+    volume = volume**2
+    padded = np.pad(u, [(GHOSTS * (a in grid.axes),) * 2 for a in range(3)])
+    fill_ghosts(padded, component, grid, sides, 0.0)
+    marks = marks_of(np.zeros(0, np.int64), component, grid, sides)
+    came = 0.0
+    for crossing in crossings(faces_of(flux), volume, marks, component, grid, sides):
+        crossing.draw_in(padded)
+        came += crossing.came_in(padded)
+    mean = float(np.average(u[-end], weights=volume[-end]))
+    rate = (-flux[0] if end else flux[0])[[-end]]
+    if component == 1:
+        rate = means(rate, 1, False)
+    expected = float((rate * np.where(rate > 0.0, mean, u[[-end]])).sum())
+    assert came == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_jet_that_comes_in_through_an_open_side_dies_away() -> None:
+    """Nothing outside drives it. Of 3 m/s, 0.2 are left; with its own velocity it would have
+    1.1 and keep them."""
+    grid = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
+    fluid = Fluid(grid, 1.0, boundaries=Boundaries(x_max=OPEN))
+    world = World.at_rest(Setup(SolidModel.empty(), fluid))
+    u = world.flow()[1].velocity[0]
+    x, y, _ = np.meshgrid(*grid.face_coordinates(0), indexing="ij")
+    u[:] = x * np.where(np.abs(y - 0.5) < 0.15, -3.0, 9.0 / 7.0)
+    for _ in range(400):
+        assert step(world, 1.0 / 128).outcome.name == "DONE"
+    assert u[-1].min() > -0.3
