@@ -68,8 +68,8 @@ class Failing:
     def __init__(self, step, at, fail):
         self.step, self.at, self.fail = step, at, fail
 
-    def __call__(self, world, dt, drive):
-        report = self.step(world, dt, drive)
+    def __call__(self, world, dt, command):
+        report = self.step(world, dt, command)
         if world.steps == self.at:
             self.fail(world, report)
         return report

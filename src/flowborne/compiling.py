@@ -33,8 +33,8 @@ def compile_solver_beside() -> None:
 def compile_solver() -> None:
     """Solve for the pressure around a light body in a small slab: all kernels of that are then in
     the cache."""
+    from flowborne.solvers.mobility import dense_mobility
     from flowborne.solvers.pressure import LowRankTerm, PressureSystem
-    from flowborne.solvers.response import dense_response
 
     count = 8
     weights = (
@@ -51,7 +51,7 @@ def compile_solver() -> None:
         np.array([0, 6, 12]),
         np.tile(np.arange(6), 2),
         np.append(np.ones(6), -np.ones(6)),
-        dense_response(100.0 * np.eye(6)),
+        dense_mobility(100.0 * np.eye(6)),
     )
     rhs = np.zeros((count, count, 1))
     rhs[2, 2], rhs[5, 5] = 1.0, -1.0

@@ -23,12 +23,12 @@ from flowborne.solids.inversion import inversion
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
-    from flowborne.coupling.motion import Drive
+    from flowborne.coupling.motion import JointCommand
     from flowborne.scenes.schema import Scene
     from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
-Step = Callable[[World, float, "Drive | None"], StepReport]
+Step = Callable[[World, float, "JointCommand | None"], StepReport]
 
 TORN = 0.02
 """Part of the elements of flesh that may be inside out, on their way back for instance."""
@@ -181,8 +181,8 @@ class Simulation:
                 tried = decision.objective
                 seconds["control"] = perf_counter() - started
             for number in range(1, self.steps_per_frame + 1):
-                drive = None if controller is None else controller.drive(world, end, dt)
-                reports.append(self._step(world, dt, drive))
+                command = None if controller is None else controller.command(world, end, dt)
+                reports.append(self._step(world, dt, command))
                 cause = trouble(world, reports[-1])
                 if cause:
                     raise BlowUpError(frame, number, cause)

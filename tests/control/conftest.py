@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.solids.model import SolidModel
@@ -44,14 +44,14 @@ BALL = """
 """
 
 
-def move_only(world: World, dt: float, drive: Drive | None = None) -> StepReport:
+def move_only(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
     """A step in which driven dofs do as told and nothing else happens."""
     model, state = world.setup.solid, world.solid
     assert model is not None
     assert state is not None
-    drive = Drive.none(model.nv) if drive is None else drive
-    state.q[:] = model.integrate(state.q, np.where(drive.prescribed, drive.move, state.v), dt)
-    state.v[:] = np.where(drive.prescribed, drive.hold, state.v)
+    command = JointCommand.none(model.nv) if command is None else command
+    state.q[:] = model.integrate(state.q, np.where(command.prescribed, command.rate, state.v), dt)
+    state.v[:] = np.where(command.prescribed, command.final_velocity, state.v)
     world.time += dt
     world.steps += 1
     none = np.zeros((model.nbody, 6))
@@ -59,7 +59,7 @@ def move_only(world: World, dt: float, drive: Drive | None = None) -> StepReport
 
 
 @pytest.fixture
-def step() -> Callable[[World, float, Drive | None], StepReport]:
+def step() -> Callable[[World, float, JointCommand | None], StepReport]:
     """The step in which driven dofs do as told and nothing else happens."""
     return move_only
 

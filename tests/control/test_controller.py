@@ -20,12 +20,12 @@ from flowborne.control.phases import PhaseIntervals
 from flowborne.control.rules import GoldenSection
 from flowborne.control.servo import ServoExact, ServoPD
 from flowborne.control.trial import Hypothesis
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import World
 
 MakeWorld = Callable[..., World]
-Step = Callable[[World, float, Drive | None], StepReport]
+Step = Callable[[World, float, JointCommand | None], StepReport]
 FRAME, SUBSTEPS = 1.0 / 24.0, 4
 
 
@@ -62,7 +62,7 @@ def advance(controller: Controller, world: World, step: Step, frames: int) -> np
         controller.decide(world, FRAME, step)
         for _ in range(SUBSTEPS):
             dt = FRAME / SUBSTEPS
-            step(world, dt, controller.drive(world, (frame + 1) * FRAME, dt))
+            step(world, dt, controller.command(world, (frame + 1) * FRAME, dt))
         path.append(controller.positions(world))
     return np.array(path)
 
@@ -95,11 +95,11 @@ def test_target_is_reached_exactly_at_the_end_of_the_frame(
         decision = controller.decide(world, FRAME, step)
         start = controller.positions(world)
         for _ in range(SUBSTEPS):
-            drive = controller.drive(world, (frame + 1) * FRAME, FRAME / SUBSTEPS)
-            assert drive.move[:2] == pytest.approx(decision.displacement / FRAME, rel=1e-9)
-            assert np.array_equal(drive.move, drive.hold)
-            assert drive.prescribed.tolist() == [True, True, False]
-            step(world, FRAME / SUBSTEPS, drive)
+            command = controller.command(world, (frame + 1) * FRAME, FRAME / SUBSTEPS)
+            assert command.rate[:2] == pytest.approx(decision.displacement / FRAME, rel=1e-9)
+            assert np.array_equal(command.rate, command.final_velocity)
+            assert command.prescribed.tolist() == [True, True, False]
+            step(world, FRAME / SUBSTEPS, command)
         assert controller.positions(world) == pytest.approx(controller.targets(world), abs=1e-13)
         moved = controller.positions(world) - start
         assert moved == pytest.approx(decision.displacement, abs=1e-13)
@@ -115,9 +115,9 @@ def test_no_gradient_no_move(make_world: MakeWorld, step: Step) -> None:
     assert decision.decided
     assert decision.evaluations == 2
     assert not decision.displacement.any()
-    drive = controller_of().drive(world, FRAME, FRAME)
-    assert drive.prescribed[0]
-    assert not drive.move.any()
+    command = controller_of().command(world, FRAME, FRAME)
+    assert command.prescribed[0]
+    assert not command.rate.any()
 
 
 def test_range_keeps_targets_inside(make_world: MakeWorld, step: Step) -> None:
@@ -132,7 +132,7 @@ def test_a_blocked_joint_does_not_wind_up(make_world: MakeWorld, step: Step) -> 
     world, controller = make_world(), controller_of((0.9,), 1.0)
     for frame in range(10):
         controller.decide(world, FRAME, step)
-        controller.drive(world, (frame + 1) * FRAME, FRAME)
+        controller.command(world, (frame + 1) * FRAME, FRAME)
         world.time += FRAME  # an obstacle keeps the arm where it is
     assert controller.targets(world)[0] - controller.positions(world)[0] <= FRAME * (1.0 + 1e-12)
 
@@ -149,8 +149,8 @@ def test_deciding_every_third_frame_spreads_its_step_evenly(
         assert decision.evaluations == (2 if decision.decided else 0)
         assert decision.displacement == pytest.approx([3 * FRAME])
         for _ in range(SUBSTEPS):
-            drive = controller.drive(world, (frame + 1) * FRAME, FRAME / SUBSTEPS)
-            step(world, FRAME / SUBSTEPS, drive)
+            command = controller.command(world, (frame + 1) * FRAME, FRAME / SUBSTEPS)
+            step(world, FRAME / SUBSTEPS, command)
         path.append(world.solid.q[0])
     assert decided == [True, False, False, True, False, False, True]
     assert np.diff(path) == pytest.approx(FRAME, abs=1e-12)
@@ -224,14 +224,14 @@ def test_pd_servo_approaches_without_overshoot(make_world: MakeWorld, step: Step
     path = advance(controller, world, step, 80)[:, 0]
     assert path.max() <= 0.7 + FRAME
     assert abs(path[-1] - 0.7) <= FRAME
-    drive = controller.drive(world, world.time + FRAME, FRAME)
-    assert drive.torque_limit.tolist() == [2.5, np.inf, np.inf]
+    command = controller.command(world, world.time + FRAME, FRAME)
+    assert command.torque_limit.tolist() == [2.5, np.inf, np.inf]
 
 
 def test_torque_limit_passes_through(make_world: MakeWorld) -> None:
     controller = controller_of((0.1, 0.2), servo=ServoExact(torque_limit=7.0))
-    drive = controller.drive(make_world(), FRAME, FRAME)
-    assert drive.torque_limit.tolist() == [7.0, 7.0, np.inf]
+    command = controller.command(make_world(), FRAME, FRAME)
+    assert command.torque_limit.tolist() == [7.0, 7.0, np.inf]
 
 
 def test_decision_touches_nothing_but_memory(make_world: MakeWorld, step: Step) -> None:
@@ -254,7 +254,7 @@ def test_memory_is_all_that_the_controller_remembers(make_world: MakeWorld, step
         again = pickle.loads(pickle.dumps(controller_of((0.7, 0.1), every=3)))
         for frame in range(4, 8):
             again.decide(each, FRAME, step)
-            step(each, FRAME, again.drive(each, (frame + 1) * FRAME, FRAME))
+            step(each, FRAME, again.command(each, (frame + 1) * FRAME, FRAME))
     left, right = world.arrays(), saved.arrays()
     assert {k: v.tobytes() for k, v in left.items()} == {k: v.tobytes() for k, v in right.items()}
 

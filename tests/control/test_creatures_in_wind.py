@@ -75,7 +75,7 @@ def run(
     path = [np.degrees(controller.positions(world))]
     for frame in range(frames):
         controller.decide(world, FRAME, step)
-        step(world, FRAME, controller.drive(world, (frame + 1) * FRAME, FRAME))
+        step(world, FRAME, controller.command(world, (frame + 1) * FRAME, FRAME))
         path.append(np.degrees(controller.positions(world)))
     return np.array(path)
 
@@ -119,8 +119,8 @@ def test_effort_of_a_moving_chain_is_what_holds_its_velocities_in_the_new_pose()
     )
     moves = np.radians([[0.0, 0.0], [0.0, 10.0], [0.0, -10.0]])
     efforts = controller.trials(world, step).values(moves)
-    for effort, move in zip(efforts, moves, strict=True):
-        there = SolidState(world.solid.q + move, world.solid.v)
+    for effort, rate in zip(efforts, moves, strict=True):
+        there = SolidState(world.solid.q + rate, world.solid.v)
         torque = holding(model, there, np.zeros(2), dt)[0]
         assert effort == pytest.approx(abs(torque) * dt, rel=1e-6)
 
@@ -209,11 +209,11 @@ def test_a_drive_that_may_give_way_arrives_as_one_that_may_not(limit: float) -> 
         world.memory["schedule"] = np.array([0.0, FRAME])
         end = world.time + FRAME
         for _ in range(4):
-            step(world, FRAME / 4, controller.drive(world, end, FRAME / 4))
+            step(world, FRAME / 4, controller.command(world, end, FRAME / 4))
         path.append(float(np.degrees(world.solid.q[0])))
     assert path == pytest.approx([1.0, 2.0, 3.0], abs=1e-9)
     for _ in range(6):
-        step(world, FRAME / 4, controller.drive(world, end, FRAME / 4))
+        step(world, FRAME / 4, controller.command(world, end, FRAME / 4))
     assert np.degrees(world.solid.q) == pytest.approx(3.0, abs=1e-9)
     assert world.solid.v == pytest.approx(0.0, abs=1e-9)
 

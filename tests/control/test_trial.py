@@ -14,14 +14,14 @@ from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum
 from flowborne.control.phases import PhaseIntervals
 from flowborne.control.trial import Hypothesis, Trial, TrialError, Trials, without_scalars
 from flowborne.coupling import step as stepping
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
 
 MakeWorld = Callable[..., World]
-Step = Callable[[World, float, Drive | None], StepReport]
+Step = Callable[[World, float, JointCommand | None], StepReport]
 SHOULDER = np.array([0])
 
 
@@ -30,16 +30,21 @@ class Recorder:
     """A step that keeps what it was asked and what it left."""
 
     step: Step
-    drives: list[Drive] = field(default_factory=list)
+    commands: list[JointCommand] = field(default_factory=list)
     before: list[np.ndarray] = field(default_factory=list)
     worlds: list[World] = field(default_factory=list)
 
-    def __call__(self, world: World, dt: float, drive: Drive | None = None) -> StepReport:
-        self.drives.append(
-            Drive(drive.prescribed.copy(), drive.move.copy(), drive.hold.copy(), drive.torque_limit)
+    def __call__(self, world: World, dt: float, command: JointCommand | None = None) -> StepReport:
+        self.commands.append(
+            JointCommand(
+                command.prescribed.copy(),
+                command.rate.copy(),
+                command.final_velocity.copy(),
+                command.torque_limit,
+            )
         )
         self.before.append(world.solid.v.copy())
-        report = self.step(world, dt, drive)
+        report = self.step(world, dt, command)
         self.worlds.append(world.copy())
         return report
 
@@ -76,10 +81,10 @@ def test_outboard_joints_are_rigid_and_others_free(make_world: MakeWorld, step: 
     world.solid.v[:] = [0.5, 0.6, 0.7]
     recorder = Recorder(step)
     trial_of(world, recorder, Hypothesis(0.1), np.array([1]), [0.2]).run()
-    drive = recorder.drives[0]
-    assert drive.prescribed.tolist() == [False, True, True]
-    assert drive.move == pytest.approx([0.0, 2.0, 0.0])
-    assert np.all(np.isinf(drive.torque_limit))
+    command = recorder.commands[0]
+    assert command.prescribed.tolist() == [False, True, True]
+    assert command.rate == pytest.approx([0.0, 2.0, 0.0])
+    assert np.all(np.isinf(command.torque_limit))
 
 
 @pytest.mark.parametrize(
@@ -96,10 +101,10 @@ def test_velocities_that_are_held_are_there_from_the_first_step(
     hypothesis = Hypothesis(0.05, 2, 3, velocities)  # type: ignore[arg-type]
     trial_of(world, recorder, hypothesis, np.array([0, 1]), [0.4, 0.0]).run()
     expected = [shoulder, elbow, 0.0]
-    for before, drive in zip(recorder.before, recorder.drives, strict=True):
-        assert drive.hold == pytest.approx(expected, abs=1e-12)
+    for before, command in zip(recorder.before, recorder.commands, strict=True):
+        assert command.final_velocity == pytest.approx(expected, abs=1e-12)
         assert before == pytest.approx(expected, abs=1e-12)
-    moves = np.array([drive.move[:2] for drive in recorder.drives])
+    moves = np.array([command.rate[:2] for command in recorder.commands])
     last = np.array([shoulder, elbow]) * (velocities == "present")
     assert moves[2:] == pytest.approx(np.tile(last, (3, 1)), abs=1e-12)
     assert moves[:2] == pytest.approx(np.tile([4.0, 0.0] - 1.5 * last, (2, 1)), abs=1e-12)
@@ -167,8 +172,8 @@ def test_phases_are_those_of_the_decision(make_world: MakeWorld, step: Step) -> 
 
 
 def test_blown_up_trial_says_what_was_tried(make_world: MakeWorld, step: Step) -> None:
-    def blow_up(world: World, dt: float, drive: Drive | None = None) -> StepReport:
-        report = step(world, dt, drive)
+    def blow_up(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
+        report = step(world, dt, command)
         report.outcome = Outcome.NOT_FINITE
         return report
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flowborne.coupling import solve
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
@@ -64,11 +64,11 @@ def test_what_does_not_settle_is_told_apart_from_a_solve(
 ) -> None:
     """One pass is too few for a drive that gives way: its dof is named, and no solve is blamed."""
     world = sliding(GRIDS[grid], 1)
-    drive = Drive.none(world.setup.solid.nv)
-    drive.set(np.array([0]), 5.0, 5.0, 1.0)
-    assert step(world.copy(), 0.01, drive).outcome is Outcome.DONE
+    command = JointCommand.none(world.setup.solid.nv)
+    command.set(np.array([0]), 5.0, 5.0, 1.0)
+    assert step(world.copy(), 0.01, command).outcome is Outcome.DONE
     monkeypatch.setattr(solve, "PASSES", 1)
-    report = step(world, 0.01, drive)
+    report = step(world, 0.01, command)
     assert report.outcome is Outcome.NOT_SETTLED
     assert 0 in report.unsettled
 

@@ -12,7 +12,7 @@ from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import accelerated, face_weights
 from flowborne.kernels.closed_fractions import CREASE
-from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.scenes.tracks import TrajectorySinusoid
 from flowborne.solids.dynamics import kinematics
 from flowborne.validation.swimmers import BOX, LINK, PERIOD, swimmer
 from flowborne.validation.worlds import advance, mjcf, world_of
@@ -41,7 +41,7 @@ def test_fluid_at_the_joints_of_a_swimmer_is_about_as_fast_as_its_links(
 ) -> None:
     """A period of a swimmer whose links overlap at their hinges; offset in cells."""
     gait = tuple(
-        MotionSinusoid(np.array([6 + k]), 0.8, PERIOD, 0.0, 1.6 * k) for k in range(links - 1)
+        TrajectorySinusoid(np.array([6 + k]), 0.8, PERIOD, 0.0, 1.6 * k) for k in range(links - 1)
     )
     world = swimmer(cells, gait, None)
     world.solid.q[:2] += np.multiply(offset, BOX / cells)
@@ -71,8 +71,8 @@ def test_fluid_between_a_body_and_a_side_is_squeezed_out_and_not_shot(
     geom, reach = CLOSING[shape]
     h = 1.0 / cells
     motions = (
-        MotionSinusoid(np.array([0]), 0.1, 0.7),
-        MotionSinusoid(np.array([1]), 0.15, 1.0, mean=-0.5 + reach - 0.3 * h + 0.15),
+        TrajectorySinusoid(np.array([0]), 0.1, 0.7),
+        TrajectorySinusoid(np.array([1]), 0.15, 1.0, mean=-0.5 + reach - 0.3 * h + 0.15),
     )
     body = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>'
     model = mjcf(f"<body>{body}<geom {geom}/></body>")

@@ -15,7 +15,7 @@ from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.scenes.inflow import FactorSteady
-from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.scenes.tracks import TrajectorySinusoid
 from flowborne.validation.worlds import mjcf, world_of
 
 CELLS = 32
@@ -30,8 +30,8 @@ def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = 
     body = f"""<body pos="0.5 0.5 0"><joint type="slide" axis="1 0 0"/>
       <joint type="hinge" axis="0 0 1"/>{geom}</body>"""
     motions = (
-        MotionSinusoid(np.array([0]), shift, 1.0),
-        MotionSinusoid(np.array([1]), turn, 0.77),
+        TrajectorySinusoid(np.array([0]), shift, 1.0),
+        TrajectorySinusoid(np.array([1]), turn, 0.77),
     )
     return world_of(
         SQUARE, mjcf(body), boundaries=boundaries or Boundaries(), motions=motions, scalars=("dye",)

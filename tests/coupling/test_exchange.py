@@ -13,7 +13,7 @@ from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
 from flowborne.scenes.load import load_scene
-from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.scenes.tracks import TrajectorySinusoid
 from flowborne.simulation import Simulation
 from flowborne.solids.momentum import momentum
 from flowborne.validation.worlds import RING, advance, mjcf, set_velocity, world_of
@@ -46,7 +46,7 @@ def swirl(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
 
 
 def paddling(**options: object) -> World:
-    turn = MotionSinusoid(np.array([0]), 0.6, 0.7)
+    turn = TrajectorySinusoid(np.array([0]), 0.6, 0.7)
     return world_of(SQUARE, mjcf(PADDLE), solid_density=2.0, motions=(turn,), **options)
 
 

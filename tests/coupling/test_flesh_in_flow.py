@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flowborne.coupling.motion import Drive
-from flowborne.coupling.operators import add_flux, leak_proof, motion, pressure_push
+from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.operators import add_flux, boundary_velocity, leak_proof, pressure_push
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import Fluid, Setup, World
@@ -136,7 +136,7 @@ def test_fluid_that_moves_with_flesh_is_not_disturbed() -> None:
     world.solid.v[:3] = velocity = np.array([0.3, -0.7, 0.4])
     world.solid.v[7:] = np.tile(velocity, (model.nv - 7) // 3)
     cut = cut_by_bodies(world)
-    moving = motion(kinematics(model, world.solid.q), world.solid.v)
+    moving = boundary_velocity(kinematics(model, world.solid.q), world.solid.v)
     field = [np.full(ROOM.face_shape(axis), velocity[axis]) for axis in range(3)]
     carried = leak_proof((field[0], field[1], field[2]), cut, moving, ROOM)
     for axis in ROOM.axes:
@@ -155,10 +155,10 @@ def test_a_driven_joint_keeps_its_promise_and_all_momentum_stays() -> None:
     knee = world.setup.solid.dofs_of("knee")
     angle = 0.0
     for n in range(15):
-        drive = Drive.none(world.setup.solid.nv)
+        command = JointCommand.none(world.setup.solid.nv)
         pace = 2.0 * np.cos(20.0 * n * DT)
-        drive.set(knee, pace, pace)
-        report = step(world, DT, drive)
+        command.set(knee, pace, pace)
+        report = step(world, DT, command)
         angle += DT * pace
         assert report.outcome is Outcome.DONE
         assert world.solid.q[7] == pytest.approx(angle, abs=1e-12)
@@ -171,10 +171,10 @@ def test_a_driven_joint_keeps_its_promise_and_all_momentum_stays() -> None:
 def test_flesh_goes_along_when_a_bone_jumps() -> None:
     """A bone that is told to move by more than its flesh is thick takes the flesh with it."""
     world = World.at_rest(Setup(leg(), Fluid(ROOM, 1000.0)))
-    drive = Drive.none(world.setup.solid.nv)
-    drive.set(np.arange(6), 0.0, 0.0)
-    drive.set(world.setup.solid.dofs_of("knee"), 0.9 / DT, 0.0)
-    step(world, DT, drive)
+    command = JointCommand.none(world.setup.solid.nv)
+    command.set(np.arange(6), 0.0, 0.0)
+    command.set(world.setup.solid.dofs_of("knee"), 0.9 / DT, 0.0)
+    step(world, DT, command)
     flesh = world.setup.solid.flesh
     assert flesh is not None
     assert inversion(flesh, world.solid.q) is None

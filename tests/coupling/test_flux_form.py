@@ -11,7 +11,7 @@ import pytest
 
 from flowborne.coupling import flow
 from flowborne.coupling.flow import carry_fluid, face_masses, volumes_of
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.step import cut_by_bodies, move_bodies, step
@@ -21,7 +21,7 @@ from flowborne.fluid.dye import Passage
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.jit import kernel_threads
 from flowborne.scenes.inflow import FactorSteady
-from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.scenes.tracks import TrajectorySinusoid
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import kinetic_energy
 from flowborne.solids.tissue import Law, Tissue, add_flesh
@@ -72,7 +72,7 @@ def swirling(world: World) -> World:
 
 
 def paddling() -> World:
-    turn = MotionSinusoid(np.array([0]), 0.6, 0.7)
+    turn = TrajectorySinusoid(np.array([0]), 0.6, 0.7)
     return swirling(world_of(SQUARE, mjcf(PADDLE), solid_density=2.0, motions=(turn,)))
 
 
@@ -155,7 +155,7 @@ def test_a_stream_past_a_body_that_goes_with_it_stays_uniform(
         set_velocity(world, lambda x, y, z: tuple(0 * x + component for component in speed))
         before_cut = cut_by_bodies(world)
         start = volumes_of(world, before_cut)
-        before, pose = move_bodies(world, Drive.none(6), DT)
+        before, pose = move_bodies(world, JointCommand.none(6), DT)
         cut = cut_by_bodies(world, pose)
         carried = carry_fluid(world, state.velocity, before.q, before_cut, start, cut, (), DT)
         for axis in grid.axes:

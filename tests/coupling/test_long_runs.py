@@ -12,7 +12,7 @@ from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import MotionConstant, MotionSinusoid
+from flowborne.scenes.tracks import TrajectoryConstant, TrajectorySinusoid
 from flowborne.solids.momentum import kinetic_energy
 from flowborne.validation.worlds import mjcf, set_velocity, world_of
 
@@ -158,7 +158,10 @@ def test_less_than_a_hundredth_leaks_through_a_thin_plate_in_a_stream() -> None:
         SQUARE,
         mjcf(plate(half_length)),
         boundaries=CHANNEL,
-        motions=(MotionSinusoid(np.array([0]), 0.1, 1.0), MotionConstant(np.array([1]), 0.0, 2.0)),
+        motions=(
+            TrajectorySinusoid(np.array([0]), 0.1, 1.0),
+            TrajectoryConstant(np.array([1]), 0.0, 2.0),
+        ),
     )
     set_velocity(world, stream)
     leaked = passed = 0.0

@@ -12,7 +12,7 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import Curve, MotionKeyframes, MotionSinusoid
+from flowborne.scenes.tracks import Curve, TrajectoryKeyframes, TrajectorySinusoid
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
 
@@ -55,15 +55,15 @@ def arm(grid: Grid, *, viscosity: float = 0.0, pull: float = 300.0) -> World:
     model = SolidModel.from_string(ARM, slab=grid.is_slab, gravity=(0.0, -9.81, 0.0))
     frames = Curve((0.0, 0.2, 0.35, 0.6), (0.2, -0.9, -0.4, 0.8))
     motions = (
-        MotionSinusoid(model.dofs_of("shoulder"), 0.5, 0.5, mean=-0.5),
-        MotionKeyframes(model.dofs_of("elbow"), frames),
+        TrajectorySinusoid(model.dofs_of("shoulder"), 0.5, 0.5, mean=-0.5),
+        TrajectoryKeyframes(model.dofs_of("elbow"), frames),
     )
     fluid = Fluid(grid, 1000.0, viscosity, channel())
     world = World.at_rest(Setup(model, fluid, motions, (Pulls(pull),)))
     for motion in motions:
         world.solid.q[model.dof_position[motion.dofs]] = motion.position(0.0)
         world.solid.v[motion.dofs] = motion.velocity(0.0)
-    for faces in (world.flow()[1].velocity, world.flow()[1].carrier):
+    for faces in (world.flow()[1].velocity, world.flow()[1].advecting_velocity):
         faces[0][:] = 1.5
     return world
 

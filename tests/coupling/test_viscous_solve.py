@@ -84,10 +84,10 @@ def case_of(
     *bodies: str,
     boundaries: Boundaries,
     dt: float,
-    response: Array | None = None,
+    mobility: Array | None = None,
     viscosity: float = VISCOSITY,
 ) -> Case:
-    """Bodies (MJCF elements) that answer with `response`; by default they do not yield."""
+    """Bodies (MJCF elements) that answer with `mobility`; by default they do not yield."""
     world = world_of(grid, mjcf(*bodies), boundaries=boundaries)
     cut = cut_by_bodies(world)
     still = grid.zeros_faces()
@@ -103,7 +103,7 @@ def case_of(
         0.0,
     )
     size = 6 * world.setup.solid.nbody
-    mobility = np.zeros((size, size)) if response is None else response
+    mobility = np.zeros((size, size)) if mobility is None else mobility
     system = ViscousSystem(
         parts,
         walls_of(parts, cut.distance, cut.nearest, grid),
@@ -128,7 +128,7 @@ def round_bodies(grid: Grid) -> list[str]:
 
 def free(grid: Grid, density: float) -> Array:
     """M of the two discs or balls of this density when they are free, twists about the origin."""
-    response = np.zeros((18, 18))
+    mobility = np.zeros((18, 18))
     for n, (centre, radius) in enumerate(zip(CENTRES, RADII, strict=True)):
         if grid.is_slab:
             mass = density * np.pi * radius**2
@@ -140,8 +140,8 @@ def free(grid: Grid, density: float) -> Array:
         motion = np.eye(6)
         motion[:3, 3:] = np.cross(centre, np.eye(3)).T
         part = slice(6 * n + 6, 6 * n + 12)
-        response[part, part] = motion @ np.diag(1.0 / parts) @ motion.T
-    return response
+        mobility[part, part] = motion @ np.diag(1.0 / parts) @ motion.T
+    return mobility
 
 
 def noise(grid: Grid, seed: int = 0) -> Faces:
@@ -214,8 +214,8 @@ def test_skin_that_slips_over_its_body_drags_as_a_body_that_moves() -> None:
     plates that yield, or not."""
     sides = Boundaries(PERIODIC, PERIODIC)
     for yielding in (0.0, 0.5):
-        response = yielding * np.diag(np.tile([1.0, 1.0, 0.0, 0.0, 0.0, 0.0], 3))
-        case = case_of(SQUARE, *PLATES, boundaries=sides, dt=0.3, response=response)
+        mobility = yielding * np.diag(np.tile([1.0, 1.0, 0.0, 0.0, 0.0, 0.0], 3))
+        case = case_of(SQUARE, *PLATES, boundaries=sides, dt=0.3, mobility=mobility)
         twist, speed = np.zeros(18), np.array([2.0, -0.3, 0.0])
         twist[12:15] = speed
         walls = case.system.walls
@@ -363,8 +363,8 @@ def test_bodies_get_what_the_fluid_loses(grid: Grid, density: float, stiff: floa
     """Linear momentum in a periodic box; stiff is mu dt / (rho h^2)."""
     dt = stiff * DENSITY * grid.spacing**2 / VISCOSITY
     sides = RING if grid.is_slab else BOX
-    response = free(grid, density)
-    case = case_of(grid, *round_bodies(grid), boundaries=sides, dt=dt, response=response)
+    mobility = free(grid, density)
+    case = case_of(grid, *round_bodies(grid), boundaries=sides, dt=dt, mobility=mobility)
     start, twist = noise(grid), np.zeros(18)
     twist[6:] = free(grid, 1.0)[6:, 6:] @ np.full(12, 1e-3)
     after, impulse, converged = case.system.solve(start, twist, TOLERANCE)
@@ -372,7 +372,7 @@ def test_bodies_get_what_the_fluid_loses(grid: Grid, density: float, stiff: floa
     gained = impulse.reshape(3, 6)[:, :3].sum(axis=0)
     lost = case.momentum(start) - case.momentum(after)
     walls = case.system.walls
-    moved = twist + response @ impulse
+    moved = twist + mobility @ impulse
     ends = np.concatenate([after[axis].ravel() for axis in grid.axes])[walls.index]
     rigid = case.system.at_walls(moved)
     exchanged = dt * float(np.abs(walls.weight * (ends - rigid)).sum())
@@ -384,8 +384,8 @@ def test_bodies_get_what_the_fluid_loses(grid: Grid, density: float, stiff: floa
 @pytest.mark.parametrize("density", [1e-3, 1e3])
 def test_matrix_is_symmetric_and_positive_definite(grid: Grid, density: float) -> None:
     sides = RING if grid.is_slab else BOX
-    response = free(grid, density)
-    case = case_of(grid, *round_bodies(grid), boundaries=sides, dt=10.0, response=response)
+    mobility = free(grid, density)
+    case = case_of(grid, *round_bodies(grid), boundaries=sides, dt=10.0, mobility=mobility)
     known = case.system.scale == 0.0
     random = np.random.default_rng(2)
     for _ in range(4):
@@ -400,8 +400,8 @@ def test_matrix_is_symmetric_and_positive_definite(grid: Grid, density: float) -
 def test_light_free_bodies_and_fluid_go_together_however_long_the_step(density: float) -> None:
     """After a step without end all moves with the mean velocity."""
     dt = 1e5
-    response = free(SQUARE, density)
-    case = case_of(SQUARE, *round_bodies(SQUARE), boundaries=RING, dt=dt, response=response)
+    mobility = free(SQUARE, density)
+    case = case_of(SQUARE, *round_bodies(SQUARE), boundaries=RING, dt=dt, mobility=mobility)
     start, twist = noise(SQUARE), np.zeros(18)
     start[0][:] += 1.0
     twist[6:] = [3.0, -2.0, 0, 0, 0, 0, -1.0, 1.0, 0, 0, 0, 0]
@@ -414,7 +414,7 @@ def test_light_free_bodies_and_fluid_go_together_however_long_the_step(density: 
     for axis, part in zip(SQUARE.axes, case.system.systems, strict=True):
         moving = (part.kind == UNKNOWN) | (part.kind == TIED)
         np.testing.assert_allclose(after[axis][moving], mean[axis], atol=1e-4)
-    moved = (twist + response @ impulse).reshape(3, 6)[1:]
+    moved = (twist + mobility @ impulse).reshape(3, 6)[1:]
     np.testing.assert_allclose(moved[:, 5], 0.0, atol=1e-4)
     np.testing.assert_allclose(moved[:, :2], np.tile(mean, (2, 1)), atol=1e-4)
 
@@ -424,11 +424,11 @@ def test_bodies_answer_friction_as_their_equation_of_motion_says() -> None:
     random = np.random.default_rng(3)
     root, pull = random.standard_normal((2, 6, 6))
     root[:, 4:] = 0.0
-    response, drag, push = root @ root.T, pull @ pull.T, random.standard_normal(6)
-    answer = Answer(response, drag)
+    mobility, drag, push = root @ root.T, pull @ pull.T, random.standard_normal(6)
+    answer = Answer(mobility, drag)
     change, impulse = answer.to(push)
     np.testing.assert_allclose(impulse, push - drag @ change, atol=1e-12)
-    np.testing.assert_allclose(change, response @ impulse, atol=1e-12)
+    np.testing.assert_allclose(change, mobility @ impulse, atol=1e-12)
     np.testing.assert_allclose(answer.change(push), change, atol=1e-12)
     assert not Answer(np.zeros((6, 6)), drag).yields
 

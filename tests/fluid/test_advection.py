@@ -35,11 +35,11 @@ def steps(
     count: int,
 ) -> Array:
     """A cell field carried by a steady velocity (half-way, m/s) for so many steps."""
-    carrier = cells_per_step(pad_faces(velocity, grid, sides, 0.0), dt, grid.spacing)
+    advecting_velocity = cells_per_step(pad_faces(velocity, grid, sides, 0.0), dt, grid.spacing)
     counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
     for _ in range(count):
         field, out = pad_cells(values, grid, sides), np.empty_like(values)
-        carry(out, field, *carrier, CENTRE, counts, periodic)
+        carry(out, field, *advecting_velocity, CENTRE, counts, periodic)
         values = out
     return values
 
@@ -144,10 +144,10 @@ def test_faces_are_carried_from_where_they_live(axis: int) -> None:
     x, y, z = np.meshgrid(*grid.face_coordinates(axis), indexing="ij")
     velocity[axis][:] = 1.0 + 2.0 * x - 3.0 * y + 0.5 * z
     move = (0.125, -0.125, 0.125)
-    carrier = cells_per_step(pad_faces(uniform(grid, move), grid, TORUS, 0.0), 1.0, 0.25)
+    advecting_velocity = cells_per_step(pad_faces(uniform(grid, move), grid, TORUS, 0.0), 1.0, 0.25)
     field = pad_faces(velocity, grid, WALLS, 0.0)[axis]
     out, never = np.empty_like(velocity[axis]), np.zeros(3, np.uint8)
-    carry(out, field, *carrier, OFFSETS[axis], np.array(grid.shape), never)
+    carry(out, field, *advecting_velocity, OFFSETS[axis], np.array(grid.shape), never)
     expected = velocity[axis] - (2.0 * move[0] - 3.0 * move[1] + 0.5 * move[2])
     inside = (slice(1, -1),) * 3
     np.testing.assert_allclose(out[inside], expected[inside], atol=1e-13)

@@ -20,7 +20,7 @@ from flowborne.fluid.boundary import (
 )
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.projection import accelerated, face_weights, push
+from flowborne.fluid.projection import accelerated, face_weights, subtract_pressure_gradient
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.model import SolidModel
 from flowborne.solvers.pressure import PressureSystem
@@ -81,7 +81,9 @@ def project(velocity: Faces, opened: Faces, grid: Grid, sides: Boundaries, rate:
     solution = system.solve(need, tolerance=TOLERANCE)
     assert solution.converged
     assert solution.residual < TOLERANCE
-    push(velocity, accelerated(opened, mass, grid), solution.pressure, grid, sides, 1.0)
+    subtract_pressure_gradient(
+        velocity, accelerated(opened, mass, grid), solution.pressure, grid, sides, 1.0
+    )
     return solution.pressure
 
 

@@ -11,22 +11,22 @@ import pytest
 from flowborne.kernels.control_volumes import (
     fill_empty,
     fill_empty_reference,
-    find_guests,
-    find_guests_reference,
-    find_hosts,
-    find_hosts_reference,
     find_parts,
     find_parts_reference,
-    follow_hosts,
-    follow_hosts_reference,
-    join_guests,
-    join_guests_reference,
+    find_small,
+    find_small_reference,
+    find_targets,
+    find_targets_reference,
+    follow_targets,
+    follow_targets_reference,
+    join_small,
+    join_small_reference,
     level,
     level_reference,
     mark_cut,
     mark_cut_reference,
-    merge_guests,
-    merge_guests_reference,
+    merge_small,
+    merge_small_reference,
     neighbour,
     neighbours_reference,
     share_velocity,
@@ -53,7 +53,7 @@ class Case:
     cells: np.ndarray
     opened: np.ndarray
     volumes: np.ndarray
-    guests: np.ndarray
+    small: np.ndarray
     wraps: np.ndarray
     last: tuple[slice, ...] | None
 
@@ -92,8 +92,8 @@ def case_of(shape: tuple, periodic: tuple, component: int, seed: int = 0) -> Cas
     return Case(cells, opened, volumes, np.flatnonzero(closed), wraps, last)
 
 
-def hosts_of(case: Case, component: int) -> np.ndarray:
-    return find_hosts(case.guests, case.opened, case.volumes, case.cells, component, case.wraps)
+def targets_of(case: Case, component: int) -> np.ndarray:
+    return find_targets(case.small, case.opened, case.volumes, case.cells, component, case.wraps)
 
 
 @ROOM_OR_SLAB
@@ -106,54 +106,54 @@ def test_neighbours(shape: tuple, periodic: tuple, component: int) -> None:
 
 @ROOM_OR_SLAB
 def test_hosts(shape: tuple, periodic: tuple, component: int) -> None:
-    """Found as said; those of guests that move with one are open."""
+    """Found as said; those of small ones that move with one are open."""
     for seed in range(20):
         case = case_of(shape, periodic, component, seed)
-        hosts = hosts_of(case, component)
-        assert (hosts != case.guests).any()
-        led = hosts[hosts != case.guests]
+        targets = targets_of(case, component)
+        assert (targets != case.small).any()
+        led = targets[targets != case.small]
         assert (case.opened.ravel()[led] > 0.0).all()
-        expected = find_hosts_reference(
-            case.guests, case.opened, case.volumes, case.cells, component, case.wraps
+        expected = find_targets_reference(
+            case.small, case.opened, case.volumes, case.cells, component, case.wraps
         )
-        np.testing.assert_array_equal(hosts, expected)
+        np.testing.assert_array_equal(targets, expected)
 
 
 @ROOM_OR_SLAB
-def test_guests_give_to_hosts_and_follow_them(
+def test_small_ones_give_to_targets_and_follow_them(
     shape: tuple, periodic: tuple, component: int
 ) -> None:
     case = case_of(shape, periodic, component)
-    hosts = hosts_of(case, component)
+    targets = targets_of(case, component)
     amount = np.random.default_rng(1).standard_normal(case.volumes.shape)
     merged, followed = amount.copy(), amount.copy()
-    shares = np.random.default_rng(2).uniform(size=hosts.size)
-    merge_guests(merged, case.guests, hosts, shares)
-    expected = merge_guests_reference(amount, case.guests, hosts, shares)
+    shares = np.random.default_rng(2).uniform(size=targets.size)
+    merge_small(merged, case.small, targets, shares)
+    expected = merge_small_reference(amount, case.small, targets, shares)
     np.testing.assert_allclose(merged, expected, atol=1e-14)
     assert merged.sum() == pytest.approx(amount.sum(), abs=1e-13 * np.abs(amount).sum())
-    follow_hosts(followed, case.guests, hosts)
-    expected = follow_hosts_reference(amount, case.guests, hosts)
+    follow_targets(followed, case.small, targets)
+    expected = follow_targets_reference(amount, case.small, targets)
     np.testing.assert_array_equal(followed, expected)
 
 
 @ROOM_OR_SLAB
-def test_guests_bring_what_they_hold(shape: tuple, periodic: tuple, component: int) -> None:
+def test_small_ones_bring_what_they_hold(shape: tuple, periodic: tuple, component: int) -> None:
     """Volumes of nothing hold an amount all the same, as one that closes in a step does."""
     case = case_of(shape, periodic, component)
-    hosts, volumes = hosts_of(case, component), case.volumes.copy()
-    volumes.reshape(-1)[case.guests[::2]] = 0.0
+    targets, volumes = targets_of(case, component), case.volumes.copy()
+    volumes.reshape(-1)[case.small[::2]] = 0.0
     field = np.random.default_rng(1).standard_normal(volumes.shape)
     joined, merged = field.copy(), volumes.copy()
-    shares = np.random.default_rng(2).uniform(size=hosts.size)
+    shares = np.random.default_rng(2).uniform(size=targets.size)
     shares[::2] = 1.0
-    join_guests(joined, merged, case.guests, hosts, shares, 1e-9)
-    expected, volumes_after = join_guests_reference(
-        field, volumes, case.guests, hosts, shares, 1e-9
+    join_small(joined, merged, case.small, targets, shares, 1e-9)
+    expected, volumes_after = join_small_reference(
+        field, volumes, case.small, targets, shares, 1e-9
     )
     np.testing.assert_allclose(merged, volumes_after, rtol=1e-12, atol=1e-14)
     own = np.ones(field.size, bool)
-    own[case.guests] = False
+    own[case.small] = False
     np.testing.assert_allclose(joined.ravel()[own], expected.ravel()[own], rtol=1e-10)
 
 
@@ -209,11 +209,11 @@ def test_parts(shape: tuple, periodic: tuple, component: int) -> None:
 def test_share_velocity(shape: tuple, periodic: tuple, component: int) -> None:
     case = case_of(shape, periodic, component)
     random = np.random.default_rng(7)
-    guests = np.sort(random.permutation(case.volumes.size)[:20])
-    hosts, shares = random.permutation(case.volumes.size)[:20], random.random(20)
+    small = np.sort(random.permutation(case.volumes.size)[:20])
+    targets, shares = random.permutation(case.volumes.size)[:20], random.random(20)
     field = random.standard_normal(case.shape)
-    expected = share_velocity_reference(field, guests, hosts, shares)
-    share_velocity(field, guests, hosts, shares)
+    expected = share_velocity_reference(field, small, targets, shares)
+    share_velocity(field, small, targets, shares)
     np.testing.assert_allclose(field, expected, rtol=1e-14)
 
 
@@ -231,14 +231,14 @@ def test_mark_cut(shape: tuple, periodic: tuple, component: int) -> None:
 
 @ROOM_OR_SLAB
 @pytest.mark.parametrize("told", [(0, 0), (1, 0), (1, 1)])
-def test_find_guests(shape: tuple, periodic: tuple, component: int, told: tuple) -> None:
+def test_find_small(shape: tuple, periodic: tuple, component: int, told: tuple) -> None:
     case, ring = case_of(shape, periodic, component), periodic[component]
     prescribed = np.array((0, 0) if ring else told, np.uint8)
     rest = case.opened, case.volumes, component, prescribed, ring, 1.5, 0.01
-    own, part, driven = find_guests_reference(*rest)
+    own, part, driven = find_small_reference(*rest)
     assert 0 < own.size < case.volumes.size
     mark = np.full(case.shape, 7, np.uint8)
-    found, share = find_guests(mark, *rest)
+    found, share = find_small(mark, *rest)
     np.testing.assert_array_equal(found, own)
     np.testing.assert_allclose(share, part, rtol=1e-14)
     inner = slice(None, -1 if ring else None)

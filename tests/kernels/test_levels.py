@@ -10,8 +10,8 @@ import pytest
 from flowborne.kernels.centres import (
     distance_ratio,
     distance_ratio_reference,
-    leaning,
-    leaning_reference,
+    interpolation_weights,
+    interpolation_weights_reference,
 )
 from flowborne.kernels.levels import (
     N0,
@@ -23,9 +23,9 @@ from flowborne.kernels.levels import (
     coarse_weights_reference,
     finest_weights,
     finest_weights_reference,
-    guests_at,
     inverse_diagonal,
     inverse_diagonal_reference,
+    orphans_at,
     weights_at,
 )
 from flowborne.kernels.regions import (
@@ -52,9 +52,11 @@ def test_distances_between_centres(cells: int, size: int, factor: int, periodic:
         given = face, factor, size, cells, periodic
         assert distance_ratio(*given) == pytest.approx(distance_ratio_reference(*given)), face
     n = -(-cells // size)
-    lean = np.empty(n + 2, np.float32)
-    leaning(lean, n, factor, size, cells, periodic)
-    np.testing.assert_allclose(lean, leaning_reference(n, factor, size, cells, periodic), atol=1e-7)
+    interpolation = np.empty(n + 2, np.float32)
+    interpolation_weights(interpolation, n, factor, size, cells, periodic)
+    np.testing.assert_allclose(
+        interpolation, interpolation_weights_reference(n, factor, size, cells, periodic), atol=1e-7
+    )
 
 
 @pytest.mark.parametrize("shape", [(6, 7, 10), (1, 12, 9)])
@@ -74,7 +76,7 @@ def test_finest_weights(shape: tuple[int, int, int]) -> None:
 
 @pytest.mark.parametrize(("shape", "periodic"), SHAPES)
 def test_coarse_operator(shape: tuple, periodic: tuple) -> None:
-    """Weights without those of guests, the diagonal, and what is added to it."""
+    """Weights without those of orphans, the diagonal, and what is added to it."""
     b, random = system_of(shape, periodic).buffers, np.random.default_rng(1)
     table, marks = b.table, at_level(b.marks, b.table, 0)
     w, inverse = weights_at(b.weights, table, 0), at_level(b.inverse, table, 0)
@@ -94,10 +96,12 @@ def test_coarse_operator(shape: tuple, periodic: tuple) -> None:
             np.testing.assert_allclose(wide[tuple(inside)], expected, rtol=1e-5, atol=1e-7)
             wide[tuple(inside)] = 0.0
         assert not wide.any()
-    guests, hosts = guests_at(b.guests, table, 0), at_level(b.hosts, table, 0)
+    orphans, aggregates = orphans_at(b.orphans, table, 0), at_level(b.aggregates, table, 0)
     sums = np.empty_like(at_level(b.inverse, table, 1))
-    coarse_sums(added, sums, marks, factor, guests, hosts)
-    expected = coarse_sums_reference(added, marks, factor, guests, hosts, np.array(sums.shape))
+    coarse_sums(added, sums, marks, factor, orphans, aggregates)
+    expected = coarse_sums_reference(
+        added, marks, factor, orphans, aggregates, np.array(sums.shape)
+    )
     np.testing.assert_allclose(sums, expected, rtol=1e-5)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from flowborne.kernels.deflation import deflated, deflated_reference
 from flowborne.kernels.laplacian import apply_laplacian, apply_laplacian_reference
-from flowborne.kernels.levels import at_level, guests_at, leaning_at, weights_at, wrap_ghosts
+from flowborne.kernels.levels import at_level, interpolation_at, orphans_at, weights_at, wrap_ghosts
 from flowborne.kernels.smoothing import (
     STEPS,
     defect,
@@ -80,13 +80,13 @@ def with_ghosts(values):
 
 
 def transfer_of(system):
-    """Marks, interpolation coefficients, guests and hosts of the finest level."""
+    """Marks, interpolation coefficients, orphans and aggregates of the finest level."""
     b = system.buffers
     return (
         at_level(b.marks, b.table, 0),
-        leaning_at(b.lean, b.table, 0),
-        guests_at(b.guests, b.table, 0),
-        at_level(b.hosts, b.table, 0),
+        interpolation_at(b.interpolation, b.table, 0),
+        orphans_at(b.orphans, b.table, 0),
+        at_level(b.aggregates, b.table, 0),
     )
 
 

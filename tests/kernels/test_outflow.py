@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flowborne.kernels.outflow import net_out, outflow, outflow_reference
-from flowborne.kernels.pressure_gradient import push_faces, push_faces_reference
+from flowborne.kernels.pressure_gradient import subtract_gradient, subtract_gradient_reference
 from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 SHAPES = [(5, 7, 6), (9, 8, 1), (1, 4, 3)]
@@ -38,6 +38,6 @@ def test_push_faces(shape: tuple[int, int, int], axis: int, sides: tuple[int, in
     velocity, rate = faces(shape, 2)[axis], faces(shape, 3)[axis]
     pressure, codes = np.random.default_rng(4).standard_normal(shape), np.full((3, 2), OPEN)
     codes[axis] = sides
-    expected = push_faces_reference(velocity, rate, pressure, axis, 0.7, codes)
-    push_faces(velocity, rate, pressure, axis, 0.7, codes)
+    expected = subtract_gradient_reference(velocity, rate, pressure, axis, 0.7, codes)
+    subtract_gradient(velocity, rate, pressure, axis, 0.7, codes)
     np.testing.assert_allclose(velocity, expected, atol=1e-14)

@@ -9,7 +9,7 @@ from scipy.sparse import csc_array, csr_array
 from flowborne.kernels.arrays import Rows
 from flowborne.kernels.conjugate_gradients import apply_low_rank
 from flowborne.kernels.deflation import mode_strengths
-from flowborne.kernels.response import respond, respond_reference
+from flowborne.kernels.mobility import respond, respond_reference
 from flowborne.kernels.sparse_rows import (
     add_rows,
     dense_rows,
@@ -19,7 +19,7 @@ from flowborne.kernels.sparse_rows import (
     row_gram_along,
     sum_rows,
 )
-from flowborne.solvers.response import dense_response, factored_response
+from flowborne.solvers.mobility import dense_mobility, factored_mobility
 
 SHAPE, SIZE = (5, 4, 6), 7
 
@@ -52,7 +52,7 @@ def test_a_term_of_low_rank_and_the_strength_of_modes() -> None:
     assert mode_strengths(p, rows, amounts[:0], 0.7).size == 0
     term = J @ (half @ half.T) @ (J.T @ p.ravel())
     expected = out.ravel() + term
-    energy = apply_low_rank(out, p, rows, dense_response(half @ half.T).arrays)
+    energy = apply_low_rank(out, p, rows, dense_mobility(half @ half.T).arrays)
     np.testing.assert_allclose(out.ravel(), expected, atol=1e-11)
     assert energy == pytest.approx(p.ravel() @ term)
 
@@ -81,10 +81,10 @@ def test_padded_rows(shape: tuple[int, int, int]) -> None:
 
 def test_dense_response() -> None:
     half, load = np.random.default_rng(4).standard_normal((2, SIZE, SIZE))
-    response = dense_response(half @ half.T)
-    expected = respond_reference(load[0], response.arrays)
-    np.testing.assert_allclose(respond(load[0], response.arrays), expected, rtol=1e-12)
-    np.testing.assert_allclose(response.times(load), load @ half @ half.T, rtol=1e-10, atol=1e-12)
+    mobility = dense_mobility(half @ half.T)
+    expected = respond_reference(load[0], mobility.arrays)
+    np.testing.assert_allclose(respond(load[0], mobility.arrays), expected, rtol=1e-12)
+    np.testing.assert_allclose(mobility.times(load), load @ half @ half.T, rtol=1e-10, atol=1e-12)
 
 
 def test_factored_response() -> None:
@@ -92,7 +92,7 @@ def test_factored_response() -> None:
     T = csr_array(random.standard_normal((SIZE, n)) * (random.random((SIZE, n)) < 0.4))
     lower = csc_array(np.tril(random.standard_normal((n, n)), -1) * (random.random((n, n)) < 0.3))
     start, row = lower.indptr.astype(np.int32), lower.indices.astype(np.int32)
-    response = factored_response(
+    mobility = factored_mobility(
         T,
         (start, row, lower.data),
         random.uniform(0.5, 2.0, n),
@@ -101,5 +101,5 @@ def test_factored_response() -> None:
         np.zeros((SIZE, 0)),
     )
     for load in random.standard_normal((3, SIZE)):
-        expected = respond_reference(load, response.arrays)
-        np.testing.assert_allclose(respond(load, response.arrays), expected, rtol=1e-9, atol=1e-11)
+        expected = respond_reference(load, mobility.arrays)
+        np.testing.assert_allclose(respond(load, mobility.arrays), expected, rtol=1e-9, atol=1e-11)

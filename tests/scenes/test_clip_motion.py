@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
 from flowborne.io.bvh import read_bvh
 from flowborne.quaternions import about, angle, inverse, product
-from flowborne.scenes.clip_following import Passage, motion_of_clip
-from flowborne.scenes.clip_motion import KEPT, MotionClip
+from flowborne.scenes.clip_following import Passage, trajectory_of_clip
+from flowborne.scenes.clip_motion import KEPT, TrajectoryClip
 from flowborne.solids.model import SolidModel
 
 from .clip_models import BODIES, MAPPING, NAMES, REST, circling, model, wandering
@@ -30,11 +30,13 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def motion(
     clip: Any = WANDER, joints: Any = None, initial: Any = None, **passage: Any
-) -> MotionClip:
-    return motion_of_clip(MODEL, clip, MAPPING, Passage(**passage), joints=joints, initial=initial)
+) -> TrajectoryClip:
+    return trajectory_of_clip(
+        MODEL, clip, MAPPING, Passage(**passage), joints=joints, initial=initial
+    )
 
 
-def whole(prescribed: MotionClip, time: float) -> np.ndarray:
+def whole(prescribed: TrajectoryClip, time: float) -> np.ndarray:
     """(nq,) q with the joints where they are told to be, the others at rest."""
     q = MODEL.mj.qpos0.copy()
     places = [MODEL.positions_of(name) for name in prescribed.columns.names]
@@ -42,7 +44,7 @@ def whole(prescribed: MotionClip, time: float) -> np.ndarray:
     return q
 
 
-def rate(prescribed: MotionClip, time: float, step: float) -> np.ndarray:
+def rate(prescribed: TrajectoryClip, time: float, step: float) -> np.ndarray:
     """(k,) difference quotient of position by MuJoCo."""
     v = np.zeros(MODEL.nv)
     before, after = whole(prescribed, time - step), whole(prescribed, time + step)
@@ -50,7 +52,7 @@ def rate(prescribed: MotionClip, time: float, step: float) -> np.ndarray:
     return v[prescribed.dofs]
 
 
-def root(prescribed: MotionClip, time: float) -> tuple[np.ndarray, np.ndarray]:
+def root(prescribed: TrajectoryClip, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Place and rotation of the pelvis, the latter from its rest."""
     position = prescribed.position(time)
     rest = REST[0].as_quat(scalar_first=True)
@@ -228,7 +230,7 @@ def test_low_pass_halves_the_power_at_its_frequency_and_does_not_lag() -> None:
 
 
 def test_motion_fits_the_contract_and_survives_pickling() -> None:
-    prescribed: Motion = MOTIONS["looped"]
+    prescribed: Trajectory = MOTIONS["looped"]
     again = pickle.loads(pickle.dumps(prescribed))
     for time in (-1.0, 0.3, 1.6, 9.0):
         assert np.array_equal(prescribed.position(time), again.position(time))
@@ -272,7 +274,7 @@ def test_joints_that_cannot_follow_are_told(joints: str, message: str) -> None:
     body = f'<body name="b">{joints}<geom size="0.1"/></body>'
     other = SolidModel.from_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     with pytest.raises(SceneError, match=message):
-        motion_of_clip(other, WANDER, MAPPING)
+        trajectory_of_clip(other, WANDER, MAPPING)
 
 
 @pytest.mark.skipif(not MOCAP.is_dir(), reason="the real clips are not here")
@@ -286,7 +288,7 @@ def test_real_clip_keeps_its_feet_on_the_ground() -> None:
         text += f'<body name="{bone}" pos="{offset[0]} {offset[1]} {offset[2]}">'
         text += f'<joint name="{joint}" type="{kind}"/><geom size="0.05"/>'
     leg = SolidModel.from_string(text + "</body>" * len(legs) + "</worldbody></mujoco>")
-    m = motion_of_clip(leg, clip, {joint: bone for bone, joint in legs}, Passage(smooth=6.0))
+    m = trajectory_of_clip(leg, clip, {joint: bone for bone, joint in legs}, Passage(smooth=6.0))
     data = mujoco.MjData(leg.mj)
     heights = []
     for time in np.arange(0.0, clip.duration, 0.02):

@@ -10,8 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from flowborne.coupling.motion import Motion
-from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes, MotionSinusoid
+from flowborne.coupling.motion import Trajectory
+from flowborne.scenes.tracks import (
+    Curve,
+    TrajectoryConstant,
+    TrajectoryKeyframes,
+    TrajectorySinusoid,
+)
 
 DOF = np.array([3])
 STEP = 1e-6
@@ -29,20 +34,20 @@ def curves(draw: st.DrawFn) -> Curve:
 
 
 motions = st.one_of(
-    st.builds(MotionConstant, st.just(DOF), moderate, moderate),
-    st.builds(MotionSinusoid, st.just(DOF), moderate, st.floats(0.3, 5.0), moderate, moderate),
-    st.builds(MotionKeyframes, st.just(DOF), curves()),
+    st.builds(TrajectoryConstant, st.just(DOF), moderate, moderate),
+    st.builds(TrajectorySinusoid, st.just(DOF), moderate, st.floats(0.3, 5.0), moderate, moderate),
+    st.builds(TrajectoryKeyframes, st.just(DOF), curves()),
 )
 
 
 @given(motions, st.floats(-8.0, 12.0))
-def test_velocity_is_the_derivative_of_position(motion: Motion, time: float) -> None:
+def test_velocity_is_the_derivative_of_position(motion: Trajectory, time: float) -> None:
     slope = (motion.position(time + STEP) - motion.position(time - STEP)) / (2.0 * STEP)
     assert_allclose(motion.velocity(time), slope, rtol=1e-6, atol=2e-3)
 
 
 @given(motions, st.floats(-8.0, 12.0))
-def test_velocity_is_continuous(motion: Motion, time: float) -> None:
+def test_velocity_is_continuous(motion: Trajectory, time: float) -> None:
     assert_allclose(motion.velocity(time), motion.velocity(time + 1e-9), atol=1e-5)
 
 
@@ -77,19 +82,19 @@ def test_curve_between_two_keyframes_is_the_cubic_hermite() -> None:
 
 
 def test_sinusoid_at_known_times() -> None:
-    motion = MotionSinusoid(DOF, amplitude=2.0, period=4.0, mean=1.0)
+    motion = TrajectorySinusoid(DOF, amplitude=2.0, period=4.0, mean=1.0)
     assert_allclose([motion.position(t)[0] for t in (0.0, 1.0, 2.0, 3.0)], [1.0, 3.0, 1.0, -1.0])
 
 
 @pytest.mark.parametrize(
     "motion",
     [
-        MotionConstant(DOF, 1.0, 2.0),
-        MotionSinusoid(DOF, 1.0, 2.0),
-        MotionKeyframes(DOF, Curve((0.0, 1.0), (0.0, 1.0))),
+        TrajectoryConstant(DOF, 1.0, 2.0),
+        TrajectorySinusoid(DOF, 1.0, 2.0),
+        TrajectoryKeyframes(DOF, Curve((0.0, 1.0), (0.0, 1.0))),
     ],
 )
-def test_motions_survive_pickling(motion: Motion) -> None:
+def test_motions_survive_pickling(motion: Trajectory) -> None:
     again = pickle.loads(pickle.dumps(motion))
     assert again.position(0.4) == motion.position(0.4)
     assert again.velocity(0.4) == motion.velocity(0.4)

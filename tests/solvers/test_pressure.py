@@ -7,8 +7,8 @@ import pytest
 
 from flowborne.kernels import jit
 from flowborne.kernels.jit import kernel_threads
+from flowborne.solvers.mobility import dense_mobility
 from flowborne.solvers.pressure import NO_TERM, LowRankTerm, PressureSystem
-from flowborne.solvers.response import dense_response
 
 
 def random_weights(shape, sides, seed=0, blocked=0.3):
@@ -64,13 +64,13 @@ def random_term(shape, bodies, seed=1, rank=None):
         6 * np.arange(cells.size + 1),
         columns,
         rng.standard_normal(columns.size),
-        dense_response(half @ half.T),
+        dense_mobility(half @ half.T),
     )
 
 
 def row_matrix(term, cells):
     """Dense J."""
-    J = np.zeros((cells, term.response.size))
+    J = np.zeros((cells, term.mobility.size))
     for n, cell in enumerate(term.cells):
         for e in range(term.row_start[n], term.row_start[n + 1]):
             J[cell, term.columns[e]] += term.values[e]
@@ -82,7 +82,7 @@ def dense_solution(weights, periodic, term, rhs):
     K = laplacian(weights, periodic)
     active = np.diag(K) > 0.0
     J = row_matrix(term, active.size)
-    A = (K + J @ term.response.times(J).T)[np.ix_(active, active)]
+    A = (K + J @ term.mobility.times(J).T)[np.ix_(active, active)]
     inverse = np.linalg.pinv(A, rcond=1e-11, hermitian=True)
     p = np.zeros(active.size)
     p[active] = inverse @ rhs.ravel()[active]
@@ -126,7 +126,7 @@ def test_light_heavy_and_jointed_bodies(sides, strength, rank):
     weights = random_weights(shape, sides)
     periodic = tuple(side == "periodic" for side in sides)
     plain = random_term(shape, 2, rank=rank)
-    term = replace(plain, response=dense_response(strength * plain.response.arrays[0]))
+    term = replace(plain, mobility=dense_mobility(strength * plain.mobility.arrays[0]))
     rhs = np.random.default_rng(3).standard_normal(shape)
     expected, A, _ = dense_solution(weights, periodic, term, rhs)
     found = PressureSystem(weights, periodic).solve(rhs, None, term, tolerance=1e-9)
@@ -152,11 +152,11 @@ def channel(n, low=0, high=0):
     index = np.arange(3 * n * n).reshape(shape)
     cells = np.concatenate([index[n - 1].ravel(), index[2 * n].ravel()])
     values = np.repeat([1.0, -1.0], n)
-    response = np.zeros((6, 6))
-    response[0, 0] = 2.0
+    mobility = np.zeros((6, 6))
+    mobility[0, 0] = 2.0
     rows = np.arange(2 * n + 1)
     columns = np.zeros(2 * n, np.int64)
-    return weights, LowRankTerm(cells, rows, columns, values, dense_response(response))
+    return weights, LowRankTerm(cells, rows, columns, values, dense_mobility(mobility))
 
 
 def test_plug_between_closed_cavities_shares_one_constant():
@@ -208,10 +208,10 @@ def disc_term(weights, n, mass):
     values = (np.diff(closed, axis=0) / n).ravel()
     cells = np.flatnonzero(values)
     rows = np.arange(cells.size + 1)
-    response = np.zeros((6, 6))
-    response[0, 0] = 1.0 / mass
+    mobility = np.zeros((6, 6))
+    mobility[0, 0] = 1.0 / mass
     columns = np.zeros(cells.size, np.int64)
-    return LowRankTerm(cells, rows, columns, values[cells], dense_response(response))
+    return LowRankTerm(cells, rows, columns, values[cells], dense_mobility(mobility))
 
 
 def stream(n):

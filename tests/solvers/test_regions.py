@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from flowborne.solvers.mobility import dense_mobility
 from flowborne.solvers.pressure import PressureSystem
 from flowborne.solvers.regions import null_basis
-from flowborne.solvers.response import dense_response
 
 
 def boxes(shape, walls, periodic=(False, False, False)):
@@ -42,8 +42,8 @@ def test_null_basis_is_orthonormal_and_moves_nothing():
     loads = rng.standard_normal((5, 6))
     loads[3] = 0.0
     half = rng.standard_normal((6, 2))
-    response = half @ half.T
-    basis = null_basis(count, loads, dense_response(response))
+    mobility = half @ half.T
+    basis = null_basis(count, loads, dense_mobility(mobility))
     assert basis.shape == (5, 3)
     np.testing.assert_allclose(basis.T @ (count[:, None] * basis), np.eye(3), atol=1e-12)
     np.testing.assert_allclose(half.T @ loads.T @ basis, 0.0, atol=1e-12)

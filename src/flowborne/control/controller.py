@@ -22,7 +22,7 @@ from flowborne.control.objectives import ObjectiveSum
 from flowborne.control.rules import FixedStep, Rule
 from flowborne.control.servo import Servo, ServoExact
 from flowborne.control.trial import Hypothesis, Step, Trials
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
 
 if TYPE_CHECKING:
@@ -137,28 +137,28 @@ class Controller:
         memory["schedule"] = np.array([self.every - 1.0, frame_time])
         return self._decision(world, True, evaluations, started)
 
-    def drive(self, world: World, frame_end_time: float, dt: float) -> Drive:
-        """Drive of the controlled dofs for the next step; without a decision yet, to hold still.
+    def command(self, world: World, frame_end_time: float, dt: float) -> JointCommand:
+        """Command to the controlled dofs for the next step; without a decision yet, to hold still.
 
         frame_end_time  s, end of the frame that the step is in
         dt              s, length of the step
         """
         model, state = creature.parts(world)
-        drive = Drive.none(model.nv)
-        move: Array | float = 0.0
-        hold: Array | float = 0.0
+        command = JointCommand.none(model.nv)
+        rate: Array | float = 0.0
+        final: Array | float = 0.0
         if "target" in world.memory:
             left, frame_time = world.memory["schedule"]
             remaining = max(frame_end_time + left * frame_time - world.time, dt)
             gap = model.difference(state.q, world.memory["target"])[self.dofs]
             v = state.v[self.dofs]
-            move, hold = self.servo.velocity(gap, v, float(remaining), dt)
+            rate, final = self.servo.velocity(gap, v, float(remaining), dt)
             # a drive that may give way moves with the velocity it has: it steers the step after
             later = float(max(remaining - dt, dt))
             ahead, _ = self.servo.velocity(gap - dt * v, v, later, dt)
-            hold = np.where(np.isfinite(self.servo.torque_limit), ahead, hold)
-        drive.set(self.dofs, move, hold, np.asarray(self.servo.torque_limit, dtype=np.float64))
-        return drive
+            final = np.where(np.isfinite(self.servo.torque_limit), ahead, final)
+        command.set(self.dofs, rate, final, np.asarray(self.servo.torque_limit, dtype=np.float64))
+        return command
 
     def measure(self, world: World, report: StepReport) -> dict[str, float]:
         """After a real step: the weighted sum as "objective", then every term's own value."""
@@ -229,8 +229,8 @@ class Controller:
                     value, gradient[places] = value + estimate.value, estimate.gradient
                 pace[places] = self.rule.pace(pace[places], slope[places], estimate.gradient)
                 slope[places] = estimate.gradient
-                move = pace[places] * self.rule.step(trials, estimate.gradient, limit[places])
-                displacement[self.dofs[places]] = trials.within_range(move)
+                rate = pace[places] * self.rule.step(trials, estimate.gradient, limit[places])
+                displacement[self.dofs[places]] = trials.within_range(rate)
                 evaluations += trials.evaluations
             if not displacement.any():
                 break

@@ -129,7 +129,7 @@ def away(world: World, dofs: Integers, places: Array) -> Array:
     """(k,) displacement from given entries of q (m,) of the joints of `dofs` to their present."""
     model, state = parts(world)
     start = state.q.copy()
-    start[model.places_of(dofs)] = places
+    start[model.indices_of(dofs)] = places
     return model.difference(start, state.q)[dofs]
 
 

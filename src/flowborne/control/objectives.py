@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from flowborne.control.measurement import Measurement
 from flowborne.control.phases import PhaseAlways, Phases
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -144,7 +144,7 @@ class ObjectiveInputMotion:
     """
 
     dofs: Integers
-    reference: Motion
+    reference: Trajectory
     name: str = "input-motion"
 
     def value(self, measurement: Measurement) -> float:

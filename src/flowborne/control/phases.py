@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 
 SLACK = 1e-9
 """s; a time that rounding has left this far before a boundary counts as having reached it."""
@@ -75,7 +75,7 @@ class PhaseTrack:
     raises     ValueError for another sign or quantity
     """
 
-    track: Motion
+    track: Trajectory
     quantity: Literal["position", "velocity"] = "velocity"
     sign: int = 1
     threshold: float = 0.0

@@ -18,7 +18,7 @@ from flowborne.control import creature
 from flowborne.control.executors import Mapper
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Velocities = Literal["removed", "present", "probe"]
-Step = Callable[["World", float, Drive | None], StepReport]
+Step = Callable[["World", float, JointCommand | None], StepReport]
 """step(world, dt, drive): advances `world` in place and says what it did."""
 
 
@@ -118,18 +118,18 @@ class Trial:
         _, state = creature.parts(world)
         state.q[:] = self.pose
         hypothesis = self.hypothesis
-        drive = self._prepare(world)
+        command = self._prepare(world)
         for _ in range(hypothesis.steps):
-            report = self._advance(world, drive)
-        drive.move[self.dofs] = self._pace(drive)
+            report = self._advance(world, command)
+        command.rate[self.dofs] = self._pace(command)
         for _ in range(hypothesis.last_steps):
-            report = self._advance(world, drive)
+            report = self._advance(world, command)
         value = self.objective.value(Measurement(world, report, self.world.time))
         if not np.isfinite(value):
             raise TrialError(self._complaint(f"the objective is {value}"))
         return value
 
-    def _prepare(self, world: World) -> Drive:
+    def _prepare(self, world: World) -> JointCommand:
         """Make rigid what is outboard, and give the drive that moves the controlled dofs.
 
         All that is outboard of any controlled dof is rigid in every trial, so that trials of
@@ -138,29 +138,29 @@ class Trial:
         _, state = creature.parts(world)
         rigid = creature.outboard(world, self.dofs) if self.rigid is None else self.rigid
         hypothesis = self.hypothesis
-        move = self.displacement / hypothesis.duration
+        rate = self.displacement / hypothesis.duration
         if hypothesis.velocities == "present":
-            hold = state.v[self.dofs].copy()
+            final = state.v[self.dofs].copy()
             creature.give_velocity(world, rigid, np.zeros(rigid.size), self.dofs)
         else:
-            hold = move if hypothesis.velocities == "probe" else np.zeros_like(move)
+            final = rate if hypothesis.velocities == "probe" else np.zeros_like(rate)
             held = np.concatenate([self.dofs, rigid])
-            velocity = np.concatenate([hold, np.zeros(rigid.size)])
+            velocity = np.concatenate([final, np.zeros(rigid.size)])
             creature.give_velocity(world, held, velocity, np.zeros(0, np.int64))
-        drive = Drive.none(state.v.size)
-        drive.set(rigid, 0.0, 0.0)
-        drive.set(self.dofs, move, hold)
-        ahead = hypothesis.last_steps * hypothesis.dt * self._pace(drive)
-        drive.move[self.dofs] -= ahead / hypothesis.duration
-        return drive
+        command = JointCommand.none(state.v.size)
+        command.set(rigid, 0.0, 0.0)
+        command.set(self.dofs, rate, final)
+        ahead = hypothesis.last_steps * hypothesis.dt * self._pace(command)
+        command.rate[self.dofs] -= ahead / hypothesis.duration
+        return command
 
-    def _pace(self, drive: Drive) -> Array:
+    def _pace(self, command: JointCommand) -> Array:
         """(n,) velocity of the controlled dofs' positions in the last steps."""
-        hold = drive.hold[self.dofs]
-        return hold if self.hypothesis.velocities == "present" else np.zeros_like(hold)
+        final = command.final_velocity[self.dofs]
+        return final if self.hypothesis.velocities == "present" else np.zeros_like(final)
 
-    def _advance(self, world: World, drive: Drive) -> StepReport:
-        report = self.step(world, self.hypothesis.dt, drive)
+    def _advance(self, world: World, command: JointCommand) -> StepReport:
+        report = self.step(world, self.hypothesis.dt, command)
         if report.outcome is Outcome.NOT_FINITE:
             raise TrialError(self._complaint(report.outcome.value))
         return report

@@ -22,7 +22,7 @@ from flowborne.coupling.mouths import (
     fill_mouths,
     jet_force,
 )
-from flowborne.coupling.operators import carried_in, leak_proof, motion
+from flowborne.coupling.operators import boundary_velocity, carried_in, leak_proof
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.advection import OFFSETS, carry, cells_per_step
 from flowborne.fluid.boundary import Boundaries, cells_in
@@ -81,7 +81,7 @@ def moved_since(world: World) -> bool:
 
 
 def face_masses(volumes: ControlVolumes, density: float) -> Faces:
-    """Mass of the fluid that pressure on each face accelerates, kg; 0 at guests."""
+    """Mass of the fluid that pressure on each face accelerates, kg; 0 at small ones."""
     return faces_of([density * v for v in volumes.merged])
 
 
@@ -139,7 +139,7 @@ def carry_fluid(
     add_rates(rate, jets)
     middle = world.time + 0.5 * dt
     flux, cells = leak_proof_flux(
-        state.carrier, before, after, start.cells, rate, fluid, middle, dt
+        state.advecting_velocity, before, after, start.cells, rate, fluid, middle, dt
     )
     end = control_volumes(cells, after.open, fluid.grid, sides)
     held = fluid.viscosity / fluid.density
@@ -236,7 +236,9 @@ def particle_paths(
     """
     fluid, state = world.flow()
     pose = kinematics(world.setup.solid, q)
-    field = leak_proof(state.carrier, before, motion(pose, world.solid.v), fluid.grid)
+    field = leak_proof(
+        state.advecting_velocity, before, boundary_velocity(pose, world.solid.v), fluid.grid
+    )
     add_closed_slip(field, jets, fluid.grid)
     padded = pad_faces(field, fluid.grid, fluid.boundaries, world.time)
     return cells_per_step(padded, dt, fluid.grid.spacing)
@@ -307,14 +309,24 @@ def settle_state(
         fill_empty_faces(velocity[axis], carried.volumes.merged[axis], inside[axis])
     carried.volumes.follow(velocity, grid)
     for axis in grid.axes:
-        u, given, carrier = velocity[axis], state.acceleration[axis], state.carrier[axis]
+        u, given, advecting_velocity = (
+            velocity[axis],
+            state.acceleration[axis],
+            state.advecting_velocity[axis],
+        )
         volume = carried.volumes.volume[axis]
         beside = parts(volume, volume, axis, grid, sides)
         gained(given, u, carried.velocity[axis], started[axis], state.velocity[axis], dt)
-        move_on(state.velocity[axis], u, carrier)
-        given.reshape(-1)[beside], carrier.reshape(-1)[beside] = 0.0, u.reshape(-1)[beside]
+        move_on(state.velocity[axis], u, advecting_velocity)
+        given.reshape(-1)[beside], advecting_velocity.reshape(-1)[beside] = (
+            0.0,
+            u.reshape(-1)[beside],
+        )
         if sides.periodic()[axis]:
             first, last = edge(axis, 0), edge(axis, -1)
-            given[last], carrier[last] = given[first], u[last] + (carrier[first] - u[first])
+            given[last], advecting_velocity[last] = (
+                given[first],
+                u[last] + (advecting_velocity[first] - u[first]),
+            )
     state.cells = carried.volumes.cells
     state.pose = world.solid.q.copy()

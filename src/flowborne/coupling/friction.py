@@ -11,16 +11,16 @@ from flowborne.coupling.flesh import skin_at
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Jet, skin_slip
 from flowborne.coupling.operators import (
+    boundary_velocity,
     generalised,
     jacobian,
-    motion,
     pressure_push,
     rigid_response,
 )
 from flowborne.coupling.viscous_solve import Answer, Answering, ViscousSystem, Walls, walls_of
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import accelerated, push
+from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh_solve import PrescribedFlesh, symmetric_factor
@@ -55,9 +55,9 @@ def diffuse(
     grid, sides = fluid.grid, fluid.boundaries
     pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
     rate = accelerated(cut.open, mass, grid)
-    push(pushed, rate, state.pressure, grid, sides, dt)
+    subtract_pressure_gradient(pushed, rate, state.pressure, grid, sides, dt)
     earlier = pressure_push(cut, dt * state.pressure, size)
-    moving = motion(pose, driven.after(generalised(pose, earlier)))
+    moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))
     parts = assemble_viscosity(
         OpenParts(cut.facets, cut.open, cut.volume),
         velocity,
@@ -74,7 +74,7 @@ def diffuse(
     )
     slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
     smooth, impulse, converged = system.solve(pushed, moving, TOLERANCE, slip)
-    push(smooth, rate, state.pressure, grid, sides, -dt)
+    subtract_pressure_gradient(smooth, rate, state.pressure, grid, sides, -dt)
     return smooth, impulse, converged
 
 

@@ -24,7 +24,7 @@ from flowborne.coupling.operators import pressure_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Faces, faces_of
-from flowborne.fluid.projection import accelerated, push
+from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
     rate = accelerated(cut.open, mass, grid)
     kick, before = grid.zeros_faces(), grid.zeros_faces()
-    push(kick, rate, pressure, grid, sides, dt)
-    push(before, rate, earlier, grid, sides, dt)
+    subtract_pressure_gradient(kick, rate, pressure, grid, sides, dt)
+    subtract_pressure_gradient(before, rate, earlier, grid, sides, dt)
     both = sum(float((m * k * b).sum()) for m, k, b in zip(mass, kick, before, strict=True))
     square = sum(float((m * k * k).sum()) for m, k in zip(mass, kick, strict=True))
     part = 0.5 * likely(both / square) if square > 0.0 else 0.0

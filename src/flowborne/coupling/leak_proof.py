@@ -25,7 +25,7 @@ from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import push
+from flowborne.fluid.projection import subtract_pressure_gradient
 from flowborne.kernels.faces import mean_flux
 from flowborne.kernels.outflow import net_out
 from flowborne.solvers.pressure import PressureSystem
@@ -75,7 +75,7 @@ def leak_proof_flux(
     rhs += net
     left = LEFT * grid.cell_volume / dt
     solution = system.solve(-rhs, None, tolerance=TOLERANCE, absolute=left)
-    push(flux, weights, solution.pressure, grid, sides, 1.0)
+    subtract_pressure_gradient(flux, weights, solution.pressure, grid, sides, 1.0)
     net_out(net, *flux)
     later = start + dt * (rate - net)
     swept.put_back(flux, later, dt)

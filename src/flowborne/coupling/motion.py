@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Motion(Protocol):
+class Trajectory(Protocol):
     """A prescribed motion of some dofs, known for all time.
 
     dofs  (k,) indices into v, ascending: all dofs of each of its joints
@@ -29,39 +29,42 @@ class Motion(Protocol):
 
 
 @dataclass
-class Drive:
+class JointCommand:
     """Which dofs are driven in a step and how; arrays over all nv dofs.
 
-    prescribed    (nv,) bool
-    move          (nv,) velocity with which a driven dof moves during the step
-    hold          (nv,) velocity that a driven dof has at the end of the step
-    torque_limit  (nv,) largest |generalised force| the drive may use; inf keeps the promise
+    prescribed      (nv,) bool
+    rate            (nv,) velocity with which a driven dof moves during the step
+    final_velocity  (nv,) velocity that a driven dof has at the end of the step
+    torque_limit    (nv,) largest |generalised force| the drive may use; inf keeps the promise
     """
 
     prescribed: NDArray[np.bool_]
-    move: Array
-    hold: Array
+    rate: Array
+    final_velocity: Array
     torque_limit: Array
 
     @classmethod
-    def none(cls, nv: int) -> Drive:
-        """Drive that leaves every dof free."""
+    def none(cls, nv: int) -> JointCommand:
+        """Leaves every dof free."""
         return cls(np.zeros(nv, bool), np.zeros(nv), np.zeros(nv), np.full(nv, np.inf))
 
-    def copy(self) -> Drive:
-        return Drive(
-            self.prescribed.copy(), self.move.copy(), self.hold.copy(), self.torque_limit.copy()
+    def copy(self) -> JointCommand:
+        return JointCommand(
+            self.prescribed.copy(),
+            self.rate.copy(),
+            self.final_velocity.copy(),
+            self.torque_limit.copy(),
         )
 
     def set(
         self,
         dofs: NDArray[np.int64] | NDArray[np.bool_],
-        move: Array | float,
-        hold: Array | float,
+        rate: Array | float,
+        final_velocity: Array | float,
         torque_limit: Array | float = np.inf,
     ) -> None:
         """Drive `dofs`, indices (k,) or a mask (nv,), with these velocities."""
         self.prescribed[dofs] = True
-        self.move[dofs] = move
-        self.hold[dofs] = hold
+        self.rate[dofs] = rate
+        self.final_velocity[dofs] = final_velocity
         self.torque_limit[dofs] = torque_limit

@@ -216,13 +216,13 @@ def skin_slip(
     return slip
 
 
-def add_closed_slip(carrier: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
+def add_closed_slip(advecting_velocity: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
     """Let a leak-proof field come out of the closed parts of faces as the jets do, in place."""
     for jet in jets:
         for axis in grid.axes:
             own = jet.axis == axis
             part = jet.closed[own] * jet.share[own]
-            carrier[axis].reshape(-1)[jet.face[own]] += part * jet.velocity[axis]
+            advecting_velocity[axis].reshape(-1)[jet.face[own]] += part * jet.velocity[axis]
 
 
 def fill_mouths(carried: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:

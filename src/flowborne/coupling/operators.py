@@ -21,7 +21,7 @@ from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import Driven, PrescribedSystem
-from flowborne.solvers.response import Response, dense_response, factored_response
+from flowborne.solvers.mobility import Mobility, dense_mobility, factored_mobility
 
 
 def twists(kinematics: Kinematics, v: Array) -> Array:
@@ -41,7 +41,7 @@ def twist_rows(kinematics: Kinematics) -> Array:
     return kinematics.twist_jacobian.reshape(bodies * components, dofs)
 
 
-def motion(kinematics: Kinematics, v: Array) -> Array:
+def boundary_velocity(kinematics: Kinematics, v: Array) -> Array:
     """(k,) twist of every body, then velocity of every vertex of flesh."""
     bones = twists(kinematics, v).ravel()
     if kinematics.vertices.size == 0:
@@ -77,13 +77,13 @@ def rigid_response(kinematics: Kinematics, driven: PrescribedSystem) -> Array:
     return np.asarray(twist @ driven.inverse @ twist.T)
 
 
-def response(kinematics: Kinematics, driven: Driven) -> Response:
+def mobility_of(kinematics: Kinematics, driven: Driven) -> Mobility:
     """The motion that a unit impulsive push gives: M = T A^-1 T^T, eq. (9) with v eliminated."""
     if isinstance(driven, PrescribedSystem):
-        return dense_response(rigid_response(kinematics, driven))
+        return dense_mobility(rigid_response(kinematics, driven))
     twist = twist_rows(kinematics)
     free = csr_array(jacobian(kinematics)[:, driven.free])
-    return factored_response(free, *driven.factors(), free @ driven.soft(twist))
+    return factored_mobility(free, *driven.factors(), free @ driven.soft(twist))
 
 
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:

@@ -26,23 +26,23 @@ from flowborne.coupling.friction import diffuse
 from flowborne.coupling.mouths import Jet, add_rates
 from flowborne.coupling.operators import (
     add_flux,
+    boundary_velocity,
     generalised,
-    motion,
+    mobility_of,
     pressure_push,
-    response,
 )
 from flowborne.coupling.report import Outcome
-from flowborne.coupling.stopwatch import Stopwatch
+from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.projection import accelerated, face_weights, push
+from flowborne.fluid.projection import accelerated, face_weights, subtract_pressure_gradient
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.faces import largest_open
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.prescribed import Driven, within_limits
+from flowborne.solvers.mobility import Mobility
 from flowborne.solvers.pressure import NO_REACTION, LowRankTerm, PressureSystem
-from flowborne.solvers.response import Response
 
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
@@ -150,7 +150,7 @@ def solve_together(
     cut: Geometry,
     jets: tuple[Jet, ...],
     torque_limit: Array,
-    watch: Stopwatch,
+    timer: Timer,
 ) -> Solved:
     """Viscosity, pressure and bodies at the end of the step (section 6, item 6).
 
@@ -164,7 +164,7 @@ def solve_together(
     fluid, state = world.flow()
     moved_by = accelerated(cut.open, mass, fluid.grid)
     weights = face_weights(cut.open, moved_by, fluid.grid, fluid.boundaries)
-    mobility = response(pose, driven)
+    mobility = mobility_of(pose, driven)
     yielding = give_way(cut, mobility, fluid.grid)
     matrix = PressureSystem(weights, fluid.boundaries.periodic(), reaction=yielding)
     pressure = dt * state.pressure
@@ -173,15 +173,15 @@ def solve_together(
         tolerance = max(tolerance, FIRST_TOLERANCE)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    watch.lap("projection")
+    timer.lap("projection")
     smooth, viscous, smoothed = diffuse(world, velocity, mass, cut, jets, pose, driven, dt)
-    watch.lap("viscosity")
+    timer.lap("viscosity")
     term = LowRankTerm(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     floor = rounding_floor(smooth, fluid.grid)
     iterations, tried = 0, driven
     for _ in range(PASSES):
-        start = motion(pose, driven.after(generalised(pose, viscous)))
+        start = boundary_velocity(pose, driven.after(generalised(pose, viscous)))
         rhs = -net
         add_flux(rhs, cut, -start)
         solution = matrix.solve(rhs, pressure, term, tolerance, floor)
@@ -191,23 +191,25 @@ def solve_together(
         v = driven.after(impulse)
         actuator = driven.actuator(v, impulse)
         changed = correct(driven, v, actuator, torque_limit)
-        watch.lap("projection")
+        timer.lap("projection")
         if changed is None and tolerance <= fluid.tolerance:
             break
         if changed is not None:
             if not changed.answers_as(driven):
-                term = replace(term, response=response(pose, changed))
+                term = replace(term, mobility=mobility_of(pose, changed))
                 smooth, viscous, smoothed = diffuse(
                     world, velocity, mass, cut, jets, pose, changed, dt
                 )
-                watch.lap("viscosity")
+                timer.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
     after = faces_of([u.copy() for u in smooth])
-    push(after, moved_by, solution.pressure, fluid.grid, fluid.boundaries, 1.0)
-    moved = start + term.response.times(on_solids)
+    subtract_pressure_gradient(
+        after, moved_by, solution.pressure, fluid.grid, fluid.boundaries, 1.0
+    )
+    moved = start + term.mobility.times(on_solids)
     projected = Projected(
         after,
         solution.pressure / dt,
@@ -236,7 +238,7 @@ def correct_under(
     return correct(driven, v, driven.actuator(v, impulse), torque_limit)
 
 
-def give_way(cut: Geometry, mobility: Response, grid: Grid) -> Array:
+def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:
     """(nx, ny, nz) volume that flesh makes room for in each cell under unit pressure there.
 
     The diagonal of J A^-1 J^T, estimated from what it does to cells of random signs (Bekas,

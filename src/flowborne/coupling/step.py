@@ -19,20 +19,20 @@ from flowborne.coupling.flow import (
 )
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.half_kick import Kick, half_kick
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.mouths import Jet, jet_wrench, jets_of
 from flowborne.coupling.operators import (
+    boundary_velocity,
     buoyancy_wrench,
     generalised,
     leak_proof,
-    motion,
     on_bodies,
     side_push,
 )
 from flowborne.coupling.report import Momentum, Outcome, StepReport
 from flowborne.coupling.solve import Solved, solve_bodies, solve_together
-from flowborne.coupling.stopwatch import Stopwatch
 from flowborne.coupling.stream import winds_on
+from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.grid import Array, Faces
 from flowborne.solids.dynamics import Kinematics, assemble, kinematics
@@ -45,99 +45,101 @@ from flowborne.solids.prescribed import Driven, prescribe
 from flowborne.solids.state import SolidState
 
 
-def step(world: World, dt: float, drive: Drive | None = None) -> StepReport:
+def step(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
     """Advance `world` by dt, in place (section 6).
 
-    drive    what the controlled dofs do; the setup's prescribed motions are added to it
+    command    what the controlled dofs do; the setup's prescribed motions are added to it
     returns  the report; its outcome is not DONE when the numbers cannot be trusted
     """
-    watch = Stopwatch()
-    orders = command(world, dt, drive)
+    timer = Timer()
+    command = joint_command(world, dt, command)
     if world.setup.fluid is None:
-        return step_bodies(world, dt, orders, watch)
-    return step_together(world, dt, orders, watch)
+        return step_bodies(world, dt, command, timer)
+    return step_together(world, dt, command, timer)
 
 
-def step_bodies(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
+def step_bodies(world: World, dt: float, command: JointCommand, timer: Timer) -> StepReport:
     """A step without a fluid: simple winds, gravity, joints and contact."""
-    model, before = world.setup.solid, move_positions(world, orders, dt)
+    model, before = world.setup.solid, move_positions(world, command, dt)
     wind, force = np.zeros((model.nbody, 6)), np.zeros(model.nv)
     if world.setup.winds:
         pose = kinematics(model, world.solid.q)
         wind = winds_on(world, pose)
         force = generalised(pose, np.append(wind, np.zeros(pose.vertices.size)))
-    driven = equations_under(world, before, force, orders, dt)
-    solved = solve_bodies(driven, orders.torque_limit, wind.size)
+    driven = equations_under(world, before, force, command, dt)
+    solved = solve_bodies(driven, command.torque_limit, wind.size)
     world.solid.v[:] = solved.v
     advance_clock(world, dt)
-    watch.lap("solids")
+    timer.lap("solids")
     none = np.zeros(wind.shape)
-    return report(world, None, solved, none.ravel(), wind, none, Momentum(), dt, watch)
+    return report(world, None, solved, none.ravel(), wind, none, Momentum(), dt, timer)
 
 
-def step_together(world: World, dt: float, orders: Drive, watch: Stopwatch) -> StepReport:
+def step_together(world: World, dt: float, command: JointCommand, timer: Timer) -> StepReport:
     """A step of bodies and fluid (section 6)."""
     fluid, state = world.flow()
     cut_before = cut_by_bodies(world)
     blown = jets_at(world, cut_before, world.time)
-    watch.lap("geometry")
+    timer.lap("geometry")
     start = volumes_of(world, cut_before)
     kick = half_kick(world, cut_before, start, dt)
-    watch.lap("advection")
+    timer.lap("advection")
     # the bodies move with the velocity they have, driven joints as they are told
-    before, pose = move_bodies(world, orders, dt)
-    watch.lap("solids")
+    before, pose = move_bodies(world, command, dt)
+    timer.lap("solids")
     cut = cut_by_bodies(world, pose)
-    watch.lap("geometry")
+    timer.lap("geometry")
     # velocity and scalars are carried by the leak-proof field
     carried = carry_fluid(world, kick.velocity, before.q, cut_before, start, cut, blown, dt)
     blown, mass = carried.jets, face_masses(carried.volumes, fluid.density)
     velocity = forced(carried.velocity, cut.open, mass, fluid, world.time + dt, dt)
-    watch.lap("advection")
+    timer.lap("advection")
     # forces on the bodies, and their own equations of motion
     wind = winds_on(world, pose)
     buoyancy = buoyant_push(world.setup.solid, pose, fluid.density)
     reaction = jet_wrench(blown, fluid.density, len(wind))
     push = buoyancy + kick.impulse / dt
     push[: wind.size] += (wind + reaction).ravel()
-    driven = equations(world, before, pose, push, orders, dt)
-    watch.lap("solids")
+    driven = equations(world, before, pose, push, command, dt)
+    timer.lap("solids")
     # viscosity, pressure, bodies, joints and contact in one solve (item 6)
     jets = jets_at(world, cut, world.time + dt, pose)
     solved = solve_together(
-        world, velocity, mass, driven, pose, cut, jets, orders.torque_limit, watch
+        world, velocity, mass, driven, pose, cut, jets, command.torque_limit, timer
     )
-    watch.lap("projection")
+    timer.lap("projection")
     # the new state, with the leak-proof field of the next step (item 4)
     assert solved.projected is not None
     world.solid.v[:] = solved.v
-    leak_free = leak_proof(solved.projected.velocity, cut, motion(pose, solved.v), fluid.grid)
+    leak_free = leak_proof(
+        solved.projected.velocity, cut, boundary_velocity(pose, solved.v), fluid.grid
+    )
     settle_state(world, carried, kick.velocity, solved.projected.velocity, leak_free, dt)
     state.earlier[:] = state.pressure + kick.pressure
     state.pressure[:] = kick.pressure + solved.projected.pressure
     state.scalars = carried.dyed.scalars
     advance_clock(world, dt)
     balance = momentum_balance(world, mass, kick, carried, solved)
-    watch.lap("advection")
+    timer.lap("advection")
     done = report(
-        world, pose, with_kick(solved, kick), buoyancy, wind, reaction, balance, dt, watch
+        world, pose, with_kick(solved, kick), buoyancy, wind, reaction, balance, dt, timer
     )
     done.expelled, done.dye_error = dt * sum(jet.rate for jet in blown), carried.dyed.error
     return done
 
 
-def command(world: World, dt: float, drive: Drive | None) -> Drive:
+def joint_command(world: World, dt: float, command: JointCommand | None) -> JointCommand:
     """The drive with prescribed motions and a slab's locked dofs added."""
     model = world.setup.solid
-    orders = Drive.none(model.nv) if drive is None else drive.copy()
+    command = JointCommand.none(model.nv) if command is None else command.copy()
     for told in world.setup.motions:
         later = world.time + dt
         goal = world.solid.q.copy()
-        goal[model.places_of(told.dofs)] = told.position(later)
-        move = model.difference(world.solid.q, goal)[told.dofs] / dt
-        orders.set(told.dofs, move, told.velocity(later))
-    orders.set(model.locked, 0.0, 0.0)
-    return orders
+        goal[model.indices_of(told.dofs)] = told.position(later)
+        rate = model.difference(world.solid.q, goal)[told.dofs] / dt
+        command.set(told.dofs, rate, told.velocity(later))
+    command.set(model.locked, 0.0, 0.0)
+    return command
 
 
 def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
@@ -184,23 +186,23 @@ def jets_at(
     return jets_of(setup.mouths, cut, pose, world.solid.v, world.flow()[0].grid, time)
 
 
-def move_bodies(world: World, orders: Drive, dt: float) -> tuple[SolidState, Kinematics]:
+def move_bodies(world: World, command: JointCommand, dt: float) -> tuple[SolidState, Kinematics]:
     """Move the bodies to the end of the step, in place; gives the state before and the new pose."""
-    before = move_positions(world, orders, dt)
+    before = move_positions(world, command, dt)
     return before, kinematics(world.setup.solid, world.solid.q)
 
 
-def move_positions(world: World, orders: Drive, dt: float) -> SolidState:
+def move_positions(world: World, command: JointCommand, dt: float) -> SolidState:
     """Move the positions to the end of the step, in place; gives the state before.
 
     A drive with a torque limit may give way, so its dof moves with the velocity it has. Where a
     drive moves bones otherwise than they went, the flesh that they carry moves with them.
     """
     before = world.solid.copy()
-    told = orders.prescribed & ~np.isfinite(orders.torque_limit)
-    otherwise = np.where(told, orders.move - before.v, 0.0)
+    told = command.prescribed & ~np.isfinite(command.torque_limit)
+    otherwise = np.where(told, command.rate - before.v, 0.0)
     velocity = before.v + follow(world.setup.solid, before.q, otherwise)
-    velocity[told] = orders.move[told]
+    velocity[told] = command.rate[told]
     world.solid.q[:] = world.setup.solid.integrate(before.q, velocity, dt)
     return before
 
@@ -210,24 +212,24 @@ def equations(
     before: SolidState,
     pose: Kinematics,
     push: Array,
-    orders: Drive,
+    command: JointCommand,
     dt: float,
 ) -> Driven:
     """The bodies' own equations of motion under a push (k,), with the drives in force."""
-    return equations_under(world, before, generalised(pose, push), orders, dt)
+    return equations_under(world, before, generalised(pose, push), command, dt)
 
 
 def equations_under(
-    world: World, before: SolidState, force: Array, orders: Drive, dt: float
+    world: World, before: SolidState, force: Array, command: JointCommand, dt: float
 ) -> Driven:
     """As `equations`, under a generalised force (nv,)."""
     setup = world.setup
     if setup.solid.flesh is None:
-        guess = np.where(orders.prescribed, orders.hold, world.solid.v)
+        guess = np.where(command.prescribed, command.final_velocity, world.solid.v)
         system = assemble(setup.solid, world.solid, force, dt, before, guess)
-        return prescribe(system, orders.prescribed, orders.hold)
+        return prescribe(system, command.prescribed, command.final_velocity)
     flesh = assemble_flesh(setup.solid, world.solid, force, dt, setup.centred_flesh, before)
-    return prescribe_flesh(flesh, orders.prescribed, orders.hold)
+    return prescribe_flesh(flesh, command.prescribed, command.final_velocity)
 
 
 def buoyant_push(model: SolidModel, pose: Kinematics, density: float) -> Array:
@@ -305,7 +307,7 @@ def report(
     reaction: Array,
     balance: Momentum,
     dt: float,
-    watch: Stopwatch,
+    timer: Timer,
 ) -> StepReport:
     """What the step did; its pose is needed where there is a fluid."""
     projected, flesh = solved.projected, world.setup.solid.flesh
@@ -328,7 +330,7 @@ def report(
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
         unsettled=solved.unsettled,
-        seconds=watch.seconds,
+        seconds=timer.seconds,
     )
     if projected is not None:
         assert pose is not None

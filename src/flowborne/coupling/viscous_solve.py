@@ -291,12 +291,12 @@ class Answer:
     their twist is  J = J0 - D R z  on bodies that change theirs by R z. J is taken from z where the
     bodies can move, which is free of the cancellation in J0 - D R z.
 
-    response  (k, k) M, positive semidefinite, 1/kg
+    mobility  (k, k) M, positive semidefinite, 1/kg
     drag      (k, k) D, positive semidefinite, kg
     """
 
-    def __init__(self, response: Array, drag: Array) -> None:
-        share, axes = np.linalg.eigh(response)
+    def __init__(self, mobility: Array, drag: Array) -> None:
+        share, axes = np.linalg.eigh(mobility)
         moving = share > ROUNDING * len(share) * np.abs(share).max()
         self.root = axes[:, moving] * np.sqrt(share[moving])
         self.lift = axes[:, moving] / np.sqrt(share[moving])

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
@@ -64,7 +64,7 @@ class Setup:
 
     solid: SolidModel
     fluid: Fluid | None = None
-    motions: tuple[Motion, ...] = ()
+    motions: tuple[Trajectory, ...] = ()
     winds: tuple[Wind, ...] = ()
     mouths: tuple[Mouth, ...] = ()
     centred_flesh: bool = False

@@ -47,7 +47,7 @@ def wrap(x: float, count: int, periodic: bool) -> float:
 
 
 @inlined
-def carrier_at(
+def advecting_velocity_at(
     cx: Array, cy: Array, cz: Array, x: float, y: float, z: float, flat: bool
 ) -> tuple[float, float, float]:
     """Carrying velocity at a position, cells per step."""
@@ -70,11 +70,11 @@ def departure(
 ) -> tuple[float, float, float]:
     """Where the particle that arrives at (x, y, z) came from."""
     flat = counts[2] == 1
-    u0, v0, w0 = carrier_at(cx, cy, cz, x, y, z, flat)
+    u0, v0, w0 = advecting_velocity_at(cx, cy, cz, x, y, z, flat)
     xa = wrap(x - u0, counts[0], periodic[0])
     ya = wrap(y - v0, counts[1], periodic[1])
     za = z if flat else wrap(z - w0, counts[2], periodic[2])
-    u, v, w = carrier_at(cx, cy, cz, xa, ya, za, flat)
+    u, v, w = advecting_velocity_at(cx, cy, cz, xa, ya, za, flat)
     xd = wrap(x - u, counts[0], periodic[0])
     yd = wrap(y - v, counts[1], periodic[1])
     zd = z if flat else wrap(z - w, counts[2], periodic[2])

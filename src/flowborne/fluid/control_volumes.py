@@ -6,8 +6,8 @@ The control volume of a face reaches from the middle of one of its cells to that
 
 so it obeys the same law as the cells, with the means of their fluxes through its sides (Verstappen
 and Veldman 2003). A face that is wholly closed is pushed by no pressure: what is left of its
-control volume, a guest, moves with another, its host. So does the part of a control volume that is
-too large for the opening of its face.
+control volume, a small one, is merged with another, its target. So is the part of a control volume
+that is too large for the opening of its face.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import (
-    find_guests,
-    find_hosts,
     find_parts,
-    follow_hosts,
-    merge_guests,
+    find_small,
+    find_targets,
+    follow_targets,
+    merge_small,
     share_velocity,
 )
 from flowborne.kernels.faces import face_means
@@ -34,8 +34,8 @@ WHOLE = 0.99
 """Control volumes of this part of the largest one count as uncut."""
 
 NARROW = 3.0
-"""Control volume over open part x cell beyond which the rest of it is a guest: pressure on a narrow
-opening would have to move all of it."""
+"""Control volume over open part x cell beyond which the rest of it is a small one:
+pressure on a narrow opening would have to move all of it."""
 
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
@@ -47,29 +47,29 @@ class ControlVolumes:
 
     cells   (nx, ny, nz) open volume of each cell, m^3
     volume  Faces, V_f, m^3; along a periodic axis the last is the first one
-    merged  Faces, the same with that of the guests at their hosts, m^3
-    guests  (n,) of each axis, flat indices
-    hosts   (n,) of each axis; a guest without a host is its own
-    shares  (n,) of each axis, part of a guest that goes with its host
+    merged  Faces, the same with that of the small ones at their targets, m^3
+    small   (n,) of each axis, flat indices
+    targets (n,) of each axis; a small one without a target is its own
+    shares  (n,) of each axis, part of a small one that goes with its target
     """
 
     cells: Array
     volume: Faces
     merged: Faces
-    guests: tuple[Integers, Integers, Integers]
-    hosts: tuple[Integers, Integers, Integers]
+    small: tuple[Integers, Integers, Integers]
+    targets: tuple[Integers, Integers, Integers]
     shares: Faces
 
     def follow(self, velocity: Faces, grid: Grid) -> None:
-        """Give guests that have nothing of their own the velocity of their hosts, in place."""
+        """Give small ones with nothing of their own the velocity of their targets, in place."""
         for axis in grid.axes:
             whole = self.shares[axis] == 1.0
-            follow_hosts(velocity[axis], self.guests[axis][whole], self.hosts[axis][whole])
+            follow_targets(velocity[axis], self.small[axis][whole], self.targets[axis][whole])
 
     def mean_velocity(self, velocity: Array, axis: int) -> Array:
-        """That of each control volume across `axis`, guests with what goes with their hosts."""
+        """That of each control volume across `axis`, small ones with their targets."""
         mean = velocity.copy()
-        share_velocity(mean, self.guests[axis], self.hosts[axis], self.shares[axis])
+        share_velocity(mean, self.small[axis], self.targets[axis], self.shares[axis])
         return mean
 
 
@@ -92,43 +92,43 @@ def prescribed_ends(component: int, boundaries: Boundaries) -> Marks:
     return np.array([kind not in ("open", "periodic") for kind in kinds], np.uint8)
 
 
-def settled(guests: Integers, hosts: Integers, shares: Array) -> tuple[Integers, Integers, Array]:
-    """The guests but for those in part that found no host."""
-    kept = (guests != hosts) | (shares == 1.0)
-    return guests[kept], hosts[kept], shares[kept]
+def settled(small: Integers, targets: Integers, shares: Array) -> tuple[Integers, Integers, Array]:
+    """The small ones but for those in part that found no target."""
+    kept = (small != targets) | (shares == 1.0)
+    return small[kept], targets[kept], shares[kept]
 
 
 def control_volumes(
     cells: Array, opened: Faces, grid: Grid, boundaries: Boundaries
 ) -> ControlVolumes:
     """Control volumes of cells with these open volumes (m^3) and open parts of faces."""
-    volumes, merged, guests, hosts, shares = [], [], [], [], []
+    volumes, merged, small, targets, shares = [], [], [], [], []
     periodic = boundaries.periodic()
     for axis in range(3):
         volume = means(cells, axis, periodic[axis])
         volumes.append(volume)
         total, none = volume.copy(), np.zeros(0, np.int64)
-        own, host, part = none, none, np.zeros(0)
+        own, target, part = none, none, np.zeros(0)
         if axis in grid.axes:
             wraps, driven = wrapping(axis, grid, boundaries), np.empty(volume.shape, np.uint8)
             narrow, nothing = NARROW * grid.cell_volume, NOTHING * grid.cell_volume
             told, ring = prescribed_ends(axis, boundaries), periodic[axis]
-            own, part = find_guests(driven, opened[axis], volume, axis, told, ring, narrow, nothing)
-            host = find_hosts(own, driven, volume, cells, axis, wraps)
-            own, host, part = settled(own, host, part)
-            merge_guests(total, own, host, part)
+            own, part = find_small(driven, opened[axis], volume, axis, told, ring, narrow, nothing)
+            target = find_targets(own, driven, volume, cells, axis, wraps)
+            own, target, part = settled(own, target, part)
+            merge_small(total, own, target, part)
             if periodic[axis]:
                 total[edge(axis, -1)] = total[edge(axis, 0)]
         merged.append(total)
-        guests.append(own)
-        hosts.append(host)
+        small.append(own)
+        targets.append(target)
         shares.append(part)
     return ControlVolumes(
         cells,
         (volumes[0], volumes[1], volumes[2]),
         (merged[0], merged[1], merged[2]),
-        (guests[0], guests[1], guests[2]),
-        (hosts[0], hosts[1], hosts[2]),
+        (small[0], small[1], small[2]),
+        (targets[0], targets[1], targets[2]),
         (shares[0], shares[1], shares[2]),
     )
 

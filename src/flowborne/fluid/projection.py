@@ -19,7 +19,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.faces import accelerate, weigh
-from flowborne.kernels.pressure_gradient import push_faces
+from flowborne.kernels.pressure_gradient import subtract_gradient
 from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 
@@ -53,7 +53,7 @@ def face_weights(opened: Faces, rate: Faces, grid: Grid, boundaries: Boundaries)
     return weights
 
 
-def push(
+def subtract_pressure_gradient(
     velocity: Faces,
     rate: Faces,
     pressure: Array,
@@ -61,7 +61,7 @@ def push(
     boundaries: Boundaries,
     scale: float,
 ) -> None:
-    """Subtract scale rate (p_upper - p_lower) on every face, in place; see `push_faces`."""
+    """Subtract scale rate (p_upper - p_lower) on every face, in place; see `subtract_gradient`."""
     codes = side_codes(boundaries)
     for axis in grid.axes:
-        push_faces(velocity[axis], rate[axis], pressure, axis, scale, codes)
+        subtract_gradient(velocity[axis], rate[axis], pressure, axis, scale, codes)

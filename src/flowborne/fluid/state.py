@@ -13,19 +13,20 @@ from flowborne.fluid.grid import Array, Faces, Grid
 class FluidState:
     """Everything that the fluid carries from one step to the next.
 
-    velocity      u on the faces, m/s; zero where a face is wholly closed
-    acceleration  what the last step gave beside what the flow carried, away from bodies, m/s^2
-    carrier       u half a step on, as the last two velocities tell, m/s
-    pressure      (nx, ny, nz) dynamic pressure, Pa (hydrostatic part left out)
-    earlier       (nx, ny, nz) that of the step before, Pa
-    scalars       name -> (nx, ny, nz), carried for pictures
-    cells         (nx, ny, nz) open volume of each cell, m^3; empty before the first step
-    pose          (nq,) positions of the bodies that left these volumes
+    velocity            u on the faces, m/s; zero where a face is wholly closed
+    acceleration        given by the last step beside what the flow carried, away from bodies,
+                        m/s^2
+    advecting_velocity  u half a step on, as the last two velocities tell, m/s
+    pressure            (nx, ny, nz) dynamic pressure, Pa (hydrostatic part left out)
+    earlier             (nx, ny, nz) that of the step before, Pa
+    scalars             name -> (nx, ny, nz), carried for pictures
+    cells               (nx, ny, nz) open volume of each cell, m^3; empty before the first step
+    pose                (nq,) positions of the bodies that left these volumes
     """
 
     velocity: Faces
     acceleration: Faces
-    carrier: Faces
+    advecting_velocity: Faces
     pressure: Array
     earlier: Array
     scalars: dict[str, Array] = field(default_factory=dict)
@@ -55,7 +56,7 @@ class FluidState:
             "cells": self.cells,
             "pose": self.pose,
         }
-        for name in ("velocity", "acceleration", "carrier"):
+        for name in ("velocity", "acceleration", "advecting_velocity"):
             for axis, values in zip("xyz", getattr(self, name), strict=True):
                 named[f"{name}_{axis}"] = values
         named.update({f"scalar_{name}": values for name, values in self.scalars.items()})
@@ -69,7 +70,7 @@ class FluidState:
         return cls(
             faces("velocity"),
             faces("acceleration"),
-            faces("carrier"),
+            faces("advecting_velocity"),
             arrays["pressure"],
             arrays["earlier"],
             {

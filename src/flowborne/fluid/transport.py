@@ -34,8 +34,8 @@ from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import (
     fill_empty,
-    follow_hosts,
-    join_guests,
+    follow_targets,
+    join_small,
     level,
     mark_cut,
     share_velocity,
@@ -221,11 +221,11 @@ class Flow:
         self.ends = transport.before.volume[component], transport.after.volume[component]
         self.listed = parts(*self.ends, component, grid, sides)
         self.marks = marks_of(self.listed, component, grid, sides)
-        self.guests = transport.after.guests[component]
-        self.hosts = transport.after.hosts[component]
+        self.small = transport.after.small[component]
+        self.targets = transport.after.targets[component]
         self.shares = transport.after.shares[component]
         alone = self.shares == 1.0
-        self.whole, self.their_hosts = self.guests[alone], self.hosts[alone]
+        self.whole, self.whole_targets = self.small[alone], self.targets[alone]
         self.wraps = wrapping(component, grid, sides)
         shape = grid.face_shape(component)
         self.shape = np.array(shape)
@@ -245,8 +245,8 @@ class Flow:
         self.join(u)
 
     def mean(self, u: Array) -> None:
-        """Give guests what goes with their hosts, in place."""
-        share_velocity(u, self.guests, self.hosts, self.shares)
+        """Give small ones what goes with their targets, in place."""
+        share_velocity(u, self.small, self.targets, self.shares)
         self.join(u)
 
     def join(self, u: Array) -> None:
@@ -307,14 +307,14 @@ class Flow:
     def settle(self, later: Array) -> None:
         """Share amounts between small control volumes and those beside them, in place."""
         merged, cell = self.high, self.grid.cell_volume
-        if self.guests.size:
+        if self.small.size:
             merged = self.merged
             np.copyto(merged, self.high)
-            join_guests(later, merged, self.guests, self.hosts, self.shares, self.nothing)
+            join_small(later, merged, self.small, self.targets, self.shares, self.nothing)
         if self.listed.size:
             limits = TINY * cell, SMALL * cell, self.held, self.nothing
             level(later, merged, self.listed, *limits, self.shape, self.wraps)
-            follow_hosts(later, self.whole, self.their_hosts)
+            follow_targets(later, self.whole, self.whole_targets)
             fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)
         self.join(later)
 

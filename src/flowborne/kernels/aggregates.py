@@ -4,7 +4,7 @@ Usually the one that covers it. But a thin plate may cut the fine cells under on
 parts that do not touch, and a coarse cell that stood for both sides would let pressure leak through
 the plate on every coarser level. So the largest part keeps the coarse cell, and a fine cell of the
 others goes with its neighbour beyond the coarse cell's side, if that one kept its own; it is then
-called a guest there. Fine cells that find no such neighbour are left to the smoother.
+called a orphan there. Fine cells that find no such neighbour are left to the smoother.
 """
 
 from __future__ import annotations
@@ -141,26 +141,26 @@ def mark_own_reference(w: Triple, inverse: Real, factor: Integers) -> Marks:
 
 
 @kernel
-def mark_leaning(marks: Marks, w: Triple, inverse: Real, lean: Triple) -> None:
+def mark_interpolated(marks: Marks, w: Triple, inverse: Real, interpolation: Triple) -> None:
     """Add 1, 2, 4 where the cell towards the next coarse cell along an axis touches and is OWN.
 
     Beyond an open side pressure is 0, and that is interpolated from as well.
     """
     w0, w1, w2 = w
-    lean0, lean1, lean2 = lean
+    towards0, towards1, towards2 = interpolation
     d = 1 if marks.shape[0] > 1 else 0
     p2 = marks.shape[2]
     for plane in prange(marks.shape[0] - 2 * d):
         i = plane + d
-        s0 = 1 if lean0[plane + 1] > 0.0 else 0
+        s0 = 1 if towards0[plane + 1] > 0.0 else 0
         next0 = i + d * (2 * s0 - 1)
         row = np.empty(p2, marks.dtype)
         for j in range(1, marks.shape[1] - 1):
-            s1 = 1 if lean1[j] > 0.0 else 0
+            s1 = 1 if towards1[j] > 0.0 else 0
             next1 = j + 2 * s1 - 1
             for k in range(1, p2 - 1):
                 share = inverse[i, j, k]
-                up = lean2[k] > 0.0
+                up = towards2[k] > 0.0
                 weight = w2[i, j, k + 1] if up else w2[i, j, k]
                 beyond = marks[i, j, k + 1] if up else marks[i, j, k - 1]
                 mark = 4 if (weight * share > WEAK) & (beyond >= OWN) else 0
@@ -173,12 +173,14 @@ def mark_leaning(marks: Marks, w: Triple, inverse: Real, lean: Triple) -> None:
                 marks[i, j, k] = row[k]
 
 
-def mark_leaning_reference(marks: Marks, w: Triple, inverse: Real, lean: Triple) -> Marks:
-    """`mark_leaning` in NumPy: the marks after it."""
+def mark_interpolated_reference(
+    marks: Marks, w: Triple, inverse: Real, interpolation: Triple
+) -> Marks:
+    """`mark_interpolated` in NumPy: the marks after it."""
     inside, out = cells_of(marks), marks.copy()
     for axis in range(3):
         if marks.shape[axis] > 1:
-            up = np.expand_dims(lean[axis] > 0.0, [d for d in range(3) if d != axis])
+            up = np.expand_dims(interpolation[axis] > 0.0, [d for d in range(3) if d != axis])
             face = np.where(up, np.roll(w[axis], -1, axis), w[axis])
             beyond = np.where(up, np.roll(marks, -1, axis), np.roll(marks, 1, axis))
             touches = (face * inverse > WEAK) & (beyond >= OWN) & (marks >= OWN)

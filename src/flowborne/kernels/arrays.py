@@ -20,13 +20,13 @@ Periodic = NDArray[np.uint8]
 """(3,) 1 for axes that are periodic."""
 
 Marks = NDArray[np.uint8]
-Places = NDArray[np.int32]
+Indices = NDArray[np.int32]
 Labels = NDArray[np.int32]
 
-Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Real, Marks, Places, Places]
+Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Real, Marks, Indices, Indices]
 """Table of levels; which axes are periodic; packed over the levels: weights across each axis, what
-is added to the diagonal, the inverse of that, interpolation coefficients (see `centres.leaning`),
-marks, guests and their hosts (see `aggregates`)."""
+is added to the diagonal, the inverse of that, interpolation coefficients (see
+`centres.interpolation_weights`), marks, orphans and their aggregates (see `aggregates`)."""
 
 Finest = tuple[Array, Array, Array, Array]
 """Padded weights across each axis and diagonal of the finest level."""
@@ -37,9 +37,11 @@ Vectors = tuple[Array, Array, Array, Array, Array]
 Rows = tuple[Integers, Integers, Integers, Array]
 """Sparse rows J: flat cell of each, where each begins, columns and values of the entries."""
 
-ResponseArrays = tuple[Array, Places, Places, Array, Places, Places, Array, Array, Integers, Array]
+MobilityArrays = tuple[
+    Array, Indices, Indices, Array, Indices, Indices, Array, Array, Integers, Array
+]
 """Dense A^-1; rows of T (start, column, value); columns of L below its diagonal (start, row,
-value); D; the order P; Y (see `solvers.response`)."""
+value); D; the order P; Y (see `solvers.mobility`)."""
 
 Point = tuple[float, float, float]
 """In kernels; a row of an array serves as well."""

@@ -50,14 +50,16 @@ def distance_ratio_reference(
 
 
 @kernel
-def leaning(lean: Real, n: int, factor: int, size: int, cells: int, periodic: bool) -> None:
+def interpolation_weights(
+    interpolation: Real, n: int, factor: int, size: int, cells: int, periodic: bool
+) -> None:
     """How far each fine cell's centre lies from its coarse cell's towards the next coarse cell.
 
-    lean      (n + 2,) with ghosts: fraction of the distance between the coarse centres (at an open
-              side: of that to the side), negative towards the lower neighbour
+    interpolation  (n + 2,) with ghosts: fraction of the distance between the coarse centres (at
+                   an open side: of that to the side), negative towards the lower neighbour
     size      finest cells in a fine cell of this axis, `cells` finest cells in all
     """
-    lean[:] = 0.0
+    interpolation[:] = 0.0
     if factor == 1:
         return
     count = (n + 1) // 2
@@ -75,14 +77,16 @@ def leaning(lean: Real, n: int, factor: int, size: int, cells: int, periodic: bo
         if 0 <= other < count:
             width = float(min(2 * size, cells - other * 2 * size))
         reach = a + b + width
-        lean[i + 1] = -b / reach if i == first else a / reach
+        interpolation[i + 1] = -b / reach if i == first else a / reach
     if periodic:
-        lean[0], lean[n + 1] = lean[n], lean[1]
+        interpolation[0], interpolation[n + 1] = interpolation[n], interpolation[1]
 
 
-def leaning_reference(n: int, factor: int, size: int, cells: int, periodic: bool) -> Array:
-    """`leaning` in NumPy: (n + 2,)."""
-    lean = np.zeros(n + 2)
+def interpolation_weights_reference(
+    n: int, factor: int, size: int, cells: int, periodic: bool
+) -> Array:
+    """`interpolation_weights` in NumPy: (n + 2,)."""
+    interpolation = np.zeros(n + 2)
     if factor == 2:
         fine, coarse = cell_edges(size, cells), cell_edges(2 * size, cells)
         centre, over = 0.5 * (fine[1:] + fine[:-1]), 0.5 * (coarse[1:] + coarse[:-1])
@@ -92,7 +96,7 @@ def leaning_reference(n: int, factor: int, size: int, cells: int, periodic: bool
         parent = np.arange(n) // 2
         offset = centre - over[parent]
         reach = 0.5 * (width[parent + 1] + width[parent + 1 + np.sign(offset).astype(int)])
-        lean[1:-1] = offset / reach
+        interpolation[1:-1] = offset / reach
     if periodic:
-        lean[0], lean[-1] = lean[-2], lean[1]
-    return lean
+        interpolation[0], interpolation[-1] = interpolation[-2], interpolation[1]
+    return interpolation

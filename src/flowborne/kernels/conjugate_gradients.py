@@ -12,8 +12,8 @@ from flowborne.kernels.arrays import (
     Finest,
     Hierarchy,
     Labels,
+    MobilityArrays,
     Real,
-    ResponseArrays,
     Rows,
     Triple,
     Vectors,
@@ -22,8 +22,8 @@ from flowborne.kernels.deflation import deflated, mode_strengths
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
 from flowborne.kernels.levels import at_level, wrap_ghosts
+from flowborne.kernels.mobility import respond
 from flowborne.kernels.regions import remove_null
-from flowborne.kernels.response import respond
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
 from flowborne.kernels.vectors import descend_on, dot, scaled, scaled_dot, true_residual, turn
@@ -36,11 +36,11 @@ STAGNATION = 0.5
 
 
 @kernel
-def apply_low_rank(out: Array, p: Array, rows: Rows, response: ResponseArrays) -> float:
+def apply_low_rank(out: Array, p: Array, rows: Rows, mobility: MobilityArrays) -> float:
     """out += J A^-1 J^T p; returns p . J A^-1 J^T p."""
-    size = max(response[0].shape[0], response[1].size - 1)
+    size = max(mobility[0].shape[0], mobility[1].size - 1)
     load = sum_rows(p, rows, size)
-    motion = respond(load, response)
+    motion = respond(load, mobility)
     energy = 0.0
     for a in range(size):
         energy += motion[a] * load[a]
@@ -55,7 +55,7 @@ def solve(
     finest: Finest,
     vectors: Vectors,
     rows: Rows,
-    response: ResponseArrays,
+    mobility: MobilityArrays,
     label: Labels,
     null: Array,
     fields: Real,
@@ -69,7 +69,7 @@ def solve(
     finest     padded weights and diagonal of K
     vectors    padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
                vectors, x as well at the end
-    rows       of J with padded flat cells; response: A^-1 (see `response`)
+    rows       of J with padded flat cells; response: A^-1 (see `mobility`)
     null       see `solvers.regions.null_basis`
     fields, amounts  of the modes in the preconditioner, at the scale of the hierarchy; see
                `solvers.deflation`
@@ -93,7 +93,7 @@ def solve(
         remove_null(x, label, null)
         wrap_ghosts(x, periodic)
         apply_laplacian(q, x, finest)
-        apply_low_rank(q, x, rows, response)
+        apply_low_rank(q, x, rows, mobility)
         true_residual(r, rhs, q)
         remove_null(r, label, null)
         square = dot(r, r)
@@ -123,7 +123,7 @@ def solve(
                     curvature = apply_laplacian(q, p, finest)
                 else:
                     curvature = turn_and_apply(q, p, q, 1.0, beta, finest)
-            curvature += apply_low_rank(q, p, rows, response)
+            curvature += apply_low_rank(q, p, rows, mobility)
             if not (curvature > 0.0 and product > 0.0):
                 break
             scale = 1.0 / np.sqrt(square)

@@ -53,31 +53,31 @@ def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
 
 
 @njit(nogil=True, cache=True)
-def find_hosts(
-    guests: Integers,
+def find_targets(
+    small: Integers,
     opened: Array,
     volumes: Array,
     cells: Array,
     component: int,
     wraps: Integers,
 ) -> Integers:
-    """Host of every guest, or the guest itself where there is none.
+    """Target of every small one, or the small one itself where there is none.
 
     A face that is wholly closed has a control volume where a cell beside it is open in part. It
     goes along with the opposite face of the larger of its two cells, else with that of the other,
-    else with the neighbour that has the largest volume, else with the host of a neighbour, which
+    else with the neighbour that has the largest volume, else with the target of a neighbour, which
     may have it from another.
 
-    guests   (n,) closed faces with a volume
+    small   (n,) closed faces with a volume
     opened   open part of each face
     volumes  of each control volume
     cells    volume of each cell
     """
-    hosts, shape, cell_shape = guests.copy(), np.array(opened.shape), np.array(cells.shape)
+    targets, shape, cell_shape = small.copy(), np.array(opened.shape), np.array(cells.shape)
     volume_flat = volumes.reshape(-1)
     open_flat, cell_flat = opened.reshape(-1), cells.reshape(-1)
-    for n in range(guests.size):
-        f = guests[n]
+    for n in range(small.size):
+        f = small[n]
         n1, n2 = shape[1], shape[2]
         i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
         best, most = -1, 0.0
@@ -105,23 +105,23 @@ def find_hosts(
                 if to >= 0 and open_flat[to] > 0.0 and volume_flat[to] > most:
                     best, most = to, volume_flat[to]
         if best >= 0:
-            hosts[n] = best
+            targets[n] = best
     led = True
     while led:
-        led, first = False, hosts.copy()
-        for n in range(guests.size):
-            if first[n] != guests[n]:
+        led, first = False, targets.copy()
+        for n in range(small.size):
+            if first[n] != small[n]:
                 continue
             best, most = -1, -1.0
             for way in range(6):
-                to = neighbour(shape, wraps, guests[n], way)
-                at = np.searchsorted(guests, to) if to >= 0 else guests.size
-                found = at < guests.size and guests[at] == to and first[at] != to
+                to = neighbour(shape, wraps, small[n], way)
+                at = np.searchsorted(small, to) if to >= 0 else small.size
+                found = at < small.size and small[at] == to and first[at] != to
                 if found and volume_flat[to] > most:
                     best, most = first[at], volume_flat[to]
             if best >= 0:
-                hosts[n], led = best, True
-    return hosts
+                targets[n], led = best, True
+    return targets
 
 
 def largest_reference(candidates: Integers, worth: Array, least: float) -> tuple[Integers, Array]:
@@ -130,20 +130,20 @@ def largest_reference(candidates: Integers, worth: Array, least: float) -> tuple
     return np.take_along_axis(candidates, best, 0)[0], worth.max(axis=0) > least
 
 
-def find_hosts_reference(
-    guests: Integers,
+def find_targets_reference(
+    small: Integers,
     opened: Array,
     volumes: Array,
     cells: Array,
     component: int,
     wraps: Integers,
 ) -> Integers:
-    """`find_hosts` in NumPy."""
-    beside = neighbours_reference(np.array(opened.shape), wraps)[:, guests]
+    """`find_targets` in NumPy."""
+    beside = neighbours_reference(np.array(opened.shape), wraps)[:, small]
     driven = (beside >= 0) & (opened.ravel()[beside] > 0.0)
     ends = [(int(axis == component),) * 2 for axis in range(3)]
     wide = np.pad(cells, ends, mode="wrap" if wraps[component] > 0 else "constant")
-    own = np.unravel_index(guests, opened.shape)
+    own = np.unravel_index(small, opened.shape)
     cell = np.stack(
         [
             wide[tuple(at + side * (axis == component) for axis, at in enumerate(own))]
@@ -154,60 +154,60 @@ def find_hosts_reference(
     volume = np.where(driven, volumes.ravel()[beside], 0.0)
     far, reached = largest_reference(beside[opposite], np.where(driven[opposite], cell, 0.0), 0.0)
     near, touched = largest_reference(beside, volume, 0.0)
-    first = np.where(reached, far, np.where(touched, near, guests))
+    first = np.where(reached, far, np.where(touched, near, small))
     while True:
-        host = np.arange(opened.size)
-        host[guests] = first
-        led = (beside >= 0) & np.isin(beside, guests[first != guests])
+        target = np.arange(opened.size)
+        target[small] = first
+        led = (beside >= 0) & np.isin(beside, small[first != small])
         after, joined = largest_reference(
-            host[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
+            target[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
         )
-        new = (first == guests) & joined
+        new = (first == small) & joined
         if not new.any():
             return first
         first = np.where(new, after, first)
 
 
 @njit(nogil=True, cache=True)
-def merge_guests(amount: Array, guests: Integers, hosts: Integers, shares: Array) -> None:
-    """Give these shares of the amounts of guests to their hosts, in place."""
+def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array) -> None:
+    """Give these shares of the amounts of small ones to their targets, in place."""
     flat = amount.reshape(-1)
-    for n in range(guests.size):
-        if hosts[n] != guests[n]:
-            given = shares[n] * flat[guests[n]]
-            flat[hosts[n]] += given
-            flat[guests[n]] -= given
+    for n in range(small.size):
+        if targets[n] != small[n]:
+            given = shares[n] * flat[small[n]]
+            flat[targets[n]] += given
+            flat[small[n]] -= given
 
 
-def merge_guests_reference(
-    amount: Array, guests: Integers, hosts: Integers, shares: Array
+def merge_small_reference(
+    amount: Array, small: Integers, targets: Integers, shares: Array
 ) -> Array:
-    """`merge_guests` in NumPy: the amounts after it."""
-    merged, moved = amount.ravel().copy(), hosts != guests
-    given = shares[moved] * merged[guests[moved]]
-    np.add.at(merged, hosts[moved], given)
-    merged[guests[moved]] -= given
+    """`merge_small` in NumPy: the amounts after it."""
+    merged, moved = amount.ravel().copy(), targets != small
+    given = shares[moved] * merged[small[moved]]
+    np.add.at(merged, targets[moved], given)
+    merged[small[moved]] -= given
     return merged.reshape(amount.shape)
 
 
 @njit(nogil=True, cache=True)
-def join_guests(
+def join_small(
     field: Array,
     volumes: Array,
-    guests: Integers,
-    hosts: Integers,
+    small: Integers,
+    targets: Integers,
     shares: Array,
     nothing: float,
 ) -> None:
-    """Give these shares of what guests hold, and of their volumes, to their hosts, in place.
+    """Give these shares of what small ones hold, and of their volumes, to their targets, in place.
 
     field    value of each control volume, what is left of the amount where there is no volume above
              `nothing`
     volumes  of each
     """
     flat, volume = field.reshape(-1), volumes.reshape(-1)
-    for n in range(guests.size):
-        g, h, share = guests[n], hosts[n], shares[n]
+    for n in range(small.size):
+        g, h, share = small[n], targets[n], shares[n]
         if g == h:
             continue
         amount = share * flat[g] * (volume[g] if volume[g] > nothing else 1.0)
@@ -217,33 +217,33 @@ def join_guests(
         flat[h] = amount / (volume[h] if volume[h] > nothing else 1.0)
 
 
-def join_guests_reference(
+def join_small_reference(
     field: Array,
     volumes: Array,
-    guests: Integers,
-    hosts: Integers,
+    small: Integers,
+    targets: Integers,
     shares: Array,
     nothing: float,
 ) -> tuple[Array, Array]:
-    """`join_guests` in NumPy: field, but for that of whole guests, and volumes after it."""
+    """`join_small` in NumPy: field, but for that of whole small ones, and volumes after it."""
     amount = field * np.where(volumes > nothing, volumes, 1.0)
-    amount = merge_guests_reference(amount, guests, hosts, shares)
-    merged = merge_guests_reference(volumes, guests, hosts, shares)
+    amount = merge_small_reference(amount, small, targets, shares)
+    merged = merge_small_reference(volumes, small, targets, shares)
     return amount / np.where(merged > nothing, merged, 1.0), merged
 
 
 @njit(nogil=True, cache=True)
-def follow_hosts(field: Array, guests: Integers, hosts: Integers) -> None:
-    """Give guests the value of their hosts, in place."""
+def follow_targets(field: Array, small: Integers, targets: Integers) -> None:
+    """Give small ones the value of their targets, in place."""
     flat = field.reshape(-1)
-    for n in range(guests.size):
-        flat[guests[n]] = flat[hosts[n]]
+    for n in range(small.size):
+        flat[small[n]] = flat[targets[n]]
 
 
-def follow_hosts_reference(field: Array, guests: Integers, hosts: Integers) -> Array:
-    """`follow_hosts` in NumPy: the field after it."""
+def follow_targets_reference(field: Array, small: Integers, targets: Integers) -> Array:
+    """`follow_targets` in NumPy: the field after it."""
     followed = field.ravel().copy()
-    followed[guests] = followed[hosts]
+    followed[small] = followed[targets]
     return followed.reshape(field.shape)
 
 
@@ -348,22 +348,22 @@ def level_reference(
 
 
 @njit(nogil=True, cache=True)
-def share_velocity(field: Array, guests: Integers, hosts: Integers, shares: Array) -> None:
-    """Give guests the velocity of all that goes with them, in place: these shares of them go with
-    their hosts."""
+def share_velocity(field: Array, small: Integers, targets: Integers, shares: Array) -> None:
+    """Give small ones the velocity of all that goes with them, in place: these shares of them go
+    with their targets."""
     flat = field.reshape(-1)
-    own = flat[guests]
-    for n in range(guests.size):
-        own[n] += shares[n] * (flat[hosts[n]] - own[n])
-    flat[guests] = own
+    own = flat[small]
+    for n in range(small.size):
+        own[n] += shares[n] * (flat[targets[n]] - own[n])
+    flat[small] = own
 
 
 def share_velocity_reference(
-    field: Array, guests: Integers, hosts: Integers, shares: Array
+    field: Array, small: Integers, targets: Integers, shares: Array
 ) -> Array:
     """`share_velocity` in NumPy: the field after it."""
     shared = field.ravel().copy()
-    shared[guests] += shares * (shared[hosts] - shared[guests])
+    shared[small] += shares * (shared[targets] - shared[small])
     return shared.reshape(field.shape)
 
 
@@ -451,7 +451,7 @@ def find_parts_reference(
 
 
 @njit(nogil=True, cache=True)
-def find_guests(
+def find_small(
     driven: Marks,
     opened: Array,
     volume: Array,
@@ -461,12 +461,12 @@ def find_guests(
     narrow: float,
     nothing: float,
 ) -> tuple[Integers, Array]:
-    """Flat indices of the guests among the faces of a component, and which part of each is one.
+    """Flat indices of the small ones among the faces of a component, and which part of each is one.
 
     A face is one with all of its volume where no pressure pushes it: where it is closed, or its
     volume is not above `nothing`; and in part where the volume exceeds `narrow` times its opening.
 
-    driven      1 where the face may be a host: pushed and no guest; given
+    driven      1 where the face may be a target: pushed and no small one; given
     opened      open part of each face
     prescribed  (2,) 1 where the velocity of the first or last layer is prescribed: none of either
     periodic    whether the last layer is the first one, and counts once
@@ -484,10 +484,10 @@ def find_guests(
             for k in range(n2 if low else 0):
                 at = k if component == 2 else at
                 pushed = narrow * one[k] if room[k] > nothing else 0.0
-                guest = room[k] != 0.0 and (pushed < room[k] or pushed == 0.0)
-                mark[k] = pushed > 0.0 and not guest
+                small = room[k] != 0.0 and (pushed < room[k] or pushed == 0.0)
+                mark[k] = pushed > 0.0 and not small
                 first = at == 0 and prescribed[0]
-                if guest and not first and not (at == last and (prescribed[1] or periodic)):
+                if small and not first and not (at == last and (prescribed[1] or periodic)):
                     own[count] = (i * n1 + j) * n2 + k
                     part[count] = 1.0 - pushed / room[k]
                     count += 1
@@ -499,7 +499,7 @@ def find_guests(
     return own[:count].copy(), part[:count].copy()
 
 
-def find_guests_reference(
+def find_small_reference(
     opened: Array,
     volume: Array,
     component: int,
@@ -508,10 +508,10 @@ def find_guests_reference(
     narrow: float,
     nothing: float,
 ) -> tuple[Integers, Array, Array]:
-    """`find_guests` in NumPy: guests, parts, and which faces may be hosts."""
+    """`find_small` in NumPy: small ones, parts, and which faces may be targets."""
     pushed = np.where(volume > nothing, narrow * opened, 0.0)
-    guest = (volume != 0.0) & ((pushed < volume) | (pushed == 0.0))
-    driven, counted = (pushed > 0.0) & ~guest, guest.copy()
+    small = (volume != 0.0) & ((pushed < volume) | (pushed == 0.0))
+    driven, counted = (pushed > 0.0) & ~small, small.copy()
     for end, told in zip((0, -1), prescribed, strict=True):
         np.moveaxis(driven, component, 0)[end] &= not told
         np.moveaxis(counted, component, 0)[end] &= not told and not (periodic and end)

@@ -21,29 +21,29 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.aggregates import OWN, mark_leaning, mark_own
+from flowborne.kernels.aggregates import OWN, mark_interpolated, mark_own
 from flowborne.kernels.arrays import (
     Array,
     Faces,
     Finest,
     Hierarchy,
+    Indices,
     Integers,
     Marks,
     Periodic,
-    Places,
     Real,
     Triple,
 )
-from flowborne.kernels.centres import distance_ratio, leaning
-from flowborne.kernels.guests import add_guest_weights, seat_guests
+from flowborne.kernels.centres import distance_ratio, interpolation_weights
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.laplacian import neighbour_sum
+from flowborne.kernels.orphans import add_orphan_weights, assign_orphans
 from flowborne.kernels.vectors import cells_of
 
-OFFSET, N0, N1, N2, LEAN, S0, S1, S2, GUESTS = range(9)
+OFFSET, N0, N1, N2, INTERPOLATION, S0, S1, S2, ORPHANS = range(9)
 """Columns of the table of levels: where it begins in the packed arrays, cells along each axis,
 where its interpolation coefficients begin, the finest cells in one of its cells, how many of its
-cells are guests."""
+cells are orphans."""
 
 
 @kernel
@@ -70,19 +70,19 @@ def weights_at(packed: Triple, table: Integers, level: int) -> Triple:
 
 
 @kernel
-def leaning_at(lean: Real, table: Integers, level: int) -> Triple:
+def interpolation_at(interpolation: Real, table: Integers, level: int) -> Triple:
     """The interpolation coefficients of one level along each axis, with ghosts."""
-    a = table[level, LEAN]
+    a = table[level, INTERPOLATION]
     b = a + table[level, N0] + 2
     c = b + table[level, N1] + 2
-    return lean[a:b], lean[b:c], lean[c : c + table[level, N2] + 2]
+    return interpolation[a:b], interpolation[b:c], interpolation[c : c + table[level, N2] + 2]
 
 
 @kernel
-def guests_at(guests: Places, table: Integers, level: int) -> Places:
-    """Padded flat cells of one level that are guests."""
+def orphans_at(orphans: Indices, table: Integers, level: int) -> Indices:
+    """Padded flat cells of one level that are orphans."""
     first = table[level, OFFSET]
-    return guests[first : first + table[level, GUESTS]]
+    return orphans[first : first + table[level, ORPHANS]]
 
 
 @kernel
@@ -245,7 +245,7 @@ def inverse_diagonal_reference(w: Triple, added: Real) -> Array:
 
 @kernel
 def coarse_sums(
-    fine: Real, coarse: Real, marks: Marks, factor: Integers, guests: Places, hosts: Places
+    fine: Real, coarse: Real, marks: Marks, factor: Integers, orphans: Indices, aggregates: Indices
 ) -> None:
     """What is added to the diagonal of coarse cells: the sum over the fine cells that have their
     value."""
@@ -258,13 +258,18 @@ def coarse_sums(
             for k in range(n2):
                 if marks[i + d, j + 1, k + 1] & OWN:
                     coarse[i // f0 + d, j // f1 + 1, k // f2 + 1] += fine[i + d, j + 1, k + 1]
-    flat, wide, host = fine.reshape(-1), coarse.reshape(-1), hosts.reshape(-1)
-    for g in range(guests.size):
-        wide[host[guests[g]]] += flat[guests[g]]
+    flat, wide, aggregate = fine.reshape(-1), coarse.reshape(-1), aggregates.reshape(-1)
+    for g in range(orphans.size):
+        wide[aggregate[orphans[g]]] += flat[orphans[g]]
 
 
 def coarse_sums_reference(
-    fine: Real, marks: Marks, factor: Integers, guests: Places, hosts: Places, shape: Integers
+    fine: Real,
+    marks: Marks,
+    factor: Integers,
+    orphans: Indices,
+    aggregates: Indices,
+    shape: Integers,
 ) -> Array:
     """`coarse_sums` in NumPy: a padded array of `shape`."""
     out, inside = np.zeros(shape), cells_of(fine)
@@ -272,14 +277,16 @@ def coarse_sums_reference(
     for n in range(3):
         values = np.add.reduceat(values, np.arange(0, values.shape[n], factor[n]), axis=n)
     out[cells_of(out)] = values
-    np.add.at(out.reshape(-1), hosts.reshape(-1)[guests], fine.reshape(-1)[guests])
+    np.add.at(out.reshape(-1), aggregates.reshape(-1)[orphans], fine.reshape(-1)[orphans])
     return out
 
 
 @kernel
 def coarsen(hierarchy: Hierarchy) -> None:
     """Fill all levels from the weights of the finest, and from what is added to its diagonal."""
-    table, periodic, weights, reaction, inverse, lean, marks, guests, hosts = hierarchy
+    table, periodic, weights, reaction, inverse, interpolation, marks, orphans, aggregates = (
+        hierarchy
+    )
     reacts = np.any(at_level(reaction, table, 0))
     for level in range(table.shape[0] - 1):
         w, share = weights_at(weights, table, level), at_level(inverse, table, level)
@@ -289,32 +296,34 @@ def coarsen(hierarchy: Hierarchy) -> None:
             break
         factor = np.empty(3, np.int64)
         ratio = np.empty((3, table[level + 1, N0 : N2 + 1].max() + 1))
-        towards = leaning_at(lean, table, level)
+        towards = interpolation_at(interpolation, table, level)
         for axis in range(3):
             n, size, cells = table[level, N0 + axis], table[level, S0 + axis], table[0, N0 + axis]
             wraps = periodic[axis] != 0
             factor[axis] = table[level + 1, S0 + axis] // size
-            leaning(towards[axis], n, factor[axis], size, cells, wraps)
+            interpolation_weights(towards[axis], n, factor[axis], size, cells, wraps)
             for face in range(table[level + 1, N0 + axis] + 1):
                 ratio[axis, face] = distance_ratio(face, factor[axis], size, cells, wraps)
-        mark, host = at_level(marks, table, level), at_level(hosts, table, level)
+        mark, aggregate = at_level(marks, table, level), at_level(aggregates, table, level)
         wide = weights_at(weights, table, level + 1)
         coarse_shape = np.array(wide[0].shape)
         mark_own(mark, w, share, factor)
         wrap_ghosts(mark, periodic)
-        mark_leaning(mark, w, share, towards)
+        mark_interpolated(mark, w, share, towards)
         wrap_ghosts(mark, periodic)
-        space = guests[table[level, OFFSET] : table[level + 1, OFFSET]]
-        table[level, GUESTS] = seat_guests(
-            mark, w, share, factor, periodic, coarse_shape, space, host
+        space = orphans[table[level, OFFSET] : table[level + 1, OFFSET]]
+        table[level, ORPHANS] = assign_orphans(
+            mark, w, share, factor, periodic, coarse_shape, space, aggregate
         )
         if reacts:
-            seated = guests_at(guests, table, level)
-            coarse_sums(added, at_level(reaction, table, level + 1), mark, factor, seated, host)
+            seated = orphans_at(orphans, table, level)
+            coarse_sums(
+                added, at_level(reaction, table, level + 1), mark, factor, seated, aggregate
+            )
         else:
             at_level(reaction, table, level + 1)[:] = 0.0
         for axis in range(3):
             coarse_weights(w[axis], wide[axis], mark, axis, factor, ratio[axis])
-        add_guest_weights(
-            mark, w, wide, factor, ratio, periodic, guests_at(guests, table, level), host
+        add_orphan_weights(
+            mark, w, wide, factor, ratio, periodic, orphans_at(orphans, table, level), aggregate
         )

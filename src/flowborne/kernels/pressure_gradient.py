@@ -12,7 +12,7 @@ from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 
 @kernel
-def push_faces(
+def subtract_gradient(
     velocity: Array,
     rate: Array,
     pressure: Array,
@@ -55,7 +55,7 @@ def push_faces(
                 velocity[i, j, k] -= scale * rate[i, j, k] * difference
 
 
-def push_faces_reference(
+def subtract_gradient_reference(
     velocity: Array,
     rate: Array,
     pressure: Array,
@@ -63,7 +63,7 @@ def push_faces_reference(
     scale: float,
     codes: NDArray[np.int64],
 ) -> Array:
-    """`push_faces` in NumPy: the velocity after it.
+    """`subtract_gradient` in NumPy: the velocity after it.
 
     Beyond a closed side lies the pressure inside, beyond an open one none.
     """

@@ -17,17 +17,23 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.aggregates import OWN
-from flowborne.kernels.arrays import Array, Integers, Marks, Periodic, Places, Real, Triple
+from flowborne.kernels.arrays import Array, Indices, Integers, Marks, Periodic, Real, Triple
 from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.vectors import cells_of
 
 
 @kernel
 def interpolate(
-    out: Real, x: Real, coarse: Real, marks: Marks, lean: Triple, guests: Places, hosts: Places
+    out: Real,
+    x: Real,
+    coarse: Real,
+    marks: Marks,
+    interpolation: Triple,
+    orphans: Indices,
+    aggregates: Indices,
 ) -> None:
     """out = x + P coarse; ghosts of `coarse` hold what lies beyond."""
-    lean0, lean1, lean2 = lean
+    towards0, towards1, towards2 = interpolation
     d = 1 if x.shape[0] > 1 else 0
     h0 = 2 if x.shape[0] > coarse.shape[0] else 1
     h1 = 2 if x.shape[1] > coarse.shape[1] else 1
@@ -37,17 +43,17 @@ def interpolate(
     none = x.dtype.type(0)
     for i in prange(x.shape[0] - 2 * d):
         m, c0 = i + d, i // h0 + d
-        next0 = c0 + d * (1 if lean0[i + 1] > 0.0 else -1)
+        next0 = c0 + d * (1 if towards0[i + 1] > 0.0 else -1)
         for j in range(1, x.shape[1] - 1):
             c1 = (j - 1) // h1 + 1
-            next1 = c1 + (1 if lean1[j] > 0.0 else -1)
+            next1 = c1 + (1 if towards1[j] > 0.0 else -1)
             for c in range(1, pairs + 1):
                 k = 2 * c - 1
                 own = coarse[c0, c1, c]
-                along0 = abs(lean0[i + 1]) * (coarse[next0, c1, c] - own)
-                along1 = abs(lean1[j]) * (coarse[c0, next1, c] - own)
-                low = abs(lean2[k]) * (coarse[c0, c1, c - 1] - own)
-                high = abs(lean2[k + 1]) * (coarse[c0, c1, c + 1] - own)
+                along0 = abs(towards0[i + 1]) * (coarse[next0, c1, c] - own)
+                along1 = abs(towards1[j]) * (coarse[c0, next1, c] - own)
+                low = abs(towards2[k]) * (coarse[c0, c1, c - 1] - own)
+                high = abs(towards2[k + 1]) * (coarse[c0, c1, c + 1] - own)
                 mark = marks[m, j, k]
                 first = own if mark & OWN else none
                 first += along1 if mark & 2 else none
@@ -65,16 +71,18 @@ def interpolate(
                 own = coarse[c0, c1, c]
                 mark = marks[m, j, k]
                 value = own if mark & OWN else none
-                value += abs(lean1[j]) * (coarse[c0, next1, c] - own) if mark & 2 else none
-                value += abs(lean0[i + 1]) * (coarse[next0, c1, c] - own) if mark & 1 else none
+                value += abs(towards1[j]) * (coarse[c0, next1, c] - own) if mark & 2 else none
+                value += abs(towards0[i + 1]) * (coarse[next0, c1, c] - own) if mark & 1 else none
                 out[m, j, k] = x[m, j, k] + value
-    fine, wide, host = out.reshape(-1), coarse.reshape(-1), hosts.reshape(-1)
-    for g in range(guests.size):
-        fine[guests[g]] += wide[host[guests[g]]]
+    fine, wide, aggregate = out.reshape(-1), coarse.reshape(-1), aggregates.reshape(-1)
+    for g in range(orphans.size):
+        fine[orphans[g]] += wide[aggregate[orphans[g]]]
 
 
 @inlined
-def add_leaning(row: Real, r: Real, marks: Marks, m: int, j: int, mark: int, part: float) -> None:
+def add_interpolated(
+    row: Real, r: Real, marks: Marks, m: int, j: int, mark: int, part: float
+) -> None:
     """row += part * r of the row (m, j) where the cells have this mark."""
     share, none = row.dtype.type(part), row.dtype.type(0)
     for k in range(1, row.size - 1):
@@ -82,9 +90,11 @@ def add_leaning(row: Real, r: Real, marks: Marks, m: int, j: int, mark: int, par
 
 
 @kernel
-def restrict(b: Real, r: Real, marks: Marks, lean: Triple, guests: Places, hosts: Places) -> None:
+def restrict(
+    b: Real, r: Real, marks: Marks, interpolation: Triple, orphans: Indices, aggregates: Indices
+) -> None:
     """b = P^T r on the coarse cells; ghosts of r hold 0, or the opposite side's values."""
-    lean0, lean1, lean2 = lean
+    towards0, towards1, towards2 = interpolation
     d = 1 if r.shape[0] > 1 else 0
     n0, n1, n2 = r.shape[0] - 2 * d, r.shape[1] - 2, r.shape[2] - 2
     h0 = 2 if r.shape[0] > b.shape[0] else 1
@@ -100,45 +110,45 @@ def restrict(b: Real, r: Real, marks: Marks, lean: Triple, guests: Places, hosts
             row[:] = 0.0
             across[:] = 0.0
             for m in range(first0, end0):
-                part0 = abs(lean0[m + 1 - d])
+                part0 = abs(towards0[m + 1 - d])
                 for j in range(first1, end1):
-                    part1 = abs(lean1[j])
+                    part1 = abs(towards1[j])
                     for k in range(1, n2 + 1):
                         value, mark = r[m, j, k], marks[m, j, k]
-                        gone = abs(lean2[k]) * value if mark & 4 else none
+                        gone = abs(towards2[k]) * value if mark & 4 else none
                         across[k] += gone
                         keep = (value if mark & OWN else none) - gone
                         keep -= part1 * value if mark & 2 else none
                         keep -= part0 * value if mark & 1 else none
                         row[k] += keep
-                if lean1[first1 - 1] > 0.0:
-                    add_leaning(row, r, marks, m, first1 - 1, 2, lean1[first1 - 1])
-                if lean1[end1] < 0.0:
-                    add_leaning(row, r, marks, m, end1, 2, -lean1[end1])
+                if towards1[first1 - 1] > 0.0:
+                    add_interpolated(row, r, marks, m, first1 - 1, 2, towards1[first1 - 1])
+                if towards1[end1] < 0.0:
+                    add_interpolated(row, r, marks, m, end1, 2, -towards1[end1])
             if d:
-                low, high = lean0[first0 - 1], lean0[end0]
+                low, high = towards0[first0 - 1], towards0[end0]
                 for j in range(first1, end1):
                     if low > 0.0:
-                        add_leaning(row, r, marks, first0 - 1, j, 1, low)
+                        add_interpolated(row, r, marks, first0 - 1, j, 1, low)
                     if high < 0.0:
-                        add_leaning(row, r, marks, end0, j, 1, -high)
-            across[0] = across[n2] if lean2[0] > 0.0 else none
-            across[n2 + 1] = across[1] if lean2[n2 + 1] < 0.0 else none
+                        add_interpolated(row, r, marks, end0, j, 1, -high)
+            across[0] = across[n2] if towards2[0] > 0.0 else none
+            across[n2 + 1] = across[1] if towards2[n2 + 1] < 0.0 else none
             for c in range(1, pairs + 1):
                 total = row[2 * c - 1] + row[2 * c]
                 b[plane + d, c1, c] = total + across[2 * c - 2] + across[2 * c + 1]
             for c in range(pairs + 1, b.shape[2] - 1):
                 k = h2 * (c - 1) + 1
                 b[plane + d, c1, c] = row[k] + across[k - 1] + across[k + 1]
-    wide, fine, host = b.reshape(-1), r.reshape(-1), hosts.reshape(-1)
-    for g in range(guests.size):
-        wide[host[guests[g]]] += fine[guests[g]]
+    wide, fine, aggregate = b.reshape(-1), r.reshape(-1), aggregates.reshape(-1)
+    for g in range(orphans.size):
+        wide[aggregate[orphans[g]]] += fine[orphans[g]]
 
 
 def coarse_parents(
-    shape: tuple[int, int, int], coarse: tuple[int, int, int], marks: Marks, lean: Triple
+    shape: tuple[int, int, int], coarse: tuple[int, int, int], marks: Marks, interpolation: Triple
 ) -> Iterator[tuple[tuple[Integers, Integers, Integers], Array]]:
-    """Coarse cells that fine ones take their value from, guests left aside.
+    """Coarse cells that fine ones take their value from, orphans left aside.
 
     yields  padded indices of a coarse cell and its weight, for every fine cell: of the one over it,
             then of the next one along each axis
@@ -148,7 +158,7 @@ def coarse_parents(
     fine = np.indices(tuple(n - 2 * s for n, s in zip(shape, d, strict=True)))
     over = [fine[n] // factor[n] + d[n] for n in range(3)]
     mark = marks[tuple(slice(s, n - s) for n, s in zip(shape, d, strict=True))]
-    towards = [lean[n][fine[n] + 1] for n in range(3)]
+    towards = [interpolation[n][fine[n] + 1] for n in range(3)]
     part = [np.abs(towards[n]) * ((mark & (1 << n)) > 0) for n in range(3)]
     yield (over[0], over[1], over[2]), ((mark & OWN) > 0) - part[0] - part[1] - part[2]
     for n in range(3):
@@ -158,14 +168,19 @@ def coarse_parents(
 
 
 def interpolate_reference(
-    x: Real, coarse: Real, marks: Marks, lean: Triple, guests: Places, hosts: Places
+    x: Real,
+    coarse: Real,
+    marks: Marks,
+    interpolation: Triple,
+    orphans: Indices,
+    aggregates: Indices,
 ) -> Array:
     """`interpolate` in NumPy: x after it."""
     out = np.array(x, np.float64)
     inside = cells_of(x)
-    for index, weight in coarse_parents(x.shape, coarse.shape, marks, lean):
+    for index, weight in coarse_parents(x.shape, coarse.shape, marks, interpolation):
         out[inside] += weight * coarse[index]
-    out.reshape(-1)[guests] += coarse.reshape(-1)[hosts.reshape(-1)[guests]]
+    out.reshape(-1)[orphans] += coarse.reshape(-1)[aggregates.reshape(-1)[orphans]]
     return out
 
 
@@ -173,9 +188,9 @@ def restrict_reference(
     b: Real,
     r: Real,
     marks: Marks,
-    lean: Triple,
-    guests: Places,
-    hosts: Places,
+    interpolation: Triple,
+    orphans: Indices,
+    aggregates: Indices,
     periodic: Periodic,
 ) -> Array:
     """`restrict` in NumPy, the transpose of `interpolate_reference`: b with ghosts 0.
@@ -183,7 +198,7 @@ def restrict_reference(
     periodic  what falls on the ghosts of such an axis belongs to the cells at its other end
     """
     out = np.zeros(b.shape)
-    for index, weight in coarse_parents(r.shape, b.shape, marks, lean):
+    for index, weight in coarse_parents(r.shape, b.shape, marks, interpolation):
         np.add.at(out, index, weight * r[cells_of(r)])
     for axis in range(3):
         ends = np.moveaxis(out, axis, 0)
@@ -192,5 +207,5 @@ def restrict_reference(
                 ends[-2] += ends[0]
                 ends[1] += ends[-1]
             ends[0] = ends[-1] = 0.0
-    np.add.at(out.reshape(-1), hosts.reshape(-1)[guests], r.reshape(-1)[guests])
+    np.add.at(out.reshape(-1), aggregates.reshape(-1)[orphans], r.reshape(-1)[orphans])
     return out

@@ -13,8 +13,8 @@ from flowborne.kernels.jit import kernel
 from flowborne.kernels.levels import (
     OFFSET,
     at_level,
-    guests_at,
-    leaning_at,
+    interpolation_at,
+    orphans_at,
     weights_at,
     wrap_ghosts,
 )
@@ -46,7 +46,7 @@ SERIAL = 40_000
 def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool) -> None:
     """The cycle's work on one level, on its way down (from x = 0, then b of the next level) or up
     (from x of the next level)."""
-    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
+    table, periodic, weights, _, inverse, interpolation, marks, orphans, aggregates = hierarchy
     coarsest = table.shape[0] - 2
     w, a = weights_at(weights, table, level), at_level(inverse, table, level)
     xl, bl = at_level(x, table, level), at_level(b, table, level)
@@ -58,9 +58,9 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
             xl,
             at_level(x, table, level + 1),
             at_level(marks, table, level),
-            leaning_at(lean, table, level),
-            guests_at(guests, table, level),
-            at_level(hosts, table, level),
+            interpolation_at(interpolation, table, level),
+            orphans_at(orphans, table, level),
+            at_level(aggregates, table, level),
         )
     if fine and down:
         smooth_down(xl, rl, bl, w, a)
@@ -84,9 +84,9 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
             at_level(b, table, level + 1),
             rl,
             at_level(marks, table, level),
-            leaning_at(lean, table, level),
-            guests_at(guests, table, level),
-            at_level(hosts, table, level),
+            interpolation_at(interpolation, table, level),
+            orphans_at(orphans, table, level),
+            at_level(aggregates, table, level),
         )
 
 
@@ -113,7 +113,7 @@ def v_cycle(hierarchy: Hierarchy, x: Real, b: Real, r: Real) -> None:
 
 def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
     """`v_cycle` in NumPy: x of a level for its b, both padded, ghosts of x as the sides have it."""
-    table, periodic, weights, _, inverse, lean, marks, guests, hosts = hierarchy
+    table, periodic, weights, _, inverse, interpolation, marks, orphans, aggregates = hierarchy
     w, a = weights_at(weights, table, level), at_level(inverse, table, level)
     coarsest = level == table.shape[0] - 2
     x = np.zeros(b.shape)
@@ -124,9 +124,9 @@ def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
         return x
     parts = (
         at_level(marks, table, level),
-        leaning_at(lean, table, level),
-        guests_at(guests, table, level),
-        at_level(hosts, table, level),
+        interpolation_at(interpolation, table, level),
+        orphans_at(orphans, table, level),
+        at_level(aggregates, table, level),
     )
     r = defect_reference(x, b, w, a)
     coarse = np.zeros(at_level(inverse, table, level + 1).shape)

@@ -8,12 +8,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import MotionConstantTable, MotionSinusoidTable, MotionTable
-from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes, MotionSinusoid
+from flowborne.scenes.tracks import (
+    Curve,
+    TrajectoryConstant,
+    TrajectoryKeyframes,
+    TrajectorySinusoid,
+)
 from flowborne.solids import mjcf
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.model import SolidModel
@@ -89,26 +94,26 @@ def joint_unit(model: SolidModel, joint: str) -> float:
     return 1.0 if joint_kind(model, joint) == SLIDE else math.pi / 180.0
 
 
-def motion_of(table: MotionTable, model: SolidModel) -> Motion:
+def trajectory_of(table: MotionTable, model: SolidModel) -> Trajectory:
     """A prescribed motion of the scene in radians or metres."""
     unit = joint_unit(model, table.joint)
     dofs = model.dofs_of(table.joint)
     if isinstance(table, MotionConstantTable):
-        return MotionConstant(dofs, unit * table.position, unit * table.rate)
+        return TrajectoryConstant(dofs, unit * table.position, unit * table.rate)
     if isinstance(table, MotionSinusoidTable):
-        return MotionSinusoid(
+        return TrajectorySinusoid(
             dofs, unit * table.amplitude, table.period, unit * table.mean, math.radians(table.phase)
         )
-    return MotionKeyframes(dofs, Curve(table.times, tuple(unit * v for v in table.values)))
+    return TrajectoryKeyframes(dofs, Curve(table.times, tuple(unit * v for v in table.values)))
 
 
-def motions_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Motion, ...]:
+def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Trajectory, ...]:
     """All prescribed motions: those of [[motion]] in their order, then that of [clip].
 
     start   (nq,) pose from which a clip is entered
     raises  SceneError when the clip cannot be used
     """
-    motions: list[Motion] = [motion_of(table, model) for table in scene.motion]
+    motions: list[Trajectory] = [trajectory_of(table, model) for table in scene.motion]
     clip = clip_motion(scene, model, start)
     return (*motions,) if clip is None else (*motions, clip)
 
@@ -136,10 +141,10 @@ def posed(scene: Scene, model: SolidModel) -> SolidState:
 def initial_state(scene: Scene, model: SolidModel) -> SolidState:
     """Where the bodies start: the model's own pose, `initial`, and the prescribed motions."""
     state = posed(scene, model)
-    motions = motions_of(scene, model, state.q.copy())
+    motions = trajectories_of(scene, model, state.q.copy())
     pose_controlled(scene, model, state.q)
     for motion in motions:
-        state.q[model.places_of(motion.dofs)] = motion.position(0.0)
+        state.q[model.indices_of(motion.dofs)] = motion.position(0.0)
         state.v[motion.dofs] = motion.velocity(0.0)
     state.q = posed_flesh(model, state.q)
     state.v = follow(model, state.q, state.v)

@@ -11,7 +11,7 @@ from flowborne.control.controller import Controller
 from flowborne.control.executors import Mapper, Serial
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import FluidState
-from flowborne.scenes.bodies import initial_state, load_model, motions_of, posed
+from flowborne.scenes.bodies import initial_state, load_model, posed, trajectories_of
 from flowborne.scenes.build_control import controller_of
 from flowborne.scenes.build_fluid import fluid_of
 from flowborne.scenes.build_mouths import mouths_of
@@ -49,7 +49,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     raises    SceneError when the model file cannot be read
     """
     model = load_model(scene) if scene.has_bodies else SolidModel.empty()
-    motions = motions_of(scene, model, posed(scene, model).q)
+    motions = trajectories_of(scene, model, posed(scene, model).q)
     fluid = fluid_of(scene)
     setup = Setup(model, fluid, motions, winds_of(scene), mouths_of(scene, model))
     world = World.at_rest(setup)
@@ -66,6 +66,6 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
 def _set_velocity(state: FluidState, scene: Scene) -> None:
     """The initial velocity on every face, as the velocity and as what carries it."""
     assert scene.fluid is not None
-    for faces in (state.velocity, state.carrier):
+    for faces in (state.velocity, state.advecting_velocity):
         for values, component in zip(faces, scene.fluid.velocity, strict=True):
             values.fill(component)

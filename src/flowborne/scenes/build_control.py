@@ -26,21 +26,21 @@ from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseT
 from flowborne.control.rules import FixedStep, GoldenSection, ResilientStep, Rule
 from flowborne.control.servo import Servo, ServoExact, ServoPD
 from flowborne.control.trial import Hypothesis
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 from flowborne.scenes import schema_control as tables
 from flowborne.scenes.bodies import joint_unit, posed
 from flowborne.scenes.capture import clip_motion
 from flowborne.scenes.fields import triple
 from flowborne.scenes.python_function import find_function
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.tracks import Curve, MotionConstant, MotionKeyframes
+from flowborne.scenes.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
 from flowborne.solids.model import SolidModel
 
 Integers = NDArray[np.int64]
 
 
 def controller_of(
-    scene: Scene, model: SolidModel, motions: tuple[Motion, ...], executor: Mapper
+    scene: Scene, model: SolidModel, motions: tuple[Trajectory, ...], executor: Mapper
 ) -> Controller:
     """The controller that the scene's tables describe.
 
@@ -109,7 +109,7 @@ def _servo(table: tables.ServoExact | tables.ServoPD, limit: tuple[float, ...]) 
 
 
 def _weighted(
-    table: tables.AnyObjective, scene: Scene, model: SolidModel, motions: tuple[Motion, ...]
+    table: tables.AnyObjective, scene: Scene, model: SolidModel, motions: tuple[Trajectory, ...]
 ) -> WeightedObjective:
     sign = 1.0 if table.goal == "least" else -1.0
     return WeightedObjective(
@@ -142,7 +142,9 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
     return ObjectiveCallable(find_function(table.function), table.function)
 
 
-def _reference(table: tables.ObjectiveInputMotionTable, scene: Scene, model: SolidModel) -> Motion:
+def _reference(
+    table: tables.ObjectiveInputMotionTable, scene: Scene, model: SolidModel
+) -> Trajectory:
     if table.values is None:
         motion = clip_motion(scene, model, posed(scene, model).q, (table.joint,))
         assert motion is not None
@@ -150,8 +152,8 @@ def _reference(table: tables.ObjectiveInputMotionTable, scene: Scene, model: Sol
     unit, dofs = joint_unit(model, table.joint), model.dofs_of(table.joint)
     values = tuple(unit * value for value in table.values)
     if len(values) == 1:
-        return MotionConstant(dofs, values[0])
-    return MotionKeyframes(dofs, Curve(table.keyframe_times(), values))
+        return TrajectoryConstant(dofs, values[0])
+    return TrajectoryKeyframes(dofs, Curve(table.keyframe_times(), values))
 
 
 def _bodies(model: SolidModel, names: tuple[str, ...] | None) -> Integers:
@@ -165,7 +167,7 @@ def _phases(
     table: tables.PhaseIntervalsTable | tables.PhaseMotionTable | None,
     scene: Scene,
     model: SolidModel,
-    motions: tuple[Motion, ...],
+    motions: tuple[Trajectory, ...],
 ) -> Phases:
     if table is None:
         return PhaseAlways()

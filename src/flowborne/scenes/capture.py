@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from flowborne.errors import SceneError
 from flowborne.io.bvh import read_bvh
 from flowborne.io.clip import Clip
-from flowborne.scenes.clip_following import Passage, motion_of_clip
-from flowborne.scenes.clip_motion import MotionClip
+from flowborne.scenes.clip_following import Passage, trajectory_of_clip
+from flowborne.scenes.clip_motion import TrajectoryClip
 from flowborne.scenes.clip_scale import check_scale, leg_length
 from flowborne.scenes.human.body import ELBOWS, human_mjcf
 from flowborne.scenes.human.clip_skeleton import skeleton_of
@@ -115,7 +115,7 @@ def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, .
 
 def clip_motion(
     scene: Scene, model: SolidModel, start: Array, joints: tuple[str, ...] | None = None
-) -> MotionClip | None:
+) -> TrajectoryClip | None:
     """The motion that the scene's clip gives to joints; None without one, or without joints.
 
     start   (nq,) pose from which a blend leads into the clip
@@ -128,7 +128,7 @@ def clip_motion(
     chosen = followers(scene, capture, model) if joints is None else joints
     if not chosen:
         return None
-    return motion_of_clip(
+    return trajectory_of_clip(
         model,
         capture.clip,
         capture.mapping,
@@ -157,7 +157,7 @@ def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:
     joints = tuple(joint for joint in model.joint_names if joint in own & set(capture.mapping))
     motion = clip_motion(scene, model, q, joints)
     if motion is not None:
-        q[model.places_of(motion.dofs)] = motion.position(0.0)
+        q[model.indices_of(motion.dofs)] = motion.position(0.0)
 
 
 def _stamp(path: Path) -> tuple[int, int]:

@@ -14,7 +14,7 @@ from flowborne.io.clip import Clip
 from flowborne.quaternions import about, continuous, inverse, product, twist
 from flowborne.scenes.clip_curves import UP, Columns, curves_of, row_of
 from flowborne.scenes.clip_loop import CLOSED, Stride, mismatch, stride_between
-from flowborne.scenes.clip_motion import MotionClip, normalise
+from flowborne.scenes.clip_motion import TrajectoryClip, normalise
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ WHOLE = Passage()
 """All of a clip, once."""
 
 
-def motion_of_clip(
+def trajectory_of_clip(
     model: SolidModel,
     clip: Clip,
     mapping: Mapping[str, str],
@@ -53,7 +53,7 @@ def motion_of_clip(
     *,
     joints: Sequence[str] | None = None,
     initial: Array | None = None,
-) -> MotionClip:
+) -> TrajectoryClip:
     """Motion of a model's joints along a clip.
 
     mapping  model joint -> clip joint; names that the model lacks are passed over
@@ -83,7 +83,9 @@ def motion_of_clip(
     pose = model.rest().q if initial is None else initial
     places = np.concatenate([model.positions_of(name) for name in columns.names])
     before = _put(columns, row_of(columns, pose[places]), spline(start))
-    return MotionClip(columns.dofs, columns, spline, start, length, blend, before, stride, overlap)
+    return TrajectoryClip(
+        columns.dofs, columns, spline, start, length, blend, before, stride, overlap
+    )
 
 
 def _check_times(clip: Clip, start: float, stop: float, blend: float) -> None:

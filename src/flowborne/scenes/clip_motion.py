@@ -1,4 +1,4 @@
-"""The motion of a clip as a prescribed motion of many joints (`coupling.motion.Motion`)."""
+"""The motion of a clip as a prescribed motion of many joints (`coupling.motion.Trajectory`)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KEPT = 64
 
 
 @dataclass(eq=False)
-class MotionClip:
+class TrajectoryClip:
     """Joints that follow a clip; time 0 is the start of the trimmed clip.
 
     Before, they stay still. For the first `blend` seconds they go over from the initial pose into

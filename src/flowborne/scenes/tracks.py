@@ -1,4 +1,4 @@
-"""Prescribed motions of a joint, known for all time (`coupling.motion.Motion`)."""
+"""Prescribed motions of a joint, known for all time (`coupling.motion.Trajectory`)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Integers = NDArray[np.int64]
 
 
 @dataclass
-class MotionConstant:
+class TrajectoryConstant:
     """start + rate * time.
 
     dofs      (1,) the dof
@@ -35,7 +35,7 @@ class MotionConstant:
 
 
 @dataclass
-class MotionSinusoid:
+class TrajectorySinusoid:
     """mean + amplitude * sin(2 pi time / period + phase).
 
     dofs             (1,) the dof
@@ -102,7 +102,7 @@ class Curve:
 
 
 @dataclass
-class MotionKeyframes:
+class TrajectoryKeyframes:
     """Smooth curve through keyframes; see `Curve`.
 
     dofs   (1,) the dof

@@ -177,7 +177,7 @@ class SolidModel:
             for j in np.flatnonzero((mj.jnt_type == BALL) & (mj.jnt_limited != 0))
         )
 
-    def places_of(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
+    def indices_of(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
         """(m,) places in q of the joints that `dofs` belong to, ascending."""
         named = np.zeros(self.mj.njnt, bool)
         named[self._joint_of_dof[dofs]] = True

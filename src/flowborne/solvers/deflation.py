@@ -18,7 +18,7 @@ from flowborne.kernels.levels import at_level
 from flowborne.kernels.sparse_rows import add_rows, row_gram, row_gram_along, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
 from flowborne.kernels.vectors import scaled_cells
-from flowborne.solvers.response import Response
+from flowborne.solvers.mobility import Mobility
 
 MOST_MODES = 32
 """Modes that are taken in, the most compliant first; more would cost more than they save."""
@@ -32,11 +32,11 @@ iterations that a mode of less would save cost less than it does."""
 
 
 def compliant_modes(
-    response: Response, rows: Rows, inverse: Real, scale: float, across: int, held: bool
+    mobility: Mobility, rows: Rows, inverse: Real, scale: float, across: int, held: bool
 ) -> Array:
     """(k, m) R with R R^T equal to scale x A^-1 but for modes that weigh little against K.
 
-    response  A^-1
+    mobility  A^-1
     inverse   padded: of the diagonal that the V-cycle is made for; what a mode weighs against it is
               `row_gram`
     scale     of the hierarchy's weights
@@ -44,13 +44,13 @@ def compliant_modes(
               diagonal
     held      whether the term alone holds the level of some region, which no V-cycle knows
     """
-    root = np.sqrt(scale) * response.compliant
-    if response.is_dense:
-        weight = root.T @ row_gram(rows, inverse, response.size) @ root
+    root = np.sqrt(scale) * mobility.compliant
+    if mobility.is_dense:
+        weight = root.T @ row_gram(rows, inverse, mobility.size) @ root
     else:
         weight = row_gram_along(rows, inverse, root)
     ratio, turned = np.linalg.eigh(weight)
-    least = LEAST_WEIGHT if response.is_dense or held else LEAST_WEIGHT_FACTORED
+    least = LEAST_WEIGHT if mobility.is_dense or held else LEAST_WEIGHT_FACTORED
     chosen = np.flatnonzero(ratio * across > least)[-MOST_MODES:]
     return np.ascontiguousarray(root @ turned[:, chosen])
 

@@ -11,8 +11,17 @@ import weakref
 import numpy as np
 
 from flowborne.kernels.aggregates import OWN
-from flowborne.kernels.arrays import Array, Finest, Hierarchy, Integers, Labels, Marks, Places, Real
-from flowborne.kernels.levels import LEAN, at_level, coarsen, finest_weights, padded_size
+from flowborne.kernels.arrays import (
+    Array,
+    Finest,
+    Hierarchy,
+    Indices,
+    Integers,
+    Labels,
+    Marks,
+    Real,
+)
+from flowborne.kernels.levels import INTERPOLATION, at_level, coarsen, finest_weights, padded_size
 from flowborne.kernels.regions import label_regions
 from flowborne.kernels.vectors import largest, scaled
 
@@ -21,21 +30,21 @@ COARSEST = 4
 
 
 def level_table(shape: tuple[int, int, int]) -> Integers:
-    """(levels + 1, 9) hierarchy over a grid of `shape` cells; see `levels.OFFSET` to `GUESTS`."""
+    """(levels + 1, 9) hierarchy over a grid of `shape` cells; see `levels.OFFSET` to `ORPHANS`."""
     rows = []
     counts, size = list(shape), [1, 1, 1]
-    offset = lean = 0
+    offset = interpolation = 0
     while True:
-        rows.append([offset, *counts, lean, *size, 0])
+        rows.append([offset, *counts, interpolation, *size, 0])
         offset += padded_size(counts[0], counts[1], counts[2])
-        lean += sum(counts) + 6
+        interpolation += sum(counts) + 6
         if max(counts) <= COARSEST:
             break
         for axis in range(3):
             if counts[axis] > 2:
                 counts[axis] = (counts[axis] + 1) // 2
                 size[axis] *= 2
-    rows.append([offset, 0, 0, 0, lean, 0, 0, 0, 0])
+    rows.append([offset, 0, 0, 0, interpolation, 0, 0, 0, 0])
     return np.array(rows, np.int64)
 
 
@@ -59,10 +68,10 @@ class Buffers:
         self.weights = packed(total), packed(total), packed(total)
         self.reaction = packed(total)
         self.inverse = packed(total)
-        self.lean = packed(int(self.table[-1, LEAN]))
+        self.interpolation = packed(int(self.table[-1, INTERPOLATION]))
         self.marks: Marks = np.full(total, OWN, np.uint8)
-        self.guests: Places = np.zeros(total, np.int32)
-        self.hosts: Places = np.zeros(total, np.int32)
+        self.orphans: Indices = np.zeros(total, np.int32)
+        self.aggregates: Indices = np.zeros(total, np.int32)
         self.cycle = packed(total), packed(total), packed(total)
         self.vectors = zeros(padded), zeros(padded), zeros(padded), zeros(padded), zeros(padded)
         self.label: Labels = np.zeros(padded, np.int32)

@@ -2,7 +2,7 @@
 
     ( K + J A^-1 J^T ) p = rhs        K     weighted cell Laplacian (see `kernels.levels`)
                                       J     rows in some of the cells
-                                      A^-1  the response between their columns (see `response`)
+                                      A^-1  the response between their columns (see `mobility`)
 
 Equation (9) of the paper with all other unknowns eliminated: symmetric positive definite but for
 its null vectors (see `regions`).
@@ -23,8 +23,8 @@ from flowborne.kernels.sparse_rows import padded_rows
 from flowborne.kernels.vectors import load_cells
 from flowborne.solvers.deflation import compliant_modes, mode_amounts, mode_fields
 from flowborne.solvers.hierarchy import borrow, prepare
+from flowborne.solvers.mobility import Mobility, dense_mobility
 from flowborne.solvers.regions import null_basis
-from flowborne.solvers.response import Response, dense_response
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,14 @@ class LowRankTerm:
     row_start  (m+1,) where each row's entries begin
     columns    (nnz,) column of J, row of A^-1
     values     (nnz,) entries
-    response   A^-1
+    mobility   A^-1
     """
 
     cells: Integers
     row_start: Integers
     columns: Integers
     values: Array
-    response: Response
+    mobility: Mobility
 
 
 NO_TERM = LowRankTerm(
@@ -50,7 +50,7 @@ NO_TERM = LowRankTerm(
     np.zeros(1, np.int64),
     np.zeros(0, np.int64),
     np.zeros(0),
-    dense_response(np.zeros((0, 0))),
+    dense_mobility(np.zeros((0, 0))),
 )
 """K alone."""
 
@@ -136,10 +136,10 @@ class PressureSystem:
             b.weights,
             b.reaction,
             b.inverse,
-            b.lean,
+            b.interpolation,
             b.marks,
-            b.guests,
-            b.hosts,
+            b.orphans,
+            b.aggregates,
         )
         self.regions, self.scale = prepare(
             self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
@@ -172,7 +172,7 @@ class PressureSystem:
             b.finest,
             b.vectors,
             added.rows,
-            term.response.arrays,
+            term.mobility.arrays,
             b.label,
             added.null,
             added.fields,
@@ -198,16 +198,16 @@ class PressureSystem:
         return self._deflation[1]
 
     def _deflate(self, term: LowRankTerm) -> Deflation:
-        b, response = self.buffers, term.response
+        b, mobility = self.buffers, term.mobility
         diagonal = b.finest[3]
         rows = padded_rows((term.cells, term.row_start, term.columns, term.values), diagonal)
         null, amounts, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
         if self.regions:
-            loads = region_loads(b.label, self.regions, response.size, rows)
-            null = null_basis(b.count[: self.regions], loads, response)
+            loads = region_loads(b.label, self.regions, mobility.size, rows)
+            null = null_basis(b.count[: self.regions], loads, mobility)
         inverse = at_level(b.inverse, b.table, 0)
         held = null.shape[1] < self.regions
-        modes = compliant_modes(response, rows, inverse, self.scale, max(self.shape), held)
+        modes = compliant_modes(mobility, rows, inverse, self.scale, max(self.shape), held)
         if modes.size:
             fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
             amounts = mode_amounts(modes, gram)

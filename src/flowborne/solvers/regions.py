@@ -10,24 +10,24 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Labels
 from flowborne.kernels.regions import NULL
-from flowborne.solvers.response import Response
+from flowborne.solvers.mobility import Mobility
 
 
-def null_basis(count: Labels, loads: Array, response: Response) -> Array:
+def null_basis(count: Labels, loads: Array, mobility: Mobility) -> Array:
     """(regions, q) constants per region of an orthonormal basis of the operator's null space.
 
     count     (regions,) cells of each region without an open side
     loads     (regions, k) J^T 1_r of each region
-    response  A^-1
+    mobility  A^-1
 
     A region whose load has no response is a null vector of its own. Among the others, combinations
     c with  c^T F c = 0  for F_rs = (J^T 1_r)^T A^-1 (J^T 1_s) are: of two regions whose loads are
     opposite, only the constant that both share.
     """
     scale = 1.0 / np.sqrt(count)
-    answers = response.times(loads)
+    answers = mobility.times(loads)
     strength = np.einsum("rk,rk->r", answers, loads) * scale**2
-    largest = response.largest() * np.square(loads * scale[:, None]).max(initial=0)
+    largest = mobility.largest() * np.square(loads * scale[:, None]).max(initial=0)
     held = strength > NULL * largest
     free = np.flatnonzero(~held)
     basis = np.zeros((count.size, free.size))
@@ -35,7 +35,7 @@ def null_basis(count: Labels, loads: Array, response: Response) -> Array:
     if not held.any():
         return basis
     scaled = loads[held] * scale[held, None]
-    energy, vectors = np.linalg.eigh(response.times(scaled) @ scaled.T)
+    energy, vectors = np.linalg.eigh(mobility.times(scaled) @ scaled.T)
     null = vectors[:, energy < NULL * energy[-1]]
     joint = np.zeros((count.size, null.shape[1]))
     joint[held] = scale[held, None] * null

@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.fluid.grid import Grid
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.reference import reference, table
@@ -72,9 +72,9 @@ def turned(grid: Grid, geom: str) -> float:
     the pressure while a drive starts the body turning."""
     body = f'<body name="body"><joint name="turn" axis="0 0 1"/>{geom}</body>'
     world = world_of(grid, mjcf(body), solid_density=1.0, tolerance=1e-11)
-    drive = Drive.none(1)
-    drive.set(np.array([0]), 0.0, DT)
-    return -float(advance(world, DT, drive=drive).pressure_wrench[1, 5])
+    command = JointCommand.none(1)
+    command.set(np.array([0]), 0.0, DT)
+    return -float(advance(world, DT, command=command).pressure_wrench[1, 5])
 
 
 def series_of(label: str, grids: Grids, values: Sequence[float], exact: float) -> GridSeries:
@@ -408,9 +408,9 @@ def pushed(grid: Grid, geom: str, direction: Vector) -> float:
     axis = " ".join(str(x) for x in direction)
     body = f'<body name="body"><joint name="slide" type="slide" axis="{axis}"/>{geom}</body>'
     world = world_of(grid, mjcf(body), solid_density=1.0, tolerance=1e-11)
-    drive = Drive.none(1)
-    drive.set(np.array([0]), 0.0, DT)
-    force = advance(world, DT, drive=drive).pressure_wrench[1, :3]
+    command = JointCommand.none(1)
+    command.set(np.array([0]), 0.0, DT)
+    force = advance(world, DT, command=command).pressure_wrench[1, :3]
     return -float(force @ np.array(direction))
 
 

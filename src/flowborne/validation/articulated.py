@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.scenes.tracks import TrajectorySinusoid
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.effort import holding
 from flowborne.solids.model import SolidModel
@@ -50,9 +50,9 @@ def statics(model: SolidModel, q: Array, weight: Array) -> Array:
 def held(world: World, q: Array, dt: float) -> Array:
     """(LINKS,) torques of the drives that hold a pose for a step, N m."""
     world.solid.q[:] = q
-    drive = Drive.none(LINKS)
-    drive.set(np.arange(LINKS), 0.0, 0.0)
-    return advance(world, dt, drive=drive).actuator
+    command = JointCommand.none(LINKS)
+    command.set(np.arange(LINKS), 0.0, 0.0)
+    return advance(world, dt, command=command).actuator
 
 
 def static_chain(quick: bool) -> list[Finding]:
@@ -145,7 +145,7 @@ def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
     The chain flies and tumbles while its motors swing its joints.
     """
     motions = tuple(
-        MotionSinusoid(np.array([6 + k]), 0.6 + 0.1 * k, 1.0 + 0.1 * k, 0.2 * k, 0.4 * k)
+        TrajectorySinusoid(np.array([6 + k]), 0.6 + 0.1 * k, 1.0 + 0.1 * k, 0.2 * k, 0.4 * k)
         for k in range(LINKS - 1)
     )
     world = world_of(None, floating(flat), slab=flat, motions=motions)
@@ -180,7 +180,7 @@ LOOP = ((0.7, 0.8, 0.0), (-0.7, 0.8, 0.5 * np.pi))
 def cat_turn(steps: int, seconds: float) -> float:
     """rad by which the cat has turned after one loop of its shape, without angular momentum."""
     motions = tuple(
-        MotionSinusoid(np.array([3 + k]), size, seconds, mean, phase)
+        TrajectorySinusoid(np.array([3 + k]), size, seconds, mean, phase)
         for k, (mean, size, phase) in enumerate(LOOP)
     )
     world = world_of(None, CAT, motions=motions)

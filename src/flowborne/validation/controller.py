@@ -80,7 +80,7 @@ def path(world: World, controller: Controller, frames: int) -> Array:
     angles = [float(world.solid.q[0])]
     for _ in range(frames):
         controller.decide(world, FRAME, step)
-        step(world, FRAME, controller.drive(world, world.time + FRAME, FRAME))
+        step(world, FRAME, controller.command(world, world.time + FRAME, FRAME))
         angles.append(float(world.solid.q[0]))
     return np.degrees(angles)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.fluid.grid import Array
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
@@ -102,11 +102,11 @@ def held_drag(degrees: float, resolution: int, seconds: float) -> float:
     """
     settings = {"domain.resolution": str(resolution), "initial.positions.hinge": str(degrees)}
     world = build(load_scene("ns-block-drag-max", settings)).world
-    drive = Drive.none(1)
-    drive.set(np.array([0]), 0.0, 0.0)
+    command = JointCommand.none(1)
+    command.set(np.array([0]), 0.0, 0.0)
     dt = 0.25 * world.flow()[0].grid.spacing
     count = round(seconds / dt)
-    drags = [float(advance(world, dt, drive=drive).pressure_wrench[1, 0]) for _ in range(count)]
+    drags = [float(advance(world, dt, command=command).pressure_wrench[1, 0]) for _ in range(count)]
     return float(np.mean(drags[count // 2 :]))
 
 

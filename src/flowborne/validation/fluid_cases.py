@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow
 from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import MotionConstant
+from flowborne.scenes.tracks import TrajectoryConstant
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, order_of
 from flowborne.validation.worlds import RING, advance, mjcf, set_velocity, whole_steps, world_of
 
@@ -111,12 +111,12 @@ def carried_body(driven: bool, steps: int, pace: float = 1.0) -> tuple[float, fl
         '<joint name="turn" type="hinge" axis="0 0 1"/>'
         f'<geom type="sphere" size="{0.5 * DIAMETER}" density="1"/></body>'
     )
-    motions: tuple[Motion, ...] = ()
+    motions: tuple[Trajectory, ...] = ()
     if driven:
         motions = (
-            MotionConstant(np.array([0]), 0.0, pace * STREAM),
-            MotionConstant(np.array([1]), 0.0),
-            MotionConstant(np.array([2]), 0.0),
+            TrajectoryConstant(np.array([0]), 0.0, pace * STREAM),
+            TrajectoryConstant(np.array([1]), 0.0),
+            TrajectoryConstant(np.array([2]), 0.0),
         )
     stream = Uniform((STREAM, 0.0, 0.0))
     world = world_of(

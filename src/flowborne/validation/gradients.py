@@ -138,8 +138,8 @@ def exact_position(quick: bool) -> list[Finding]:
         controller.decide(world, FRAME, step)
         target = world.memory["target"].copy()
         for _ in range(3):
-            drive = controller.drive(world, FRAME, FRAME / 3.0)
-            step(world, FRAME / 3.0, drive)
+            command = controller.command(world, FRAME, FRAME / 3.0)
+            step(world, FRAME / 3.0, command)
         off = max(off, float(np.abs(world.solid.q - target).max()))
     return [
         at_most("displacement of a trial minus the one asked for, rad", wrong, 1e-6),

@@ -76,7 +76,7 @@ def standing(pose: Pose, free: Sequence[str], *winds: Wind) -> World:
         turn[model.dofs_of(joint)] = np.radians(degrees)
     q = model.integrate(model.rest().q, turn, 1.0)
     still = np.setdiff1d(np.arange(model.nv), dofs_of(free))
-    world = World.at_rest(Setup(model, None, (Still(still, q[model.places_of(still)]),), winds))
+    world = World.at_rest(Setup(model, None, (Still(still, q[model.indices_of(still)]),), winds))
     world.solid.q[:] = q
     return world
 
@@ -112,7 +112,7 @@ def settle(
         controller.decide(world, FRAME, step)
         end = world.time + FRAME
         for _ in range(STEPS):
-            report = step(world, FRAME / STEPS, controller.drive(world, end, FRAME / STEPS))
+            report = step(world, FRAME / STEPS, controller.command(world, end, FRAME / STEPS))
     return report
 
 

@@ -189,7 +189,7 @@ def start_midway(world: World, dt: float) -> None:
     _, later = ahead.flow()
     for axis in range(3):
         state.velocity[axis][:] = 0.5 * later.velocity[axis]
-        state.carrier[axis][:] = 0.5 * later.carrier[axis]
+        state.advecting_velocity[axis][:] = 0.5 * later.advecting_velocity[axis]
         state.acceleration[axis][:] = later.acceleration[axis]
 
 

@@ -13,7 +13,10 @@ def start_from(coarse: World, fine: World) -> None:
     """Give `fine` the flow of `coarse`, interpolated."""
     (fluid, to), (rough, of) = fine.flow(), coarse.flow()
     for axis in fluid.grid.axes:
-        for kept, found in ((to.velocity, of.velocity), (to.carrier, of.carrier)):
+        for kept, found in (
+            (to.velocity, of.velocity),
+            (to.advecting_velocity, of.advecting_velocity),
+        ):
             known, wanted = (g.face_coordinates(axis) for g in (rough.grid, fluid.grid))
             kept[axis][:] = interpolated(found[axis], known, wanted)
     known, wanted = rough.grid.cell_coordinates(), fluid.grid.cell_coordinates()

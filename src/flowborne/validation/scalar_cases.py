@@ -104,7 +104,7 @@ def slotted_disc(x: Array, y: Array) -> Array:
     return np.where(inside & ~slot, 1.0, 0.0)
 
 
-def carrier_of(flow: Flow, grid: Grid, time: float, dt: float) -> Faces:
+def advecting_velocity_of(flow: Flow, grid: Grid, time: float, dt: float) -> Faces:
     """Padded Faces, cells per step: the velocity with which a particle on each face crosses the
     step that begins at `time`, which is what the engine makes of velocity and acceleration."""
     h, (x0, y0, _) = grid.spacing, grid.origin
@@ -148,16 +148,16 @@ def carried_back(
             passage = Passage(transport, none, grid, OPEN, step % 2 == 1)
             after, _ = passage.carry("dye", after, BOUNDS)
         else:
-            after = carry_once(after, carrier_of(flow, grid, step * dt, dt), grid)
+            after = carry_once(after, advecting_velocity_of(flow, grid, step * dt, dt), grid)
     return before, after
 
 
-def carry_once(values: Array, carrier: Faces, grid: Grid) -> Array:
+def carry_once(values: Array, advecting_velocity: Faces, grid: Grid) -> Array:
     """One semi-Lagrangian step."""
     out = np.empty_like(values)
     field = pad_cells(values, grid, WALLS)
     closed = np.zeros(3, np.uint8)
-    carry(out, field, *carrier, CENTRE, np.array(grid.shape), closed)
+    carry(out, field, *advecting_velocity, CENTRE, np.array(grid.shape), closed)
     return out
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import MotionSinusoid
+from flowborne.scenes.tracks import TrajectorySinusoid
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.momentum import halfway_momentum
 from flowborne.validation.case import Case, Finding, GridSeries, at_most
@@ -35,7 +35,7 @@ def chain(links: int) -> str:
     return mjcf(body)
 
 
-def swimmer(cells: int, gait: tuple[MotionSinusoid, ...], sides: Boundaries | None) -> World:
+def swimmer(cells: int, gait: tuple[TrajectorySinusoid, ...], sides: Boundaries | None) -> World:
     """A neutrally buoyant chain at rest in still fluid without gravity, in its gait's first pose.
 
     cells  across the box
@@ -69,7 +69,7 @@ def momentum_kept(cells: int, steps: int) -> tuple[float, float]:
              error of the coupled solve's exchange
     """
     gait = tuple(
-        MotionSinusoid(np.array([6 + k]), 0.8, PERIOD, 0.0, 0.5 * np.pi * k) for k in range(2)
+        TrajectorySinusoid(np.array([6 + k]), 0.8, PERIOD, 0.0, 0.5 * np.pi * k) for k in range(2)
     )
     world = swimmer(cells, gait, RING)
     model, dt = world.setup.solid, PERIOD / steps
@@ -86,7 +86,7 @@ def momentum_kept(cells: int, steps: int) -> tuple[float, float]:
 
 def scallop(cells: int, steps: int, cycles: int) -> float:
     """Largest drift of the mass centre in a cycle of one hinge that opens and closes, over L."""
-    hinge = MotionSinusoid(np.array([6]), 0.5, PERIOD, 0.7, -0.5 * np.pi)
+    hinge = TrajectorySinusoid(np.array([6]), 0.5, PERIOD, 0.7, -0.5 * np.pi)
     world = swimmer(cells, (hinge,), None)
     places = [mass_centre(world)]
     for _ in range(cycles):

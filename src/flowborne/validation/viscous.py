@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.motion import Motion
+from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
-from flowborne.scenes.tracks import MotionConstant
+from flowborne.scenes.tracks import TrajectoryConstant
 from flowborne.validation.case import Case, Finding, GridSeries, near
 from flowborne.validation.worlds import advance, mjcf, world_of
 
@@ -69,9 +69,9 @@ def annulus(cells: int, free: bool) -> World:
         '<body name="shaft"><joint name="turn" type="hinge" axis="0 0 1"/>'
         f'<geom type="cylinder" size="{INNER} 1" density="{HEAVY}"/></body>'
     )
-    motions: tuple[Motion, ...] = ()
+    motions: tuple[Trajectory, ...] = ()
     if not free:
-        motions = (MotionConstant(np.array([0]), 0.0, SPIN),)
+        motions = (TrajectoryConstant(np.array([0]), 0.0, SPIN),)
     return world_of(grid, mjcf(ring, shaft), viscosity=VISCOSITY, motions=motions)
 
 

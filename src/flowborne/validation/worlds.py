@@ -7,7 +7,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from flowborne.coupling.motion import Drive, Motion
+from flowborne.coupling.motion import JointCommand, Trajectory
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
@@ -54,7 +54,7 @@ def world_of(
     slab: bool = True,
     gravity: Vector = NOWHERE,
     solid_density: float | None = None,
-    motions: tuple[Motion, ...] = (),
+    motions: tuple[Trajectory, ...] = (),
     winds: tuple[Wind, ...] = (),
     **properties: Unpack[FluidProperties],
 ) -> World:
@@ -77,14 +77,16 @@ def set_velocity(world: World, field: Field) -> None:
         x, y, z = np.meshgrid(*fluid.grid.face_coordinates(axis), indexing="ij")
         values = np.broadcast_to(field(x, y, z)[axis], x.shape)
         state.velocity[axis][:] = values
-        state.carrier[axis][:] = values
+        state.advecting_velocity[axis][:] = values
 
 
-def advance(world: World, dt: float, steps: int = 1, drive: Drive | None = None) -> StepReport:
+def advance(
+    world: World, dt: float, steps: int = 1, command: JointCommand | None = None
+) -> StepReport:
     """Take steps; gives the last report. Raises ArithmeticError when one fails."""
     assert steps > 0
     for _ in range(steps):
-        report = step(world, dt, drive)
+        report = step(world, dt, command)
         if report.outcome is not Outcome.DONE:
             raise ArithmeticError(f"step {world.steps}: {report.outcome.value}")
     return report

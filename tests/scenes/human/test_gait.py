@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from flowborne.scenes.clip_following import Passage, motion_of_clip
+from flowborne.scenes.clip_following import Passage, trajectory_of_clip
 from flowborne.scenes.human.body import human_mjcf
 from flowborne.scenes.human.clip_skeleton import skeleton_of
 from flowborne.scenes.human.gait import CYCLE, NAMES, gait_clip, leg_turns, standing_clip
@@ -229,7 +229,7 @@ def test_a_cycle_lasts():
 
 def test_the_walk_goes_on_round_after_round(model, clip):
     """Played as a loop through a scene's motion, without a jump of place or velocity."""
-    motion = motion_of_clip(model, clip, {name: name for name in NAMES}, Passage(loop=True))
+    motion = trajectory_of_clip(model, clip, {name: name for name in NAMES}, Passage(loop=True))
     stride = clip.translation[-1, 0] - clip.translation[0, 0]
     start = motion.position(0.0)
     np.testing.assert_allclose(motion.position(3.0 * CYCLE)[0] - start[0], 3.0 * stride, rtol=1e-9)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from flowborne.coupling.motion import Drive
+from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
@@ -66,11 +66,11 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     History.create(folder.history, ["frame", "time_s"]).close()
     recorder = Recorder(folder)
     recorder.write(0, world, None)
-    drive = Drive.none(model.nv)
+    command = JointCommand.none(model.nv)
     for joint, speed in (("shoulder", 1.0), ("elbow", -3.0)):
-        drive.set(model.dofs_of(joint), speed, speed)
+        command.set(model.dofs_of(joint), speed, speed)
     for frame in (1, 2):
-        report = step(world, 0.02, drive)
+        report = step(world, 0.02, command)
         assert report.outcome is Outcome.DONE
         recorder.write(frame, world, report)
     return folder.path

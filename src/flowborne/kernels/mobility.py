@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Places, ResponseArrays
+from flowborne.kernels.arrays import Array, Indices, MobilityArrays
 from flowborne.kernels.jit import kernel
 
 
 @kernel
-def solve_factored(x: Array, start: Places, row: Places, value: Array, diagonal: Array) -> None:
+def solve_factored(x: Array, start: Indices, row: Indices, value: Array, diagonal: Array) -> None:
     """x = (L D L^T)^-1 x, in place."""
     n = x.size
     for j in range(n):
@@ -27,9 +27,9 @@ def solve_factored(x: Array, start: Places, row: Places, value: Array, diagonal:
 
 
 @kernel
-def respond(load: Array, response: ResponseArrays) -> Array:
+def respond(load: Array, mobility: MobilityArrays) -> Array:
     """(k,) A^-1 load."""
-    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = response
+    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = mobility
     size = load.size
     motion = np.zeros(size)
     if t_start.size == 1:
@@ -61,9 +61,9 @@ def respond(load: Array, response: ResponseArrays) -> Array:
     return motion
 
 
-def respond_reference(load: Array, response: ResponseArrays) -> Array:
+def respond_reference(load: Array, mobility: MobilityArrays) -> Array:
     """`respond` in NumPy, by dense matrices."""
-    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = response
+    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = mobility
     if t_start.size == 1:
         return np.asarray(dense @ load)
     T, L = np.zeros((load.size, order.size)), np.eye(order.size)

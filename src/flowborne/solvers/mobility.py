@@ -13,19 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from flowborne.kernels.arrays import Array, Integers, Places, ResponseArrays
-from flowborne.kernels.response import respond
+from flowborne.kernels.arrays import Array, Indices, Integers, MobilityArrays
+from flowborne.kernels.mobility import respond
 
 
 @dataclass(frozen=True)
-class Response:
+class Mobility:
     """A^-1 (k, k), symmetric positive semidefinite.
 
     arrays     for kernels; the factors are empty where A^-1 is dense, and it is where they are not
     compliant  (k, m) R with R R^T close to A^-1 for the modes that meet little resistance
     """
 
-    arrays: ResponseArrays
+    arrays: MobilityArrays
     compliant: Array
 
     @property
@@ -57,7 +57,7 @@ NONE = np.zeros(0, np.int32)
 START = np.zeros(1, np.int32)
 
 
-def dense_response(matrix: Array) -> Response:
+def dense_mobility(matrix: Array) -> Mobility:
     """Of a dense A^-1 (k, k)."""
     whole = np.ascontiguousarray(matrix)
     share, axes = np.linalg.eigh(whole) if len(whole) else (np.zeros(0), whole)
@@ -65,27 +65,27 @@ def dense_response(matrix: Array) -> Response:
         whole, START, NONE, np.zeros(0), START, NONE, np.zeros(0), np.zeros(0),
         np.zeros(0, np.int64), np.zeros((0, 0)),
     )  # fmt: skip
-    return Response(arrays, axes * np.sqrt(np.maximum(share, 0.0)))
+    return Mobility(arrays, axes * np.sqrt(np.maximum(share, 0.0)))
 
 
-def factored_response(
+def factored_mobility(
     jacobian: csr_array,
-    lower: tuple[Places, Places, Array],
+    lower: tuple[Indices, Indices, Array],
     diagonal: Array,
     order: Integers,
     taken: Array,
     compliant: Array,
-) -> Response:
+) -> Mobility:
     """Of a factorised matrix.
 
     jacobian  (k, n) T
     lower     columns of L (n, n) below its diagonal of ones: start, row, value
     diagonal  (n,) D;  order  (n,) index of each unknown in L
-    taken     (n, c) Y;  compliant  see `Response`
+    taken     (n, c) Y;  compliant  see `Mobility`
     """
     starts, columns = jacobian.indptr.astype(np.int32), jacobian.indices.astype(np.int32)
     arrays = (
         np.zeros((0, 0)), starts, columns, jacobian.data, *lower, diagonal,
         order.astype(np.int64), np.ascontiguousarray(taken),
     )  # fmt: skip
-    return Response(arrays, np.ascontiguousarray(compliant))
+    return Mobility(arrays, np.ascontiguousarray(compliant))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.kernels.aggregates import OWN, WEAK
-from flowborne.kernels.arrays import Array, Integers, Marks, Periodic, Places, Real, Triple
+from flowborne.kernels.arrays import Array, Indices, Integers, Marks, Periodic, Real, Triple
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.vectors import cells_of
 
@@ -50,32 +50,32 @@ def face_of(w: Triple, shape: Integers, axis: int, at: int, up: int) -> float:
 
 
 @kernel
-def seat_guests(
+def assign_orphans(
     marks: Marks,
     w: Triple,
     inverse: Real,
     factor: Integers,
     periodic: Periodic,
     coarse_shape: Integers,
-    guests: Places,
-    hosts: Places,
+    orphans: Indices,
+    aggregates: Indices,
 ) -> int:
     """Find a coarse cell for the fine cells that lost their own; returns how many found one.
 
     coarse_shape  of the padded coarse arrays
-    guests        filled with the padded flat fine cells
-    hosts         padded over the fine level: flat coarse cell of each guest, 0 elsewhere
+    orphans        filled with the padded flat fine cells
+    aggregates         padded over the fine level: flat coarse cell of each orphan, 0 elsewhere
     """
     p0, p1, p2 = marks.shape
     shape = np.array([p0, p1, p2])
     d = 1 if p0 > 1 else 0
-    flat, share, host = marks.reshape(-1), inverse.reshape(-1), hosts.reshape(-1)
+    flat, share, aggregate = marks.reshape(-1), inverse.reshape(-1), aggregates.reshape(-1)
     count = 0
     for i in range(d, p0 - d):
         for j in range(1, p1 - 1):
             lost = 0
             for k in range(1, p2 - 1):
-                hosts[i, j, k] = 0
+                aggregates[i, j, k] = 0
                 lost += marks[i, j, k] < OWN
             for k in range(1, p2 - 1 if lost else 1):
                 at = (i * p1 + j) * p2 + k
@@ -90,9 +90,9 @@ def seat_guests(
                         weight = face_of(w, shape, axis, at, up)
                         if weight > best:
                             best = weight
-                            host[at] = cover(other, shape, factor, coarse_shape)
-                if host[at] > 0:
-                    guests[count] = at
+                            aggregate[at] = cover(other, shape, factor, coarse_shape)
+                if aggregate[at] > 0:
+                    orphans[count] = at
                     count += 1
     return count
 
@@ -127,7 +127,7 @@ def cover_reference(
     return np.asarray(np.ravel_multi_index(tuple(over), tuple(coarse_shape)))
 
 
-def seat_guests_reference(
+def assign_orphans_reference(
     marks: Marks,
     w: Triple,
     inverse: Real,
@@ -135,7 +135,7 @@ def seat_guests_reference(
     periodic: Periodic,
     coarse_shape: Integers,
 ) -> tuple[Integers, Integers]:
-    """`seat_guests` in NumPy: the guests, and the host of each."""
+    """`assign_orphans` in NumPy: the orphans, and the aggregate of each."""
     shape, flat, share = np.array(marks.shape), marks.ravel(), inverse.ravel()
     inside = np.zeros(marks.shape, bool)
     inside[cells_of(marks)] = True
@@ -155,64 +155,64 @@ def seat_guests_reference(
 
 
 @kernel
-def add_guest_weights(
+def add_orphan_weights(
     marks: Marks,
     w: Triple,
     coarse: Triple,
     factor: Integers,
     ratio: Array,
     periodic: Periodic,
-    guests: Places,
-    hosts: Places,
+    orphans: Indices,
+    aggregates: Indices,
 ) -> None:
-    """Add the faces of guests to the faces between their hosts and the coarse cells beyond.
+    """Add the faces of orphans to the faces between their aggregates and the coarse cells beyond.
 
     w, coarse  padded weights of the fine and the coarse level
     ratio      (3, most faces) of distances for each coarse face, see `centres.distance_ratio`
     """
     shape, wide = np.array(marks.shape), np.array(coarse[0].shape)
-    host, flat = hosts.reshape(-1), marks.reshape(-1)
-    for g in range(guests.size):
-        at = guests[g]
+    aggregate, flat = aggregates.reshape(-1), marks.reshape(-1)
+    for g in range(orphans.size):
+        at = orphans[g]
         for axis in range(1 if shape[0] == 1 else 0, 3):
             for up in range(2):
                 weight = face_of(w, shape, axis, at, up)
                 other = neighbour(at, axis, up, shape, periodic)
                 if weight == 0.0 or other < 0:
                     continue
-                if host[other] > 0:
-                    there = host[other]
+                if aggregate[other] > 0:
+                    there = aggregate[other]
                     if other < at:
                         continue
                 elif flat[other] & OWN:
                     there = cover(other, shape, factor, wide)
                 else:
                     continue
-                add_between(coarse, wide, host[at], there, weight, ratio, periodic)
+                add_between(coarse, wide, aggregate[at], there, weight, ratio, periodic)
 
 
-def add_guest_weights_reference(
+def add_orphan_weights_reference(
     marks: Marks,
     w: Triple,
     coarse: Triple,
     factor: Integers,
     ratio: Array,
     periodic: Periodic,
-    guests: Places,
-    hosts: Places,
+    orphans: Indices,
+    aggregates: Indices,
 ) -> Triple:
-    """`add_guest_weights` in NumPy: the coarse weights after it."""
+    """`add_orphan_weights` in NumPy: the coarse weights after it."""
     shape, wide = np.array(marks.shape), np.array(coarse[0].shape)
     out = coarse[0].copy(), coarse[1].copy(), coarse[2].copy()
-    host, flat = hosts.ravel(), marks.ravel()
-    at = guests.astype(np.int64)
+    aggregate, flat = aggregates.ravel(), marks.ravel()
+    at = orphans.astype(np.int64)
     for axis, up, other in neighbours_reference(at, shape, periodic):
         weight = w[axis].ravel()[at + up * int(np.prod(shape[axis + 1 :]))]
-        guest = (other >= 0) & (host[other] > 0)
-        counts = (other >= 0) & np.where(guest, other > at, flat[other] >= OWN)
-        own = np.where(counts & ~guest, other, at)
-        there = np.where(guest, host[other], cover_reference(own, shape, factor, wide))
-        ends = np.stack([np.minimum(host[at], there), np.maximum(host[at], there)])
+        orphan = (other >= 0) & (aggregate[other] > 0)
+        counts = (other >= 0) & np.where(orphan, other > at, flat[other] >= OWN)
+        own = np.where(counts & ~orphan, other, at)
+        there = np.where(orphan, aggregate[other], cover_reference(own, shape, factor, wide))
+        ends = np.stack([np.minimum(aggregate[at], there), np.maximum(aggregate[at], there)])
         low, high = (np.stack(np.unravel_index(end, tuple(wide))) for end in ends)
         for d in range(3):
             level = np.all(np.delete(low, d, 0) == np.delete(high, d, 0), axis=0) & counts

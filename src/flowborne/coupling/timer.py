@@ -5,7 +5,7 @@ from __future__ import annotations
 from time import perf_counter
 
 
-class Stopwatch:
+class Timer:
     """Seconds by part of a step."""
 
     def __init__(self) -> None:
