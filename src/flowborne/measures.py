@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.body_measures import BodyMeasures
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.frame_report import FrameReport
@@ -44,6 +45,8 @@ class Measures:
       flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
                                                 of elements inside out, in scenes with flesh
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
+      <body>_centre_x_m … _torque_z_Nm          of bodies named in the scene's output; see
+                                                `body_measures`
       momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
       momentum_{exchanged,advection,…}_…_Ns     given to the bodies by pressure; made in advection
                                                 or lost (0 but in the paper's scheme); given to the
@@ -66,12 +69,14 @@ class Measures:
         setup: Setup,
         controller: Controller | None,
         stream: tuple[float, ...] | None,
+        bodies: tuple[str, ...] = (),
     ) -> None:
         self._model = setup.solid
         self._controller = controller
         self._blows = bool(setup.mouths)
         self._dyed = setup.fluid is not None and bool(setup.fluid.scalars)
         self._along, self._across = _axes(stream)
+        self._named = BodyMeasures(setup.solid, bodies)
         self._joints = _scalar_joints(setup.solid)
         places = (
             {} if controller is None else {int(dof): n for n, dof in enumerate(controller.dofs)}
@@ -92,6 +97,7 @@ class Measures:
         values |= {"frame": frame, "time_s": world.time}
         values |= {column: float(world.solid.q[place]) for column, place, _ in self._joints}
         values |= self._poses(world.solid.q) | self._flesh(world.solid.q)
+        values |= self._named.values(world.solid.q, None if report is None else report.step)
         if report is not None:
             values |= self._of_frame(report)
         return values
@@ -116,6 +122,7 @@ class Measures:
             names += ["flesh_least_detF", "flesh_inside_out"]
         for body in self._model.body_names[1:]:
             names += [f"{body}_{axis}_m" for axis in "xyz"] + [f"{body}_q{axis}" for axis in "wxyz"]
+        names += self._named.columns
         for part in ("solid", "fluid", *IMPULSES, *(["jet"] if self._blows else [])):
             names += [f"momentum_{part}_{axis}_Ns" for axis in "xyz"]
         names += ["expelled_m3"] if self._blows else []

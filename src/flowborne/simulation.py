@@ -106,7 +106,9 @@ class Simulation:
         self.frame_time = built.frame_time
         self.steps_per_frame = built.steps_per_frame
         self.frames = built.frames
-        self.measures = Measures(built.world.setup, self.controller, self.scene.stream())
+        self.measures = Measures(
+            built.world.setup, self.controller, self.scene.stream(), self.scene.output.bodies
+        )
         self._moment = _Moment(built.world, 0, None)
         self._step: Step = step
 

@@ -55,7 +55,9 @@ def move_only(world: World, dt: float, command: JointCommand | None = None) -> S
     world.time += dt
     world.steps += 1
     none = np.zeros((model.nbody, 6))
-    return StepReport(dt, Outcome.DONE, np.zeros(model.nv), none, none, none, none, none)
+    return StepReport(
+        dt, Outcome.DONE, world.solid.v, np.zeros(model.nv), none, none, none, none, none
+    )
 
 
 @pytest.fixture

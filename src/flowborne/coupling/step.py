@@ -319,6 +319,7 @@ def report(
     done = StepReport(
         dt=dt,
         outcome=solved.outcome if finite else Outcome.NOT_FINITE,
+        velocity=np.where(solved.driven.prescribed, solved.v, halfway),
         actuator=solved.actuator,
         pressure_wrench=np.zeros(wind.shape),
         viscous_wrench=np.zeros(wind.shape),

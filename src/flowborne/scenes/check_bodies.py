@@ -49,6 +49,11 @@ def check_without_bodies(draft: Draft) -> Iterator[str]:
                 f"{draft.at(table)}: there are no bodies. "
                 "Add [solids] with a model, or drop this table."
             )
+    if draft.scene.output.bodies:
+        yield (
+            f"{draft.at('output', 'bodies')}: there are no bodies. "
+            "Add [solids] with a model, or drop this key."
+        )
 
 
 def unknown_joint(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> list[str]:
@@ -78,6 +83,8 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     named = []
     for body in () if scene.solids is None else scene.solids.densities:
         named += unknown_body(draft, model, body, "solids", "densities")
+    for body in scene.output.bodies:
+        named += unknown_body(draft, model, body, "output", "bodies")
     for index, wind in enumerate(scene.wind):
         for body in wind.bodies or ():
             named += unknown_body(draft, model, body, "wind", index)

@@ -45,10 +45,13 @@ class OutputTable(Table):
 
     checkpoint_every  frames between checkpoints
     picture           what the fluid shows in pictures and films
+    bodies            whose centre of mass, velocity, and force and torque of the fluid the history
+                      holds
     """
 
     checkpoint_every: Count = 24
     picture: Literal["dye", "vorticity", "none"] = "vorticity"
+    bodies: tuple[Text, ...] = ()
 
 
 class Scene(Table):
