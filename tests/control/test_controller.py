@@ -18,10 +18,10 @@ from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, WeightedObjective
 from flowborne.control.phases import PhaseIntervals
 from flowborne.control.rules import GoldenSection
-from flowborne.control.servo import ServoExact, ServoPD
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
+from flowborne.coupling.servo import ServoExact, ServoPD
 from flowborne.coupling.world import World
 
 MakeWorld = Callable[..., World]

@@ -20,8 +20,8 @@ from flowborne.control.objectives import (
     ObjectiveWindDrag,
     WeightedObjective,
 )
-from flowborne.control.servo import ServoExact
 from flowborne.control.trial import Hypothesis
+from flowborne.coupling.servo import ServoExact
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid

@@ -17,7 +17,7 @@ from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectivePressureDrag
 from flowborne.control.phases import PhaseIntervals, PhaseTrack
 from flowborne.control.rules import GoldenSection
-from flowborne.control.servo import ServoPD
+from flowborne.coupling.servo import ServoPD
 from flowborne.coupling.stream import WindStream
 from flowborne.fluid.boundary import BoundaryInflow, BoundaryNoSlip
 from flowborne.scenes.build import Built, build

@@ -20,10 +20,10 @@ from flowborne.control.gradients import Gradient, GradientCentral
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.control.rules import FixedStep, Rule
-from flowborne.control.servo import Servo, ServoExact
 from flowborne.control.trial import Hypothesis, Step, Trials
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
+from flowborne.coupling.servo import Servo, ServoExact
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World

@@ -17,7 +17,8 @@ class Trajectory(Protocol):
     dofs  (k,) indices into v, ascending: all dofs of each of its joints
     """
 
-    dofs: NDArray[np.int64]
+    @property
+    def dofs(self) -> NDArray[np.int64]: ...
 
     def position(self, time: float) -> Array:
         """(m,) the joints' entries of q at `time` (s): rad, m, unit quaternions."""

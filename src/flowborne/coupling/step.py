@@ -19,7 +19,7 @@ from flowborne.coupling.flow import (
 )
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.half_kick import Kick, half_kick
-from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.motion import JointCommand, Trajectory
 from flowborne.coupling.mouths import Jet, jet_wrench, jets_of
 from flowborne.coupling.operators import (
     boundary_velocity,
@@ -30,6 +30,7 @@ from flowborne.coupling.operators import (
     side_push,
 )
 from flowborne.coupling.report import Momentum, Outcome, StepReport
+from flowborne.coupling.servo import TrajectoryServo
 from flowborne.coupling.solve import Solved, solve_bodies, solve_together
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.timer import Timer
@@ -134,12 +135,24 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
     command = JointCommand.none(model.nv) if command is None else command.copy()
     for told in world.setup.motions:
         later = world.time + dt
-        goal = world.solid.q.copy()
-        goal[model.indices_of(told.dofs)] = told.position(later)
-        rate = model.difference(world.solid.q, goal)[told.dofs] / dt
-        command.set(told.dofs, rate, told.velocity(later))
+        if isinstance(told, TrajectoryServo):
+            # a drive that may give way moves with the velocity it has: it steers the step after
+            v = world.solid.v[told.dofs]
+            after = gap_to(world, told, later + dt) - dt * v
+            final_velocity, _ = told.servo.velocity(after, v, dt, dt)
+            limit = np.asarray(told.servo.torque_limit, dtype=np.float64)
+            command.set(told.dofs, v, final_velocity, limit)
+        else:
+            command.set(told.dofs, gap_to(world, told, later) / dt, told.velocity(later))
     command.set(model.locked, 0.0, 0.0)
     return command
+
+
+def gap_to(world: World, told: Trajectory, time: float) -> Array:
+    """(k,) displacement of a motion's dofs from where they are to where it is at `time` (s)."""
+    model, goal = world.setup.solid, world.solid.q.copy()
+    goal[model.indices_of(told.dofs)] = told.position(time)
+    return model.difference(world.solid.q, goal)[told.dofs]
 
 
 def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:

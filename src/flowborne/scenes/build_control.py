@@ -24,11 +24,11 @@ from flowborne.control.objectives import (
 )
 from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseTrack
 from flowborne.control.rules import FixedStep, GoldenSection, ResilientStep, Rule
-from flowborne.control.servo import Servo, ServoExact, ServoPD
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Trajectory
 from flowborne.scenes import schema_control as tables
 from flowborne.scenes.bodies import joint_unit, posed
+from flowborne.scenes.build_drives import servo_of
 from flowborne.scenes.capture import clip_motion
 from flowborne.scenes.fields import triple
 from flowborne.scenes.python_function import find_function
@@ -74,7 +74,7 @@ def controller_of(
         rule=_rule(how.rule, scene, model),
         every=how.every,
         iterations=how.iterations,
-        servo=_servo(how.servo, tuple(limit)),
+        servo=servo_of(how.servo, tuple(limit)),
         executor=executor,
     )
 
@@ -100,12 +100,6 @@ def _rule(table: tables.AnyRule, scene: Scene, model: SolidModel) -> Rule:
     unit = joint_unit(model, scene.controlled_joints()[0])
     reach = None if table.reach is None else unit * table.reach
     return GoldenSection(reach, table.tolerance)
-
-
-def _servo(table: tables.ServoExact | tables.ServoPD, limit: tuple[float, ...]) -> Servo:
-    if isinstance(table, tables.ServoExact):
-        return ServoExact(limit)
-    return ServoPD(2.0 * math.pi * table.frequency, limit)
 
 
 def _weighted(

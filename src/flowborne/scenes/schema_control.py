@@ -21,6 +21,7 @@ from flowborne.scenes.fields import (
     Vector,
     WholeNumber,
 )
+from flowborne.scenes.schema_drives import EXACT, ServoTable
 
 
 class ControlTable(Table):
@@ -226,19 +227,6 @@ class RuleGoldenSection(Table):
 AnyRule = Annotated[RuleFixed | RuleResilient | RuleGoldenSection, *ByKind]
 
 
-class ServoExact(Table):
-    """The drive reaches every target exactly when it is due."""
-
-    kind: Literal["exact"]
-
-
-class ServoPD(Table):
-    """Critically damped drive of natural frequency `frequency`, Hz."""
-
-    kind: Literal["pd"]
-    frequency: Positive
-
-
 class ControllerTable(Table):
     """[controller]: how the controlled joints decide.
 
@@ -262,4 +250,4 @@ class ControllerTable(Table):
     rule: AnyRule = RuleFixed(kind="fixed")
     every: Count = 1
     iterations: Count = 1
-    servo: Annotated[ServoExact | ServoPD, *ByKind] = ServoExact(kind="exact")
+    servo: ServoTable = EXACT

@@ -13,9 +13,9 @@ from flowborne.control.executors import Serial
 from flowborne.control.gradients import GradientCentral
 from flowborne.control.objectives import ObjectiveEffort, ObjectiveSum, WeightedObjective
 from flowborne.control.rules import GoldenSection
-from flowborne.control.servo import ServoExact
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.report import StepReport
+from flowborne.coupling.servo import ServoExact
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.grid import Array

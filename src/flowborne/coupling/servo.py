@@ -12,6 +12,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.coupling.motion import Trajectory
+
 Array = NDArray[np.float64]
 
 
@@ -89,3 +91,27 @@ class ServoPD:
         decay = np.exp(-w * dt)
         after = (x + slope * dt) * decay
         return (after - x) / dt, (slope - w * (x + slope * dt)) * decay
+
+
+@dataclass(frozen=True)
+class TrajectoryServo:
+    """A prescribed motion whose dofs are taken to it by a servo: late, or with limited force.
+
+    trajectory  what the dofs are told, and where they start
+    servo       how their drives follow
+    """
+
+    trajectory: Trajectory
+    servo: Servo
+
+    @property
+    def dofs(self) -> NDArray[np.int64]:
+        return self.trajectory.dofs
+
+    def position(self, time: float) -> Array:
+        """(m,) rad, m, unit quaternions that the dofs are told."""
+        return self.trajectory.position(time)
+
+    def velocity(self, time: float) -> Array:
+        """(k,) rad/s or m/s that the dofs are told."""
+        return self.trajectory.velocity(time)

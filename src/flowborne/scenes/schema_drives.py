@@ -1,0 +1,25 @@
+"""Tables of a scene that say how the drives of joints follow what they are told."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from flowborne.scenes.fields import ByKind, Positive, Table
+
+
+class ServoExact(Table):
+    """The drive reaches every target exactly when it is due."""
+
+    kind: Literal["exact"]
+
+
+class ServoPD(Table):
+    """Critically damped drive of natural frequency `frequency`, Hz."""
+
+    kind: Literal["pd"]
+    frequency: Positive
+
+
+ServoTable = Annotated[ServoExact | ServoPD, *ByKind]
+
+EXACT = ServoExact(kind="exact")
