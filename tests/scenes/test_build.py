@@ -17,7 +17,7 @@ from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectivePressureDrag
 from flowborne.control.phases import PhaseIntervals, PhaseTrack
 from flowborne.control.rules import GoldenSection
-from flowborne.coupling.servo import ServoPD
+from flowborne.coupling.servo import ServoExact, ServoPD, TrajectoryServo
 from flowborne.coupling.stream import WindStream
 from flowborne.fluid.boundary import BoundaryInflow, BoundaryNoSlip
 from flowborne.scenes.build import Built, build
@@ -70,6 +70,46 @@ def test_a_joint_with_a_motion_starts_in_it(write: Write) -> None:
     motion = made.world.setup.motions[0]
     assert_allclose(motion.dofs, model.dofs_of("shoulder"))
     assert_allclose(motion.velocity(0.5), -math.radians(30.0) * math.pi)
+
+
+def test_a_formula_follows_the_constants_that_are_set(write: Write) -> None:
+    formula = """
+[[motion]]
+kind = "formula"
+joint = "wrist"
+position = "turn * (1 + ramp(t, 2))"
+
+[[motion]]
+kind = "formula"
+joint = "rail"
+position = "0.01 * turn * cos(pi * t)"
+
+[constants]
+turn = 30.0
+"""
+    settings = {"constants.turn": "40.0", "control": "[]", "objectives": "[]"}
+    made = build(load_scene(write(append=formula), settings))
+    _, wrist, rail = made.world.setup.motions
+    assert_allclose(wrist.position(1.0), math.radians(60.0))
+    assert_allclose(wrist.velocity(1.0), math.radians(40.0) * 0.75)
+    assert_allclose(rail.position(1.0), -0.4)
+    assert_allclose(made.world.solid.q[made.world.setup.solid.positions_of("rail")], 0.4)
+    load_scene(write(append=formula), settings).to_toml()
+
+
+def test_a_motion_has_the_servo_and_the_limit_of_the_scene(write: Write) -> None:
+    settings = {"motion.0.servo": '{ kind = "pd", frequency = 2.0 }', "motion.0.torque_limit": "4"}
+    (told,) = build(load_scene(write(), settings)).world.setup.motions
+    assert isinstance(told, TrajectoryServo)
+    assert isinstance(told.servo, ServoPD)
+    assert told.servo.frequency == pytest.approx(4.0 * math.pi)
+    assert told.servo.torque_limit == 4.0
+    assert_allclose(told.velocity(0.0), math.radians(30.0) * math.pi)
+    (told,) = build(load_scene(write(), {"motion.0.torque_limit": "4.0"})).world.setup.motions
+    assert isinstance(told, TrajectoryServo)
+    assert told.servo == ServoExact(4.0)
+    (told,) = build(load_scene(write())).world.setup.motions
+    assert not isinstance(told, TrajectoryServo)
 
 
 def test_the_fluid_starts_with_the_scenes_velocity_everywhere(write: Write) -> None:

@@ -189,6 +189,16 @@ radius = 0.05
 volume_rate = 0.1
 """
 
+FORMULA = """
+[[motion]]
+kind = "formula"
+joint = "rail"
+position = "height * t"
+
+[constants]
+height = 0.3
+"""
+
 APPENDED_FAULT = {
     "keyframes that go back in time": (
         '[[motion]]\nkind = "keyframes"\njoint = "rail"\ntimes = [0, 2, 1]\nvalues = [0, 1, 2]',
@@ -207,6 +217,37 @@ APPENDED_FAULT = {
     "two motions of one joint": (
         '[[motion]]\nkind = "constant"\njoint = "shoulder"',
         "scene swim.toml, [[motion]] 2: joint 'shoulder' has another [[motion]] above.",
+    ),
+    "a name that a formula does not know": (
+        FORMULA.replace("height *", "hieght *"),
+        "scene swim.toml, [[motion]] 2, position: formula 'hieght * t': "
+        "name 'hieght' is not known; "
+        "did you mean 'height'?",
+    ),
+    "a formula that is not finite": (
+        FORMULA.replace("height *", "height / (t - 0.125) *").replace(' t"', ' sqrt(t + 1)"'),
+        "scene swim.toml, [[motion]] 2, position: formula 'height / (t - 0.125) * sqrt(t + 1)' or "
+        "its derivative is not finite at t = 0.125 s. Change it, or end the run before.",
+    ),
+    "a constant that no formula uses": (
+        FORMULA + "hieght = 2.0",
+        "scene swim.toml, constants: no formula uses 'hieght'; did you mean 'height'?",
+    ),
+    "a constant with the name of a function": (
+        FORMULA + "ramp = 2.0",
+        "scene swim.toml, constants: 'ramp' cannot be a constant's name. Change it.",
+    ),
+    "a constant that is text": (
+        FORMULA.replace("0.3", '"0.3"'),
+        "scene swim.toml, constants height: '0.3' is not a number. Give a number without quotes.",
+    ),
+    "a drive without force": (
+        '[[motion]]\nkind = "constant"\njoint = "rail"\ntorque_limit = 0.0',
+        "scene swim.toml, [[motion]] 2, torque_limit: 0.0 is not greater than 0.",
+    ),
+    "a servo that does not exist": (
+        '[[motion]]\nkind = "constant"\njoint = "rail"\nservo = "exct"',
+        "scene swim.toml, [[motion]] 2, servo: 'exct' is not known; did you mean 'exact'?",
     ),
     "a start and a motion of one joint": (
         "[initial]\npositions = { shoulder = 3.0 }",

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from flowborne.coupling.motion import Trajectory
+from flowborne.scenes.formula import Formula
 from flowborne.scenes.tracks import (
     Curve,
     TrajectoryConstant,
+    TrajectoryFormula,
     TrajectoryKeyframes,
     TrajectorySinusoid,
 )
@@ -22,6 +24,8 @@ DOF = np.array([3])
 STEP = 1e-6
 
 moderate = st.floats(-5.0, 5.0)
+
+GAIT = Formula("a * ramp(t) * sin(2*pi*(0.5*t - 0.14))", {"a": 0.7})
 
 
 @st.composite
@@ -37,6 +41,7 @@ motions = st.one_of(
     st.builds(TrajectoryConstant, st.just(DOF), moderate, moderate),
     st.builds(TrajectorySinusoid, st.just(DOF), moderate, st.floats(0.3, 5.0), moderate, moderate),
     st.builds(TrajectoryKeyframes, st.just(DOF), curves()),
+    st.builds(TrajectoryFormula, st.just(DOF), st.just(GAIT), moderate),
 )
 
 
@@ -92,6 +97,7 @@ def test_sinusoid_at_known_times() -> None:
         TrajectoryConstant(DOF, 1.0, 2.0),
         TrajectorySinusoid(DOF, 1.0, 2.0),
         TrajectoryKeyframes(DOF, Curve((0.0, 1.0), (0.0, 1.0))),
+        TrajectoryFormula(DOF, GAIT),
     ],
 )
 def test_motions_survive_pickling(motion: Trajectory) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -10,12 +11,20 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
+from flowborne.scenes.build_drives import driven, servo_of
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
+from flowborne.scenes.formula import Formula
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_solids import MotionConstantTable, MotionSinusoidTable, MotionTable
+from flowborne.scenes.schema_solids import (
+    MotionConstantTable,
+    MotionFormulaTable,
+    MotionSinusoidTable,
+    MotionTable,
+)
 from flowborne.scenes.tracks import (
     Curve,
     TrajectoryConstant,
+    TrajectoryFormula,
     TrajectoryKeyframes,
     TrajectorySinusoid,
 )
@@ -94,8 +103,18 @@ def joint_unit(model: SolidModel, joint: str) -> float:
     return 1.0 if joint_kind(model, joint) == SLIDE else math.pi / 180.0
 
 
-def trajectory_of(table: MotionTable, model: SolidModel) -> Trajectory:
-    """A prescribed motion of the scene in radians or metres."""
+def trajectory_of(
+    table: MotionTable, model: SolidModel, constants: Mapping[str, float]
+) -> Trajectory:
+    """A prescribed motion of the scene in radians or metres, with its servo.
+
+    constants  of its formula
+    """
+    limit = math.inf if table.torque_limit is None else table.torque_limit
+    return driven(_told(table, model, constants), servo_of(table.servo, limit))
+
+
+def _told(table: MotionTable, model: SolidModel, constants: Mapping[str, float]) -> Trajectory:
     unit = joint_unit(model, table.joint)
     dofs = model.dofs_of(table.joint)
     if isinstance(table, MotionConstantTable):
@@ -104,6 +123,8 @@ def trajectory_of(table: MotionTable, model: SolidModel) -> Trajectory:
         return TrajectorySinusoid(
             dofs, unit * table.amplitude, table.period, unit * table.mean, math.radians(table.phase)
         )
+    if isinstance(table, MotionFormulaTable):
+        return TrajectoryFormula(dofs, Formula(table.position, constants), unit)
     return TrajectoryKeyframes(dofs, Curve(table.times, tuple(unit * v for v in table.values)))
 
 
@@ -113,7 +134,9 @@ def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Traj
     start   (nq,) pose from which a clip is entered
     raises  SceneError when the clip cannot be used
     """
-    motions: list[Trajectory] = [trajectory_of(table, model) for table in scene.motion]
+    motions: list[Trajectory] = [
+        trajectory_of(table, model, scene.constants) for table in scene.motion
+    ]
     clip = clip_motion(scene, model, start)
     return (*motions,) if clip is None else (*motions, clip)
 

@@ -19,6 +19,7 @@ from flowborne.scenes.bodies import (
     joint_unit,
 )
 from flowborne.scenes.check_flesh import check_flesh_places
+from flowborne.scenes.check_formulas import check_formulas
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.python_function import find_function
 from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
@@ -28,6 +29,7 @@ from flowborne.solids.model import SolidModel
 
 NEEDS_BODIES = (
     "clip",
+    "constants",
     "flesh",
     "initial",
     "motion",
@@ -99,9 +101,13 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
                 "of 2 dimensions does not have. Drop it."
             )
     yield from named
-    state = [*_check_initial(draft, model), *_check_motions(draft, model)]
+    state = [
+        *_check_initial(draft, model),
+        *_check_motions(draft, model),
+        *check_formulas(draft),
+    ]
     yield from state
-    if not state and draft.sound("initial", "motion"):
+    if not state and draft.sound("initial", "motion", "constants"):
         yield from _check_ranges(draft, model)
         yield from _check_places(draft, model)
 

@@ -33,5 +33,5 @@ class Draft:
 
     def gives(self, table: str) -> bool:
         """Whether the file says anything in this table, right or wrong."""
-        default = Scene.model_fields[table].default
+        default = Scene.model_fields[table].get_default(call_default_factory=True)
         return table in self.broken or getattr(self.scene, table) != default

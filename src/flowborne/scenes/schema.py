@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 import tomli_w
-from pydantic import PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
-from flowborne.scenes.fields import Count, Positive, Table, Text, Vector, filled
+from flowborne.scenes.fields import Count, Number, Positive, Table, Text, Vector, filled
 from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
 from flowborne.scenes.schema_flesh import FleshTable
 from flowborne.scenes.schema_fluid import (
@@ -59,9 +59,10 @@ class Scene(Table):
 
     name         as in the file, or the file's own name
     description  one line that says what is seen
-    figure       the paper's figure or section that it shows
+    figure       the paper's figure or section that it shows, or the case that it is of
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
+    constants    name -> number, for the formulas of [[motion]]
     """
 
     name: Text
@@ -69,6 +70,7 @@ class Scene(Table):
     figure: str = ""
     dimensions: Literal[2, 3] = 3
     gravity: Vector = (0.0, 0.0, 0.0)
+    constants: dict[str, Number] = Field(default_factory=dict)
     time: TimeTable = TimeTable()
     domain: Domain | None = None
     fluid: FluidTable | None = None

@@ -21,6 +21,7 @@ from flowborne.scenes.fields import (
     Text,
     Vector,
 )
+from flowborne.scenes.schema_drives import EXACT, ServoTable
 from flowborne.scenes.schema_fluid import check_table
 
 
@@ -50,27 +51,40 @@ class InitialTable(Table):
     velocities: dict[str, JointValues] = Field(default_factory=dict)
 
 
-class MotionConstantTable(Table):
+class DrivenTable(Table):
+    """What every motion has.
+
+    joint         that it moves
+    servo         how the joint's drive follows: "exact", or "pd" with its frequency, which follows
+                  a steady motion 1 / (pi frequency) s late
+    torque_limit  largest torque (N m) or force (N) of the drive, per m in a slab; unlimited unless
+                  given
+    """
+
+    joint: Text
+    servo: ServoTable = EXACT
+    torque_limit: Positive | None = None
+
+
+class MotionConstantTable(DrivenTable):
     """Joint that keeps its place or its rate: position + rate * time."""
 
     kind: Literal["constant"]
-    joint: Text
     position: Number = 0.0
     rate: Number = 0.0
 
 
-class MotionSinusoidTable(Table):
+class MotionSinusoidTable(DrivenTable):
     """mean + amplitude * sin(360 degrees * time / period + phase), phase in degrees."""
 
     kind: Literal["sinusoid"]
-    joint: Text
     amplitude: Number
     period: Positive
     mean: Number = 0.0
     phase: Number = 0.0
 
 
-class MotionKeyframesTable(Table):
+class MotionKeyframesTable(DrivenTable):
     """Smooth curve through keyframes, still before the first and after the last.
 
     times   s, increasing
@@ -80,7 +94,6 @@ class MotionKeyframesTable(Table):
     """
 
     kind: Literal["keyframes"]
-    joint: Text
     times: tuple[Number, ...]
     values: tuple[Number, ...]
 
@@ -90,7 +103,21 @@ class MotionKeyframesTable(Table):
         return self
 
 
-MotionTable = Annotated[MotionConstantTable | MotionSinusoidTable | MotionKeyframesTable, *ByKind]
+class MotionFormulaTable(DrivenTable):
+    """A formula in t (s), pi and the scene's [constants]; see `formula`.
+
+    position  such as "amplitude * ramp(t) * sin(2*pi*t)", degrees or m. ramp(x, length) rises
+              smoothly from 0 at x = 0 to 1 at x = length, which is 1 unless given; angles within a
+              formula are radians
+    """
+
+    kind: Literal["formula"]
+    position: Text
+
+
+MotionTable = Annotated[
+    MotionConstantTable | MotionSinusoidTable | MotionKeyframesTable | MotionFormulaTable, *ByKind
+]
 
 
 class WindFacesTable(Table):

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from flowborne.scenes.formula import Formula
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -119,3 +121,25 @@ class TrajectoryKeyframes:
     def velocity(self, time: float) -> Array:
         """(1,) rad/s or m/s."""
         return np.array([self.curve.slope(time)])
+
+
+@dataclass
+class TrajectoryFormula:
+    """unit * formula of time.
+
+    dofs     (1,) the dof
+    formula  degrees or m
+    unit     rad of a degree, or 1
+    """
+
+    dofs: Integers
+    formula: Formula
+    unit: float = 1.0
+
+    def position(self, time: float) -> Array:
+        """(1,) rad or m."""
+        return np.array([self.unit * self.formula.at(time).value])
+
+    def velocity(self, time: float) -> Array:
+        """(1,) rad/s or m/s."""
+        return np.array([self.unit * self.formula.at(time).slope])

@@ -1,0 +1,40 @@
+"""Formulas and constants of a scene that cannot be used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from flowborne.errors import SceneError
+from flowborne.scenes.draft import Draft
+from flowborne.scenes.formula import RESERVED, Formula
+from flowborne.scenes.schema_solids import MotionFormulaTable
+from flowborne.scenes.wording import suggestion
+
+
+def check_formulas(draft: Draft) -> Iterator[str]:
+    """Names of constants, and formulas that are wrong, or not finite in a frame of the run."""
+    scene = draft.scene
+    if not draft.sound("constants"):
+        return
+    used: set[str] = set()
+    wrong = []
+    for index, table in enumerate(scene.motion):
+        if not isinstance(table, MotionFormulaTable):
+            continue
+        where = draft.at("motion", index, "position")
+        try:
+            formula = Formula(table.position, scene.constants)
+            used |= formula.names()
+            for frame in range(scene.time.frames + 1):
+                formula.at(frame * scene.frame_time)
+        except SceneError as error:
+            wrong.append(f"{where}: {error}")
+        except ArithmeticError as error:
+            wrong.append(f"{where}: {error}. Change it, or end the run before.")
+    yield from wrong
+    for name in scene.constants:
+        if name in RESERVED or not name.isidentifier():
+            yield f"{draft.at('constants')}: '{name}' cannot be a constant's name. Change it."
+        elif not (wrong or name in used) and draft.sound("motion"):
+            end = suggestion(name, used, "They use")
+            yield f"{draft.at('constants')}: no formula uses '{name}'{end}"
