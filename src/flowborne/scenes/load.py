@@ -46,6 +46,7 @@ BUILT_IN = (
     "swimmer-jet-only",
     "swimmer-no-control",
     "swimmer-held",
+    "eel",
 )
 
 

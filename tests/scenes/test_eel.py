@@ -1,0 +1,42 @@
+"""The built-in robot of six links: its measures, and its first strokes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.scenes.build import build
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import Simulation
+
+THICKNESS, LENGTH, WATER = 0.016, 0.61, 1000.0
+
+
+def test_it_weighs_about_what_it_displaces() -> None:
+    model = build(load_scene("eel")).world.setup.solid
+    assert model.body_mass.sum() == pytest.approx(2.0535 + 5 * 1.4973)
+    corners = (1.0 - 0.25 * np.pi) * THICKNESS**2
+    displaced = WATER * (LENGTH * THICKNESS - corners)
+    assert model.body_mass.sum() == pytest.approx(displaced, rel=0.02)
+
+
+@pytest.mark.parametrize("amplitude", [20.0, 40.0])
+def test_it_swims_forward_by_its_gait_alone(amplitude: float) -> None:
+    """The first 1.5 s on cells of 2 cm."""
+    settings = {"constants.amplitude": f"{amplitude}", "domain.resolution": "61"}
+    told, worst = load_scene("eel", settings), 0.0
+    with Simulation(told) as simulation:
+        joints = simulation.world.setup.solid.positions_of("joint_1")[0] + np.arange(5)
+        for _ in range(90):
+            step = simulation.advance_frame().step
+            t = simulation.time
+            s = min(t, 1.0)
+            wave = np.sin(2.0 * np.pi * (0.5 * t - 0.14 * np.arange(1, 6)))
+            gait = np.radians(amplitude) * (3.0 * s**2 - 2.0 * s**3) * wave
+            off = np.abs(simulation.world.solid.q[joints] - gait).max()
+            worst = max(worst, step.momentum.budget_error, step.momentum.exchange_error)
+            assert off < 1e-9
+        _, y, heading = simulation.world.solid.q[:3]
+    assert worst < 1e-10
+    assert y > 0.002 * amplitude
+    assert abs(np.degrees(heading)) < 2.0 * amplitude
