@@ -50,6 +50,7 @@ MODULES = {
     "K10": "human_wind",
     "K11": "swimmer",
     "S5": "swimmers",
+    "R1": "rexeel",
 }
 """Case -> module that holds it, in the order of the list; a module is imported when it is run."""
 

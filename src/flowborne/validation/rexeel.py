@@ -1,0 +1,118 @@
+"""R1: a real swimming robot, and the one of the scene `eel`, from the same start by the same gait.
+
+The robot's thickness is not published: the scene's links are 1.6 cm thick. Nor is where it began in
+its tank: all start in the middle, and at 40 degrees the head's front ends beyond the upper wall,
+measured and computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from types import MappingProxyType
+
+import numpy as np
+
+from flowborne.fluid.grid import Array
+from flowborne.scenes.load import load_scene
+from flowborne.simulation import BlowUpError, Simulation
+from flowborne.solids.dynamics import kinematics
+from flowborne.validation.case import Case, Finding
+from flowborne.validation.eel_runs import (
+    QUANTITIES,
+    TIMES,
+    SwimPath,
+    measured,
+    rmse,
+    scatter,
+)
+from flowborne.validation.reference import reference
+
+GRIDS = {True: (122,), False: (122, 183, 244)}
+"""Cells across the tank, by quick."""
+
+AMPLITUDES = {True: (20,), False: (20, 40)}
+"""Degrees of the gait, by quick."""
+
+
+@dataclass(frozen=True)
+class Swim:
+    """A run of the scene.
+
+    path     at TIMES
+    seconds  of wall clock that it took
+    """
+
+    path: SwimPath
+    seconds: float
+
+
+def swim(amplitude: int, cells: int, settings: Mapping[str, str] = MappingProxyType({})) -> Swim:
+    """Let the robot of the scene swim.
+
+    settings  in place of the scene's own
+    raises    ArithmeticError when the run blows up
+    """
+    own = {"constants.amplitude": f"{amplitude}", "domain.resolution": f"{cells}"}
+    started = perf_counter()
+    with Simulation(load_scene("eel", {**own, **settings})) as simulation:
+        rows = [place(simulation)]
+        try:
+            for _ in TIMES[1:]:
+                simulation.advance_frame()
+                rows.append(place(simulation))
+        except BlowUpError as error:
+            raise ArithmeticError(f"eel on {cells} cells: {error}") from error
+    places = np.array(rows)
+    return Swim(SwimPath(places[:, :2], places[:, 2:]), perf_counter() - started)
+
+
+def place(simulation: Simulation) -> Array:
+    """(5,) QUANTITIES now."""
+    model, q = simulation.world.setup.solid, simulation.world.solid.q
+    pose, mass = kinematics(model, q), model.body_mass
+    centre = 100.0 * (mass @ pose.mass_centre)[:2] / mass.sum()
+    head = 100.0 * pose.body_position[model.body("head"), :2]
+    return np.array([*centre, *head, np.degrees(q[model.positions_of("heading")[0]])])
+
+
+def compared(amplitude: int, cells: tuple[int, ...]) -> list[Finding]:
+    """Errors of the robot on some grids, the last one judged, beside those of other simulators."""
+    runs = measured(amplitude)
+    swims = [swim(amplitude, count) for count in cells]
+    errors = np.array([rmse(one.path.changes(), runs) for one in swims])
+    least = scatter(runs)
+    findings = []
+    for n, quantity in enumerate(QUANTITIES):
+        aquarium, genesis = (
+            reference("R1", simulator)[str(amplitude)][quantity]
+            for simulator in ("Aquarium", "Genesis")
+        )
+        value = float(errors[-1, n])
+        lines = [
+            f"{count:>6} cells across the tank: {error:.3f}, 4 s in {one.seconds:.0f} s"
+            for count, error, one in zip(cells, errors[:, n], swims, strict=True)
+        ]
+        others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
+        findings.append(
+            Finding(
+                f"gait of {amplitude} degrees: RMSE of {quantity}",
+                value,
+                aquarium,
+                "at most",
+                value <= aquarium,
+                lines=(*lines, f"{others}, mean of the {len(runs)} runs {least[n]:.3f}"),
+            )
+        )
+    return findings
+
+
+def robot(quick: bool) -> list[Finding]:
+    """R1: none of the errors above those of the robot's own simulator, Aquarium."""
+    return [
+        finding for amplitude in AMPLITUDES[quick] for finding in compared(amplitude, GRIDS[quick])
+    ]
+
+
+CASES = (Case("R1", robot),)
