@@ -8,6 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.solids.model import SolidModel
+
 Array = NDArray[np.float64]
 
 
@@ -27,6 +29,20 @@ class Trajectory(Protocol):
     def velocity(self, time: float) -> Array:
         """(k,) their entries of v, rad/s or m/s: the derivative of the positions."""
         ...
+
+
+def velocity_after(model: SolidModel, q: Array, told: Trajectory, time: float, dt: float) -> Array:
+    """(k,) velocity with which a motion goes on for a step after `time` (s).
+
+    In leapfrog the velocities at an instant are those of half a step on, which the bodies then move
+    with; given to driven dofs as it is to free ones, what they exchange is of second order in time.
+
+    q  (nq,) a pose whose other joints do not matter
+    """
+    here, there = q.copy(), q.copy()
+    places = model.indices_of(told.dofs)
+    here[places], there[places] = told.position(time), told.position(time + dt)
+    return model.difference(here, there)[told.dofs] / dt
 
 
 @dataclass

@@ -59,8 +59,8 @@ class StepReport:
     """What `step` did.
 
     dt               s
-    velocity         (nv,) at the end of the step: that of a driven dof is told, and v of a free
-                     one is half a step before, then half a step after it: the mean of both
+    velocity         (nv,) at the end of the step: v is that half a step before, then half a step
+                     after it, and this is the mean of both
     actuator         (nv,) generalised force of the drives (and of locked dofs), N or N m
     pressure_wrench  (nbody, 6) force and torque about the world origin of the dynamic pressure
     viscous_wrench   (nbody, 6) the same of the shear stress

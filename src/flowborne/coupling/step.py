@@ -19,7 +19,7 @@ from flowborne.coupling.flow import (
 )
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.half_kick import Kick, half_kick
-from flowborne.coupling.motion import JointCommand, Trajectory
+from flowborne.coupling.motion import JointCommand, Trajectory, velocity_after
 from flowborne.coupling.mouths import Jet, jet_wrench, jets_of
 from flowborne.coupling.operators import (
     boundary_velocity,
@@ -143,7 +143,9 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
             limit = np.asarray(told.servo.torque_limit, dtype=np.float64)
             command.set(told.dofs, v, final_velocity, limit)
         else:
-            command.set(told.dofs, gap_to(world, told, later) / dt, told.velocity(later))
+            # v is that of half a step on (leapfrog), of driven dofs as of those that answer them
+            rate = gap_to(world, told, later) / dt
+            command.set(told.dofs, rate, velocity_after(model, world.solid.q, told, later, dt))
     command.set(model.locked, 0.0, 0.0)
     return command
 
@@ -332,7 +334,7 @@ def report(
     done = StepReport(
         dt=dt,
         outcome=solved.outcome if finite else Outcome.NOT_FINITE,
-        velocity=np.where(solved.driven.prescribed, solved.v, halfway),
+        velocity=halfway,
         actuator=solved.actuator,
         pressure_wrench=np.zeros(wind.shape),
         viscous_wrench=np.zeros(wind.shape),
