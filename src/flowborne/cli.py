@@ -141,13 +141,15 @@ def check(
         typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the scene."),
     ] = None,
 ) -> None:
-    """Say everything that is wrong with a scene."""
-    from flowborne.scenes.load import check_scene
+    """Say everything that is wrong with a scene, and how thick the fluid sees its bodies."""
+    from flowborne.coupling.seen import seen_bodies
+    from flowborne.scenes.build import build
+    from flowborne.scenes.load import load_scene
 
-    problems = check_scene(scene, _overrides(settings or []))
-    if problems:
-        raise SceneError(problems)
+    setup = build(load_scene(scene, _overrides(settings or []))).world.setup
     print("nothing wrong")
+    for seen in seen_bodies(setup):
+        print(f"  {seen.sentence()}")
 
 
 @app.command()

@@ -6,13 +6,14 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
 from math import nan, prod
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from flowborne.coupling.seen import seen_bodies
 from flowborne.errors import SceneError
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
@@ -310,6 +311,7 @@ class _Run:
             "message": message,
             **summarise(self.folder.history, strength),
             "cells": cells,
+            "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],
             "state_bytes": state_bytes(world),
             "bytes_per_cell": None if cells is None else state_bytes(world) / cells,
             "peak_memory_bytes": peak_memory(),
