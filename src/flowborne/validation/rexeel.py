@@ -2,7 +2,7 @@
 
 The robot's thickness is not published: the scene's links are 1.6 cm thick. Nor is where it began in
 its tank: all start in the middle, and at 40 degrees the head's front ends beyond the upper wall,
-measured and computed.
+measured and computed. There the tank is a quarter longer, so that no wall is in its way.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ GRIDS = {True: (122,), False: (122, 183, 244)}
 AMPLITUDES = {True: (20,), False: (20, 40)}
 """Degrees of the gait, by quick."""
 
+LENGTH = {20: 1.0, 40: 1.25}
+"""Of the tank along the way, over that of the scene, by amplitude."""
+
 
 @dataclass(frozen=True)
 class Swim:
@@ -51,10 +54,15 @@ class Swim:
 def swim(amplitude: int, cells: int, settings: Mapping[str, str] = MappingProxyType({})) -> Swim:
     """Let the robot of the scene swim.
 
+    cells     across the tank
     settings  in place of the scene's own
     raises    ArithmeticError when the run blows up
     """
-    own = {"constants.amplitude": f"{amplitude}", "domain.resolution": f"{cells}"}
+    own = {
+        "constants.amplitude": f"{amplitude}",
+        "domain.upper": f"[1.22, {1.22 * LENGTH[amplitude]:g}]",
+        "domain.resolution": f"{round(cells * LENGTH[amplitude])}",
+    }
     started = perf_counter()
     with Simulation(load_scene("eel", {**own, **settings})) as simulation:
         rows = [place(simulation)]
