@@ -98,7 +98,7 @@ def test_a_saved_state_goes_on_bit_for_bit(simulation: Simulation) -> None:
 
 def test_a_state_that_lacks_a_part_is_refused(simulation: Simulation) -> None:
     arrays = simulation.world.arrays()
-    for name in ("clock", "solid/v", "fluid/pressure", "fluid/carrier_y"):
+    for name in ("clock", "solid/v", "fluid/pressure", "fluid/advecting_velocity_y"):
         rest = {other: values for other, values in arrays.items() if other != name}
         with pytest.raises(KeyError):
             World.from_arrays(simulation.world.setup, rest)

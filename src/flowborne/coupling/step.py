@@ -53,6 +53,8 @@ def step(world: World, dt: float, command: JointCommand | None = None) -> StepRe
     returns  the report; its outcome is not DONE when the numbers cannot be trusted
     """
     timer = Timer()
+    if not world.setup.trial:
+        world.ahead = 0.5 * dt
     command = joint_command(world, dt, command)
     if world.setup.fluid is None:
         return step_bodies(world, dt, command, timer)
@@ -143,9 +145,14 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
             limit = np.asarray(told.servo.torque_limit, dtype=np.float64)
             command.set(told.dofs, v, final_velocity, limit)
         else:
-            # v is that of half a step on (leapfrog), of driven dofs as of those that answer them
+            # v is that of half a step on (leapfrog), of driven dofs as of those that answer them;
+            # a trial keeps to the world's own, so that its velocities change over just its step
             rate = gap_to(world, told, later) / dt
-            command.set(told.dofs, rate, velocity_after(model, world.solid.q, told, later, dt))
+            span = 2.0 * world.ahead
+            ahead = told.velocity(later)
+            if span > 0.0:
+                ahead = velocity_after(model, world.solid.q, told, later, span)
+            command.set(told.dofs, rate, ahead)
     command.set(model.locked, 0.0, 0.0)
     return command
 

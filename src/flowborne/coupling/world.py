@@ -60,6 +60,7 @@ class Setup:
     winds    simple winds (paper eq. 2, or a uniform force)
     mouths   patches of skin through which fluid is expelled; a fluid that feels the bodies is there
     centred_flesh  whether flesh vibrates without loss (see `assemble_flesh`)
+    trial    whether steps are hypothetical, and may be longer than those of the world itself
     """
 
     solid: SolidModel
@@ -68,13 +69,15 @@ class Setup:
     winds: tuple[Wind, ...] = ()
     mouths: tuple[Mouth, ...] = ()
     centred_flesh: bool = False
+    trial: bool = False
 
     @cached_property
     def hypothetical(self) -> Setup:
         """The same for hypothetical steps: their pressure is solved as far as a gradient needs."""
-        if self.fluid is None or self.fluid.tolerance >= HYPOTHETICAL:
-            return self
-        looser = replace(self, fluid=replace(self.fluid, tolerance=HYPOTHETICAL))
+        if self.fluid is None:
+            return replace(self, trial=True)
+        tolerance = max(self.fluid.tolerance, HYPOTHETICAL)
+        looser = replace(self, fluid=replace(self.fluid, tolerance=tolerance), trial=True)
         vars(looser)["shapes"] = self.shapes  # the same bodies on the same grid, sampled once
         return looser
 
@@ -94,6 +97,7 @@ class World:
     fluid   None when the setup has no fluid
     time    s
     steps   number of steps taken
+    ahead   s by which v is ahead of the positions: half of the last step of the world itself
     memory  the controller's own arrays, by name
     cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
             and not part of it
@@ -104,6 +108,7 @@ class World:
     fluid: FluidState | None = None
     time: float = 0.0
     steps: int = 0
+    ahead: float = 0.0
     memory: dict[str, Array] = field(default_factory=dict)
     cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
 
@@ -133,13 +138,14 @@ class World:
             None if self.fluid is None else self.fluid.copy(),
             self.time,
             self.steps,
+            self.ahead,
             {name: values.copy() for name, values in self.memory.items()},
             self.cut,
         )
 
     def arrays(self) -> dict[str, Array]:
         """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""
-        named: dict[str, Array] = {"clock": np.array([self.time, float(self.steps)])}
+        named: dict[str, Array] = {"clock": np.array([self.time, self.steps, self.ahead])}
         named |= {"solid/q": self.solid.q, "solid/v": self.solid.v}
         if self.fluid is not None:
             named |= {f"fluid/{k}": v for k, v in self.fluid.arrays().items()}
@@ -156,12 +162,13 @@ class World:
                 if name.startswith(prefix)
             }
 
-        time, steps = arrays["clock"]
+        time, steps, ahead = arrays["clock"]
         return cls(
             setup,
             SolidState(arrays["solid/q"], arrays["solid/v"]),
             None if setup.fluid is None else FluidState.from_arrays(part("fluid/")),
             float(time),
             int(steps),
+            float(ahead),
             part("memory/"),
         )
