@@ -29,14 +29,14 @@ def world():
     memory = {"target": np.array([0.1, np.nextafter(0.2, 1.0)])}
     model = SolidModel.from_string(MODEL, slab=True)
     setup = Setup(model, Fluid(grid, 1.0, scalars=("smoke",)))
-    return World(setup, model.rest(), state, time=1 / 3, steps=7, memory=memory)
+    return World(setup, model.rest(), state, time=1 / 3, steps=7, ahead=0.05, memory=memory)
 
 
 def test_a_world_is_read_back_bit_for_bit(tmp_path, world):
     path = tmp_path / "checkpoint.npz"
     save_checkpoint(path, world, 5)
     again, frame = load_checkpoint(path, world.setup)
-    assert (frame, again.steps, again.time) == (5, 7, world.time)
+    assert (frame, again.steps, again.time, again.ahead) == (5, 7, world.time, 0.05)
     saved, read = world.arrays(), again.arrays()
     assert list(saved) == list(read)
     for name, values in saved.items():
@@ -61,4 +61,5 @@ def test_what_is_no_checkpoint_is_refused(tmp_path, world, contents):
 def test_state_bytes_counts_every_array_once(world):
     cells = 6 * 4
     faces = 7 * 4 + 6 * 5 + 2 * cells
-    assert state_bytes(world) == 8 * (3 * cells + 3 * faces + 2 + 2 + 2)
+    clock, bodies, target = 3, 2, 2
+    assert state_bytes(world) == 8 * (3 * cells + 3 * faces + clock + bodies + target)
