@@ -31,7 +31,7 @@ STEADY_GRIDS = {True: (10,), False: (20, 40, 80)}
 SHEDDING_GRIDS = {True: (10,), False: (10, 20, 40)}
 """Cells across D of B1 and B2, by quick; multiples of 10 fit the channel."""
 
-OPEN_GRIDS = {True: (4,), False: (8, 24)}
+OPEN_GRIDS = {True: (4,), False: (8, 16, 24, 32)}
 """Cells across D of B5, by quick."""
 
 STEADY = {True: 1e-2, False: 2e-5}

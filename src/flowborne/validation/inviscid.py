@@ -163,15 +163,37 @@ def munk_moment(quick: bool) -> list[Finding]:
     return findings
 
 
-RADIUS, ROD, BOX = 0.1, 0.5, 2.0
-"""Bob, rod and box of I7, m."""
-
-IN_BOX = 0.1
-"""D/L of the bob in its box, the key of I2's table."""
+RADIUS, ROD = 0.1, 0.5
+"""Bob and rod of I7, m."""
 
 
-WIDE_GRIDS = (64, 128, 256, 384)
-"""Cells across the box for the wider swings; beyond 90 degrees the bob would leave the box."""
+@dataclass(frozen=True)
+class PendulumBox:
+    """The closed square in which I7's bob swings.
+
+    side   m
+    above  m that the pivot is over the square's middle
+    grids  cells across it for the wider swings
+    """
+
+    side: float
+    above: float
+    grids: tuple[int, ...]
+
+    @property
+    def added(self) -> float:
+        """Ca of the bob in the middle, by I2's table."""
+        return float(table("I2", "cylinder in closed square, Ca vs D/L")[2.0 * RADIUS / self.side])
+
+
+WIDEST = 150.0
+"""Degrees from which the bob is let go at most."""
+
+NARROW = PendulumBox(2.0, ROD, (64, 128, 256, 384))
+"""The bob rests in the middle."""
+
+WIDE = PendulumBox(4.0, 0.0, (128, 256, 512))
+"""For swings of more than 90 degrees, on which the bob would leave the other."""
 
 
 def small_period(ratio: float, added: float) -> float:
@@ -193,17 +215,17 @@ def start_midway(world: World, dt: float) -> None:
         state.acceleration[axis][:] = later.acceleration[axis]
 
 
-def swing(cells: int, ratio: float, degrees: float, period: float) -> float:
-    """Period in s of the bob, let go at an angle from where it rests, which is the box's middle.
+def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: float) -> float:
+    """Period in s of the bob, let go at an angle from where it rests.
 
     cells   across the box
     ratio   density over the fluid's: the rod stands on its pivot below 1, and hangs above
-    period  expected, s; a hundredth of it is the step, more when the bob is fast
+    period  expected, s; a hundredth of it is the step, less when the bob is fast
     """
-    grid = Grid.slab(cells, cells, BOX / cells, (-0.5 * BOX, -0.5 * BOX))
-    up = ROD if ratio > 1.0 else -ROD
-    bob = f'<geom type="sphere" size="{RADIUS}" pos="0 {-up} 0" density="{ratio}"/>'
-    body = f'<body pos="0 {up} 0"><joint name="pivot" axis="0 0 1"/>{bob}</body>'
+    grid = Grid.slab(cells, cells, box.side / cells, (-0.5 * box.side, -0.5 * box.side))
+    up = 1.0 if ratio > 1.0 else -1.0
+    bob = f'<geom type="sphere" size="{RADIUS}" pos="0 {-up * ROD} 0" density="{ratio}"/>'
+    body = f'<body pos="0 {up * box.above} 0"><joint name="pivot" axis="0 0 1"/>{bob}</body>'
     world = world_of(grid, mjcf(body), gravity=(0.0, -G, 0.0))
     world.solid.q[0] = np.radians(degrees)
     fastest = 2.0 * np.pi / period * ROD * np.radians(degrees)
@@ -222,24 +244,24 @@ def swing(cells: int, ratio: float, degrees: float, period: float) -> float:
 def pendulum(quick: bool) -> list[Finding]:
     """I7: period of a heavy bob and of light ones, which stand up, and of wider swings."""
     grids = (32, 64) if quick else (64, 128, 256)
-    added = float(table("I2", "cylinder in closed square, Ca vs D/L")[IN_BOX])
     findings = []
     for ratio in (2.0, 0.5) if quick else (2.0, 0.5, 0.01):
-        exact = small_period(ratio, added)
-        found = [swing(n, ratio, 5.0, exact) for n in grids]
+        exact = small_period(ratio, NARROW.added)
+        found = [swing(NARROW, n, ratio, 5.0, exact) for n in grids]
         errors = [abs(f / exact - 1.0) for f in found]
         series = GridSeries("cells a side", grids, found, errors)
         said = f"period at rho_s/rho_f = {ratio:g} let go at 5 degrees, s"
         findings.append(near(said, found[-1], exact, relative=0.02, series=series))
     if quick:
         return findings
-    exact = small_period(2.0, added)
     for degrees, factor in table("I7", "amplitude factor").items():
-        if degrees == 5.0 or degrees > 90.0:
+        if not 5.0 < degrees <= WIDEST:
             continue
-        values = [swing(n, 2.0, degrees, factor * exact) / exact for n in WIDE_GRIDS]
+        box = NARROW if degrees <= 90.0 else WIDE
+        exact = small_period(2.0, box.added)
+        values = [swing(box, n, 2.0, degrees, factor * exact) / exact for n in box.grids]
         errors = [abs(v - factor) for v in values]
-        series = GridSeries("cells a side", WIDE_GRIDS, values, errors)
+        series = GridSeries("cells a side", box.grids, values, errors)
         said = f"T/T0 at rho_s/rho_f = 2 let go at {degrees:g} degrees"
         findings.append(near(said, values[-1], factor, relative=0.02, series=series))
     return findings
