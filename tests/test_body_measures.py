@@ -5,15 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flowborne import Grid, SceneError, Simulation, load_scene, step
 from flowborne.body_measures import BodyMeasures
-from flowborne.coupling.step import step
-from flowborne.errors import SceneError
-from flowborne.fluid.grid import Grid
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.tracks import TrajectorySinusoid
-from flowborne.simulation import Simulation
-from flowborne.solids.wind import WindForce
-from flowborne.validation.worlds import mjcf, world_of
+from flowborne.motions import TrajectorySinusoid
+from flowborne.validation.worlds import mjcf
+from flowborne.winds import WindForce
+from flowborne.worlds import make_world
 
 BALL = (
     '<body name="ball" pos="0.1 0 0"><joint name="along" type="slide" axis="1 0 0"{spring}/>'
@@ -25,8 +22,8 @@ def test_velocity_of_a_free_body_is_that_where_it_is():
     """The central difference of its path; v itself would be that of half a step later."""
     force = WindForce((30.0, 0.0, 0.0), ("ball",))
     grid = Grid.slab(24, 24, 1 / 24, (-0.5, -0.5))
-    world = world_of(
-        grid, mjcf(BALL.format(spring="")), solid_density=2.0, winds=(force,), density=1.0
+    world = make_world(
+        mjcf(BALL.format(spring="")), grid, solid_density=2.0, winds=(force,), density=1.0
     )
     dt, path, told = 0.01, [], []
     measures = BodyMeasures(world.setup.solid, ("ball",))
@@ -40,9 +37,9 @@ def test_velocity_of_a_free_body_is_that_where_it_is():
 
 
 def test_force_of_a_wind_is_told_with_its_torque_about_the_centre_of_mass():
-    world = world_of(
-        None,
+    world = make_world(
         mjcf(BALL.format(spring="")),
+        slab=True,
         solid_density=1000.0,
         winds=(WindForce((3.0, 2.0, 0.0), ("ball",)),),
     )
@@ -55,7 +52,7 @@ def test_force_of_a_wind_is_told_with_its_torque_about_the_centre_of_mass():
 def test_velocity_of_a_driven_body_is_told_where_the_body_is():
     told = TrajectorySinusoid(np.array([0]), 0.05, 1.0)
     grid = Grid.slab(24, 24, 1 / 24, (-0.5, -0.5))
-    world = world_of(grid, mjcf(BALL.format(spring="")), motions=(told,))
+    world = make_world(mjcf(BALL.format(spring="")), grid, motions=(told,))
     measures = BodyMeasures(world.setup.solid, ("ball",))
     for _ in range(3):
         report = step(world, 0.02)

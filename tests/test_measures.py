@@ -1,14 +1,12 @@
 import numpy as np
 import pytest
 
-from flowborne.coupling.step import cut_by_bodies, step
-from flowborne.coupling.world import Setup, World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.fluid.grid import Grid
-from flowborne.frame_report import FrameReport
+from flowborne import FrameReport, Grid, Setup, SolidModel, World, step
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.measures import Measures, quaternion
-from flowborne.solids.model import SolidModel
-from flowborne.validation.worlds import mjcf, world_of
+from flowborne.operators import cut_by_bodies
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import make_world
 
 MODEL = """
 <mujoco>
@@ -51,7 +49,7 @@ def test_fastest_is_the_largest_speed_of_any_step_across_an_open_face():
 
     sides = Boundaries(x_min=BoundaryInflow(slowing), x_max=BoundaryOpen())
     grid = Grid.slab(32, 32, 1 / 32, (-0.5, -0.5))
-    world = world_of(grid, mjcf('<geom type="sphere" size="0.1"/>'), boundaries=sides)
+    world = make_world(mjcf('<geom type="sphere" size="0.1"/>'), grid, boundaries=sides)
     measures = Measures(world.setup, None, None)
     steps, largest = [], []
     for _ in range(2):

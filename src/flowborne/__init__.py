@@ -1,4 +1,23 @@
-"""flowborne: creatures that answer the fluid around them."""
+"""flowborne: creatures that answer the fluid around them.
+
+All that a script needs is here, and on the pages beside it:
+
+    bodies        models, poses, momentum and energy of bodies
+    boundaries    what the sides of a domain do
+    executors     where the trials of a decision run
+    exporters     runs as files for other programs
+    gradients     how a gradient is estimated
+    machine       threads, memory, seconds by part
+    motions       joints that are told how to move
+    objectives    what a creature may want
+    operators     the operators of a step, one by one
+    pictures      pictures and plots
+    rules         how far to go down a gradient
+    winds         simple winds
+    worlds        worlds made and stepped in code
+
+Every other module is flowborne's own and may change.
+"""
 
 from __future__ import annotations
 
@@ -7,25 +26,147 @@ from typing import TYPE_CHECKING, Any
 from flowborne.version import __version__
 
 if TYPE_CHECKING:
-    from flowborne.running import run
+    from flowborne.control.controller import Controller, Decision
+    from flowborne.control.measurement import Measurement
+    from flowborne.control.trial import Hypothesis, Velocities
+    from flowborne.coupling.named import BodyState, JointState
+    from flowborne.coupling.report import Momentum, Outcome, StepReport
+    from flowborne.coupling.step import step
+    from flowborne.coupling.world import Fluid, Setup, World
+    from flowborne.errors import PartError, SceneError
+    from flowborne.exporting import export
+    from flowborne.fluid.grid import Array, Faces, Grid
+    from flowborne.fluid.state import FluidState
+    from flowborne.frame_report import FrameReport
+    from flowborne.io.open_run import OpenRun
+    from flowborne.io.run_folder import RunFolderError
+    from flowborne.running import RunInterrupted, RunResult, run
     from flowborne.scenes.load import load_scene
-    from flowborne.simulation import Simulation
+    from flowborne.scenes.schema import Scene
+    from flowborne.simulation import BlowUpError, Simulation
+    from flowborne.solids.model import SolidModel
+    from flowborne.solids.state import SolidState
+    from flowborne.solids.tissue import Tissue
+    from flowborne.worlds import advance, make_world
 
-__all__ = ["Simulation", "__version__", "load_scene", "run"]
+__all__ = [
+    "Array",
+    "BlowUpError",
+    "BodyState",
+    "Controller",
+    "Decision",
+    "Faces",
+    "Fluid",
+    "FluidState",
+    "FrameReport",
+    "Grid",
+    "Hypothesis",
+    "JointState",
+    "Measurement",
+    "Momentum",
+    "OpenRun",
+    "Outcome",
+    "PartError",
+    "RunFolderError",
+    "RunInterrupted",
+    "RunResult",
+    "Scene",
+    "SceneError",
+    "Setup",
+    "Simulation",
+    "SolidModel",
+    "SolidState",
+    "StepReport",
+    "Tissue",
+    "Velocities",
+    "World",
+    "__version__",
+    "advance",
+    "bodies",
+    "boundaries",
+    "executors",
+    "export",
+    "exporters",
+    "gradients",
+    "load_scene",
+    "machine",
+    "make_world",
+    "motions",
+    "objectives",
+    "operators",
+    "pictures",
+    "rules",
+    "run",
+    "step",
+    "winds",
+    "worlds",
+]
+
+PAGES = (
+    "bodies",
+    "boundaries",
+    "executors",
+    "exporters",
+    "gradients",
+    "machine",
+    "motions",
+    "objectives",
+    "operators",
+    "pictures",
+    "rules",
+    "winds",
+    "worlds",
+)
+"""Public modules of the package, besides itself."""
 
 _PLACES = {
+    "Array": "flowborne.fluid.grid",
+    "BlowUpError": "flowborne.simulation",
+    "BodyState": "flowborne.coupling.named",
+    "Controller": "flowborne.control.controller",
+    "Decision": "flowborne.control.controller",
+    "Faces": "flowborne.fluid.grid",
+    "Fluid": "flowborne.coupling.world",
+    "FluidState": "flowborne.fluid.state",
+    "FrameReport": "flowborne.frame_report",
+    "Grid": "flowborne.fluid.grid",
+    "Hypothesis": "flowborne.control.trial",
+    "JointState": "flowborne.coupling.named",
+    "Measurement": "flowborne.control.measurement",
+    "Momentum": "flowborne.coupling.report",
+    "OpenRun": "flowborne.io.open_run",
+    "Outcome": "flowborne.coupling.report",
+    "PartError": "flowborne.errors",
+    "RunFolderError": "flowborne.io.run_folder",
+    "RunInterrupted": "flowborne.running",
+    "RunResult": "flowborne.running",
+    "Scene": "flowborne.scenes.schema",
+    "SceneError": "flowborne.errors",
+    "Setup": "flowborne.coupling.world",
     "Simulation": "flowborne.simulation",
+    "SolidModel": "flowborne.solids.model",
+    "SolidState": "flowborne.solids.state",
+    "StepReport": "flowborne.coupling.report",
+    "Tissue": "flowborne.solids.tissue",
+    "Velocities": "flowborne.control.trial",
+    "World": "flowborne.coupling.world",
+    "advance": "flowborne.worlds",
+    "export": "flowborne.exporting",
     "load_scene": "flowborne.scenes.load",
+    "make_world": "flowborne.worlds",
     "run": "flowborne.running",
+    "step": "flowborne.coupling.step",
 }
 
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for when it is asked for, so that `import flowborne` is light."""
-    if name not in _PLACES:
-        raise AttributeError(f"module 'flowborne' has no attribute {name!r}")
     from importlib import import_module
 
+    if name in PAGES:
+        return import_module(f"flowborne.{name}")
+    if name not in _PLACES:
+        raise AttributeError(f"module 'flowborne' has no attribute {name!r}")
     return getattr(import_module(_PLACES[name]), name)
 
 

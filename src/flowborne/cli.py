@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flowborne.errors import SceneError
+from flowborne.errors import PartError, SceneError
 from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write
 from flowborne.version import __version__
 
@@ -175,14 +175,21 @@ def film(
 @app.command()
 def export(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="BVH file to write.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File to write; its ending says what.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the exporter."),
+    ] = None,
 ) -> None:
-    """Write the motion of a run as BVH, on the skeleton of its clip."""
-    path = RunFolder.existing(folder).path
-    from flowborne.scenes.motion_out import export_bvh
+    """Write a run for another program: .bvh is its motion on the skeleton of its clip."""
+    from flowborne.exporting import export as export_run
+    from flowborne.scenes.load import value_of
 
+    parameters = {key: value_of(text) for key, text in _overrides(settings or []).items()}
     try:
-        export_bvh(path, out)
+        export_run(folder, out, parameters)
+    except PartError as error:
+        raise InputError(str(error)) from error
     except OSError as error:
         raise cannot_write(out, error) from error
     print(f"written: {out}")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Sequence
+from pathlib import Path
 
 
 class SceneError(Exception):
@@ -18,3 +20,21 @@ class SceneError(Exception):
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[list[str]]]:
         return type(self), (self.problems,)
+
+
+class PartError(ValueError):
+    """A part of the user's own failed: an objective, a rule, a wind, an exporter.
+
+    The text says which one, and what it did.
+    """
+
+    @classmethod
+    def failed(cls, part: str, error: BaseException) -> PartError:
+        """The part raised `error`: says where, outside of flowborne's own files."""
+        ours = str(Path(__file__).parent)
+        calls = traceback.extract_tb(error.__traceback__)
+        at = next((c for c in reversed(calls) if not c.filename.startswith(ours)), calls[-1])
+        return cls(
+            f"{part} failed in {Path(at.filename).name}, line {at.lineno} "
+            f"({type(error).__name__}: {error}): mend it there"
+        )

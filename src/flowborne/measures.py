@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.body_measures import BodyMeasures
+from flowborne.control.objectives import name_of
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.frame_report import FrameReport
@@ -208,7 +209,7 @@ def _scalar_joints(model: SolidModel) -> list[tuple[str, int, int]]:
 
 def _terms(controller: Controller) -> list[str]:
     """Names of the terms of the objective, each once."""
-    return list(dict.fromkeys(term.objective.name for term in controller.objective.terms))
+    return list(dict.fromkeys(name_of(term.objective) for term in controller.objective.terms))
 
 
 def _axes(stream: tuple[float, ...] | None) -> tuple[Array, Array]:

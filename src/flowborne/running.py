@@ -14,7 +14,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from flowborne.coupling.seen import seen_bodies
-from flowborne.errors import SceneError
+from flowborne.errors import PartError, SceneError
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.io.history import History
@@ -225,7 +225,12 @@ class _Run:
         assert self.history is not None
         self.history.close()
         folder = self.folder
+        exported: list[str] = []
+        if outcome is RunOutcome.DONE:
+            exported, failed = self._export()
+            message += failed
         summary = self._summary(outcome, message)
+        summary["model_files"] += exported
         try:
             folder.write_summary(summary)
             if film and outcome in (RunOutcome.DONE, RunOutcome.BLEW_UP):
@@ -248,6 +253,19 @@ class _Run:
         except ValueError as error:
             return f"; no film: {error}"
         return ""
+
+    def _export(self) -> tuple[list[str], str]:
+        """Write the files that the scene asks for; their names, and what to tell of the others."""
+        from flowborne.exporting import export
+
+        exported, failed = [], ""
+        for table in self.simulation.scene.output.exports:
+            try:
+                export(self.folder.path, self.folder.path / table.file, table.parameters)
+                exported.append(table.file)
+            except (OSError, PartError, SceneError) as error:
+                failed += f"; no {table.file}: {error}"
+        return exported, failed
 
     def compilation_told(self) -> AbstractContextManager[None]:
         """Context in which news is given of every kernel that is compiled."""
@@ -326,6 +344,8 @@ class _Run:
             self._save()
         except OSError as full:
             kept += f", but its checkpoint could not be written ({full.strerror})"
+        if isinstance(error.__cause__, PartError):
+            return f"the run stopped in {error}; {kept}; then {self._how()}"
         return f"the simulation blew up in {error}; {kept}; try more steps per frame"
 
     def _not_written(self, error: OSError) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
 from flowborne.frame_report import PARTS, FrameReport
@@ -146,6 +147,23 @@ class Simulation:
             report = self._advance(world, self.frame + 1)
         self._moment = _Moment(world, report.frame, report)
         return report
+
+    def body(self, name: str) -> BodyState:
+        """Pose, velocity and force of a body now, in SI units; see `BodyState`.
+
+        raises  ValueError for an unknown name
+        """
+        return self._named().body(name)
+
+    def joint(self, name: str) -> JointState:
+        """Position, velocity and drive force of a joint now, in SI units; see `JointState`.
+
+        raises  ValueError for an unknown name
+        """
+        return self._named().joint(name)
+
+    def _named(self) -> Named:
+        return Named.after(self.world, None if self.report is None else self.report.step)
 
     def measure(self) -> dict[str, float]:
         """What the history says of the present state, by the history's column names.

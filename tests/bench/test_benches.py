@@ -5,11 +5,10 @@ import os
 import numpy as np
 import pytest
 
+from flowborne import Simulation, load_scene
 from flowborne.bench import chain, first_run, human, memory, parts, realtime, size, workers
 from flowborne.bench.frames import frame_times
-from flowborne.frame_report import PARTS
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.machine import PARTS
 
 COARSE = {"domain.resolution": "16", "controller.settle_steps": "0"}
 

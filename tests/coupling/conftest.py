@@ -7,11 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flowborne import Grid
+from flowborne.boundaries import Boundaries
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.step import cut_by_bodies
-from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Grid
-from flowborne.validation.worlds import mjcf, world_of
+from flowborne.operators import cut_by_bodies
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import make_world
 
 Cut = Callable[..., Geometry]
 
@@ -20,7 +21,7 @@ def cut_grid(
     grid: Grid, *bodies: str, q: np.ndarray | None = None, boundaries: Boundaries | None = None
 ) -> Geometry:
     """The grid cut by bodies (MJCF elements) in their rest pose, or at q."""
-    world = world_of(grid, mjcf(*bodies), boundaries=boundaries or Boundaries())
+    world = make_world(mjcf(*bodies), grid, boundaries=boundaries or Boundaries())
     if q is not None:
         world.solid.q[:] = q
     return cut_by_bodies(world)

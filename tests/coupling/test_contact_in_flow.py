@@ -7,14 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flowborne import Grid, Outcome, World, step
 from flowborne.coupling import solve
-from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.report import Outcome
-from flowborne.coupling.step import step
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Grid
-from flowborne.solvers.pressure import PressureSolution, PressureSystem
-from flowborne.validation.worlds import advance, world_of
+from flowborne.motions import JointCommand
+from flowborne.operators import PressureSolution, PressureSystem
+from flowborne.worlds import advance, make_world
 
 BOX = """<mujoco><worldbody>
   <geom type="plane" size="4 4 1" pos="0 -0.4 0" zaxis="0 1 0" condim="{condim}" friction="0 0 0"/>
@@ -32,7 +29,7 @@ GRIDS = {
 
 def sliding(grid: Grid | None, condim: int) -> World:
     """A box that slides over a floor without friction, under gravity."""
-    world = world_of(grid, BOX.format(condim=condim), gravity=(0.0, -9.81, 0.0), density=1000.0)
+    world = make_world(BOX.format(condim=condim), grid, gravity=(0.0, -9.81, 0.0), density=1000.0)
     world.solid.v[0] = 0.5
     return world
 

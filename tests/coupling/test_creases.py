@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne import Grid, World
+from flowborne.bodies import kinematics
 from flowborne.coupling.flow import face_masses, volumes_of
 from flowborne.coupling.operators import twists
-from flowborne.coupling.step import cut_by_bodies
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import accelerated, face_weights
 from flowborne.kernels.closed_fractions import CREASE
-from flowborne.scenes.tracks import TrajectorySinusoid
-from flowborne.solids.dynamics import kinematics
+from flowborne.motions import TrajectorySinusoid
+from flowborne.operators import cut_by_bodies
 from flowborne.validation.swimmers import BOX, LINK, PERIOD, swimmer
-from flowborne.validation.worlds import advance, mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import advance, make_world
 
 
 def fastest_end(world: World) -> float:
@@ -76,7 +76,7 @@ def test_fluid_between_a_body_and_a_side_is_squeezed_out_and_not_shot(
     )
     body = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>'
     model = mjcf(f"<body>{body}<geom {geom}/></body>")
-    world = world_of(Grid.slab(cells, cells, h, (-0.5, -0.5)), model, motions=motions)
+    world = make_world(model, Grid.slab(cells, cells, h, (-0.5, -0.5)), motions=motions)
     world.solid.q[:] = [float(motion.position(0.0)[0]) for motion in motions]
     speeds, gaps, body_speed = [], [], 0.0
     for _ in range(200):
@@ -98,7 +98,7 @@ def test_cells_that_a_body_and_a_side_seal_have_no_row() -> None:
     sealed = 0
     for depth in np.linspace(-0.9, 0.1, 101):
         disc = f'<body pos="8.3 {3.0 + depth} 0"><freejoint/><geom type="sphere" size="3"/></body>'
-        world = world_of(grid, mjcf(disc))
+        world = make_world(mjcf(disc), grid)
         cut, sides = cut_by_bodies(world), world.flow()[0].boundaries
         mass = face_masses(volumes_of(world, cut), 1.0)
         x, y, _ = face_weights(cut.open, accelerated(cut.open, mass, grid), grid, sides)
@@ -114,7 +114,7 @@ def test_a_crease_keeps_momentum() -> None:
     first = f'<body pos="-0.1 0.01 0"><freejoint/>{capsule}</body>'
     second = f'<body pos="0.12 0.05 0" euler="0 0 0.9"><freejoint/>{capsule}</body>'
     grid = Grid.slab(40, 40, 1.0 / 40, (-0.5, -0.5))
-    world = world_of(grid, mjcf(first, second), solid_density=2.0, tolerance=1e-11)
+    world = make_world(mjcf(first, second), grid, solid_density=2.0, tolerance=1e-11)
     world.solid.v[:] = [0.5, 0.2, 0.0, 0.0, 0.0, 2.0, -0.4, 0.1, 0.0, 0.0, 0.0, -3.0]
     for _ in range(30):
         balance = advance(world, 0.005).momentum

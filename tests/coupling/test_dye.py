@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flowborne import Array, Faces, Grid, World, step
+from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling import flow
 from flowborne.coupling.leak_proof import leak_proof_flux
 from flowborne.coupling.mouths import Mouth
-from flowborne.coupling.step import cut_by_bodies, step
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.motions import TrajectorySinusoid
+from flowborne.operators import cut_by_bodies
 from flowborne.scenes.inflow import FactorSteady
-from flowborne.scenes.tracks import TrajectorySinusoid
-from flowborne.validation.worlds import mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import make_world
 
 CELLS = 32
 H = 1.0 / CELLS
@@ -33,8 +33,8 @@ def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = 
         TrajectorySinusoid(np.array([0]), shift, 1.0),
         TrajectorySinusoid(np.array([1]), turn, 0.77),
     )
-    return world_of(
-        SQUARE, mjcf(body), boundaries=boundaries or Boundaries(), motions=motions, scalars=("dye",)
+    return make_world(
+        mjcf(body), SQUARE, boundaries=boundaries or Boundaries(), motions=motions, scalars=("dye",)
     )
 
 
@@ -127,7 +127,7 @@ def test_the_dye_of_a_jet_in_space_is_as_much_as_was_blown_and_never_more_than_t
     grid = Grid((20, 20, 20), 1.0 / 20.0, (-0.5, -0.5, -0.5))
     sides = Boundaries(*(BoundaryOpen(),) * 6)
     ball = mjcf('<body><geom type="sphere" size="0.2"/></body>')
-    plain = world_of(grid, ball, boundaries=sides, scalars=("dye",))
+    plain = make_world(ball, grid, boundaries=sides, scalars=("dye",))
     place, along = (0.2, 0.0, 0.0), (1.0, 0.0, 0.0)
     mouth = Mouth("a mouth", 1, place, along, 0.1, 0.1, FactorSteady(), {"dye": 1.0})
     world = World.at_rest(replace(plain.setup, mouths=(mouth,)))

@@ -7,16 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flowborne import Array, Grid, Simulation, World, load_scene, step
+from flowborne.bodies import momentum
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.coupling.flow import face_masses, fluid_momentum, volumes_of
-from flowborne.coupling.step import cut_by_bodies, step
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.tracks import TrajectorySinusoid
-from flowborne.simulation import Simulation
-from flowborne.solids.momentum import momentum
-from flowborne.validation.worlds import RING, advance, mjcf, set_velocity, world_of
+from flowborne.motions import TrajectorySinusoid
+from flowborne.operators import cut_by_bodies
+from flowborne.validation.worlds import RING, mjcf
+from flowborne.worlds import advance, make_world, set_velocity
 
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))
@@ -47,12 +45,12 @@ def swirl(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
 
 def paddling(**options: object) -> World:
     turn = TrajectorySinusoid(np.array([0]), 0.6, 0.7)
-    return world_of(SQUARE, mjcf(PADDLE), solid_density=2.0, motions=(turn,), **options)
+    return make_world(mjcf(PADDLE), SQUARE, solid_density=2.0, motions=(turn,), **options)
 
 
 def of_discs(*density_and_place: tuple[float, float], density: float, **options: object) -> World:
     discs = [DISC.format(n=n, x=x, y=y, size=0.11) for n, (x, y) in enumerate(density_and_place)]
-    return world_of(SQUARE, mjcf(*discs), solid_density=density, **options)
+    return make_world(mjcf(*discs), SQUARE, solid_density=density, **options)
 
 
 def channel() -> Boundaries:
@@ -70,13 +68,13 @@ WORLDS: dict[str, Callable[[], World]] = {
     "free disc in a channel": lambda: of_discs((0.37, 0.44), density=0.5, boundaries=channel()),
     "two discs": lambda: of_discs((0.37, 0.44), (0.6, 0.5), density=1.5),
     "two discs that touch": lambda: of_discs((0.37, 0.44), (0.59, 0.44), density=1.5),
-    "chain": lambda: world_of(SQUARE, mjcf(CHAIN), solid_density=1.2),
-    "chain that falls": lambda: world_of(
-        SQUARE, mjcf(CHAIN), solid_density=1.2, gravity=(0.0, -1.0, 0.0)
+    "chain": lambda: make_world(mjcf(CHAIN), SQUARE, solid_density=1.2),
+    "chain that falls": lambda: make_world(
+        mjcf(CHAIN), SQUARE, solid_density=1.2, gravity=(0.0, -1.0, 0.0)
     ),
     "prescribed paddle": paddling,
     "prescribed paddle, viscous": lambda: paddling(viscosity=0.02),
-    "sphere": lambda: world_of(CUBE, mjcf(BALL), solid_density=0.3),
+    "sphere": lambda: make_world(mjcf(BALL), CUBE, solid_density=0.3),
 }
 
 

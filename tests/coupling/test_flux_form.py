@@ -9,24 +9,32 @@ import mujoco
 import numpy as np
 import pytest
 
+from flowborne import (
+    Array,
+    Fluid,
+    Grid,
+    Outcome,
+    Setup,
+    SolidModel,
+    StepReport,
+    Tissue,
+    World,
+    step,
+)
+from flowborne.bodies import kinetic_energy
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.coupling import flow
 from flowborne.coupling.flow import carry_fluid, face_masses, volumes_of
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.mouths import Mouth
-from flowborne.coupling.report import Outcome, StepReport
-from flowborne.coupling.step import cut_by_bodies, move_bodies, step
-from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.fluid.dye import Passage
-from flowborne.fluid.grid import Array, Grid
-from flowborne.kernels.jit import kernel_threads
+from flowborne.coupling.step import move_bodies
+from flowborne.machine import kernel_threads
+from flowborne.motions import JointCommand, TrajectorySinusoid
+from flowborne.operators import Passage, cut_by_bodies
 from flowborne.scenes.inflow import FactorSteady
-from flowborne.scenes.tracks import TrajectorySinusoid
-from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import kinetic_energy
-from flowborne.solids.tissue import Law, Tissue, add_flesh
+from flowborne.solids.tissue import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
-from flowborne.validation.worlds import PERIODIC, RING, mjcf, set_velocity, world_of
+from flowborne.validation.worlds import PERIODIC, RING, mjcf
+from flowborne.worlds import make_world, set_velocity
 
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))
@@ -63,7 +71,7 @@ def disc(grid: Grid, x: float = 0.37, size: float = 0.15, held: bool = False) ->
 
 def free(grid: Grid, sides: Boundaries | None = None, density: float = 0.5) -> World:
     body = mjcf(disc(grid))
-    return swirling(world_of(grid, body, solid_density=density, boundaries=sides or Boundaries()))
+    return swirling(make_world(body, grid, solid_density=density, boundaries=sides or Boundaries()))
 
 
 def swirling(world: World) -> World:
@@ -73,13 +81,13 @@ def swirling(world: World) -> World:
 
 def paddling() -> World:
     turn = TrajectorySinusoid(np.array([0]), 0.6, 0.7)
-    return swirling(world_of(SQUARE, mjcf(PADDLE), solid_density=2.0, motions=(turn,)))
+    return swirling(make_world(mjcf(PADDLE), SQUARE, solid_density=2.0, motions=(turn,)))
 
 
 def channel(grid: Grid, viscosity: float = 0.0) -> World:
     """A held disc or ball in a stream."""
     body = mjcf(disc(grid, held=True))
-    world = world_of(grid, body, boundaries=CHANNEL, viscosity=viscosity)
+    world = make_world(body, grid, boundaries=CHANNEL, viscosity=viscosity)
     set_velocity(world, stream)
     return world
 
@@ -88,7 +96,7 @@ def mouthed(grid: Grid, rate: float, held: bool) -> World:
     """A disc or ball with a mouth, askew, in still and open surroundings."""
     body = mjcf(disc(grid, held=held))
     sides = Boundaries(*(OPEN,) * (4 if grid.is_slab else 6))
-    world = world_of(grid, body, solid_density=3.0, boundaries=sides)
+    world = make_world(body, grid, solid_density=3.0, boundaries=sides)
     x, y = np.cos(0.7), np.sin(0.7)
     place = (0.15 * x, 0.15 * y, 0.0)
     mouth = Mouth("the mouth", 1, place, (x, y, 0.0), 0.08, rate, FactorSteady())
@@ -148,7 +156,7 @@ def test_a_stream_past_a_body_that_goes_with_it_stays_uniform(
         speed[2] = 0.0
     around = RING if grid.is_slab else AROUND
     body = disc(grid) if shape == "round" else BLOCK.format(z=0.0 if grid.is_slab else 0.55)
-    world = world_of(grid, mjcf(body), boundaries=around if sides == "ring" else CHANNEL)
+    world = make_world(mjcf(body), grid, boundaries=around if sides == "ring" else CHANNEL)
     world.solid.v[:] = [*speed, *turn]
     _, state = world.flow()
     for _ in range(15):
@@ -196,7 +204,7 @@ def energy(world: World) -> float:
 @pytest.mark.parametrize("grid", [SQUARE, CUBE], ids=["slab", "room"])
 def test_energy_never_grows_in_a_closed_box(grid: Grid, shape: str, density: float) -> None:
     body = disc(grid) if shape == "round" else BLOCK.format(z=0.0 if grid.is_slab else 0.55)
-    world = swirling(world_of(grid, mjcf(body), solid_density=density))
+    world = swirling(make_world(mjcf(body), grid, solid_density=density))
     taken(world)
     last = first = energy(world)
     for _ in range(100):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne import Array, Grid, World, step
+from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.flow import volumes_of
 from flowborne.coupling.half_kick import half_kick, likely
-from flowborne.coupling.step import cut_by_bodies, step
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
-from flowborne.validation.worlds import mjcf, set_velocity, world_of
+from flowborne.operators import cut_by_bodies
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import make_world, set_velocity
 
 DT = 1.0 / 64
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
@@ -34,7 +34,7 @@ def test_a_pressure_goes_on_unless_it_is_an_impulse(earlier: float, part: float)
 
 @pytest.mark.parametrize("sides", [Boundaries(), Boundaries(x_max=BoundaryOpen())])
 def test_half_of_the_last_pressure_acts_where_no_side_is_open(sides: Boundaries) -> None:
-    world = world_of(SQUARE, BODY, solid_density=0.5, boundaries=sides)
+    world = make_world(BODY, SQUARE, solid_density=0.5, boundaries=sides)
     set_velocity(world, swirl)
     turned(world, 4)
     cut = cut_by_bodies(world)
@@ -58,7 +58,7 @@ def turned(world: World, steps: int) -> World:
 def test_the_pressure_of_a_step_is_that_of_the_whole_step() -> None:
     """With and without what acts beforehand the bodies are pushed alike, but for the error in time:
     the reported pressure is all of it, and so is the wrench."""
-    world = world_of(SQUARE, BODY, solid_density=0.5)
+    world = make_world(BODY, SQUARE, solid_density=0.5)
     set_velocity(world, swirl)
     other = turned(world, 4).copy()
     flow = other.flow()[1]

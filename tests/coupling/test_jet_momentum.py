@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flowborne import Array, Grid, World, step
+from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.mouths import Mouth
-from flowborne.coupling.step import step
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
 from flowborne.scenes.inflow import FactorPulse
-from flowborne.validation.worlds import mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import make_world
 
 RADIUS, HALF, RATE, DURATION = 0.2, 0.1, 0.1, 1.0
 SQUARE = Grid.slab(48, 48, 2.0 / 48.0, (-1.0, -1.0))
@@ -24,7 +23,7 @@ def with_mouths(grid: Grid, *angles: float, rate: float = RATE) -> World:
     """A held disc or ball in open surroundings, with mouths at angles to x."""
     ball = f'<body pos="0 0.007 0"><geom type="sphere" size="{RADIUS}"/></body>'
     sides = Boundaries(*(BoundaryOpen(),) * (4 if grid.is_slab else 6))
-    world = world_of(grid, mjcf(ball), boundaries=sides)
+    world = make_world(mjcf(ball), grid, boundaries=sides)
     mouths = []
     for angle in angles:
         x, y = np.cos(angle), np.sin(angle)

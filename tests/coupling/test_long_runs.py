@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne import Array, Grid, World, step
+from flowborne.bodies import kinetic_energy
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.coupling import flow
 from flowborne.coupling.flow import face_masses, volumes_of
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.step import cut_by_bodies, step
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import TrajectoryConstant, TrajectorySinusoid
-from flowborne.solids.momentum import kinetic_energy
-from flowborne.validation.worlds import mjcf, set_velocity, world_of
+from flowborne.motions import TrajectoryConstant, TrajectorySinusoid
+from flowborne.operators import cut_by_bodies
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import make_world, set_velocity
 
 STEPS = 1000
 CELLS = 32
@@ -78,7 +78,7 @@ def test_a_body_of_a_hundredth_of_the_density_is_carried_for_1000_steps(
     """Nothing drives the closed box: its energy never grows. A body without mass answers a
     change of the flow with at most twice that change, and is nowhere faster than the flow was.
     In an ideal fluid the sides draw it in: there it squeezes out what is between."""
-    world = world_of(SQUARE, mjcf(body), solid_density=0.01)
+    world = make_world(mjcf(body), SQUARE, solid_density=0.01)
     set_velocity(world, swirl)
     at_start = energy(world)
     largest = max(float(np.abs(u).max()) for u in world.flow()[1].velocity)
@@ -98,7 +98,7 @@ def test_a_body_of_a_hundredth_of_the_density_is_carried_for_1000_steps(
 def test_a_flag_of_a_hundredth_of_the_density_settles_along_the_stream() -> None:
     """Its tip is never faster than the flow around a blunt body, twice the stream, and it ends
     where a weathercock does."""
-    world = world_of(SQUARE, mjcf(FLAG), solid_density=0.01, boundaries=CHANNEL, viscosity=0.005)
+    world = make_world(mjcf(FLAG), SQUARE, solid_density=0.01, boundaries=CHANNEL, viscosity=0.005)
     set_velocity(world, stream)
     world.solid.q[0] = 0.5
     angles = []
@@ -154,9 +154,9 @@ def through_plate(world: World, half_length: float) -> tuple[float, float]:
 def test_less_than_a_hundredth_leaks_through_a_thin_plate_in_a_stream() -> None:
     """Thickness h/4, moving and turning for 1000 steps."""
     half_length = 0.2
-    world = world_of(
-        SQUARE,
+    world = make_world(
         mjcf(plate(half_length)),
+        SQUARE,
         boundaries=CHANNEL,
         motions=(
             TrajectorySinusoid(np.array([0]), 0.1, 1.0),

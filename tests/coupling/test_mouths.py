@@ -8,17 +8,17 @@ import mujoco
 import numpy as np
 import pytest
 
+from flowborne import Array, Fluid, Grid, Setup, SolidModel, Tissue, World, step
+from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.flow import face_masses, fluid_momentum, volumes_of
 from flowborne.coupling.mouths import Mouth
-from flowborne.coupling.step import cut_by_bodies, jets_at, step
-from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
+from flowborne.coupling.step import jets_at
+from flowborne.operators import cut_by_bodies
 from flowborne.scenes.inflow import FactorSteady
-from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue import Law, Tissue, add_flesh
+from flowborne.solids.tissue import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
-from flowborne.validation.worlds import advance, mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import advance, make_world
 
 OPEN = BoundaryOpen()
 RADIUS, HALF, RATE = 0.2, 0.1, 0.1
@@ -49,9 +49,9 @@ def mouthed(
     ball = f'<body pos="0.013 0.007 0">{joint}<geom type="sphere" size="{RADIUS}"/></body>'
     ends = (OPEN,) * (4 if grid.is_slab else 6)
     scalars = ("dye",) if dye else ()
-    world = world_of(
-        grid,
+    world = make_world(
         mjcf(ball),
+        grid,
         solid_density=density,
         viscosity=viscosity,
         boundaries=Boundaries(*ends),
@@ -189,7 +189,7 @@ def test_dye_leaves_from_the_mouth(grid: Grid) -> None:
 
 def test_nothing_is_blown_out_of_the_far_side_of_a_thin_plate() -> None:
     plate = '<body><geom type="box" size="0.05 0.4 1"/></body>'
-    world = world_of(slab(32), mjcf(plate), boundaries=Boundaries(OPEN, OPEN, OPEN, OPEN))
+    world = make_world(mjcf(plate), slab(32), boundaries=Boundaries(OPEN, OPEN, OPEN, OPEN))
     mouth = Mouth("the mouth", 1, (0.05, 0.0, 0.0), (1.0, 0.0, 0.0), 0.1, RATE, FactorSteady())
     world = World.at_rest(replace(world.setup, mouths=(mouth,)))
     (jet,) = jets_at(world, cut_by_bodies(world), 0.0)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from flowborne import Grid, load_scene
 from flowborne.coupling.seen import seen_bodies
-from flowborne.fluid.grid import Grid
 from flowborne.scenes.build import build
-from flowborne.scenes.load import load_scene
-from flowborne.validation.worlds import mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import make_world
 
 CUBE = Grid((20, 20, 20), 0.05, (-0.5, -0.5, -0.5))
 TILE = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (-0.01, 0.01)])
@@ -15,7 +15,7 @@ TILE = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (-
 
 def seen_in(grid: Grid, *geoms: str) -> list:
     body = f'<body name="fin"><joint type="slide"/>{"".join(geoms)}</body>'
-    return seen_bodies(world_of(grid, mjcf(body), solid_density=1000.0).setup)
+    return seen_bodies(make_world(mjcf(body), grid, solid_density=1000.0).setup)
 
 
 def test_a_thick_body_is_seen_as_it_is():
@@ -55,7 +55,7 @@ def test_fluid_passes_through_a_mesh_thinner_than_that():
         '<body name="tile"><joint type="slide"/><geom type="mesh" mesh="tile" contype="0" '
         'conaffinity="0"/></body></worldbody></mujoco>'
     )
-    (tile,) = seen_bodies(world_of(CUBE, model, solid_density=1000.0).setup)
+    (tile,) = seen_bodies(make_world(model, CUBE, solid_density=1000.0).setup)
     assert tile.thickness == tile.seen == pytest.approx(0.02)
     assert not tile.tight
     assert "fluid passes through it" in tile.sentence()

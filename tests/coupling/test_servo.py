@@ -7,10 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
-from flowborne.coupling.world import World
-from flowborne.scenes.tracks import TrajectoryConstant, TrajectorySinusoid
-from flowborne.validation.worlds import advance, mjcf, world_of
+from flowborne import World
+from flowborne.motions import (
+    Servo,
+    ServoExact,
+    ServoPD,
+    TrajectoryConstant,
+    TrajectoryServo,
+    TrajectorySinusoid,
+)
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import advance, make_world
 
 
 @given(st.floats(-3, 3), st.integers(1, 40), st.floats(1e-4, 0.1))
@@ -56,7 +63,7 @@ DOF = np.array([0])
 
 
 def wheel(motion: TrajectoryConstant | TrajectorySinusoid, servo: Servo) -> World:
-    return world_of(None, WHEEL, motions=(TrajectoryServo(motion, servo),))
+    return make_world(WHEEL, slab=True, motions=(TrajectoryServo(motion, servo),))
 
 
 @pytest.mark.parametrize("limit", [np.inf, 4.0])

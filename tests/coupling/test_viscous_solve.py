@@ -7,18 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from flowborne import Array, Faces, Grid
+from flowborne.boundaries import Boundaries, BoundaryNoSlip
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.friction import TOLERANCE
-from flowborne.coupling.step import cut_by_bodies
 from flowborne.coupling.viscous_solve import Answer, ViscousSystem, walls_of
-from flowborne.fluid.boundary import Boundaries, BoundaryNoSlip
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
+from flowborne.operators import cut_by_bodies, faces_of
 from flowborne.solvers.conjugate_gradients import spread
 from flowborne.validation.viscous import measured
-from flowborne.validation.worlds import PERIODIC, RING, mjcf, world_of
+from flowborne.validation.worlds import PERIODIC, RING, mjcf
+from flowborne.worlds import make_world
 
 DENSITY, VISCOSITY = 1.3, 0.7
 """kg/m^3 and Pa s."""
@@ -88,7 +89,7 @@ def case_of(
     viscosity: float = VISCOSITY,
 ) -> Case:
     """Bodies (MJCF elements) that answer with `mobility`; by default they do not yield."""
-    world = world_of(grid, mjcf(*bodies), boundaries=boundaries)
+    world = make_world(mjcf(*bodies), grid, boundaries=boundaries)
     cut = cut_by_bodies(world)
     still = grid.zeros_faces()
     masses = masses_of(cut.open, grid, boundaries)

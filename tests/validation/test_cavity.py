@@ -5,7 +5,7 @@ import pytest
 
 from flowborne.validation import case
 from flowborne.validation.cavity import cavity, primary_vortex, profiles, settle, stream_function
-from flowborne.validation.worlds import advance, set_velocity
+from flowborne.worlds import advance, set_velocity
 
 
 @pytest.fixture(scope="module")

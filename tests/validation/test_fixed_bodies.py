@@ -12,8 +12,7 @@ from flowborne.validation.fixed_bodies import (
     pressure_drop,
     recirculation,
 )
-from flowborne.validation.refine import start_from
-from flowborne.validation.worlds import set_velocity
+from flowborne.worlds import set_velocity, start_from
 
 
 def test_B1_on_ten_cells_across_D():

@@ -5,7 +5,7 @@ import pytest
 
 from flowborne.validation import case
 from flowborne.validation.fixed_sphere import quarter, recirculation, separation
-from flowborne.validation.worlds import set_velocity
+from flowborne.worlds import set_velocity
 
 
 def test_B7_drag_falls_with_the_reynolds_number_and_a_bubble_forms():

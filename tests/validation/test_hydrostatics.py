@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from flowborne.fluid.grid import Grid
+from flowborne import Grid
 from flowborne.validation import case
 from flowborne.validation.hydrostatics import BOX, SLAB, displaced, fixed_bodies
-from flowborne.validation.worlds import world_of
+from flowborne.worlds import make_world
 
 
 def test_F5_fluid_and_bodies_stay_at_rest():
@@ -42,7 +42,7 @@ def test_F5_discrete_volume_is_the_bodies_own(grid, exact):
     """The volume of Archimedes' force on cut cells comes to that of the shapes at order 2."""
     errors = []
     for g in (grid, finer(grid)):
-        volume, _ = displaced(world_of(g, fixed_bodies(g)))
+        volume, _ = displaced(make_world(fixed_bodies(g), g))
         wrong = volume[1:4, list(g.axes)] / np.array(exact)[:, None] - 1.0
         errors.append(np.abs(wrong).max())
     order = np.log2(errors[0] / errors[1])

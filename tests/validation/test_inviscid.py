@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.validation import inviscid as case
 from flowborne.validation.worlds import PERIODIC
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flowborne.fluid.grid import Grid
+from flowborne import Grid
 from flowborne.validation import case
 from flowborne.validation.scalar_cases import Blob, Swirl, Turn, carried_back
 

@@ -6,7 +6,7 @@ import pytest
 
 from flowborne.validation import case
 from flowborne.validation.settling import DENSITY, GRAVITY, OILS, quarter
-from flowborne.validation.worlds import advance
+from flowborne.worlds import advance
 
 
 def test_V2_spheres_settle_near_their_speed():

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne import Simulation, load_scene
 from flowborne.validation.swimmer import CYCLE, Swim
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from flowborne.validation import case
 from flowborne.validation.viscous import INNER, OUTER, SPIN, annulus
-from flowborne.validation.worlds import advance
+from flowborne.worlds import advance
 
 
 def test_V8_torque_comes_near():

@@ -7,12 +7,10 @@ from contextlib import ExitStack
 
 import numpy as np
 
+from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.frames import FRAMES, frame_times, told
 from flowborne.bench.result import Result, verdict
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema import Scene
-from flowborne.simulation import Simulation
-from flowborne.view.plots import straight_line
+from flowborne.pictures import straight_line
 
 NAME = "chain"
 JOINTS = (1, 2, 3, 4)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.kernels.jit import kernel_threads
-from flowborne.simulation import Simulation
+from flowborne import Simulation
+from flowborne.machine import kernel_threads
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,9 @@ from contextlib import ExitStack
 
 import numpy as np
 
+from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.frames import frame_times, told
 from flowborne.bench.result import Result, verdict
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema import Scene
-from flowborne.simulation import Simulation
 
 NAME = "human"
 SCENES = ("gravity-back", "gravity-arms", "wind-back", "wind-arms", "wind-drag")

@@ -9,13 +9,9 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from math import prod
 
+from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.result import Result, verdict
-from flowborne.io.checkpoint import state_bytes
-from flowborne.io.summary import peak_memory
-from flowborne.scenes.build import build
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema import Scene
-from flowborne.simulation import Simulation
+from flowborne.machine import peak_memory, state_bytes
 
 NAME = "memory"
 SCENE = "ns-block-drag-max"
@@ -54,7 +50,7 @@ def footprint(scene: Scene, early: int = EARLY, late: int = LATE) -> list[Result
     """
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as executor:
         before, after = executor.submit(held, scene, (early, late)).result()
-    world = build(scene).world
+    world = Simulation(scene, 1).world
     cells = prod(world.flow()[0].grid.shape)
     ratio = max(after.now / before.now, after.process / before.process)
     return [

@@ -6,13 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.frames import FRAMES
 from flowborne.bench.result import Result
-from flowborne.frame_report import PARTS
-from flowborne.kernels.jit import kernel_threads
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema import Scene
-from flowborne.simulation import Simulation
+from flowborne.machine import PARTS, kernel_threads
 
 NAME = "parts"
 SCENES = ("ns-block-drag-max", "ns-chain-4")

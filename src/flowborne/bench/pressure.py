@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from flowborne import Array, Faces
 from flowborne.bench.result import Result, timed, verdict
-from flowborne.fluid.grid import Array, Faces
-from flowborne.kernels.jit import cores, kernel_threads
-from flowborne.solvers.pressure import PressureSolution, PressureSystem
+from flowborne.machine import cores, kernel_threads
+from flowborne.operators import PressureSolution, PressureSystem
 
 NAME = "pressure"
 TOLERANCE = 1e-5

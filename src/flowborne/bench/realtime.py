@@ -6,11 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.frames import frame_times, told
 from flowborne.bench.result import Result, verdict
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema import Scene
-from flowborne.simulation import Simulation
 
 NAME = "realtime"
 SCENE = "ns-block-drag-max"

@@ -24,6 +24,7 @@ from flowborne.control.trial import Hypothesis, Step, Trials
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.servo import Servo, ServoExact
+from flowborne.errors import PartError
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
@@ -225,11 +226,12 @@ class Controller:
             for places, wanted in groups:
                 trials = self.trials(world, step, pose, wanted, places)
                 estimate = self.gradient.of(places, pace[places]).estimate(trials)
+                slopes = estimate.gradient
                 if iteration == 0:
-                    value, gradient[places] = value + estimate.value, estimate.gradient
-                pace[places] = self.rule.pace(pace[places], slope[places], estimate.gradient)
-                slope[places] = estimate.gradient
-                rate = pace[places] * self.rule.step(trials, estimate.gradient, limit[places])
+                    value, gradient[places] = value + estimate.value, slopes
+                pace[places] = self.rule.pace(pace[places], slope[places], slopes)
+                slope[places] = slopes
+                rate = pace[places] * self._step(trials, slopes, limit[places])
                 displacement[self.dofs[places]] = trials.within_range(rate)
                 evaluations += trials.evaluations
             if not displacement.any():
@@ -237,6 +239,16 @@ class Controller:
             pose = creature.moved(model, pose, displacement)
         world.memory["pace"] = np.array([pace, slope])
         return pose, value, gradient, evaluations
+
+    def _step(self, trials: Trials, gradient: Array, limit: Array) -> Array:
+        """(m,) what the rule says. Raises PartError when that is no such displacement."""
+        step = np.asarray(self.rule.step(trials, gradient, limit))
+        if step.shape != gradient.shape or not np.isfinite(step).all():
+            raise PartError(
+                f"rule {type(self.rule).__name__} gave {step}: return a finite displacement in rad "
+                f"or m for each of {gradient.size} dofs"
+            )
+        return step
 
     def _decision(self, world: World, decided: bool, evaluations: int, started: float) -> Decision:
         memory = world.memory

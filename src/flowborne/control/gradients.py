@@ -8,6 +8,8 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.registry import Registry
+
 Array = NDArray[np.float64]
 
 
@@ -51,6 +53,15 @@ class Gradient(Protocol):
     def estimate(self, poses: Poses) -> Estimate:
         """Objective and gradient in the present pose."""
         ...
+
+
+GRADIENTS: Registry[Gradient] = Registry(
+    "gradient",
+    methods=("of", "estimate"),
+    taken=("central", "one-sided"),
+    given=("displacement",),
+)
+"""Gradients of one's own; `displacement` is what the scene's probes say, rad or m for each dof."""
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.control import creature
+from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import StepReport
 
 if TYPE_CHECKING:
@@ -21,6 +23,9 @@ Integers = NDArray[np.int64]
 @dataclass(frozen=True)
 class Measurement:
     """A world after a step, real or hypothetical.
+
+    `body("head").velocity` and `joint("leg_1").position` say by name all that a step tells of a
+    body or a joint, in SI units; see `BodyState` and `JointState`.
 
     world   the state after the step
     report  what the step said
@@ -40,6 +45,23 @@ class Measurement:
     def phase_time(self) -> float:
         """Time at which phases are looked up, s."""
         return self.world.time if self.now is None else self.now
+
+    @property
+    def time(self) -> float:
+        """s since the start, after the step."""
+        return self.world.time
+
+    @cached_property
+    def _named(self) -> Named:
+        return Named.after(self.world, self.report)
+
+    def body(self, name: str) -> BodyState:
+        """Everything that is known of a body. Raises ValueError for an unknown name."""
+        return self._named.body(name)
+
+    def joint(self, name: str) -> JointState:
+        """Everything that is known of a joint. Raises ValueError for an unknown name."""
+        return self._named.joint(name)
 
     def joint_positions(self, dofs: Integers) -> Array:
         """(k,) positions of scalar joints, rad or m; NaN for dofs of ball and free joints."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from flowborne.control.measurement import Measurement
 from flowborne.control.phases import PhaseAlways, Phases
 from flowborne.coupling.motion import Trajectory
+from flowborne.errors import PartError
+from flowborne.registry import Registry
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -25,15 +27,49 @@ Vector = tuple[float, float, float]
 class Objective(Protocol):
     """A number that the creature wants small.
 
-    name  heading under which it is written to the history
+    One that has a `name` is written to the history under it, any other under its kind.
     """
-
-    @property
-    def name(self) -> str: ...
 
     def value(self, measurement: Measurement) -> float:
         """The number in the measured state."""
         ...
+
+
+OBJECTIVES: Registry[Objective] = Registry(
+    "objective",
+    methods=("value",),
+    taken=(
+        "effort",
+        "wind-drag",
+        "drag",
+        "pressure-drag",
+        "pressure-lift",
+        "input-motion",
+        "velocity",
+        "python",
+    ),
+    keys=("goal", "weight", "phases", "wanted_by"),
+)
+"""Objectives of one's own."""
+
+
+def name_of(objective: Objective) -> str:
+    """Heading of an objective in the history: its `name`, else its kind, else its class."""
+    given = type(objective).__name__
+    return str(getattr(objective, "name", getattr(objective, "kind", given)))
+
+
+def value_of(objective: Objective, measurement: Measurement) -> float:
+    """The objective's number. Raises PartError when it fails, or gives anything else."""
+    try:
+        value = objective.value(measurement)
+    except Exception as error:
+        raise PartError.failed(f"objective '{name_of(objective)}'", error) from error
+    if not isinstance(value, SupportsFloat) or np.ndim(value) != 0:
+        raise PartError(
+            f"objective '{name_of(objective)}' gave {value!r}, which is no number: return one"
+        )
+    return float(value)
 
 
 def unit(direction: Vector) -> Array:
@@ -185,7 +221,7 @@ class ObjectiveCallable:
     name: str = "callable"
 
     def value(self, measurement: Measurement) -> float:
-        return float(self.function(measurement))
+        return self.function(measurement)
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +252,7 @@ class ObjectiveSum:
         for term in self.terms:
             if not np.isfinite(term.weight):
                 raise ValueError(
-                    f"weight of objective {term.objective.name!r} is {term.weight}: "
+                    f"weight of objective '{name_of(term.objective)}' is {term.weight}: "
                     "give a finite number"
                 )
 
@@ -254,7 +290,7 @@ class ObjectiveSum:
         now = measurement.phase_time
         return float(
             sum(
-                term.weight * term.objective.value(measurement)
+                term.weight * value_of(term.objective, measurement)
                 for term in self.terms
                 if term.phases.active(now)
             )
@@ -264,8 +300,9 @@ class ObjectiveSum:
         """Value of every term without its weight, on or off, under distinct names."""
         named: dict[str, float] = {}
         for term in self.terms:
-            name, again = term.objective.name, 2
+            own, again = name_of(term.objective), 2
+            name = own
             while name in named:
-                name, again = f"{term.objective.name}-{again}", again + 1
-            named[name] = term.objective.value(measurement)
+                name, again = f"{own}-{again}", again + 1
+            named[name] = value_of(term.objective, measurement)
         return named

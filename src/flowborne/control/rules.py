@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.control.gradients import Poses
+from flowborne.registry import Registry
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,12 @@ class Rule(Protocol):
     def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
         """(n,) displacement, rad or m, each at most `limit` (n,), what strength allows."""
         ...
+
+
+RULES: Registry[Rule] = Registry(
+    "rule", methods=("pace", "step"), taken=("fixed", "resilient", "golden-section")
+)
+"""Rules of one's own."""
 
 
 def descent(gradient: Array, limit: Array) -> Array:

@@ -9,8 +9,14 @@ from numpy.typing import NDArray
 
 from flowborne.control.controller import Controller
 from flowborne.control.executors import Mapper
-from flowborne.control.gradients import Gradient, GradientCentral, GradientOneSided
+from flowborne.control.gradients import (
+    GRADIENTS,
+    Gradient,
+    GradientCentral,
+    GradientOneSided,
+)
 from flowborne.control.objectives import (
+    OBJECTIVES,
     Objective,
     ObjectiveCallable,
     ObjectiveDrag,
@@ -23,7 +29,7 @@ from flowborne.control.objectives import (
     WeightedObjective,
 )
 from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseTrack
-from flowborne.control.rules import FixedStep, GoldenSection, ResilientStep, Rule
+from flowborne.control.rules import RULES, FixedStep, GoldenSection, ResilientStep, Rule
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Trajectory
 from flowborne.scenes import schema_control as tables
@@ -31,7 +37,7 @@ from flowborne.scenes.bodies import joint_unit, posed
 from flowborne.scenes.build_drives import servo_of
 from flowborne.scenes.capture import clip_motion
 from flowborne.scenes.fields import triple
-from flowborne.scenes.python_function import find_function
+from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
 from flowborne.solids.model import SolidModel
@@ -88,11 +94,16 @@ def _dofs_of(model: SolidModel, joints: tuple[str, ...]) -> Integers:
     return np.array([dof for joint in joints for dof in _free_dofs(model, joint)], dtype=np.int64)
 
 
-def _gradient(kind: str, probe: tuple[float, ...]) -> Gradient:
-    return GradientCentral(probe) if kind == "central" else GradientOneSided(probe)
+def _gradient(table: tables.AnyGradient, probe: tuple[float, ...]) -> Gradient:
+    if isinstance(table, tables.GradientOwnTable):
+        return GRADIENTS.make(table.kind, table.parameters, displacement=probe)
+    central = isinstance(table, tables.GradientCentralTable)
+    return GradientCentral(probe) if central else GradientOneSided(probe)
 
 
 def _rule(table: tables.AnyRule, scene: Scene, model: SolidModel) -> Rule:
+    if isinstance(table, tables.RuleOwn):
+        return RULES.make(table.kind, table.parameters)
     if isinstance(table, tables.RuleFixed):
         return FixedStep()
     if isinstance(table, tables.RuleResilient):
@@ -133,7 +144,10 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
     if isinstance(table, tables.ObjectiveVelocityTable):
         body = None if table.body is None else model.body(table.body)
         return ObjectiveVelocity(body, triple(table.target))
-    return ObjectiveCallable(find_function(table.function), table.function)
+    if isinstance(table, tables.ObjectiveOwnTable):
+        return OBJECTIVES.make(table.kind, table.parameters)
+    function = with_parameters(table.function, table.parameters)
+    return ObjectiveCallable(function, table.function)
 
 
 def _reference(

@@ -10,7 +10,7 @@ from flowborne.coupling.stream import WindStream
 from flowborne.fluid.grid import Array
 from flowborne.scenes.fields import triple
 from flowborne.scenes.inflow import Factor, FactorKeyframes, FactorSteady
-from flowborne.scenes.python_function import find_function
+from flowborne.scenes.python_function import WindFunction, with_parameters
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import (
     WindFacesTable,
@@ -50,7 +50,8 @@ def _wind(table: WindTable, scene: Scene) -> Wind | None:
     if isinstance(table, WindForceTable):
         return WindForce(triple(table.force), table.bodies)
     if isinstance(table, WindPythonTable):
-        return WindFaces(find_function(table.function), table.density, table.bodies)
+        function = with_parameters(table.function, table.parameters)
+        return WindFaces(WindFunction(function, table.function), table.density, table.bodies)
     if isinstance(table, WindStreamTable):
         return _stream(table, scene)
     velocity = triple(table.velocity)

@@ -21,7 +21,7 @@ from flowborne.scenes.bodies import (
 from flowborne.scenes.check_flesh import check_flesh_places
 from flowborne.scenes.check_formulas import check_formulas
 from flowborne.scenes.draft import Draft
-from flowborne.scenes.python_function import find_function
+from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
 from flowborne.scenes.wording import Key, suggestion
 from flowborne.solids.dynamics import kinematics
@@ -92,7 +92,7 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
             named += unknown_body(draft, model, body, "wind", index)
         if isinstance(wind, WindPythonTable):
             try:
-                find_function(wind.function)
+                with_parameters(wind.function, wind.parameters)
             except SceneError as error:
                 named.append(f"{draft.at('wind', index)}: {error}")
         if isinstance(wind, WindFacesTable) and wind.exponent > 0.0 and scene.is_slab:

@@ -9,7 +9,7 @@ from flowborne.scenes.bodies import FREE, HINGE, JOINT_KINDS, SLIDE, joint_kind
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.check_bodies import out_of_plane, unknown_body, unknown_joint
 from flowborne.scenes.draft import Draft
-from flowborne.scenes.python_function import find_function
+from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema_control import (
     ObjectiveDragTable,
     ObjectiveEffortTable,
@@ -147,7 +147,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
         yield from unknown_body(draft, model, table.body, "objectives", index)
     if isinstance(table, ObjectivePythonTable):
         try:
-            find_function(table.function)
+            with_parameters(table.function, table.parameters)
         except SceneError as error:
             yield f"{where}: {error}"
     phases = table.phases

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     PlainSerializer,
     Strict,
+    model_validator,
 )
+
+from flowborne.registry import Registry
 
 Number = Annotated[float, Strict()]
 """A finite number; text such as "3" is not one."""
@@ -25,6 +29,9 @@ WholeNumber = Annotated[int, Strict(), Field(ge=0)]
 """0, 1, 2, ..."""
 
 Text = Annotated[str, Field(min_length=1)]
+
+Parameters = dict[str, Any]
+"""Arguments of a Python function by name: numbers, texts, lists of them."""
 
 FUNCTION = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
 """Form of a Python function's name, "module:function"."""
@@ -73,6 +80,41 @@ def _named_kind(value: Any) -> Any:
 
 ByKind = (Field(discriminator="kind"), BeforeValidator(_named_kind))
 """For a choice among tables by their key `kind`; the bare name stands for a table of defaults."""
+
+
+BUILT_IN, OWN = "built-in", "own"
+"""Tags of the two sorts of tables that `ByKindOrOwn` chooses from."""
+
+
+def by_kind_or_own(registry: Registry[Any]) -> tuple[Discriminator, BeforeValidator]:
+    """For a choice between tables with the tags BUILT_IN and OWN: kinds that a user has registered
+    have the latter."""
+
+    def tag(value: Any) -> str:
+        kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
+        return OWN if kind in registry else BUILT_IN
+
+    return Discriminator(tag), BeforeValidator(_named_kind)
+
+
+class OwnTable(BaseModel):
+    """What a table of a kind of the user's own adds: its further keys are the kind's parameters."""
+
+    model_config = ConfigDict(extra="allow")
+
+    registry: ClassVar[Registry[Any]]
+
+    kind: str
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The further keys."""
+        return dict(self.model_extra or {})
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        self.registry.check(self.kind, self.parameters)
+        return self
 
 
 def as_interval(start: float, stop: float | None) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from flowborne.scenes.check import cross_check
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.elbows import join_elbows
 from flowborne.scenes.keyframe_file import inline_keyframes
+from flowborne.scenes.plugins import load_plugins
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import explain, keys_of, suggestion
 
@@ -90,7 +91,8 @@ def _examine(
         return None, error.problems
     raw.setdefault("name", path.stem)
     join_elbows(raw)
-    problems = inline_keyframes(raw, path.parent, path.name)
+    problems = load_plugins(raw, path.parent, path.name)
+    problems += inline_keyframes(raw, path.parent, path.name)
     draft, more = _validate(raw, path)
     problems += more
     if draft is None:
@@ -161,7 +163,7 @@ def override(raw: dict[str, Any], key: str, text: str) -> None:
                 f"--set {key}={text}: {so_far} is {value!r} and has no keys. Shorten the key."
             )
         if last:
-            value[index] = _value_of(text)
+            value[index] = value_of(text)
             return
         if isinstance(value, dict):
             value.setdefault(index, {})
@@ -170,7 +172,8 @@ def override(raw: dict[str, Any], key: str, text: str) -> None:
         value = value[index]
 
 
-def _value_of(text: str) -> Any:
+def value_of(text: str) -> Any:
+    """The TOML value that a text is, or the text."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

@@ -53,6 +53,10 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
         files |= _model_files(model)
         solids = scene.solids.model_copy(update={"model": model.name})
         scene = scene.model_copy(update={"solids": solids}).in_folder(scene.folder)
+    for name in scene.plugins:
+        files[Path(name).name] = _read(scene.folder / name)
+    names = tuple(Path(name).name for name in scene.plugins)
+    scene = scene.model_copy(update={"plugins": names}).in_folder(scene.folder)
     if scene.human is not None:
         files[HUMAN_FILE] = human_of(scene).encode()
     if scene.clip is not None and scene.clip.file is not None:

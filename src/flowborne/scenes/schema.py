@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import tomli_w
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
+from flowborne.io.exporters import EXPORTERS, endings
+from flowborne.io.run_folder import FIXED_NAMES
 from flowborne.scenes.fields import Count, Number, Positive, Table, Text, Vector, filled
 from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
 from flowborne.scenes.schema_flesh import FleshTable
@@ -40,6 +42,42 @@ class TimeTable(Table):
     steps_per_frame: Count = 1
 
 
+def _named_file(value: Any) -> Any:
+    return {"file": value} if isinstance(value, str) else value
+
+
+class ExportTable(Table):
+    """A file that a run leaves behind for another program; further keys are its exporter's.
+
+    file  its name, in the run folder; the ending says which exporter writes it
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    file: Annotated[str, Field(pattern=r"^[^/\\]+\.\w+$")]
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The further keys."""
+        return dict(self.model_extra or {})
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        ending = Path(self.file).suffix
+        if self.file in FIXED_NAMES:
+            raise ValueError(f"is {self.file}, a file of the run itself. Take another name")
+        if ending in EXPORTERS:
+            EXPORTERS.check(ending, self.parameters)
+        elif ending not in endings():
+            raise ValueError(
+                f"is {self.file}, and nothing writes '{ending}' files. End it with one of "
+                f"{', '.join(endings())}"
+            )
+        elif self.parameters:
+            raise ValueError(f"of kind '{ending}' takes no keys but file. Drop the others")
+        return self
+
+
 class OutputTable(Table):
     """[output]: what a run leaves behind.
 
@@ -47,11 +85,13 @@ class OutputTable(Table):
     picture           what the fluid shows in pictures and films
     bodies            whose centre of mass, velocity, and force and torque of the fluid the history
                       holds
+    exports           files for other programs, written at the end: names, or tables with file
     """
 
     checkpoint_every: Count = 24
     picture: Literal["dye", "vorticity", "none"] = "vorticity"
     bodies: tuple[Text, ...] = ()
+    exports: tuple[Annotated[ExportTable, BeforeValidator(_named_file)], ...] = ()
 
 
 class Scene(Table):
@@ -63,6 +103,7 @@ class Scene(Table):
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
     constants    name -> number, for the formulas of [[motion]]
+    plugins      Python files, found from the scene's folder, that register parts of one's own
     """
 
     name: Text
@@ -71,6 +112,7 @@ class Scene(Table):
     dimensions: Literal[2, 3] = 3
     gravity: Vector = (0.0, 0.0, 0.0)
     constants: dict[str, Number] = Field(default_factory=dict)
+    plugins: tuple[Text, ...] = ()
     time: TimeTable = TimeTable()
     domain: Domain | None = None
     fluid: FluidTable | None = None

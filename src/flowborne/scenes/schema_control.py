@@ -8,18 +8,26 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, Tag, model_validator
 
+from flowborne.control.gradients import GRADIENTS
+from flowborne.control.objectives import OBJECTIVES
+from flowborne.control.rules import RULES
 from flowborne.scenes.fields import (
+    BUILT_IN,
     FUNCTION,
+    OWN,
     ByKind,
     Count,
     Number,
+    OwnTable,
+    Parameters,
     Positive,
     Table,
     Text,
     Vector,
     WholeNumber,
+    by_kind_or_own,
 )
 from flowborne.scenes.schema_drives import EXACT, ServoTable
 
@@ -181,21 +189,36 @@ class ObjectiveVelocityTable(ObjectiveTable):
 
 
 class ObjectivePythonTable(ObjectiveTable):
-    """Python function "module:name" that takes a Measurement and gives a number."""
+    """Python function "module:name" that takes a Measurement and gives a number.
+
+    parameters  further arguments of the function, by name
+    """
 
     kind: Literal["python"]
     function: Annotated[str, Field(pattern=FUNCTION)]
+    parameters: Parameters = Field(default_factory=dict)
+
+
+class ObjectiveOwnTable(ObjectiveTable, OwnTable):
+    """An objective of the user's own; every further key is a parameter of it."""
+
+    registry = OBJECTIVES
 
 
 AnyObjective = Annotated[
-    ObjectiveEffortTable
-    | ObjectiveWindDragTable
-    | ObjectiveDragTable
-    | ObjectivePressureTable
-    | ObjectiveInputMotionTable
-    | ObjectiveVelocityTable
-    | ObjectivePythonTable,
-    *ByKind,
+    Annotated[
+        ObjectiveEffortTable
+        | ObjectiveWindDragTable
+        | ObjectiveDragTable
+        | ObjectivePressureTable
+        | ObjectiveInputMotionTable
+        | ObjectiveVelocityTable
+        | ObjectivePythonTable,
+        Field(discriminator="kind"),
+        Tag(BUILT_IN),
+    ]
+    | Annotated[ObjectiveOwnTable, Tag(OWN)],
+    *by_kind_or_own(OBJECTIVES),
 ]
 
 
@@ -224,25 +247,64 @@ class RuleGoldenSection(Table):
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.02
 
 
-AnyRule = Annotated[RuleFixed | RuleResilient | RuleGoldenSection, *ByKind]
+class RuleOwn(Table, OwnTable):
+    """A rule of the user's own; every further key is a parameter of it."""
+
+    registry = RULES
+
+
+AnyRule = Annotated[
+    Annotated[
+        RuleFixed | RuleResilient | RuleGoldenSection, Field(discriminator="kind"), Tag(BUILT_IN)
+    ]
+    | Annotated[RuleOwn, Tag(OWN)],
+    *by_kind_or_own(RULES),
+]
+
+
+class GradientCentralTable(Table):
+    """Central differences: two trials a dof."""
+
+    kind: Literal["central"]
+
+
+class GradientOneSidedTable(Table):
+    """One-sided differences: a trial a dof and one of the present pose."""
+
+    kind: Literal["one-sided"]
+
+
+class GradientOwnTable(Table, OwnTable):
+    """A gradient of the user's own; every further key is a parameter of it."""
+
+    registry = GRADIENTS
+
+
+AnyGradient = Annotated[
+    Annotated[
+        GradientCentralTable | GradientOneSidedTable, Field(discriminator="kind"), Tag(BUILT_IN)
+    ]
+    | Annotated[GradientOwnTable, Tag(OWN)],
+    *by_kind_or_own(GRADIENTS),
+]
 
 
 class ControllerTable(Table):
     """[controller]: how the controlled joints decide.
 
-    gradient           "central" (2 trials a dof) or "one-sided" (1 a dof and 1)
+    gradient           "central" (2 trials a dof), "one-sided" (1 a dof and 1), or one's own
     velocities         during a trial's measurement: "removed" (steady state), "present" (as now),
                        or "probe" (those of the trial's own motion)
     hypothetical_steps steps over which a trial makes its displacement
     hypothetical_time  s of one such step; the time of a frame unless given
     settle_steps       further steps of a trial in the fixed pose
-    rule               "fixed", "resilient", or "golden-section" with its options
+    rule               "fixed", "resilient", "golden-section" with its options, or one's own
     every              frames between decisions
     iterations         descent steps per decision, in the flow as it is then
     servo              "exact", or "pd" with its frequency
     """
 
-    gradient: Literal["central", "one-sided"] = "central"
+    gradient: AnyGradient = GradientCentralTable(kind="central")
     velocities: Literal["removed", "present", "probe"] = "removed"
     hypothetical_steps: Count = 1
     hypothetical_time: Positive | None = None

@@ -16,6 +16,7 @@ from flowborne.scenes.fields import (
     JointValues,
     NotNegative,
     Number,
+    Parameters,
     Positive,
     Table,
     Text,
@@ -175,6 +176,7 @@ class WindPythonTable(Table):
 
     kind: Literal["python"]
     function: Annotated[str, Field(pattern=FUNCTION)]
+    parameters: Parameters = Field(default_factory=dict)
     density: Positive = 1.2
     bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
 

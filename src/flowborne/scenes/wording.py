@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic_core import ErrorDetails
 
-from flowborne.scenes.fields import Table
+from flowborne.scenes.fields import BUILT_IN, OWN, OwnTable, Table
 from flowborne.scenes.schema import Scene
 
 Key = str | int
@@ -128,6 +128,8 @@ def keys_of(location: tuple[Key, ...], raw: Any) -> tuple[Key, ...]:
     value = raw
     choosing = False
     for key in location:
+        if choosing and key in (BUILT_IN, OWN):
+            continue
         if choosing and key == _kind_of(value):
             choosing = False
             continue
@@ -156,6 +158,8 @@ def explain(error: ErrorDetails, raw: Any, file: str) -> str:
     if kind in ("union_tag_invalid", "literal_error"):
         known = str(context.get("expected_tags", context.get("expected", "")))
         names = [part.strip(" '") for part in known.replace(" or ", ",").split(",")]
+        own = [table for table in _choices(keys, raw) if issubclass(table, OwnTable)]
+        names += [kind for table in own for kind in table.registry.kinds]
         given = context.get("tag", value)
         return f"{where}: '{given}' is not known{suggestion(str(given), names, 'Give one of')}"
     if kind == "value_error":

@@ -81,7 +81,7 @@ def run_cases(
     """
     from threadpoolctl import threadpool_limits
 
-    from flowborne.kernels.jit import kernel_threads
+    from flowborne.machine import kernel_threads
 
     results = []
     for name in case_ids() if ids is None else ids:

@@ -11,11 +11,12 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from flowborne.coupling.motion import JointCommand
-from flowborne.fluid.grid import Grid
+from flowborne import Grid
+from flowborne.motions import JointCommand
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.reference import reference, table
-from flowborne.validation.worlds import Vector, advance, mjcf, world_of
+from flowborne.validation.worlds import Vector, mjcf
+from flowborne.worlds import advance, make_world
 
 DT = 1e-3
 """s, the one step; nothing depends on it."""
@@ -57,7 +58,9 @@ def rise(grid: Grid, geom: str, ratio: float, direction: Vector = UP, walls: str
     """
     body = f'<body name="body"><freejoint name="root"/>{geom}</body>'
     gravity = (-direction[0], -direction[1], -direction[2])
-    world = world_of(grid, mjcf(walls, body), gravity=gravity, solid_density=ratio, tolerance=1e-11)
+    world = make_world(
+        mjcf(walls, body), grid, gravity=gravity, solid_density=ratio, tolerance=1e-11
+    )
     advance(world, DT)
     return float(world.solid.v[:3] @ np.array(direction)) / DT
 
@@ -71,7 +74,7 @@ def turned(grid: Grid, geom: str) -> float:
     """Added moment of inertia about the origin over the fluid's density, m^4: from the torque of
     the pressure while a drive starts the body turning."""
     body = f'<body name="body"><joint name="turn" axis="0 0 1"/>{geom}</body>'
-    world = world_of(grid, mjcf(body), solid_density=1.0, tolerance=1e-11)
+    world = make_world(mjcf(body), grid, solid_density=1.0, tolerance=1e-11)
     command = JointCommand.none(1)
     command.set(np.array([0]), 0.0, DT)
     return -float(advance(world, DT, command=command).pressure_wrench[1, 5])
@@ -407,7 +410,7 @@ def pushed(grid: Grid, geom: str, direction: Vector) -> float:
     """Added mass over the fluid's density, from the pressure while a drive starts the body."""
     axis = " ".join(str(x) for x in direction)
     body = f'<body name="body"><joint name="slide" type="slide" axis="{axis}"/>{geom}</body>'
-    world = world_of(grid, mjcf(body), solid_density=1.0, tolerance=1e-11)
+    world = make_world(mjcf(body), grid, solid_density=1.0, tolerance=1e-11)
     command = JointCommand.none(1)
     command.set(np.array([0]), 0.0, DT)
     force = advance(world, DT, command=command).pressure_wrench[1, :3]

@@ -6,19 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import TrajectorySinusoid
-from flowborne.solids.dynamics import kinematics
-from flowborne.solids.effort import holding
-from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import halfway_momentum, mass_matrix
-from flowborne.solids.state import SolidState
+from flowborne import Array, Grid, SolidModel, SolidState, World
+from flowborne.bodies import halfway_momentum, holding, kinematics, mass_matrix
+from flowborne.motions import JointCommand, TrajectorySinusoid
 from flowborne.validation import pendulums
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.pendulums import DOWN, G
-from flowborne.validation.worlds import advance, mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import advance, make_world
 
 LINKS, LINK = 4, 0.7
 ARM_DENSITY = 1000.0
@@ -59,7 +54,7 @@ def static_chain(quick: bool) -> list[Finding]:
     """A3: torque and effort of a held chain, dry and in a fluid at rest, and where it is none."""
     rng = np.random.default_rng(7)
     poses = rng.uniform(-2.0, 2.0, (3 if quick else 20, LINKS))
-    dry = world_of(None, arm(), gravity=DOWN)
+    dry = make_world(arm(), slab=True, gravity=DOWN)
     model = dry.setup.solid
     weight = G * model.body_mass[1:]
     scale = float(weight.sum()) * LINK
@@ -78,7 +73,7 @@ def static_chain(quick: bool) -> list[Finding]:
     side, density = 2.2 * LINKS * LINK, 1300.0
     cells = 48
     grid = Grid.slab(cells, cells, side / cells, (-0.5 * side, -0.5 * side))
-    wet = world_of(grid, arm(), gravity=DOWN, density=density)
+    wet = make_world(arm(), grid, gravity=DOWN, density=density)
     volume = model.volume[1:]
     buoyed = G * (ARM_DENSITY - density) * volume
     wrong = max(
@@ -148,7 +143,7 @@ def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
         TrajectorySinusoid(np.array([6 + k]), 0.6 + 0.1 * k, 1.0 + 0.1 * k, 0.2 * k, 0.4 * k)
         for k in range(LINKS - 1)
     )
-    world = world_of(None, floating(flat), slab=flat, motions=motions)
+    world = make_world(floating(flat), slab=flat, motions=motions)
     state = world.solid
     state.v[:6] = [0.3, -0.2, 0.0, 0.0, 0.0, 0.7] if flat else [0.3, -0.2, 0.1, 0.2, 0.5, 0.7]
     for k, motion in enumerate(motions):
@@ -183,7 +178,7 @@ def cat_turn(steps: int, seconds: float) -> float:
         TrajectorySinusoid(np.array([3 + k]), size, seconds, mean, phase)
         for k, (mean, size, phase) in enumerate(LOOP)
     )
-    world = world_of(None, CAT, motions=motions)
+    world = make_world(CAT, slab=True, motions=motions)
     state, dt = world.solid, seconds / steps
     for k, motion in enumerate(motions):
         state.q[3 + k], state.v[3 + k] = motion.position(0.0)[0], motion.velocity(0.0)[0]

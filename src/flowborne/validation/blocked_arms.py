@@ -10,14 +10,9 @@ from tempfile import TemporaryDirectory
 import imageio.v3 as imageio
 import numpy as np
 
-from flowborne.fluid.grid import Array
-from flowborne.io.atomic import write_atomically
-from flowborne.running import run
-from flowborne.scenes.human.skeleton import SIDES
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
-from flowborne.solids.dynamics import kinematics
-from flowborne.solids.model import SolidModel
+from flowborne import Array, Simulation, SolidModel, load_scene, run
+from flowborne.bodies import SIDES, kinematics
+from flowborne.exporters import write_atomically
 
 SCENE = "human-gravity-arms"
 ARM = ("upper_arm", "forearm", "hand")
@@ -112,8 +107,7 @@ def draw_frame(frame: int, path: Path) -> None:
 
     raises  ValueError when this machine cannot draw in three dimensions
     """
-    from flowborne.view.pictures import Picture
-    from flowborne.view.run import Run
+    from flowborne.pictures import Picture, Run
 
     with TemporaryDirectory() as folder:
         run(load_scene(SCENE), Path(folder) / "run", frames=frame, film=False)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryNoSlip
-from flowborne.fluid.grid import Array, Grid
+from flowborne import Array, Grid, World
+from flowborne.boundaries import Boundaries, BoundaryNoSlip
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.reference import reference
-from flowborne.validation.refine import start_from
-from flowborne.validation.worlds import advance, world_of
+from flowborne.worlds import advance, make_world, start_from
 
 REYNOLDS = {True: (100,), False: (100, 400, 1000)}
 GRIDS = {True: (16, 32), False: (64, 128, 160)}
@@ -34,8 +32,8 @@ MISPRINT = (400, 0.9063)
 def cavity(cells: int, reynolds: int) -> World:
     """The unit square at rest under a lid of 1 m/s."""
     wall, lid = BoundaryNoSlip(), BoundaryNoSlip((1.0, 0.0, 0.0))
-    return world_of(
-        Grid.slab(cells, cells, 1.0 / cells, (0.0, 0.0)),
+    return make_world(
+        grid=Grid.slab(cells, cells, 1.0 / cells, (0.0, 0.0)),
         viscosity=1.0 / reynolds,
         boundaries=Boundaries(wall, wall, wall, lid),
         tolerance=1e-9,

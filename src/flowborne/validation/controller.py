@@ -9,25 +9,15 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from flowborne.control.controller import Controller
-from flowborne.control.executors import Serial
-from flowborne.control.gradients import GradientCentral
-from flowborne.control.objectives import (
-    Objective,
-    ObjectiveEffort,
-    ObjectiveSum,
-    ObjectiveWindDrag,
-)
-from flowborne.control.trial import Hypothesis, Velocities
-from flowborne.coupling.step import step
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
-from flowborne.solids.dynamics import kinematics
-from flowborne.solids.wind import Wind, WindFaces, WindForce
+from flowborne import Array, Controller, Hypothesis, Simulation, Velocities, World, load_scene, step
+from flowborne.bodies import kinematics
+from flowborne.executors import Serial
+from flowborne.gradients import GradientCentral
+from flowborne.objectives import Objective, ObjectiveEffort, ObjectiveSum, ObjectiveWindDrag
 from flowborne.validation.case import Case, Finding, at_most, near
-from flowborne.validation.worlds import Vector, mjcf, world_of
+from flowborne.validation.worlds import Vector, mjcf
+from flowborne.winds import Wind, WindFaces, WindForce
+from flowborne.worlds import make_world
 
 G = 9.81
 FRAME = 1.0 / 24.0
@@ -50,8 +40,8 @@ BLOCK = mjcf(
 
 def block(degrees: float, gravity: float, wind: Wind) -> World:
     """World of the block at rest at an angle."""
-    world = world_of(
-        None, BLOCK, gravity=(0.0, -gravity, 0.0), solid_density=DENSITY, winds=(wind,)
+    world = make_world(
+        BLOCK, slab=True, gravity=(0.0, -gravity, 0.0), solid_density=DENSITY, winds=(wind,)
     )
     world.solid.q[0] = np.radians(degrees)
     return world

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from flowborne.coupling.motion import JointCommand
-from flowborne.fluid.grid import Array
-from flowborne.scenes.build import build
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import BlowUpError, Simulation
+from flowborne import Array, BlowUpError, Simulation, load_scene
+from flowborne.motions import JointCommand
 from flowborne.validation.case import Case, Finding, GridSeries, near
 from flowborne.validation.reference import reference
-from flowborne.validation.worlds import advance
+from flowborne.worlds import advance
 
 FRAMES_PER_SECOND = 24.0
 STRENGTH = 20.0
@@ -101,7 +98,7 @@ def held_drag(degrees: float, resolution: int, seconds: float) -> float:
     A step takes the stream of 1 m/s a quarter of a cell.
     """
     settings = {"domain.resolution": str(resolution), "initial.positions.hinge": str(degrees)}
-    world = build(load_scene("ns-block-drag-max", settings)).world
+    world = Simulation(load_scene("ns-block-drag-max", settings)).world
     command = JointCommand.none(1)
     command.set(np.array([0]), 0.0, 0.0)
     dt = 0.25 * world.flow()[0].grid.spacing
@@ -188,7 +185,7 @@ def frames_and_strength(quick: bool) -> list[Finding]:
     for scene, optimum in OPTIMA.items():
         findings += own_rule(scene, optimum, strengths)
         best = balanced_corner() if scene == "block-drag-min" else optimum
-        start = float(np.degrees(build(load_scene(scene)).world.solid.q[0]))
+        start = float(np.degrees(Simulation(scene).world.solid.q[0]))
         runs = [
             course(scene, frames_enough(abs(start - best), s), s, rule="fixed") for s in strengths
         ]
@@ -236,7 +233,7 @@ def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Find
     """How a scene's own rule goes to its optimum (degrees): as fast, and to the optimum itself."""
     late, off, chatter = 0.0, 0.0, 0.0
     for strength in strengths:
-        away = abs(float(np.degrees(build(load_scene(scene)).world.solid.q[0])) - best)
+        away = abs(float(np.degrees(Simulation(scene).world.solid.q[0])) - best)
         run = course(scene, frames_enough(away, strength), strength)
         near_it = int(np.argmax(np.abs(run.angles - best) <= PROBE))
         late = max(late, near_it - float(np.ceil((away - PROBE) / run.step)))

@@ -12,7 +12,7 @@ from importlib.resources import files
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flowborne.fluid.grid import Array
+from flowborne import Array
 
 LENGTH = np.array([12.0, 9.8, 9.8, 9.8, 9.8, 9.8])
 """cm of each link, head first."""

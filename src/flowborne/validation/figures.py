@@ -11,17 +11,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from flowborne import Simulation, load_scene
 from flowborne.bench.frames import frame_times
-from flowborne.io.atomic import write_atomically
-from flowborne.kernels.jit import cores
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.exporters import write_atomically
+from flowborne.machine import cores
+from flowborne.pictures import ChainCost, plot_chain_cost, plot_courses, plot_forces
 from flowborne.validation.blocked_arms import COLUMNS, blocked_rows, draw_frame
 from flowborne.validation.controller_in_flow import SCENES, course
 from flowborne.validation.flyer import flights
 from flowborne.validation.reference import reference
 from flowborne.validation.swimmer import swims
-from flowborne.view.plots import ChainCost, plot_chain_cost, plot_courses, plot_forces
 
 PAPER_SERIAL = {1: 14.0, 2: 29.0, 3: 43.0, 4: 58.0}
 PAPER_PARALLEL = (14.0, 15.0)

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.report import StepReport
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
+from flowborne import Array, Grid, StepReport, World
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
 from flowborne.validation.case import Case, Finding, GridSeries, near
 from flowborne.validation.fluid_cases import Uniform
 from flowborne.validation.reference import reference
-from flowborne.validation.refine import start_from
 from flowborne.validation.shedding import Shedding, amplitude, crest
-from flowborne.validation.worlds import Field, advance, mjcf, set_velocity, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import Field, advance, make_world, set_velocity, start_from
 
 DIAMETER, CENTRE = 0.1, 0.2
 """m: of the channel's cylinder, and both coordinates of its centre."""
@@ -70,9 +68,9 @@ def channel(cells: int, peak: float) -> World:
     h = DIAMETER / cells
     grid = Grid.slab(round(LENGTH / h), round(HEIGHT / h), h, (0.0, 0.0))
     wall = BoundaryNoSlip()
-    return world_of(
-        grid,
+    return make_world(
         cylinder(DIAMETER, CENTRE, CENTRE),
+        grid,
         viscosity=VISCOSITY,
         boundaries=Boundaries(BoundaryInflow(Parabola(peak)), BoundaryOpen(), wall, wall),
         tolerance=1e-7,
@@ -82,9 +80,9 @@ def channel(cells: int, peak: float) -> World:
 def open_water(cells: int, stream: Uniform) -> World:
     """B5's domain with the stream that enters it, the cylinder at the origin."""
     grid = Grid.slab(50 * cells, 60 * cells, 1.0 / cells, (-20.0, -30.0))
-    return world_of(
-        grid,
+    return make_world(
         cylinder(1.0, 0.0, 0.0),
+        grid,
         viscosity=0.01,
         boundaries=Boundaries(BoundaryInflow(stream), BoundaryOpen()),
         tolerance=1e-7,

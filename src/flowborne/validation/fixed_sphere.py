@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.stream import Sampled
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.fluid.grid import Grid
+from flowborne import Grid, World
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.validation.case import Case, Finding, GridSeries, near
 from flowborne.validation.fluid_cases import Uniform
 from flowborne.validation.reference import reference
-from flowborne.validation.refine import start_from
-from flowborne.validation.worlds import advance, mjcf, set_velocity, whole_steps, world_of
+from flowborne.validation.worlds import mjcf, whole_steps
+from flowborne.worlds import advance, make_world, set_velocity, start_from, velocity_at
 
 UPSTREAM, DOWNSTREAM, ASIDE = 6, 16, 5
 """Diameters from the sphere's centre to the sides of the box; those aside slip."""
@@ -36,9 +34,9 @@ def quarter(cells: int, reynolds: float) -> World:
     counts = (UPSTREAM + DOWNSTREAM) * cells, ASIDE * cells, ASIDE * cells
     grid = Grid(counts, 1.0 / cells, (-float(UPSTREAM), 0.0, 0.0))
     sphere = '<body name="sphere"><geom type="sphere" size="0.5"/></body>'
-    return world_of(
-        grid,
+    return make_world(
         mjcf(sphere),
+        grid,
         viscosity=1.0 / reynolds,
         boundaries=Boundaries(BoundaryInflow(STREAM), BoundaryOpen()),
         tolerance=1e-7,
@@ -82,16 +80,14 @@ def separation(world: World) -> float:
 
     Found at one and at two cells from the sphere and continued to its side.
     """
-    fluid, state = world.flow()
-    h = fluid.grid.spacing
-    field = Sampled((state.velocity[0], state.velocity[1], state.velocity[2]), fluid.grid)
+    h = world.flow()[0].grid.spacing
     angles = np.radians(np.arange(95.0, 175.0, 0.25))
     turns = []
     for away in (h, 2.0 * h):
         # in the plane between y and z, away from the planes of symmetry
         out = np.sin(angles) * np.sqrt(0.5)
         x = (0.5 + away) * np.column_stack([-np.cos(angles), out, out])
-        velocity = field(x, 0.0)
+        velocity = velocity_at(world, x)
         aside = np.cos(angles) * np.sqrt(0.5)
         along = velocity[:, 0] * np.sin(angles) + (velocity[:, 1] + velocity[:, 2]) * aside
         if not (along < 0.0).any():

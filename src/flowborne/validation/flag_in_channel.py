@@ -7,18 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flowborne.coupling.report import StepReport
-from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
-from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue import Tissue
+from flowborne import Array, Fluid, Grid, Setup, SolidModel, StepReport, Tissue, World
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
 from flowborne.validation.case import Case, Finding, GridSeries, near
 from flowborne.validation.fixed_bodies import Parabola, begin
 from flowborne.validation.flesh_bars import bar_in_slab
 from flowborne.validation.reference import reference
 from flowborne.validation.shedding import Shedding, amplitude, crest
-from flowborne.validation.worlds import NOWHERE, advance, mjcf
+from flowborne.validation.worlds import NOWHERE, mjcf
+from flowborne.worlds import advance
 
 LENGTH, HEIGHT = 2.5, 0.41
 """m, of the channel."""

@@ -9,10 +9,8 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
-from flowborne.solids.flesh_solve import prescribe_flesh, symmetric_factor
-from flowborne.solids.state import SolidState
-from flowborne.solids.tissue import Tissue
+from flowborne import SolidState, Tissue
+from flowborne.bodies import assemble_flesh, prescribe_flesh, static_forces, symmetric_factor
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near, order_of
 from flowborne.validation.flesh_bars import (
     Array,

@@ -10,11 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, dia_array
 
-from flowborne.solids.flesh import Flesh, flesh_of
-from flowborne.solids.flesh_dynamics import static_forces
-from flowborne.solids.flesh_solve import symmetric_factor
-from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue import Tissue, add_flesh
+from flowborne import SolidModel, Tissue
+from flowborne.bodies import Flesh, add_flesh, flesh_of, static_forces, symmetric_factor
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow
-from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import TrajectoryConstant
+from flowborne import Array, Grid, World
+from flowborne.boundaries import Boundaries, BoundaryInflow
+from flowborne.motions import Trajectory, TrajectoryConstant
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, order_of
-from flowborne.validation.worlds import RING, advance, mjcf, set_velocity, whole_steps, world_of
+from flowborne.validation.worlds import RING, mjcf, whole_steps
+from flowborne.worlds import advance, make_world, set_velocity
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ cells on every grid."""
 def taylor_green(cells: int, viscosity: float, mean: float) -> tuple[float, float]:
     """Energy and largest velocity of the pattern after a quarter, over their first values."""
     grid = Grid.slab(cells, cells, 2.0 * np.pi / cells, (0.0, 0.0))
-    world = world_of(grid, viscosity=viscosity, boundaries=RING, tolerance=1e-11)
+    world = make_world(grid=grid, viscosity=viscosity, boundaries=RING, tolerance=1e-11)
     set_velocity(world, Vortices(mean))
     energy, fastest = pattern(world, mean)
     count, dt = whole_steps(QUARTER, 0.5 * grid.spacing / (1.0 + mean))
@@ -119,8 +118,8 @@ def carried_body(driven: bool, steps: int, pace: float = 1.0) -> tuple[float, fl
             TrajectoryConstant(np.array([2]), 0.0),
         )
     stream = Uniform((STREAM, 0.0, 0.0))
-    world = world_of(
-        grid, mjcf(body), boundaries=all_inflow(stream), tolerance=1e-13, motions=motions
+    world = make_world(
+        mjcf(body), grid, boundaries=all_inflow(stream), tolerance=1e-13, motions=motions
     )
     set_velocity(world, stream)
     world.solid.v[0] = pace * STREAM
@@ -167,7 +166,7 @@ def kovasznay_error(cells: int, duration: float) -> float:
     flow, with `cells` per m."""
     grid = Grid.slab(3 * cells // 2, 2 * cells, 1.0 / cells, (-0.5, -0.5))
     exact = Kovasznay()
-    world = world_of(grid, viscosity=1.0 / RE, boundaries=all_inflow(exact), tolerance=1e-10)
+    world = make_world(grid=grid, viscosity=1.0 / RE, boundaries=all_inflow(exact), tolerance=1e-10)
     set_velocity(world, exact)
     count, dt = whole_steps(duration, 0.25 * grid.spacing)
     advance(world, dt, count)

@@ -8,12 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from flowborne.fluid.grid import Array
-from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_control import ControllerTable
-from flowborne.scenes.schema_solids import MotionConstantTable
-from flowborne.simulation import BlowUpError, Simulation
+from flowborne import Array, BlowUpError, Scene, Simulation, load_scene
 from flowborne.validation.case import Finding
 
 CYCLES = {True: 1, False: 5}
@@ -56,14 +51,10 @@ class Flight:
 
 def held(scene: Scene) -> Scene:
     """The scene without control: its controlled joints stay at 0."""
-    motion = tuple(MotionConstantTable(kind="constant", joint=j) for j in scene.controlled_joints())
-    changes = {
-        "motion": scene.motion + motion,
-        "control": (),
-        "objectives": (),
-        "controller": ControllerTable(),
-    }
-    return scene.model_copy(update=changes).in_folder(scene.folder)
+    tables = scene.model_dump(exclude_none=True, exclude={"control", "objectives", "controller"})
+    still = [{"kind": "constant", "joint": joint} for joint in scene.controlled_joints()]
+    tables["motion"] = [*tables["motion"], *still]
+    return Scene.model_validate(tables).in_folder(scene.folder)
 
 
 def fly(

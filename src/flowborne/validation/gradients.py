@@ -9,22 +9,16 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from flowborne.control.controller import Controller
-from flowborne.control.executors import Serial
-from flowborne.control.gradients import GradientCentral, GradientOneSided
-from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, ObjectiveWindDrag
-from flowborne.control.trial import Hypothesis
-from flowborne.coupling.step import step
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Grid
-from flowborne.kernels.jit import cores, kernel_threads
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
-from flowborne.solids.wind import WindFaces, WindForce
+from flowborne import Controller, Grid, Hypothesis, Measurement, Simulation, World, load_scene, step
+from flowborne.executors import Serial
+from flowborne.gradients import GradientCentral, GradientOneSided
+from flowborne.machine import cores, kernel_threads
+from flowborne.objectives import ObjectiveCallable, ObjectiveSum, ObjectiveWindDrag
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near, order_of
 from flowborne.validation.controller import AIR, HINGE, LENGTH, SPEED, WIDTH, block
-from flowborne.validation.worlds import Vector, mjcf, world_of
+from flowborne.validation.worlds import Vector, mjcf
+from flowborne.winds import WindFaces, WindForce
+from flowborne.worlds import make_world
 
 FRAME = 1.0 / 24.0
 
@@ -105,9 +99,9 @@ def pushed_arm(force: Vector) -> World:
         f'<geom type="box" size=".1 .25 1" pos="0 -.25 0"/>{lower}</body>'
     )
     grid = Grid.slab(32, 32, 3.0 / 32, (-1.5, -1.5))
-    return world_of(
-        grid,
+    return make_world(
         model,
+        grid,
         gravity=(0.0, -9.81, 0.0),
         solid_density=3.0,
         density=1.0,

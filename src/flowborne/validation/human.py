@@ -7,25 +7,17 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flowborne.control.controller import Controller
-from flowborne.control.executors import Serial
-from flowborne.control.gradients import GradientCentral
-from flowborne.control.objectives import ObjectiveEffort, ObjectiveSum, WeightedObjective
-from flowborne.control.rules import GoldenSection
-from flowborne.control.trial import Hypothesis
-from flowborne.coupling.report import StepReport
-from flowborne.coupling.servo import ServoExact
-from flowborne.coupling.step import step
-from flowborne.coupling.world import Setup, World
-from flowborne.fluid.grid import Array
-from flowborne.kernels.arrays import Integers
-from flowborne.scenes.human.body import human_mjcf
-from flowborne.scenes.human.standard import standard_skeleton
-from flowborne.solids.dynamics import kinematics
-from flowborne.solids.model import SolidModel
-from flowborne.solids.wind import Wind
+from flowborne import Array, Controller, Hypothesis, Setup, SolidModel, StepReport, World, step
+from flowborne.bodies import human_mjcf, kinematics, standard_skeleton
+from flowborne.executors import Serial
+from flowborne.gradients import GradientCentral
+from flowborne.motions import ServoExact
+from flowborne.objectives import ObjectiveEffort, ObjectiveSum, WeightedObjective
+from flowborne.rules import GoldenSection
 from flowborne.validation.case import Case, Finding, at_most
+from flowborne.winds import Wind
 
 G = 9.81
 FRAME, STEPS = 1.0 / 24.0, 4
@@ -48,7 +40,7 @@ Pose = Mapping[str, Sequence[float]]
 class Still:
     """Joints that stay in a pose."""
 
-    dofs: Integers
+    dofs: NDArray[np.int64]
     places: Array
 
     def position(self, time: float) -> Array:
@@ -81,7 +73,7 @@ def standing(pose: Pose, free: Sequence[str], *winds: Wind) -> World:
     return world
 
 
-def dofs_of(joints: Sequence[str]) -> Integers:
+def dofs_of(joints: Sequence[str]) -> NDArray[np.int64]:
     """Dofs of joints, in their order."""
     return np.array([dof for joint in joints for dof in human().dofs_of(joint)], dtype=np.int64)
 
@@ -116,7 +108,7 @@ def settle(
     return report
 
 
-def bodies_above(joint: str) -> Integers:
+def bodies_above(joint: str) -> NDArray[np.int64]:
     """The bodies that a joint moves."""
     model = human()
     return np.flatnonzero(model.moves[:, model.dofs_of(joint)[0]]).astype(np.int64)

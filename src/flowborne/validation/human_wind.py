@@ -6,13 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.control.objectives import ObjectiveWindDrag, WeightedObjective
-from flowborne.coupling.report import StepReport
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array
-from flowborne.solids.dynamics import Kinematics, kinematics
-from flowborne.solids.model import SolidModel
-from flowborne.solids.wind import Wind, WindFaces
+from flowborne import Array, SolidModel, StepReport, World
+from flowborne.bodies import Kinematics, kinematics
+from flowborne.objectives import ObjectiveWindDrag, WeightedObjective
 from flowborne.validation.case import Case, Finding, at_most, near
 from flowborne.validation.human import (
     ABOVE,
@@ -29,6 +25,7 @@ from flowborne.validation.human import (
     standing,
     wish,
 )
+from flowborne.winds import Wind, WindFaces
 
 HEADWIND = (-8.0, 0.0, 0.0)
 """m/s, against the face."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.step import cut_by_bodies
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array, Grid
+from flowborne import Array, Grid, World
+from flowborne.operators import cut_by_bodies
 from flowborne.validation.case import Case, Finding, at_most
-from flowborne.validation.worlds import Vector, advance, mjcf, world_of
+from flowborne.validation.worlds import Vector, mjcf
+from flowborne.worlds import advance, make_world
 
 GRAVITY: Vector = (751.0, 83.6, 0.0)
 TILTED: Vector = (751.0, 83.6, -212.0)
@@ -107,7 +107,9 @@ def still_around_fixed(grid: Grid, gravity: Vector, steps: int) -> tuple[float, 
     returns  max|u| / (g dt); largest error of a body's force over that force; largest torque
              about its displaced centroid over force times the cube root of its volume
     """
-    world = world_of(grid, fixed_bodies(grid), density=DENSITY, body_force=gravity, tolerance=SOLVE)
+    world = make_world(
+        fixed_bodies(grid), grid, density=DENSITY, body_force=gravity, tolerance=SOLVE
+    )
     report = advance(world, DT, steps)
     volume, centroid = displaced(world)
     weight = DENSITY * volume * np.array(gravity)
@@ -127,9 +129,9 @@ def still_around_fixed(grid: Grid, gravity: Vector, steps: int) -> tuple[float, 
 
 def still_around_free(grid: Grid, gravity: Vector, steps: int) -> tuple[float, float]:
     """Neutral free bodies in fluid at rest: max|u| and largest velocity of a body over g dt."""
-    world = world_of(
-        grid,
+    world = make_world(
         free_bodies(grid),
+        grid,
         gravity=gravity,
         solid_density=DENSITY,
         density=DENSITY,

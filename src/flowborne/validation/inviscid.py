@@ -7,27 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.flow import face_masses, kinetic_energy, volumes_of
-from flowborne.coupling.step import cut_by_bodies
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
-from flowborne.fluid.grid import Array, Grid
-from flowborne.solids.momentum import kinetic_energy as energy_of_bodies
-from flowborne.solids.wind import WindForce
+from flowborne import Array, Grid, World
+from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.fluid_cases import Uniform, all_inflow
 from flowborne.validation.pendulums import passages
 from flowborne.validation.reference import reference, table
-from flowborne.validation.worlds import (
-    PERIODIC,
-    RING,
-    Vector,
-    advance,
-    mjcf,
-    set_velocity,
-    start_at_once,
-    world_of,
-)
+from flowborne.validation.worlds import PERIODIC, RING, Vector, mjcf, start_at_once
+from flowborne.winds import WindForce
+from flowborne.worlds import advance, kinetic_energy, make_world, set_velocity
 
 G = 9.81
 
@@ -61,9 +49,9 @@ def neutral(
     elements = (
         f'<body pos="{at[0]} {at[1]} {at[2]}"><freejoint/>{geom}</body>' for at, geom in bodies
     )
-    world = world_of(
-        grid,
+    world = make_world(
         mjcf(*elements),
+        grid,
         gravity=(0.0, -G, 0.0),
         solid_density=1.0,
         boundaries=Boundaries() if stream is None else RING,
@@ -136,7 +124,7 @@ def held_ellipse(cells: int, incidence: float) -> tuple[float, float]:
     count = round(cells * side)
     grid = Grid.slab(count, count, side / count, (-0.5 * side, -0.5 * side))
     model = mjcf(f'<geom type="ellipsoid" size="{LONG} {SHORT} 1"/>')
-    world = world_of(grid, model, boundaries=all_inflow(PotentialFlow(incidence)))
+    world = make_world(model, grid, boundaries=all_inflow(PotentialFlow(incidence)))
     dt = 0.25 * grid.spacing
     start_at_once(world, dt)
     wrench = advance(world, dt, 4).pressure_wrench[0]
@@ -226,7 +214,7 @@ def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: fl
     up = 1.0 if ratio > 1.0 else -1.0
     bob = f'<geom type="sphere" size="{RADIUS}" pos="0 {-up * ROD} 0" density="{ratio}"/>'
     body = f'<body pos="0 {up * box.above} 0"><joint name="pivot" axis="0 0 1"/>{bob}</body>'
-    world = world_of(grid, mjcf(body), gravity=(0.0, -G, 0.0))
+    world = make_world(mjcf(body), grid, gravity=(0.0, -G, 0.0))
     world.solid.q[0] = np.radians(degrees)
     fastest = 2.0 * np.pi / period * ROD * np.radians(degrees)
     dt = min(0.01 * period, 0.5 * grid.spacing / fastest)
@@ -288,7 +276,7 @@ def slug(cells: int, plug: float, mass: float, sides: Boundaries, steps: int, so
     geom = f'<geom type="box" size="{0.5 * plug} 1 1" mass="{mass}"/>'
     body = f'<body name="plug" pos=".0123 0 0"><joint type="slide" axis="1 0 0"/>{geom}</body>'
     force = WindForce((1.0, 0.0, 0.0))
-    world = world_of(grid, mjcf(body), boundaries=sides, tolerance=1e-12, winds=(force,))
+    world = make_world(mjcf(body), grid, boundaries=sides, tolerance=1e-12, winds=(force,))
     dt = 0.01
     advance(world, dt, steps)
     return float(world.solid.v[0]) / (steps * dt) * (mass + LENGTH - plug)
@@ -329,14 +317,6 @@ SPIN, DRIFT = 1.0, (0.1, 0.06)
 """rad/s and m/s that it is set going with, before the fluid takes its share."""
 
 
-def kinetic(world: World) -> float:
-    """Kinetic energy of fluid and bodies, J per metre of depth."""
-    fluid, state = world.flow()
-    mass = face_masses(volumes_of(world, cut_by_bodies(world)), fluid.density)
-    flow = kinetic_energy(state.velocity, mass, fluid.grid, fluid.boundaries)
-    return flow + energy_of_bodies(world.setup.solid, world.solid)
-
-
 def turning(cells: int) -> Array:
     """Kinetic energy after every step of half a turn, over that at its start.
 
@@ -346,16 +326,16 @@ def turning(cells: int) -> Array:
     count = round(cells * side)
     grid = Grid.slab(count, count, side / count, (-0.5 * side, -0.5 * side))
     geom = f'<geom type="ellipsoid" size="{TURNING[0]} {TURNING[1]} 1"/>'
-    world = world_of(grid, mjcf(f"<body><freejoint/>{geom}</body>"), solid_density=1.0)
+    world = make_world(mjcf(f"<body><freejoint/>{geom}</body>"), grid, solid_density=1.0)
     world.solid.q[:2] = -0.0123, 0.0177
     world.solid.v[[0, 1, 5]] = *DRIFT, SPIN
     start_at_once(world, 1e-9)
     dt = 0.5 * grid.spacing / (SPIN * TURNING[0])
-    energies, turned = [kinetic(world)], 0.0
+    energies, turned = [kinetic_energy(world)], 0.0
     while turned < np.pi:
         advance(world, dt)
         turned += dt * abs(world.solid.v[5])
-        energies.append(kinetic(world))
+        energies.append(kinetic_energy(world))
     return np.array(energies) / energies[0]
 
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array
-from flowborne.solids.dynamics import kinematics
-from flowborne.solids.momentum import halfway_momentum, kinetic_energy, potential_energy
-from flowborne.solids.state import SolidState
+from flowborne import Array, SolidState, World
+from flowborne.bodies import halfway_momentum, kinematics, kinetic_energy, potential_energy
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.reference import reference, table
-from flowborne.validation.worlds import advance, mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import advance, make_world
 
 G = 9.81
 DOWN = (0.0, -G, 0.0)
@@ -47,7 +45,7 @@ def period(model: str, amplitude: float, dt: float, longest: float) -> float:
 
     longest  s, at least 5/4 of the period
     """
-    world = world_of(None, model, gravity=DOWN)
+    world = make_world(model, slab=True, gravity=DOWN)
     world.solid.q[0] = amplitude
     kick(world, dt)
     angles = [amplitude]
@@ -98,7 +96,7 @@ DOUBLE = mjcf(
 
 def double_pendulum(first: float, second: float) -> World:
     """World of DOUBLE at rest; angles in rad, the second relative to the first."""
-    world = world_of(None, DOUBLE, gravity=DOWN)
+    world = make_world(DOUBLE, slab=True, gravity=DOWN)
     world.solid.q[:] = first, second
     return world
 

@@ -8,13 +8,18 @@ from typing import Protocol
 
 import numpy as np
 
-from flowborne.fluid.advection import CENTRE, carry, cells_per_step
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
-from flowborne.fluid.control_volumes import control_volumes
-from flowborne.fluid.dye import Passage, nothing_brought
-from flowborne.fluid.ghosts import pad_cells
-from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.transport import Transport
+from flowborne import Array, Faces, Grid
+from flowborne.boundaries import Boundaries, BoundaryOpen
+from flowborne.operators import (
+    CENTRE,
+    Passage,
+    Transport,
+    carry,
+    cells_per_step,
+    control_volumes,
+    nothing_brought,
+    pad_cells,
+)
 from flowborne.validation.case import Case, Finding, GridSeries, order_of
 from flowborne.validation.worlds import whole_steps
 

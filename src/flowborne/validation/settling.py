@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries, BoundaryClosed, BoundaryNoSlip
-from flowborne.fluid.grid import Array, Grid
-from flowborne.solids.wind import WindForce
+from flowborne import Array, Grid, World
+from flowborne.boundaries import Boundaries, BoundaryClosed, BoundaryNoSlip
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.reference import reference
-from flowborne.validation.worlds import advance, mjcf, whole_steps, world_of
+from flowborne.validation.worlds import mjcf, whole_steps
+from flowborne.winds import WindForce
+from flowborne.worlds import advance, make_world
 
 DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
 """m and kg/m^3 of the sphere, m/s^2."""
@@ -74,9 +74,9 @@ def quarter(oil: Oil, cells: int) -> World:
     )
     volume = 0.25 * np.pi / 6.0 * DIAMETER**3
     pull = WindForce((0.0, 0.0, -(DENSITY - oil.density) * volume * GRAVITY), ("ball",))
-    return world_of(
-        grid,
+    return make_world(
         mjcf(ball),
+        grid,
         solid_density=0.25 * DENSITY,
         density=oil.density,
         viscosity=oil.viscosity,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.fluid.grid import Array
+from flowborne import Array
 
 
 @dataclass(frozen=True)

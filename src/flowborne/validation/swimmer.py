@@ -8,10 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from flowborne.fluid.grid import Array
-from flowborne.scenes.load import load_scene
-from flowborne.simulation import BlowUpError, Simulation
-from flowborne.solids.dynamics import kinematics
+from flowborne import Array, BlowUpError, Simulation, load_scene
+from flowborne.bodies import kinematics
 from flowborne.validation.case import Case, Finding
 from flowborne.validation.flyer import control_is_worth_it
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.world import World
-from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import TrajectorySinusoid
-from flowborne.solids.dynamics import kinematics
-from flowborne.solids.momentum import halfway_momentum
+from flowborne import Array, Grid, World
+from flowborne.bodies import halfway_momentum, kinematics
+from flowborne.boundaries import Boundaries
+from flowborne.motions import TrajectorySinusoid
 from flowborne.validation.case import Case, Finding, GridSeries, at_most
-from flowborne.validation.worlds import RING, advance, mjcf, world_of
+from flowborne.validation.worlds import RING, mjcf
+from flowborne.worlds import advance, make_world
 
 BOX = 3.0
 LINK, WIDTH = 0.4, 0.1
@@ -42,9 +41,9 @@ def swimmer(cells: int, gait: tuple[TrajectorySinusoid, ...], sides: Boundaries 
     gait   motion of each joint
     """
     grid = Grid.slab(cells, cells, BOX / cells, (-0.5 * BOX, -0.5 * BOX))
-    world = world_of(
-        grid,
+    world = make_world(
         chain(len(gait) + 1),
+        grid,
         boundaries=sides or Boundaries(),
         solid_density=1.0,
         motions=gait,

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.world import World
-from flowborne.fluid.grid import Grid
-from flowborne.scenes.tracks import TrajectoryConstant
+from flowborne import Grid, World
+from flowborne.motions import Trajectory, TrajectoryConstant
 from flowborne.validation.case import Case, Finding, GridSeries, near
-from flowborne.validation.worlds import advance, mjcf, world_of
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import advance, make_world
 
 INNER, OUTER = 0.5, 1.0
 """Radii a and b, m."""
@@ -72,7 +71,7 @@ def annulus(cells: int, free: bool) -> World:
     motions: tuple[Trajectory, ...] = ()
     if not free:
         motions = (TrajectoryConstant(np.array([0]), 0.0, SPIN),)
-    return world_of(grid, mjcf(ring, shaft), viscosity=VISCOSITY, motions=motions)
+    return make_world(mjcf(ring, shaft), grid, viscosity=VISCOSITY, motions=motions)
 
 
 def measured(cells: int) -> tuple[float, float]:

@@ -4,12 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from flowborne.coupling.step import step
-from flowborne.scenes.human.body import human_mjcf
+from flowborne import SolidModel, step
+from flowborne.bodies import human_mjcf, standard_skeleton
 from flowborne.scenes.human.skeleton import BODIES, Skeleton
-from flowborne.scenes.human.standard import standard_skeleton
-from flowborne.solids.model import SolidModel
-from flowborne.validation.worlds import advance, world_of
+from flowborne.worlds import advance, make_world
 
 MASS = 73.0
 
@@ -141,7 +139,7 @@ def test_it_is_as_broad_and_as_tall_as_people():
 def test_a_tumbling_human_falls_as_a_whole():
     """Joints and collisions between its own parts leave the centre of mass alone."""
     xml = human_mjcf(standard_skeleton(), MASS, "male", ("left_elbow",))
-    world = world_of(None, xml, slab=False, gravity=(0.0, 0.0, -9.81))
+    world = make_world(xml, slab=False, gravity=(0.0, 0.0, -9.81))
     world.solid.v[:] = np.random.default_rng(0).uniform(-1.0, 1.0, world.solid.v.size)
     model = world.setup.solid
     data = mujoco.MjData(model.mj)
@@ -172,11 +170,8 @@ def test_only_elbows_can_be_hinges():
 
 
 def test_it_falls_freely_as_one_and_stays_as_it_is() -> None:
-    world = world_of(
-        None,
-        human_mjcf(standard_skeleton(), 73.0, "male"),
-        slab=False,
-        gravity=(0.0, 0.0, -9.81),
+    world = make_world(
+        human_mjcf(standard_skeleton(), 73.0, "male"), slab=False, gravity=(0.0, 0.0, -9.81)
     )
     for _ in range(20):
         assert step(world, 0.01).outcome.name == "DONE"

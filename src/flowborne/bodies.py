@@ -1,0 +1,46 @@
+"""Articulated bodies and flesh by themselves: models, poses, momentum, energy."""
+
+from __future__ import annotations
+
+from flowborne.scenes.human.body import human_mjcf
+from flowborne.scenes.human.skeleton import SIDES
+from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.solids.dynamics import Kinematics, kinematics
+from flowborne.solids.effort import holding
+from flowborne.solids.flesh import Flesh, flesh_of
+from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
+from flowborne.solids.flesh_solve import prescribe_flesh, symmetric_factor
+from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import (
+    halfway_momentum,
+    kinetic_energy,
+    mass_matrix,
+    momentum,
+    potential_energy,
+)
+from flowborne.solids.state import SolidState
+from flowborne.solids.tissue import Tissue, add_flesh
+
+__all__ = [
+    "SIDES",
+    "Flesh",
+    "Kinematics",
+    "SolidModel",
+    "SolidState",
+    "Tissue",
+    "add_flesh",
+    "assemble_flesh",
+    "flesh_of",
+    "halfway_momentum",
+    "holding",
+    "human_mjcf",
+    "kinematics",
+    "kinetic_energy",
+    "mass_matrix",
+    "momentum",
+    "potential_energy",
+    "prescribe_flesh",
+    "standard_skeleton",
+    "static_forces",
+    "symmetric_factor",
+]

@@ -1,0 +1,103 @@
+"""A run folder opened for reading: what holds for all frames at once, and frames as asked for."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.fluid.grid import Grid
+from flowborne.io.history import history_columns, history_rows
+from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError
+
+Array = NDArray[np.float64]
+
+
+class OpenRun:
+    """What a run has left behind, read lazily and in its own units (SI, radians).
+
+    folder  of the run
+    raises  RunFolderError when it is none, or has no state yet
+
+    scene              the scene as run: its file as nested dictionaries
+    bodies             names of the bodies, the world's first
+    joints             names of the joints
+    frames_per_second  of the run
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        files = RunFolder.existing(Path(folder))
+        self.folder = files.path
+        self._files = files
+        try:
+            self.scene: dict[str, Any] = tomllib.loads(files.scene.read_text(encoding="utf-8"))
+            self._model = json.loads(files.model.read_text(encoding="utf-8"))
+            names = sorted(p.name for p in files.states.iterdir() if STATE_NAME.fullmatch(p.name))
+        except (OSError, ValueError) as error:
+            raise RunFolderError(
+                f"{folder} cannot be read ({error}); start the run again with --replace"
+            ) from error
+        if not names:
+            raise RunFolderError(f"{folder} has no frame yet; let the run go on with --resume")
+        self._states = tuple(files.states / name for name in names)
+        self.bodies: tuple[str, ...] = tuple(self._model["bodies"])
+        self.joints: tuple[str, ...] = tuple(self._model["joints"])
+        self.frames_per_second = float(self._model["frames_per_second"])
+
+    def __len__(self) -> int:
+        """Number of states: that of the frames, and the start."""
+        return len(self._states)
+
+    @cached_property
+    def grid(self) -> Grid | None:
+        """The fluid's grid; None without a fluid."""
+        entry = self._model["grid"]
+        if entry is None:
+            return None
+        nx, ny, nz = entry["shape"]
+        x, y, z = entry["origin"]
+        return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
+
+    @cached_property
+    def skin(self) -> NDArray[np.int64] | None:
+        """(m, 3) triangles of the `flesh_vertices` of a state, outward; None without flesh."""
+        entry = self._model.get("flesh")
+        return None if entry is None else np.asarray(entry["triangles"], np.int64)
+
+    @cached_property
+    def history(self) -> dict[str, Array]:
+        """column -> (frames,) numbers, as history.csv has them; the unit ends the name."""
+        columns = list(history_columns(self._files.history))
+        rows = np.array(list(history_rows(self._files.history, columns)), float)
+        return dict(zip(columns, rows.reshape(-1, len(columns)).T, strict=True))
+
+    @cached_property
+    def times(self) -> Array:
+        """(n,) s of every state."""
+        return self.every("time")
+
+    def state(self, number: int) -> dict[str, NDArray[Any]]:
+        """Arrays of a state by name, in single precision; negative numbers count from the end.
+
+        time, q, v, body_position (nb, 3), body_rotation (nb, 3, 3), geom_position, geom_rotation,
+        fluid_force (nb, 3), flesh_vertices (k, 3); of the fluid velocity_x, velocity_y, velocity_z
+        on the faces, pressure, scalar_<dye>, and open, the part of each cell that no body takes up.
+        """
+        with np.load(self._states[number]) as file:
+            return {name: file[name] for name in file.files}
+
+    def every(self, name: str) -> Array:
+        """(n, ...) one array of all states, such as "body_position".
+
+        raises  KeyError when the states have none of that name
+        """
+        values = []
+        for path in self._states:
+            with np.load(path) as file:
+                values.append(file[name])
+        return np.asarray(values, float)

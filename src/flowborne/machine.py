@@ -1,0 +1,30 @@
+"""What a run takes of the machine: threads, memory, seconds by part."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from flowborne.frame_report import PARTS
+from flowborne.io.checkpoint import state_bytes
+from flowborne.io.summary import peak_memory
+from flowborne.kernels.jit import cores, kernel_threads
+from flowborne.kernels.vectors import turn
+
+__all__ = ["PARTS", "cores", "kernel_threads", "memory_bandwidth", "peak_memory", "state_bytes"]
+
+STREAM = (100, 100, 1000)
+"""Shape of arrays that fit into no cache."""
+
+
+def memory_bandwidth() -> float:
+    """Bytes per second that p = z + s p moves, at best of a few times, on the threads that kernels
+    may use here."""
+    p, z = np.ones(STREAM), np.ones(STREAM)
+    seconds = []
+    for _ in range(6):
+        started = perf_counter()
+        turn(p, z, 0.5)
+        seconds.append(perf_counter() - started)
+    return 3.0 * p.nbytes / min(seconds)

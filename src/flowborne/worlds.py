@@ -1,0 +1,154 @@
+"""Worlds made and stepped in code: a model, a grid, and what the fluid is.
+
+world = make_world("<mujoco>...</mujoco>", Grid.slab(64, 64, 1 / 64, (0, 0)), density=1000.0)
+report = advance(world, 0.01, 20)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypedDict, Unpack
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from flowborne.coupling import flow
+from flowborne.coupling.motion import JointCommand, Trajectory
+from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.coupling.stream import Sampled
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.fluid.boundary import Boundaries, Source
+from flowborne.fluid.grid import Array, Grid
+from flowborne.solids import momentum
+from flowborne.solids.model import SolidModel
+from flowborne.solids.wind import Wind
+
+__all__ = [
+    "Field",
+    "FluidProperties",
+    "advance",
+    "kinetic_energy",
+    "make_world",
+    "set_velocity",
+    "start_from",
+    "velocity_at",
+]
+
+Field = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
+"""velocity(x, y, z) -> (u, v, w), broadcasting arrays in m to m/s."""
+
+EMPTY = "<mujoco/>"
+
+
+class FluidProperties(TypedDict, total=False):
+    """What a fluid may be given; see `Fluid`."""
+
+    density: float
+    viscosity: float
+    boundaries: Boundaries
+    sources: tuple[Source, ...]
+    body_force: tuple[float, float, float]
+    tolerance: float
+    scalars: tuple[str, ...]
+
+
+def make_world(
+    model: str | SolidModel = EMPTY,
+    grid: Grid | None = None,
+    *,
+    slab: bool | None = None,
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    solid_density: float | None = None,
+    motions: tuple[Trajectory, ...] = (),
+    winds: tuple[Wind, ...] = (),
+    **fluid: Unpack[FluidProperties],
+) -> World:
+    """A world at rest.
+
+    model          MJCF as text, or a model that is there already
+    grid           of the fluid; None for a world without one
+    slab           whether the bodies move in the plane; as the grid says unless given
+    gravity        m/s^2, of a model given as text
+    solid_density  kg/m^3 of every geom of such a model, in place of its own
+    motions        joints that are told how to move
+    winds          simple winds
+    fluid          its properties; its density is 1 kg/m^3 unless another is given
+    raises         SceneError when the text is no model
+    """
+    if isinstance(model, str):
+        flat = (grid is not None and grid.is_slab) if slab is None else slab
+        model = SolidModel.from_string(model, slab=flat, gravity=gravity, density=solid_density)
+    fluid.setdefault("density", 1.0)
+    return World.at_rest(
+        Setup(model, None if grid is None else Fluid(grid, **fluid), motions, winds)
+    )
+
+
+def advance(
+    world: World, dt: float, steps: int = 1, command: JointCommand | None = None
+) -> StepReport:
+    """Take equal steps of dt (s), in place; gives the last report.
+
+    command  to joints without a trajectory
+    raises   ArithmeticError when a step fails; ValueError for less than one step
+    """
+    if steps < 1:
+        raise ValueError(f"steps is {steps}: give 1 or more")
+    for _ in range(steps):
+        report = step(world, dt, command)
+        if report.outcome is not Outcome.DONE:
+            raise ArithmeticError(f"step {world.steps}: {report.outcome.value}")
+    return report
+
+
+def set_velocity(world: World, field: Field) -> None:
+    """Give the fluid a velocity, as what it is and as what carries it."""
+    fluid, state = world.flow()
+    for axis in fluid.grid.axes:
+        x, y, z = np.meshgrid(*fluid.grid.face_coordinates(axis), indexing="ij")
+        values = np.broadcast_to(field(x, y, z)[axis], x.shape)
+        state.velocity[axis][:] = values
+        state.advecting_velocity[axis][:] = values
+
+
+def velocity_at(world: World, x: Array) -> Array:
+    """(n, 3) velocity of the fluid at the places x (n, 3), m/s, linear between faces."""
+    fluid, state = world.flow()
+    return Sampled(state.velocity, fluid.grid)(x, world.time)
+
+
+def kinetic_energy(world: World) -> float:
+    """J of the fluid and the bodies together (J/m in a slab)."""
+    energy = momentum.kinetic_energy(world.setup.solid, world.solid)
+    if world.fluid is None:
+        return energy
+    fluid, state = world.flow()
+    mass = flow.face_masses(flow.volumes_of(world, cut_by_bodies(world)), fluid.density)
+    return energy + flow.kinetic_energy(state.velocity, mass, fluid.grid, fluid.boundaries)
+
+
+def start_from(coarse: World, fine: World) -> None:
+    """Give `fine` the flow of `coarse`, interpolated: velocity and pressure."""
+    (fluid, to), (rough, of) = fine.flow(), coarse.flow()
+    for axis in fluid.grid.axes:
+        known, wanted = (g.face_coordinates(axis) for g in (rough.grid, fluid.grid))
+        to.velocity[axis][:] = _interpolated(of.velocity[axis], known, wanted)
+        found = _interpolated(of.advecting_velocity[axis], known, wanted)
+        to.advecting_velocity[axis][:] = found
+    known, wanted = rough.grid.cell_coordinates(), fluid.grid.cell_coordinates()
+    to.pressure[:] = _interpolated(of.pressure, known, wanted)
+
+
+def _interpolated(
+    values: Array, known: tuple[Array, Array, Array], wanted: tuple[Array, Array, Array]
+) -> Array:
+    """Values (nx, ny, nz) between the coordinates where they are known: trilinear, in a slab
+    bilinear."""
+    axes = 2 if values.shape[2] == 1 else 3
+    table = RegularGridInterpolator(
+        known[:axes], values if axes == 3 else values[:, :, 0], bounds_error=False, fill_value=None
+    )
+    places = np.meshgrid(*wanted[:axes], indexing="ij")
+    found = np.asarray(table(tuple(places)))
+    return found if axes == 3 else found[:, :, None]

@@ -1,0 +1,15 @@
+"""An objective: how far a body's centre of mass is from a height, m."""
+
+from dataclasses import dataclass
+
+from flowborne.objectives import Measurement, register
+
+
+@register("level")
+@dataclass(frozen=True)
+class Level:
+    body: str
+    height: float
+
+    def value(self, measured: Measurement) -> float:
+        return abs(measured.body(self.body).centre[1] - self.height)

@@ -1,0 +1,14 @@
+"""A rule: a part of what strength allows."""
+
+from dataclasses import dataclass
+
+from flowborne.rules import Poses, WholePace, descent, register
+
+
+@register("share")
+@dataclass(frozen=True)
+class Share(WholePace):
+    part: float = 0.5
+
+    def step(self, poses: Poses, gradient, limit):
+        return self.part * descent(gradient, limit)

@@ -1,0 +1,249 @@
+"""Parts of one's own: each a file of a few lines, used in Python and from a scene file alike."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import flowborne as fb
+from flowborne.scenes.load import check_scene, library
+from flowborne.scenes.plugins import LOADED
+
+PARTS = Path(__file__).parent / "own_parts"
+
+SCENE = """
+dimensions = 2
+plugins = ["level.py", "share.py", "track.py"]
+
+[time]
+frames = 4
+
+[solids]
+model = "block.xml"
+
+[initial]
+positions = { hinge = 34.0 }
+
+[[control]]
+joints = ["hinge"]
+strength = 24.0
+
+[[objectives]]
+kind = "level"
+body = "block"
+height = -9.0
+
+[controller]
+rule = { kind = "share", part = 0.25 }
+
+[output]
+picture = "none"
+exports = [{ file = "block.track", body = "block", every = 2 }]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    """The scene in a folder with its model and its parts."""
+    for path in (*PARTS.glob("*.py"), library() / "block.xml"):
+        shutil.copy(path, tmp_path)
+    file = tmp_path / "own.toml"
+    file.write_text(SCENE)
+    file.with_name("sound.toml").write_text(SCENE)
+    return file
+
+
+def forget(name: str) -> None:
+    """Let a plugin of this name be imported anew."""
+    sys.modules.pop(name, None)
+    LOADED.pop(name, None)
+
+
+@pytest.mark.parametrize("path", sorted(PARTS.glob("*.py")), ids=lambda path: path.stem)
+def test_a_part_takes_few_lines(path: Path) -> None:
+    code = [line for line in path.read_text().splitlines() if line.strip()]
+    assert len(code) < 15
+
+
+def test_parts_work_from_a_scene_file(scene: Path, tmp_path: Path) -> None:
+    """The objective is measured, the rule goes a quarter of the way, the exporter writes."""
+    result = fb.run(scene, tmp_path / "run", film=False)
+    assert result.outcome.name == "DONE"
+    assert result.message.endswith("run")
+    run = fb.OpenRun(tmp_path / "run")
+    angles = np.degrees(run.history["angle_hinge_rad"])
+    assert_allclose(np.abs(np.diff(angles, prepend=34.0)), 0.25)
+    centre = fb.Simulation(scene)
+    for _ in range(4):
+        centre.advance_frame()
+    away = abs(centre.body("block").centre[1] + 9.0)
+    assert run.history["objective_level"][-1] == pytest.approx(away)
+    assert run.history["objective"][-1] == pytest.approx(away)
+    assert np.loadtxt(tmp_path / "run" / "block.track").shape == (3, 3)
+
+
+def test_the_run_folder_stands_on_its_own(scene: Path, tmp_path: Path) -> None:
+    fb.run(scene, tmp_path / "run", film=False)
+    assert {"level.py", "share.py", "track.py"} <= {p.name for p in (tmp_path / "run").iterdir()}
+    again = fb.load_scene(tmp_path / "run" / "scene.toml")
+    assert again.objectives == fb.load_scene(scene).objectives
+    fb.export(tmp_path / "run", tmp_path / "again.track", {"body": "block"})
+    assert np.loadtxt(tmp_path / "again.track").shape == (5, 3)
+    fb.run(scene, tmp_path / "run", film=False, replace=True)
+
+
+def test_parts_work_in_python(scene: Path) -> None:
+    fb.load_scene(scene)
+    level, share = sys.modules["level"].Level, sys.modules["share"].Share
+    world = fb.Simulation(scene).world
+    controller = fb.Controller(
+        np.array([0]),
+        fb.objectives.ObjectiveSum.of(level("block", -9.0)),
+        fb.Hypothesis(0.04),
+        strength=1.0,
+        rule=share(0.5),
+        executor=fb.executors.Serial(),
+    )
+    decision = controller.decide(world, 0.1, fb.step)
+    assert abs(decision.displacement[0]) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("height = -9.0", "", "[[objectives]] 1 of kind 'level': key 'height' is missing. Add it."),
+        ("height =", "heigth =", "unknown key 'heigth'. Its keys are: body, height"),
+        ("height = -9.0", 'height = "up"', "height is 'up' (input should be a valid number"),
+        ('"level"\n', '"levle"\n', "'levle' is not known; did you mean 'level'?"),
+        ("part = 0.25", "parts = 0.25", "[controller] rule of kind 'share': unknown key 'parts'"),
+        ("every = 2", "every = 2.5", "[output] exports, entry 1 of kind '.track': every is 2.5"),
+        ('"block.track"', '"block.trak"', "nothing writes '.trak' files. End it with one of .bvh"),
+        ('"level.py"', '"no.py"', "plugins 1: file "),
+        ('"level.py"', '"level.txt"', "plugins 1: 'level.txt' is no Python module"),
+        ('"level.py"', '"broken.py"', "plugin 'broken.py' failed in broken.py, line 2 (ZeroDiv"),
+        ('"level.py"', '"leaver.py"', "plugin 'leaver.py' failed in leaver.py, line 1 (SystemExit"),
+        ('"level.py"', '"other/level.py"', "another file level.py is in use already"),
+        ('"level.py"', '"json.py"', "'json' is the name of another Python module, too"),
+    ],
+)
+def test_what_is_wrong_is_one_message(scene: Path, before: str, after: str, said: str) -> None:
+    scene.with_name("broken.py").write_text("one = 1\none / 0\n")
+    scene.with_name("leaver.py").write_text("raise SystemExit(0)\n")
+    scene.with_name("json.py").write_text("")
+    (scene.parent / "other").mkdir()
+    (scene.parent / "other" / "level.py").write_text("one = 1\n")
+    scene.write_text(SCENE.replace(before, after, 1))
+    fb.load_scene(scene.with_name("sound.toml"))
+    problems = check_scene(scene)
+    assert len(problems) == 1 or before == '"level.py"', problems
+    assert said in problems[0]
+
+
+@pytest.mark.parametrize(
+    ("returned", "said"),
+    [
+        ("'high'", "objective 'level' gave 'high', which is no number: return one"),
+        ("1 / 0", "objective 'level' failed in level.py, line 15 (ZeroDivisionError"),
+        ("None", "objective 'level' gave None, which is no number"),
+    ],
+)
+def test_an_objective_that_fails_stops_the_run_with_its_place(
+    scene: Path, tmp_path: Path, returned: str, said: str
+) -> None:
+    forget("level")
+    path = scene.with_name("level.py")
+    text = path.read_text()
+    path.write_text(text[: text.index("return")] + f"return {returned}\n")
+    result = fb.run(scene, tmp_path / "run", film=False)
+    forget("level")
+    assert result.outcome.name == "BLEW_UP"
+    assert said in result.message
+    assert "more steps" not in result.message
+
+
+def test_a_name_of_ours_a_class_without_its_method_and_a_taken_key_are_refused() -> None:
+    from dataclasses import dataclass
+
+    with pytest.raises(ValueError, match="'effort' is flowborne's own"):
+        fb.objectives.register("effort")(object)
+    with pytest.raises(ValueError, match="'thing' is no dataclass"):
+        fb.objectives.register("thing")(object)
+
+    @dataclass
+    class Weighty:
+        weight: float
+
+        def value(self, measured: fb.Measurement) -> float:
+            return self.weight
+
+    with pytest.raises(ValueError, match="has a field 'weight', which is a key of every objective"):
+        fb.objectives.register("weighty")(Weighty)
+    with pytest.raises(ValueError, match=r"has no method pace\(\): add it"):
+        fb.rules.register("weighty")(Weighty)
+
+
+WIND = """
+dimensions = 2
+plugins = ["breeze.py"]
+
+[time]
+frames = 2
+
+[solids]
+model = "block.xml"
+
+[[wind]]
+kind = "python"
+function = "breeze:rising"
+parameters = { speed = 3.0 }
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("return speed * np.ones_like(x)", None),
+        ("return [1.0, 2.0]", "wind 'breeze:rising' gave an array of shape (2,)"),
+        ("return x.gusts", "wind 'breeze:rising' failed in breeze.py, line 3 (AttributeError"),
+    ],
+)
+def test_a_wind_takes_parameters_and_says_where_it_fails(
+    scene: Path, tmp_path: Path, body: str, said: str | None
+) -> None:
+    forget("breeze")
+    code = f"import numpy as np\ndef rising(x, time, speed):\n    {body}\n"
+    scene.with_name("breeze.py").write_text(code)
+    file = scene.with_name("wind.toml")
+    file.write_text(WIND)
+    result = fb.run(file, tmp_path / "run", film=False)
+    if said is None:
+        assert result.outcome.name == "DONE"
+        assert fb.OpenRun(tmp_path / "run").history["drag_N"][0] > 1.0
+    else:
+        assert said in result.message
+    file.write_text(WIND.replace("speed", "pace"))
+    assert "function 'breeze:rising': got an unexpected keyword argument 'pace'" in str(
+        check_scene(file)
+    )
+    forget("breeze")
+
+
+def test_a_gradient_of_ones_own_gets_the_probes_of_the_scene(scene: Path) -> None:
+    from dataclasses import dataclass
+
+    @fb.gradients.register("doubled")
+    @dataclass(frozen=True)
+    class Doubled(fb.gradients.GradientCentral):
+        factor: float = 2.0
+
+    scene.write_text(
+        SCENE.replace("[controller]", '[controller]\ngradient = { kind = "doubled", factor = 3.0 }')
+    )
+    controller = fb.Simulation(scene).controller
+    assert controller is not None
+    assert controller.gradient == Doubled((np.radians(5.0),), factor=3.0)
