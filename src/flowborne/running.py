@@ -162,6 +162,9 @@ class _Run:
         try:
             write_scene(self.folder, self.files)
             self._write_start()
+        except SceneError:
+            self.folder.remove()
+            raise
         except OSError as error:
             self.folder.remove()
             raise cannot_write(self.folder.path, error) from error
@@ -171,7 +174,7 @@ class _Run:
         folder, simulation = self.folder, self.simulation
         try:
             if folder.checkpoint.exists():
-                simulation.restore(*load_checkpoint(folder.checkpoint, simulation.world.setup))
+                simulation.restore(*load_checkpoint(folder.checkpoint, simulation.setup))
             if simulation.frame > self.frames:
                 raise RunFolderError(
                     f"{folder.path} has {simulation.frame} frames already; ask for more of them, "
@@ -269,7 +272,7 @@ class _Run:
 
     def compilation_told(self) -> AbstractContextManager[None]:
         """Context in which news is given of every kernel that is compiled."""
-        if self.simulation.world.setup.fluid is None:
+        if not self.simulation.scene.has_fluid:
             return nullcontext()
         return compilation_watched(lambda kernels: self._tell("compiling", kernels=kernels))
 
@@ -278,7 +281,7 @@ class _Run:
         simulation, folder = self.simulation, self.folder
         write_model(
             folder,
-            simulation.world.setup,
+            simulation.setup,
             controlled=list(simulation.scene.controlled_joints()),
             frames_per_second=1.0 / simulation.frame_time,
             wind=[list(stream)] if (stream := simulation.scene.stream()) else [],

@@ -16,7 +16,8 @@ from threadpoolctl import ThreadpoolController
 
 from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import Outcome, StepReport
-from flowborne.coupling.world import World
+from flowborne.coupling.world import Setup, World
+from flowborne.errors import SceneError
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
@@ -111,12 +112,23 @@ class Simulation:
             built.world.setup, self.controller, self.scene.stream(), self.scene.output.bodies
         )
         self._moment = _Moment(built.world, 0, None)
+        self._at_rest = built.world.fluid is not None
         self._step: Step = step
 
     @property
     def world(self) -> World:
-        """The state after `frame` frames; each frame puts a new World in its place."""
+        """The state after `frame` frames; each frame puts a new World in its place.
+
+        raises  SceneError when the fluid cannot be set going with the bodies, the first time
+        """
+        if self._at_rest:
+            self._set_going()
         return self._moment.world
+
+    @property
+    def setup(self) -> Setup:
+        """What never changes during the run."""
+        return self._moment.world.setup
 
     @property
     def frame(self) -> int:
@@ -135,7 +147,7 @@ class Simulation:
 
     def restore(self, world: World, frame: int) -> None:
         """Go on from `world`, which is the state after `frame` frames of the same scene."""
-        self._moment = _Moment(world, frame, None)
+        self._moment, self._at_rest = _Moment(world, frame, None), False
 
     def advance_frame(self) -> FrameReport:
         """Decide, then take the steps of one frame, on all cores unless a context allows less.
@@ -182,6 +194,23 @@ class Simulation:
 
     def __exit__(self, *raised: object) -> None:
         self.close()
+
+    def _set_going(self) -> None:
+        """Let the fluid flow around bodies that move from the start."""
+        from flowborne.coupling.start import set_going
+
+        world, scene = self._moment.world, self.scene
+        free = free_joint_dofs(world.setup.solid)
+        given = np.ones(free.size, bool) if scene.initial.impulse == "given" else ~free
+        try:
+            with _one_blas_thread(), kernel_threads():
+                set_going(world, given)
+        except (ArithmeticError, ValueError) as error:
+            raise SceneError(
+                f"scene {scene.name}, [initial]: {error}. Look for bodies that are in each other "
+                "or in a side of the domain, and for velocities that are too large."
+            ) from error
+        self._at_rest = False
 
     def _advance(self, world: World, frame: int) -> FrameReport:
         """Take `world` through a frame."""
@@ -274,6 +303,12 @@ def turning_dofs(model: SolidModel) -> NDArray[np.bool_]:
     kind, first = model.mj.jnt_type[model.mj.dof_jntid], model.mj.jnt_dofadr[model.mj.dof_jntid]
     turning: NDArray[np.bool_] = np.where(kind == 0, np.arange(model.nv) - first >= 3, kind != 2)
     return turning
+
+
+def free_joint_dofs(model: SolidModel) -> NDArray[np.bool_]:
+    """(nv,) which dofs are of free joints."""
+    free: NDArray[np.bool_] = model.mj.jnt_type[model.mj.dof_jntid] == 0
+    return free
 
 
 def default_workers(joints: int, fluid: bool) -> int:

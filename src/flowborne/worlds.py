@@ -15,6 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 from flowborne.coupling import flow
 from flowborne.coupling.motion import JointCommand, Trajectory
 from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.start import set_going
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.stream import Sampled
 from flowborne.coupling.world import Fluid, Setup, World
@@ -30,6 +31,7 @@ __all__ = [
     "advance",
     "kinetic_energy",
     "make_world",
+    "set_going",
     "set_velocity",
     "start_from",
     "velocity_at",

@@ -92,6 +92,23 @@ def test_the_human_has_the_bones_of_the_clip_and_follows_it(write: Write) -> Non
             assert q[:3] == pytest.approx(clip.translation[moment], abs=2e-3)
 
 
+def test_a_clip_can_be_placed(write: Write) -> None:
+    """Turned to the left about where it begins, then moved; and the way goes along."""
+    placed = {"unit = 0.01": "unit = 0.01\nheading = 90.0\noffset = [3.0, -1.0, 0.5]"}
+    there, here = (build(load_scene(write(scene=s))).world for s in (placed, None))
+    assert there.solid.q[:3] == pytest.approx(np.add(here.solid.q[:3], (3.0, -1.0, 0.5)))
+    ahead, left = here.solid.v[:2], there.solid.v[:2]
+    assert ahead[0] > 0.5
+    assert left == pytest.approx((-ahead[1], ahead[0]), abs=1e-9)
+    assert there.solid.q[7:] == pytest.approx(here.solid.q[7:], abs=1e-9)
+
+
+def test_a_creature_outside_the_domain_is_told_the_keys_that_place_it(write: Write) -> None:
+    domain = "[domain]\nlower = [5.0, -2.0, -1.0]\nupper = [9.0, 2.0, 3.0]\nresolution = 24\n"
+    problems = check_scene(write(domain))
+    assert "Place the clip by offset and heading in [clip] or enlarge the domain." in problems[0]
+
+
 def test_controlled_joints_start_where_the_clip_has_them_and_do_not_follow(write: Write) -> None:
     made = built(write(CONTROL))
     model, q = made.world.setup.solid, made.world.solid.q

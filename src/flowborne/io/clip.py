@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,18 @@ class Clip:
     def duration(self) -> float:
         """s from the first frame to the last."""
         return (self.frames - 1) * self.frame_time
+
+    def placed(self, offset: tuple[float, ...], heading: float) -> Clip:
+        """The clip elsewhere: turned by `heading` (rad) about the vertical through where the root
+        begins, to the left, then moved by `offset` (3,) m."""
+        if not any(offset) and heading == 0.0:
+            return self
+        left = np.array([np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading)])
+        begin = self.translation[0]
+        rotations = self.rotations.copy()
+        rotations[:, 0] = product(left, rotations[:, 0])
+        translation = begin + turned(left, self.translation - begin) + np.array(offset)
+        return replace(self, rotations=rotations, translation=translation)
 
     def places(self, frame: int | slice = slice(None)) -> tuple[Array, Array]:
         """Where the joints are in the world, in one frame or in several.

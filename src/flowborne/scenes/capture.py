@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -51,11 +51,13 @@ def capture_of(scene: Scene) -> Capture | None:
     table = scene.clip
     if table is None:
         return None
+    offset, heading = table.offset, float(np.radians(table.heading))
     if table.file is None:
         assert scene.human is not None
-        return _walk(scene.human.height)
+        walk = _walk(scene.human.height)
+        return replace(walk, clip=walk.clip.placed(offset, heading))
     path = scene.folder / table.file
-    clip = _read(path, _stamp(path), table.unit, table.up, table.skip)
+    clip = _read(path, _stamp(path), table.unit, table.up, table.skip).placed(offset, heading)
     if scene.human is None:
         return Capture(clip, _named(clip, table.mapping), None)
     mapping = mapping_of(clip, table.mapping)

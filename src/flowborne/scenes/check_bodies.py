@@ -79,6 +79,10 @@ def _unknown(
     return [f"{draft.at(*keys)}: {what} '{name}' is not in {model}{end}"]
 
 
+PLACED = "Place the clip by offset and heading in [clip]"
+"""What to do about a creature outside the domain that a clip moves."""
+
+
 def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     """Names, initial state, motions and winds against the model."""
     scene = draft.scene
@@ -114,6 +118,13 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
 
 def _check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
     initial = draft.scene.initial
+    if initial.impulse == "none" and not any(
+        joint_kind(model, joint) == FREE for joint in model.joint_names
+    ):
+        yield (
+            f"{draft.at('initial', 'impulse')}: 'none' is for creatures that float, and the model "
+            "has no free joint. Drop it."
+        )
     moved = {table.joint for table in draft.scene.motion}
     for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
         for joint, numbers in values.items():
@@ -207,8 +218,9 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
             gone = (high <= first or low >= last) if fixed else (low < first or high > last)
             if gone and body not in outside and math.isfinite(low):
                 outside.add(body)
+                how = "Move the body" if draft.scene.clip is None else PLACED
                 yield (
                     f"{draft.at('domain')}: body '{model.body_names[body]}' reaches from {low:g} "
                     f"to {high:g} m in {'xyz'[axis]} at the start, outside the domain from "
-                    f"{first:g} to {last:g} m. Move the body or enlarge the domain."
+                    f"{first:g} to {last:g} m. {how} or enlarge the domain."
                 )

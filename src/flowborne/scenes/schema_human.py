@@ -6,7 +6,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.fields import NotNegative, Positive, Table, Text, WholeNumber
+from flowborne.scenes.fields import (
+    NotNegative,
+    Number,
+    Positive,
+    Table,
+    Text,
+    Vector,
+    WholeNumber,
+)
 from flowborne.scenes.schema_fluid import check_interval
 
 
@@ -40,6 +48,8 @@ class ClipTable(Table):
     blend        s over which it leaves the starting pose, comes to rest at the end, or passes from
                  one round of a loop to the next
     smooth       Hz below which motion is kept; all of it unless given
+    heading      degrees by which it is turned to the left, about where it begins
+    offset       m by which it is then moved
     mapping      joint of the model -> joint of the clip, where their names do not tell
     joints       joints of the model that follow; unless given all that the clip has and that are
                  not controlled
@@ -54,6 +64,8 @@ class ClipTable(Table):
     loop: bool | None = None
     blend: NotNegative = 0.0
     smooth: Positive | None = None
+    heading: Number = 0.0
+    offset: Vector = (0.0, 0.0, 0.0)
     mapping: dict[str, Text] = Field(default_factory=dict)
     joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
 

@@ -46,10 +46,14 @@ class InitialTable(Table):
                 a free joint (x, y, z) in m and a quaternion
     velocities  joint -> degrees/s or m/s; a ball joint takes (x, y, z) in degrees/s, a free joint
                 (x, y, z) in m/s and (x, y, z) in degrees/s, as MuJoCo's qvel does
+    impulse     "given": all velocities are as they stand, and the fluid flows around the moving
+                bodies; "none": free joints start with the velocity at which the creature and the
+                fluid together have no impulse, as after moving its joints from rest
     """
 
     positions: dict[str, JointValues] = Field(default_factory=dict)
     velocities: dict[str, JointValues] = Field(default_factory=dict)
+    impulse: Literal["given", "none"] = "given"
 
 
 class DrivenTable(Table):
