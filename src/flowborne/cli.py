@@ -201,6 +201,10 @@ def validate(
         list[str] | None, typer.Option(metavar="ID", help="Only this case; may be repeated.")
     ] = None,
     quick: Annotated[bool, typer.Option(help="Coarser grids, in minutes.")] = False,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of a report that the cases are put into."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compare with analytic and published cases."""
@@ -208,7 +212,15 @@ def validate(
 
     ids = _known(case or [], case_ids(), "case", "--case")
     show = None if as_json else _result_printer("id", "reference", "tolerance")
-    _report(run_cases(ids or None, quick, on_result=show), as_json)
+    if report is not None:
+        _make_folder(report)
+    try:
+        results = run_cases(ids or None, quick, on_result=show, report=report)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    except OSError as error:
+        raise cannot_write(report or Path(), error) from error
+    _report(results, as_json)
 
 
 @app.command()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from pathlib import Path
 
 from flowborne.validation.case import Case, GridSeries, Result
 
@@ -71,6 +72,7 @@ def run_cases(
     ids: Sequence[str] | None,
     quick: bool,
     on_result: Callable[[Result], None] | None = None,
+    report: Path | None = None,
 ) -> list[Result]:
     """Run cases one after the other, each on all of the machine's cores, and BLAS on one: its
     solves are small.
@@ -78,10 +80,13 @@ def run_cases(
     ids        which; every one when None
     quick      coarser grids and shorter runs
     on_result  called with every result as its case ends
+    report     folder of the report that each case is put into as it ends
+    raises     ValueError when that folder holds something else, OSError when it cannot be written
     """
     from threadpoolctl import threadpool_limits
 
     from flowborne.machine import kernel_threads
+    from flowborne.validation.report import add_to_report
 
     results = []
     for name in case_ids() if ids is None else ids:
@@ -91,5 +96,7 @@ def run_cases(
         for result in found:
             if on_result is not None:
                 on_result(result)
+        if report is not None:
+            add_to_report(report, found, quick, case_ids())
         results += found
     return results
