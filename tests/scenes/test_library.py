@@ -13,7 +13,7 @@ from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, library, load_scene, scene_names
 
 NAMES = scene_names()
-UNCONTROLLED = ("flyer-base", "swimmer-jet-only", "swimmer-no-control", "eel")
+UNCONTROLLED = ("flyer-base", "swimmer-jet-only", "swimmer-no-control", "eel", "eel-room")
 
 
 def test_the_list_of_scenes_is_what_lies_in_the_library() -> None:

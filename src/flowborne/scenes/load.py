@@ -48,6 +48,7 @@ BUILT_IN = (
     "swimmer-no-control",
     "swimmer-held",
     "eel",
+    "eel-room",
 )
 
 

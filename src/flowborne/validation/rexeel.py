@@ -1,4 +1,5 @@
-"""R1: a real swimming robot, and the one of the scene `eel`, from the same start by the same gait.
+"""R1: a real swimming robot, and those of the scenes `eel` and `eel-room`, from the same start by
+the same gait: as a slab in flat flow, and as tall as it is in a tank four times as deep.
 
 The robot's thickness is not published: the scene's links are 1.6 cm thick. Nor is where it began in
 its tank: all start in the middle, and at 40 degrees the head's front ends beyond the upper wall,
@@ -28,7 +29,8 @@ from flowborne.validation.eel_runs import (
 from flowborne.validation.reference import reference
 
 GRIDS = {True: (122,), False: (122, 183, 244)}
-"""Cells across the tank, by quick."""
+ROOM_GRIDS = (61, 92, 122)
+"""Cells across the tank, by quick; and of the one in three dimensions, which is not quick."""
 
 AMPLITUDES = {True: (20,), False: (20, 40)}
 """Degrees of the gait, by quick."""
@@ -49,27 +51,35 @@ class Swim:
     seconds: float
 
 
-def swim(amplitude: int, cells: int, settings: Mapping[str, str] = MappingProxyType({})) -> Swim:
-    """Let the robot of the scene swim.
+def swim(
+    amplitude: int,
+    cells: int,
+    settings: Mapping[str, str] = MappingProxyType({}),
+    scene: str = "eel",
+) -> Swim:
+    """Let the robot of a scene swim.
 
     cells     across the tank
     settings  in place of the scene's own
     raises    ArithmeticError when the run blows up
     """
+    told = load_scene(scene).domain
+    assert told is not None
+    upper = (told.upper[0], told.upper[1] * LENGTH[amplitude], *told.upper[2:])
     own = {
         "constants.amplitude": f"{amplitude}",
-        "domain.upper": f"[1.22, {1.22 * LENGTH[amplitude]:g}]",
+        "domain.upper": f"[{', '.join(f'{c:g}' for c in upper)}]",
         "domain.resolution": f"{round(cells * LENGTH[amplitude])}",
     }
     started = perf_counter()
-    with Simulation(load_scene("eel", {**own, **settings})) as simulation:
+    with Simulation(load_scene(scene, {**own, **settings})) as simulation:
         rows = [place(simulation)]
         try:
             for _ in TIMES[1:]:
                 simulation.advance_frame()
                 rows.append(place(simulation))
         except BlowUpError as error:
-            raise ArithmeticError(f"eel on {cells} cells: {error}") from error
+            raise ArithmeticError(f"{scene} on {cells} cells: {error}") from error
     places = np.array(rows)
     return Swim(SwimPath(places[:, :2], places[:, 2:]), perf_counter() - started)
 
@@ -83,10 +93,10 @@ def place(simulation: Simulation) -> Array:
     return np.array([*centre, *head, np.degrees(q[model.positions_of("heading")[0]])])
 
 
-def compared(amplitude: int, cells: tuple[int, ...]) -> list[Finding]:
+def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list[Finding]:
     """Errors of the robot on some grids, the last one judged, beside those of other simulators."""
     runs = measured(amplitude)
-    swims = [swim(amplitude, count) for count in cells]
+    swims = [swim(amplitude, count, scene=scene) for count in cells]
     errors = np.array([rmse(one.path.changes(), runs) for one in swims])
     least = scatter(runs)
     findings = []
@@ -103,7 +113,7 @@ def compared(amplitude: int, cells: tuple[int, ...]) -> list[Finding]:
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
         findings.append(
             Finding(
-                f"gait of {amplitude} degrees: RMSE of {quantity}",
+                f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}",
                 value,
                 aquarium,
                 "at most",
@@ -116,9 +126,10 @@ def compared(amplitude: int, cells: tuple[int, ...]) -> list[Finding]:
 
 def robot(quick: bool) -> list[Finding]:
     """R1: none of the errors above those of the robot's own simulator, Aquarium."""
-    return [
-        finding for amplitude in AMPLITUDES[quick] for finding in compared(amplitude, GRIDS[quick])
-    ]
+    cases = [(amplitude, GRIDS[quick], "eel") for amplitude in AMPLITUDES[quick]]
+    if not quick:
+        cases += [(amplitude, ROOM_GRIDS, "eel-room") for amplitude in AMPLITUDES[quick]]
+    return [finding for case in cases for finding in compared(*case)]
 
 
 CASES = (Case("R1", robot),)
