@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint imports clean
+.PHONY: demo test imports failing clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -15,6 +15,9 @@ test: $(VENV)/installed-test
 
 imports: $(VENV)/installed-test
 	$(BIN)/python tools/imports.py
+
+failing: $(VENV)/installed-test
+	$(BIN)/python tools/failing.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
