@@ -11,7 +11,7 @@ test: $(VENV)/installed-test
 	$(BIN)/ruff check src tests tools
 	$(BIN)/ruff format --check src tests tools
 	$(BIN)/mypy
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 imports: $(VENV)/installed-test
 	$(BIN)/python tools/imports.py

@@ -3,6 +3,8 @@
 import pytest
 from hypothesis import settings
 
+from flowborne.kernels.jit import cores
+
 settings.register_profile("same every time", derandomize=True)
 settings.load_profile("same every time")
 
@@ -52,6 +54,11 @@ bodies = ["block"]
 [output]
 checkpoint_every = 5
 """
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Test processes side by side: one a core, but no more than memory has room for."""
+    return min(cores(), 4)
 
 
 @pytest.fixture

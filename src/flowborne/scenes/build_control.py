@@ -107,7 +107,7 @@ def _rule(table: tables.AnyRule, scene: Scene, model: SolidModel) -> Rule:
     if isinstance(table, tables.RuleFixed):
         return FixedStep()
     if isinstance(table, tables.RuleResilient):
-        return ResilientStep()
+        return ResilientStep(least=table.least)
     unit = joint_unit(model, scene.controlled_joints()[0])
     reach = None if table.reach is None else unit * table.reach
     return GoldenSection(reach, table.tolerance)

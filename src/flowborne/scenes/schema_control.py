@@ -229,9 +229,14 @@ class RuleFixed(Table):
 
 
 class RuleResilient(Table):
-    """Steps and probes that halve where the descent turns back, and grow again where it goes on."""
+    """Steps and probes that halve where the descent turns back, and grow again where it goes on.
+
+    least  part of strength and probe below which nothing shortens. In a fluid a probe that moves a
+           body by less than a cell or so feels the grid
+    """
 
     kind: Literal["resilient"]
+    least: Annotated[float, Field(gt=0, le=1)] = 1.0 / 64.0
 
 
 class RuleGoldenSection(Table):

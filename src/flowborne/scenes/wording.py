@@ -30,11 +30,17 @@ WHAT = {
 }
 """pydantic's type of error -> what is wrong with the value, and the remedy."""
 
-BOUNDS = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt"}
+BOUNDS = {
+    "greater_than": "gt",
+    "greater_than_equal": "ge",
+    "less_than": "lt",
+    "less_than_equal": "le",
+}
 COMPARED = {
     "greater_than": "is not greater than",
     "greater_than_equal": "is less than",
     "less_than": "is not less than",
+    "less_than_equal": "is greater than",
 }
 
 
@@ -166,7 +172,7 @@ def explain(error: ErrorDetails, raw: Any, file: str) -> str:
         return f"{where} {context['error']}."
     if kind in BOUNDS:
         bound = context[BOUNDS[kind]]
-        remedy = "Give a larger number" if kind != "less_than" else "Give a smaller number"
+        remedy = "Give a larger number" if kind.startswith("greater") else "Give a smaller number"
         return f"{where}: {value!r} {COMPARED[kind]} {bound:g}. {remedy}."
     if kind == "tuple_type" and isinstance(value, dict) and _is_list_of_tables(str(keys[0])):
         return f"scene {file}: [{keys[0]}] may be there several times. Write [[{keys[0]}]]."
