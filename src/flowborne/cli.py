@@ -145,9 +145,13 @@ def check(
     from flowborne.coupling.seen import seen_bodies
     from flowborne.scenes.build import build
     from flowborne.scenes.load import load_scene
+    from flowborne.scenes.notes import notes_of
 
-    setup = build(load_scene(scene, _overrides(settings or []))).world.setup
+    loaded = load_scene(scene, _overrides(settings or []))
+    setup = build(loaded).world.setup
     print("nothing wrong")
+    for note in notes_of(loaded, setup.solid):
+        print(f"  {note}")
     for seen in seen_bodies(setup):
         print(f"  {seen.sentence()}")
 

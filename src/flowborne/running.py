@@ -23,6 +23,7 @@ from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, che
 from flowborne.io.summary import peak_memory, summarise, versions
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
+from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
 from flowborne.simulation import BlowUpError, Simulation
 
@@ -332,6 +333,7 @@ class _Run:
             "message": message,
             **summarise(self.folder.history, strength),
             "cells": cells,
+            "notes": list(notes_of(simulation.scene, world.setup.solid)),
             "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],
             "state_bytes": state_bytes(world),
             "bytes_per_cell": None if cells is None else state_bytes(world) / cells,
