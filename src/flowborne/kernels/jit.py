@@ -41,7 +41,8 @@ R = TypeVar("R")
 
 inlined = njit(forceinline=True, nogil=True, cache=True)
 """For what is called at every cell or face: inlined by LLVM, which compiles far sooner than by
-Numba."""
+Numba. What goes through a row or a plane is a kernel: inlined, it would be compiled anew at every
+place that calls it, and once more in all that these are called from."""
 
 ONLY_PRANGE = {
     "comprehension": False,

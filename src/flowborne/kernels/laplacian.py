@@ -11,7 +11,7 @@ from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.vectors import cells_of, in_order
 
 
-@inlined
+@kernel
 def apply_plane(out: Array, p: Array, finest: Finest, m: int) -> float:
     """`apply_laplacian` on plane m."""
     w0, w1, w2, diagonal = finest

@@ -19,7 +19,7 @@ from numba import prange
 
 from flowborne.kernels.arrays import Array, Real, Triple
 from flowborne.kernels.blocks import BLOCK, reach
-from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.jit import kernel
 from flowborne.kernels.laplacian import neighbour_sum
 from flowborne.kernels.vectors import cells_of
 
@@ -30,12 +30,14 @@ WEIGHTS = tuple(1.0 / (1.0 - np.cos(2.0 * np.pi * k / (2 * STEPS + 1))) for k in
 """The weights w_k."""
 
 
-@inlined
-def smooth_plane(out: Real, x: Real, b: Real, w: Triple, inverse: Real, step: int, m: int) -> None:
-    """`smooth` on plane m."""
+@kernel
+def smooth_plane(
+    out: Real, x: Real, b: Real, w: Triple, inverse: Real, weight: float, m: int
+) -> None:
+    """`smooth` with a weight w_k on plane m."""
     w0, w1, w2 = w
     d = 1 if x.shape[0] > 1 else 0
-    part, keep = x.dtype.type(WEIGHTS[step]), x.dtype.type(1.0 - WEIGHTS[step])
+    part, keep = x.dtype.type(weight), x.dtype.type(1.0 - weight)
     for j in range(1, x.shape[1] - 1):
         for k in range(1, x.shape[2] - 1):
             total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
@@ -50,8 +52,9 @@ def smooth_plane(out: Real, x: Real, b: Real, w: Triple, inverse: Real, step: in
 def smooth(out: Real, x: Real, b: Real, w: Triple, inverse: Real, step: int) -> None:
     """out = x after a step, counted from 0; ghosts of `out` are left alone."""
     d = 1 if x.shape[0] > 1 else 0
+    weight = WEIGHTS[step]
     for i in prange(x.shape[0] - 2 * d):
-        smooth_plane(out, x, b, w, inverse, step, i + d)
+        smooth_plane(out, x, b, w, inverse, weight, i + d)
 
 
 def smooth_reference(x: Real, b: Real, w: Triple, inverse: Real, step: int) -> Array:
@@ -62,7 +65,7 @@ def smooth_reference(x: Real, b: Real, w: Triple, inverse: Real, step: int) -> A
     return out
 
 
-@inlined
+@kernel
 def begin_plane(x: Real, b: Real, inverse: Real, m: int) -> None:
     """`first_smooth` on plane m."""
     part = x.dtype.type(WEIGHTS[0])
@@ -78,7 +81,7 @@ def first_smooth(x: Real, b: Real, inverse: Real) -> None:
         begin_plane(x, b, inverse, i)
 
 
-@inlined
+@kernel
 def defect_plane(r: Real, x: Real, b: Real, w: Triple, inverse: Real, m: int) -> None:
     """`defect` on plane m."""
     w0, w1, w2 = w
@@ -118,17 +121,17 @@ def smooth_down(x: Real, r: Real, b: Real, w: Triple, inverse: Real) -> None:
             if i < end:
                 begin_plane(x, b, inverse, i + d)
             if first <= i - 1 < last:
-                smooth_plane(r, x, b, w, inverse, 1, i - 1 + d)
+                smooth_plane(r, x, b, w, inverse, WEIGHTS[1], i - 1 + d)
             if one <= i - 2 < two:
-                smooth_plane(x, r, b, w, inverse, 2, i - 2 + d)
+                smooth_plane(x, r, b, w, inverse, WEIGHTS[2], i - 2 + d)
             if low <= i - 3 < high:
                 defect_plane(r, x, b, w, inverse, i - 3 + d)
     for between in prange(blocks - 1):
         i = planes * (between + 1) // blocks
         for m in range(i - 1, i + 1):
-            smooth_plane(r, x, b, w, inverse, 1, m + d)
+            smooth_plane(r, x, b, w, inverse, WEIGHTS[1], m + d)
         for m in range(i - 2, i + 2):
-            smooth_plane(x, r, b, w, inverse, 2, m + d)
+            smooth_plane(x, r, b, w, inverse, WEIGHTS[2], m + d)
         for m in range(i - 3, i + 3):
             defect_plane(r, x, b, w, inverse, m + d)
 
@@ -146,17 +149,17 @@ def smooth_up(x: Real, r: Real, b: Real, w: Triple, inverse: Real) -> None:
         one, two = reach(block, blocks, planes, 2)
         for i in range(start, end + 2):
             if i < end:
-                smooth_plane(x, r, b, w, inverse, 2, i + d)
+                smooth_plane(x, r, b, w, inverse, WEIGHTS[2], i + d)
             if first <= i - 1 < last:
-                smooth_plane(r, x, b, w, inverse, 1, i - 1 + d)
+                smooth_plane(r, x, b, w, inverse, WEIGHTS[1], i - 1 + d)
             if one <= i - 2 < two:
-                smooth_plane(x, r, b, w, inverse, 0, i - 2 + d)
+                smooth_plane(x, r, b, w, inverse, WEIGHTS[0], i - 2 + d)
     for between in prange(blocks - 1):
         i = planes * (between + 1) // blocks
         for m in range(i - 1, i + 1):
-            smooth_plane(r, x, b, w, inverse, 1, m + d)
+            smooth_plane(r, x, b, w, inverse, WEIGHTS[1], m + d)
         for m in range(i - 2, i + 2):
-            smooth_plane(x, r, b, w, inverse, 0, m + d)
+            smooth_plane(x, r, b, w, inverse, WEIGHTS[0], m + d)
 
 
 def defect_reference(x: Real, b: Real, w: Triple, inverse: Real) -> Array:
