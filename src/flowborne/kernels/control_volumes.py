@@ -351,11 +351,12 @@ def level_reference(
 def share_velocity(field: Array, small: Integers, targets: Integers, shares: Array) -> None:
     """Give small ones the velocity of all that goes with them, in place: these shares of them go
     with their targets."""
-    flat = field.reshape(-1)
-    own = flat[small]
+    flat, shared = field.reshape(-1), np.empty(small.size)
     for n in range(small.size):
-        own[n] += shares[n] * (flat[targets[n]] - own[n])
-    flat[small] = own
+        own = flat[small[n]]
+        shared[n] = own + shares[n] * (flat[targets[n]] - own)
+    for n in range(small.size):
+        flat[small[n]] = shared[n]
 
 
 def share_velocity_reference(

@@ -21,10 +21,10 @@ def mode_strengths(z: Real, rows: Rows, amounts: Array, scale: float) -> Array:
     count, size = amounts.shape
     strength = np.zeros(count)
     if count:
-        load = scale * sum_rows(z, rows, size)
+        load = sum_rows(z, rows, size)
         for n in range(count):
             for c in range(size):
-                strength[n] += amounts[n, c] * load[c]
+                strength[n] += amounts[n, c] * (scale * load[c])
     return strength
 
 

@@ -295,7 +295,8 @@ def coarsen(hierarchy: Hierarchy) -> None:
         if level == table.shape[0] - 2:
             break
         factor = np.empty(3, np.int64)
-        ratio = np.empty((3, table[level + 1, N0 : N2 + 1].max() + 1))
+        most = max(table[level + 1, N0], table[level + 1, N1], table[level + 1, N2])
+        ratio = np.empty((3, most + 1))
         towards = interpolation_at(interpolation, table, level)
         for axis in range(3):
             n, size, cells = table[level, N0 + axis], table[level, S0 + axis], table[0, N0 + axis]

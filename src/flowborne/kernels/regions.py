@@ -163,7 +163,8 @@ def region_sums(x: Array, label: Labels, regions: int) -> Array:
                     parts[i, a] += x[i + d, j, k]
     total = np.zeros(regions)
     for i in range(planes):
-        total += parts[i]
+        for a in range(regions):
+            total[a] += parts[i, a]
     return total
 
 

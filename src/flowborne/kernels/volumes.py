@@ -88,14 +88,16 @@ def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> 
                 out[i, j] = 1.0
                 continue
             for k in range(out.shape[2]):
+                least = np.inf
                 for corner in range(8):
                     phi[corner] = distance[i + corner // 4, j + (corner // 2) % 2, k + corner % 2]
+                    least = min(least, phi[corner])
                 faces = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
                 if not flat:
                     faces += oz[i, j, k] + oz[i, j, k + 1]
                 if faces == 0.0:
                     out[i, j, k] = 0.0
-                elif phi.min() >= 0.0:
+                elif least >= 0.0:
                     out[i, j, k] = 1.0
                 elif flat:
                     out[i, j, k] = 1.0 - closed_fraction(phi[0], phi[4], phi[6], phi[2])
