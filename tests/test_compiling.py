@@ -3,7 +3,12 @@ from types import SimpleNamespace
 import numba
 
 from flowborne import compiling
-from flowborne.compiling import compile_solver, compile_solver_beside
+from flowborne.compiling import (
+    compile_iteration,
+    compile_solver,
+    compile_solver_beside,
+    solve_small_slab,
+)
 from flowborne.kernels import conjugate_gradients, jit
 from flowborne.kernels.compilation import compilation_watched
 
@@ -37,3 +42,11 @@ def test_another_process_compiles_the_solver_unless_it_is_there(tmp_path, monkey
     monkeypatch.setattr(jit, "cores", lambda: 1)
     compile_solver_beside.__wrapped__()
     assert len(started) == 1
+
+
+def test_the_iteration_is_compiled_for_the_types_that_a_solve_has():
+    """Else the first solve would compile it once more."""
+    compile_iteration()
+    compiled = list(conjugate_gradients.solve.serial.signatures)
+    solve_small_slab()
+    assert conjugate_gradients.solve.serial.signatures == compiled

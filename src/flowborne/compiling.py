@@ -1,8 +1,9 @@
 """Compiling the kernels of the pressure solver in a second process.
 
-A first run compiles for a minute on one core. The pressure solver is half of that and needs nothing
-of the rest, so another process compiles it for the cache on disc while this one begins with the
-grid and what flows there; when the solver's turn comes, it is loaded.
+A first run compiles for more than half a minute on two cores. The pressure solver is more than half
+of that and needs nothing of the rest, so another process compiles it for the cache on disc. It
+begins where a step comes last, with the iteration: meanwhile this process compiles what the step
+begins with, and finds in the cache what the other has done by then.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+
+SMALL = 8
+"""Cells along both axes of the slab that is solved for."""
 
 
 @cache
@@ -31,29 +35,45 @@ def compile_solver_beside() -> None:
 
 
 def compile_solver() -> None:
-    """Solve for the pressure around a light body in a small slab: all kernels of that are then in
-    the cache."""
+    """Have all kernels of the pressure solver in the cache: the iteration first."""
+    compile_iteration()
+    solve_small_slab()
+
+
+def compile_iteration() -> None:
+    """Solve for the pressure of nothing: the types of arrays are all that compiling needs."""
+    from flowborne.kernels.conjugate_gradients import solve
+    from flowborne.solvers.hierarchy import Buffers
+    from flowborne.solvers.pressure import NO_FIELDS, NO_TERM, NO_VECTORS
+
+    b, term = Buffers((1, SMALL, SMALL)), NO_TERM
+    rows = term.cells, term.row_start, term.columns, term.values
+    hierarchy, response = b.hierarchy(np.zeros(3, np.uint8)), term.mobility.arrays
+    matrix = hierarchy, b.cycle, b.finest, b.vectors, rows, response
+    solve(*matrix, b.label, NO_VECTORS, NO_FIELDS, NO_VECTORS, 0.0, 0.0)
+
+
+def solve_small_slab() -> None:
+    """Solve for the pressure around a light body in a small slab, which takes every kernel."""
     from flowborne.solvers.mobility import dense_mobility
     from flowborne.solvers.pressure import LowRankTerm, PressureSystem
 
-    count = 8
     weights = (
-        np.ones((count + 1, count, 1)),
-        np.ones((count, count + 1, 1)),
-        np.zeros((count, count, 2)),
+        np.ones((SMALL + 1, SMALL, 1)),
+        np.ones((SMALL, SMALL + 1, 1)),
+        np.zeros((SMALL, SMALL, 2)),
     )
     for axis in range(2):
         for end in (0, -1):
             np.moveaxis(weights[axis], axis, 0)[end] = 0.0
-    rows = np.array([27, 28])
     term = LowRankTerm(
-        rows,
+        np.array([27, 28]),
         np.array([0, 6, 12]),
         np.tile(np.arange(6), 2),
         np.append(np.ones(6), -np.ones(6)),
         dense_mobility(100.0 * np.eye(6)),
     )
-    rhs = np.zeros((count, count, 1))
+    rhs = np.zeros((SMALL, SMALL, 1))
     rhs[2, 2], rhs[5, 5] = 1.0, -1.0
     PressureSystem(weights).solve(rhs, term=term)
 

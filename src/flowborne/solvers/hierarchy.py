@@ -19,6 +19,7 @@ from flowborne.kernels.arrays import (
     Integers,
     Labels,
     Marks,
+    Periodic,
     Real,
 )
 from flowborne.kernels.levels import INTERPOLATION, at_level, coarsen, finest_weights, padded_size
@@ -77,6 +78,20 @@ class Buffers:
         self.label: Labels = np.zeros(padded, np.int32)
         self.parent: Labels = np.zeros(self.label.size + 1, np.int32)
         self.count: Labels = np.zeros(self.label.size + 1, np.int32)
+
+    def hierarchy(self, periodic: Periodic) -> Hierarchy:
+        """The arrays of all levels, on a grid with these periodic axes."""
+        return (
+            self.table,
+            periodic,
+            self.weights,
+            self.reaction,
+            self.inverse,
+            self.interpolation,
+            self.marks,
+            self.orphans,
+            self.aggregates,
+        )
 
 
 Kind = tuple[tuple[int, int, int], tuple[bool, bool, bool]]

@@ -130,17 +130,7 @@ class PressureSystem:
         self._deflation: tuple[LowRankTerm, Deflation] | None = None
         self.buffers = borrow((inner, wraps), self)
         b = self.buffers
-        self.hierarchy = (
-            b.table,
-            self.periodic,
-            b.weights,
-            b.reaction,
-            b.inverse,
-            b.interpolation,
-            b.marks,
-            b.orphans,
-            b.aggregates,
-        )
+        self.hierarchy = b.hierarchy(self.periodic)
         self.regions, self.scale = prepare(
             self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
         )
