@@ -14,7 +14,8 @@ from flowborne.coupling.flow import face_masses, fluid_momentum, volumes_of
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import jets_at
 from flowborne.operators import cut_by_bodies
-from flowborne.scenes.inflow import FactorSteady
+from flowborne.scenes.formula import Formula
+from flowborne.scenes.inflow import FactorFormula, FactorSteady
 from flowborne.solids.tissue import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.validation.worlds import mjcf
@@ -185,6 +186,43 @@ def test_dye_leaves_from_the_mouth(grid: Grid) -> None:
     assert np.vdot(state.cells, dye) == pytest.approx(RATE * world.time, rel=1e-12)
     assert np.abs(dye[x < 0.013]).max() < 1e-4
     assert (dye * y).sum() / dye.sum() == pytest.approx(0.007, abs=0.5 * grid.spacing)
+
+
+@pytest.mark.parametrize("grid", [slab(64), cube(24)], ids=["slab", "cube"])
+def test_a_mouth_that_drinks_takes_the_dye_that_is_there(grid: Grid) -> None:
+    """Where it is everywhere it stays so, within what the open sides let in."""
+    world = mouthed(grid, dye=True, rate=-RATE, half=0.12)
+    _, state = world.flow()
+    state.scalars["dye"][:] = 1.0
+    area = 0.24 if grid.is_slab else np.pi * 0.12**2
+    for _ in range(12):
+        report = advance(world, 0.5 * grid.spacing * area / RATE)
+        assert report.dye_error < 1e-13
+        outside = state.cells > 0.0
+        np.testing.assert_allclose(state.scalars["dye"][outside], 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("grid", [slab(64), cube(24)], ids=["slab", "cube"])
+def test_a_mouth_drinks_again_the_dye_that_it_blew(grid: Grid) -> None:
+    """None while clear water comes in, and never more than comes in."""
+    swing = FactorFormula(Formula("-sin(2*pi*t / period)", {"period": 0.5}))
+    world = mouthed(grid, dye=True, half=0.12)
+    world.setup = replace(world.setup, mouths=(replace(world.setup.mouths[0], strength=swing),))
+    _, state = world.flow()
+    dt = 0.5 / 24.0
+    amount = [0.0]
+    for _ in range(36):
+        report = advance(world, dt)
+        assert report.dye_error < 1e-13
+        dye = state.scalars["dye"]
+        assert 0.0 <= dye.min() <= dye.max() <= 1.0
+        amount.append(float(np.vdot(state.cells, dye)))
+    gained = np.diff(amount)
+    blown = RATE * dt * np.array([swing.at(n * dt) for n in range(36)])
+    assert np.abs(gained[:12]).max() == 0.0
+    np.testing.assert_allclose(gained[12:24], blown[12:24], atol=1e-12)
+    assert np.all(gained[25:36] >= blown[25:36])
+    assert gained[25:28].sum() < 0.2 * blown[25:28].sum() < 0.0
 
 
 def test_nothing_is_blown_out_of_the_far_side_of_a_thin_plate() -> None:

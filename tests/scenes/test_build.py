@@ -202,9 +202,18 @@ radius = 0.05
 volume_rate = -0.1
 times = [0.0, 1.0]
 factors = [0.0, 1.0]
+[[mouths]]
+body = "float"
+position = [-0.1, 0.0]
+direction = [-1.0, 0.0]
+radius = 0.05
+volume_rate = 0.2
+factor = "-sin(2*pi*min(t % period, 1))"
+[constants]
+period = 1.75
 """,
     )
-    pulsed, inhaling = made.world.setup.mouths
+    pulsed, inhaling, both = made.world.setup.mouths
     model = made.world.setup.solid
     assert model.body_names[pulsed.body] == "hand"
     assert (pulsed.position, pulsed.direction) == ((0.0, -0.2, 0.0), (0.0, -1.0, 0.0))
@@ -215,6 +224,8 @@ factors = [0.0, 1.0]
     assert_allclose(strength, [0.0, 0.0, half, 1.0, 0.0, 0.0, half, half], atol=1e-12)
     assert [inhaling.strength.at(time) for time in (-1.0, 0.5, 2.0)] == [0.0, 0.5, 1.0]
     assert inhaling.volume_rate == -0.1
+    strength = [both.strength.at(time) for time in (0.0, 0.25, 0.75, 1.5, 2.0)]
+    assert_allclose(strength, [0.0, -1.0, 1.0, 0.0, -1.0], atol=1e-12)
     assert made.world.setup.fluid is not None
     assert made.world.setup.fluid.scalars == ("ink",)
     pickle.loads(pickle.dumps(made.world.setup.mouths))

@@ -294,7 +294,20 @@ APPENDED_FAULT = {
     ),
     "a mouth with a pulse and keyframes": (
         MOUTH + "pulse = { period = 1, duration = 1 }\ntimes = [0.0, 1.0]\nfactors = [0.0, 1.0]",
-        "scene swim.toml, [[mouths]] 1 has both a pulse and keyframes. Keep one of them.",
+        "scene swim.toml, [[mouths]] 1 has keyframes and a pulse. Keep one of them.",
+    ),
+    "a mouth with a pulse and a formula": (
+        MOUTH + 'pulse = { period = 1, duration = 1 }\nfactor = "sin(t)"',
+        "scene swim.toml, [[mouths]] 1 has a pulse and a formula. Keep one of them.",
+    ),
+    "a mouth's formula with a name that is not known": (
+        MOUTH + 'factor = "sin(t / period)"\n[constants]\nperoid = 1.75',
+        "scene swim.toml, [[mouths]] 1, factor: formula 'sin(t / period)': name 'period' is not "
+        "known; did you mean 'peroid'?",
+    ),
+    "a constant that no mouth uses": (
+        MOUTH + 'factor = "sin(t / period)"\n[constants]\nperiod = 1.75\nperoid = 1.75',
+        "scene swim.toml, constants: no formula uses 'peroid'; did you mean 'period'?",
     ),
     "a pulse longer than its period": (
         MOUTH + "pulse = { period = 1.0, duration = 1.5 }",

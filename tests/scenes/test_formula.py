@@ -53,6 +53,11 @@ def test_slope_is_the_derivative_of_the_value(text: str, time: float) -> None:
         ("abs(1 - t)", 1.0, 0.0, 1.0),
         ("min(t, 1)", 1.0, 1.0, 0.0),
         ("max(t, 1)", 1.0, 1.0, 1.0),
+        ("t % 1.75", 4.0, 0.5, 1.0),
+        ("t % 1.75", 3.5, 0.0, 1.0),
+        ("-t % 1.75", 0.5, 1.25, -1.0),
+        ("7 % t", 2.0, 1.0, -3.0),
+        ("sin(2*pi*min(t % 1.75, 1))", 2.0, 1.0, 0.0),
     ],
 )
 def test_formula_at_known_times(text: str, time: float, value: float, slope: float) -> None:
@@ -61,7 +66,9 @@ def test_formula_at_known_times(text: str, time: float, value: float, slope: flo
     assert (found.value, found.slope) == pytest.approx((value, slope), abs=1e-14)
 
 
-@pytest.mark.parametrize("text", ["sqrt(t)", "1 / t", "log(t)", "t**-1", "exp(1000 - t)", "1e999"])
+@pytest.mark.parametrize(
+    "text", ["sqrt(t)", "1 / t", "1 % t", "log(t)", "t**-1", "exp(1000 - t)", "1e999"]
+)
 def test_a_formula_that_is_not_finite_says_when(text: str) -> None:
     with pytest.raises(ArithmeticError, match=r"derivative is not finite at t = 0 s$"):
         Formula(text).at(0.0)
@@ -78,7 +85,7 @@ def test_a_formula_that_is_not_finite_says_when(text: str) -> None:
         ("ramp(t, 1, 2)", "gives 'ramp' 3 arguments. Give it 1 or 2."),
         ("min(t)", "gives 'min' 1 arguments. Give it 2 or more."),
         ("sin(t, t)", "gives 'sin' 2 arguments. Give it 1."),
-        ("2pi", "cannot be read. A formula has numbers, t, pi, constants, + - * / ** and"),
+        ("2pi", "cannot be read. A formula has numbers, t, pi, constants, + - * / % ** and"),
         ("t^2", "cannot have 't ^ 2'. A formula has numbers"),
         ("t if t > 1 else 0", "cannot have 't if t > 1 else 0'."),
         ("t.real", "cannot have 't.real'."),

@@ -18,12 +18,9 @@ def check_formulas(draft: Draft) -> Iterator[str]:
         return
     used: set[str] = set()
     wrong = []
-    for index, table in enumerate(scene.motion):
-        if not isinstance(table, MotionFormulaTable):
-            continue
-        where = draft.at("motion", index, "position")
+    for where, text in _formulas(draft):
         try:
-            formula = Formula(table.position, scene.constants)
+            formula = Formula(text, scene.constants)
             used |= formula.names()
             for frame in range(scene.time.frames + 1):
                 formula.at(frame * scene.frame_time)
@@ -35,6 +32,16 @@ def check_formulas(draft: Draft) -> Iterator[str]:
     for name in scene.constants:
         if name in RESERVED or not name.isidentifier():
             yield f"{draft.at('constants')}: '{name}' cannot be a constant's name. Change it."
-        elif not (wrong or name in used) and draft.sound("motion"):
+        elif not (wrong or name in used) and draft.sound("motion", "mouths"):
             end = suggestion(name, used, "They use")
             yield f"{draft.at('constants')}: no formula uses '{name}'{end}"
+
+
+def _formulas(draft: Draft) -> Iterator[tuple[str, str]]:
+    """Where a formula is, for a message, and its text."""
+    for index, motion in enumerate(draft.scene.motion):
+        if isinstance(motion, MotionFormulaTable):
+            yield draft.at("motion", index, "position"), motion.position
+    for index, mouth in enumerate(draft.scene.mouths):
+        if mouth.factor is not None:
+            yield draft.at("mouths", index, "factor"), mouth.factor

@@ -35,6 +35,10 @@ class Dual:
         ratio = self.value / other.value
         return Dual(ratio, (self.slope - ratio * other.slope) / other.value)
 
+    def __mod__(self, other: Dual) -> Dual:
+        whole = math.floor(self.value / other.value)
+        return Dual(self.value % other.value, self.slope - whole * other.slope)
+
     def __pow__(self, other: Dual) -> Dual:
         base, exponent = self.value, other.value
         power = math.pow(base, exponent)

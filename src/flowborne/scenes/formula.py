@@ -23,6 +23,7 @@ OPERATORS: Mapping[type[ast.operator], Callable[[Dual, Dual], Dual]] = {
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
+    ast.Mod: operator.mod,
     ast.Pow: operator.pow,
 }
 SIGNS: Mapping[type[ast.unaryop], Callable[[Dual], Dual]] = {
@@ -51,7 +52,9 @@ LONGEST = 80
 """Letters of a formula in a message."""
 
 GRAMMAR = (
-    f"A formula has numbers, t, pi, constants, + - * / ** and the functions {', '.join(FUNCTIONS)}."
+    "A formula has numbers, t, pi, constants, + - * / % ** and the functions "
+    + ", ".join(FUNCTIONS)
+    + "."
 )
 
 

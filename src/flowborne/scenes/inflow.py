@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from flowborne.fluid.grid import Array
+from flowborne.scenes.formula import Formula
 from flowborne.scenes.tracks import Curve
 
 Span = tuple[int, float, float]
@@ -70,6 +71,17 @@ class FactorPulse:
         if time < self.start or since >= self.duration:
             return 0.0
         return math.sin(math.pi * since / self.duration)
+
+
+@dataclass(frozen=True)
+class FactorFormula:
+    """A formula in time."""
+
+    formula: Formula
+
+    def at(self, time: float) -> float:
+        """Its value. Raises ArithmeticError where it is not finite."""
+        return self.formula.at(time).value
 
 
 @dataclass(frozen=True)

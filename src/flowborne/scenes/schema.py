@@ -102,7 +102,7 @@ class Scene(Table):
     figure       the paper's figure or section that it shows, or the case that it is of
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
-    constants    name -> number, for the formulas of [[motion]]
+    constants    name -> number, for the formulas of [[motion]] and [[mouths]]
     plugins      Python files, found from the scene's folder, that register parts of one's own
     """
 

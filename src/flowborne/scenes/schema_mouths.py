@@ -1,4 +1,4 @@
-"""Tables of a scene that describe mouths: patches of skin through which fluid is expelled."""
+"""Tables of a scene that describe mouths: patches of skin that let fluid out, or in."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class PulseTable(Table):
 
 
 class MouthTable(Table):
-    """[[mouths]]: a patch of a body's skin through which fluid of the domain is expelled.
+    """[[mouths]]: a patch of a body's skin through which fluid is expelled, or taken in.
 
     body         the body
     position     centre of the patch in the body's frame, m
@@ -42,7 +42,8 @@ class MouthTable(Table):
     volume_rate  m^3/s (m^2/s in two dimensions); negative is taken in
     times        s, keyframes between which `factors` of the volume rate change smoothly
     pulse        instead of keyframes: a pulse with volume_rate at its height
-    dye          name -> value of a dye in what is expelled
+    factor       instead of both: a formula of the factor; negative turns the flow about
+    dye          name -> value of a dye in what is expelled; what is taken in has the fluid's own
     """
 
     body: Text
@@ -53,15 +54,22 @@ class MouthTable(Table):
     times: tuple[Number, ...] | None = None
     factors: tuple[Number, ...] | None = None
     pulse: PulseTable | None = None
+    factor: Text | None = None
     dye: dict[str, Number] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not any(self.direction):
             raise ValueError("has a direction of length 0. Point it out of the body")
-        if self.times is None and self.factors is None:
-            return self
-        if self.pulse is not None:
-            raise ValueError("has both a pulse and keyframes. Keep one of them")
-        check_table(self.times, self.factors, "times", "factors")
+        keyframed = self.times is not None or self.factors is not None
+        given = {
+            "keyframes": keyframed,
+            "a pulse": self.pulse is not None,
+            "a formula": self.factor is not None,
+        }
+        found = [what for what, there in given.items() if there]
+        if len(found) > 1:
+            raise ValueError(f"has {' and '.join(found)}. Keep one of them")
+        if keyframed:
+            check_table(self.times, self.factors, "times", "factors")
         return self
