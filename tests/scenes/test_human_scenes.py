@@ -14,8 +14,8 @@ from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 from flowborne.validation.blocked_arms import posture
 
-FRAMES, LATE = 50, 25
-"""Run, and of them the last, over which means are taken."""
+FRAMES, LATE = 80, 55
+"""Run, and of them the last, over which means are taken: two strides."""
 
 ARMS = [f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm", "hand")]
 
