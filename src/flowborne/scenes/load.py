@@ -46,6 +46,7 @@ BUILT_IN = (
     "swimmer",
     "swimmer-jet-only",
     "swimmer-no-control",
+    "swimmer-stroke",
     "swimmer-held",
     "eel",
     "eel-room",
