@@ -17,7 +17,9 @@ BELOW = {
     "kernels": set(),
     "solvers": {"kernels"},
     "fluid": {"kernels", "solvers"},
-    "coupling": {"kernels", "solvers", "fluid", "solids"},
+    "shapes": {"kernels"},
+    "solids": {"kernels", "shapes"},
+    "coupling": {"kernels", "solvers", "fluid", "shapes", "solids"},
 }
 """Rooms that each of these may import from, besides itself; single modules are free."""
 

@@ -19,7 +19,7 @@ from flowborne.kernels.distance import (
     signed_distance,
     signed_distance_reference,
 )
-from flowborne.kernels.mesh_distance import sample_mesh, sample_mesh_reference
+from flowborne.kernels.mesh_distance import distances_to_mesh, distances_to_mesh_reference
 from flowborne.kernels.node_distance import (
     BAND,
     merge,
@@ -81,11 +81,12 @@ def test_closest_on_triangle() -> None:
     assert len(places) == 7  # each corner, each edge, and the inside
 
 
-def test_sample_mesh() -> None:
-    given = CUBE + np.array([0.1, 0.05, -0.2]), FACES, np.full(3, -1.9), 0.55, np.full(3, 7.0)
-    expected = sample_mesh_reference(*given)
+def test_distances_to_mesh() -> None:
+    points = np.random.default_rng(6).uniform(-1.9, 1.9, (300, 3))
+    given = points, CUBE + np.array([0.1, 0.05, -0.2]), FACES
+    expected = distances_to_mesh_reference(*given)
     assert 0 < (expected < 0.0).sum() < expected.size
-    np.testing.assert_allclose(sample_mesh(*given), expected, atol=1e-9)
+    np.testing.assert_allclose(distances_to_mesh(*given), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("shape", [(14, 12, 13), (20, 15, 1)])

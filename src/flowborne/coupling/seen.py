@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from flowborne.coupling.shapes import ENDLESS, WATERTIGHT, shapes
+import numpy as np
+
+from flowborne.coupling.shapes import WATERTIGHT, own_shape, seen_shape
 from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.distance import CAPSULE, CYLINDER, MESH, SPHERE
 from flowborne.solids.model import SolidModel
-from flowborne.solids.thickness import thinnest
 
 FEW = 3.0
 """Cells across a body below which the flow around it is a guess."""
@@ -62,18 +62,9 @@ def seen_bodies(setup: Setup) -> list[Seen]:
 
 def _bones(model: SolidModel, grid: Grid) -> Iterator[Seen]:
     """Every geometry that flesh does not cover."""
-    shape = shapes(model, grid)
-    across = {SPHERE: [0], CAPSULE: [0], CYLINDER: [0, 1]}
-    for kind, size, body, geom in zip(
-        shape.kind, shape.size, shape.body, shape.source, strict=True
-    ):
-        name = model.body_names[body]
-        if kind == MESH:
-            own = thinnest(*model.mesh_of(geom), grid.is_slab)
-            yield _seen(name, own, own, grid)
-            continue
-        ways = [a for a in across.get(int(kind), [0, 1, 2]) if size[a] < ENDLESS]
-        yield _seen(name, 2.0 * min(model.geom_size[geom][ways]), 2.0 * min(size[ways]), grid)
+    for geom in map(int, np.flatnonzero(~model.geom_covered)):
+        own, seen = own_shape(model, geom, grid), seen_shape(model, geom, grid)
+        yield _seen(model.body_names[model.geom_body[geom]], own.thickness, seen.thickness, grid)
 
 
 def _flesh(setup: Setup, grid: Grid) -> Iterator[Seen]:

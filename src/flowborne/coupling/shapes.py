@@ -8,12 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
-from flowborne.kernels.distance import BOX, CAPSULE, CYLINDER, ELLIPSOID, MESH, SPHERE
-from flowborne.kernels.mesh_distance import sample_mesh
+from flowborne.shapes.mesh import ShapeMesh
+from flowborne.shapes.shape import Shape
 from flowborne.solids.model import SolidModel
-
-ENDLESS = 1e30
-"""Half extent along z of a geometry's cross-section in a slab, in m."""
 
 WATERTIGHT = {True: np.sqrt(2.0) / 2.0 * 1.01, False: np.sqrt(3.0) / 2.0 * 1.01}
 """Half thickness, in cells, from which a sheet blocks every face it passes (slab or not).
@@ -56,49 +53,27 @@ MESH_SAMPLES = 40
 
 def shapes(model: SolidModel, grid: Grid) -> Shapes:
     """Geometries of `model` as `grid` sees them: thickened to be watertight, endless in a slab."""
-    thinnest = WATERTIGHT[grid.is_slab] * grid.spacing
     order = np.argsort(model.geom_body, kind="stable")
-    kinds = {"sphere": 0, "capsule": 1, "cylinder": 2, "box": 3, "ellipsoid": 4, "mesh": 5}
-    chosen = [int(g) for g in order if model.geom_type[g] in kinds and not model.geom_covered[g]]
+    chosen = [int(g) for g in order if not model.geom_covered[g]]
     count = len(chosen)
-    kind = np.zeros(count, np.int64)
-    size, reach = np.ones((count, 3)), np.ones((count, 3))
+    seen = [seen_shape(model, g, grid) for g in chosen]
     table, corner, pitch = np.zeros((count, 4), np.int64), np.zeros((count, 3)), np.ones(count)
     tables: list[Array] = []
     first = 0
-    rest = model.rest_geom_rotation()
-    for n, g in enumerate(chosen):
-        kind[n] = kinds[str(model.geom_type[g])]
-        size[n] = np.maximum(model.geom_size[g], thinnest)
-        if kind[n] == SPHERE:
-            reach[n] = size[n, 0]
-        elif kind[n] == CAPSULE:
-            size[n, 1] = model.geom_size[g, 1]
-            reach[n] = size[n, 0], size[n, 0], size[n, 0] + size[n, 1]
-        elif kind[n] == CYLINDER:
-            reach[n] = size[n, 0], size[n, 0], size[n, 1]
-        elif kind[n] == MESH:
-            vertices, faces = model.mesh_of(g)
-            low, high = vertices.min(axis=0), vertices.max(axis=0)
+    for n, shape in enumerate(seen):
+        if isinstance(shape, ShapeMesh):
+            low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
             pitch[n] = float((high - low).max()) / MESH_SAMPLES
             corner[n] = low - 3.0 * pitch[n]
-            counts = np.ceil((high - low) / pitch[n]) + 7.0
-            tables.append(sample_mesh(vertices, faces, corner[n], pitch[n], counts))
-            table[n] = first, *counts.astype(np.int64)
+            counts = np.ceil((high - low) / pitch[n]).astype(np.int64) + 7
+            lattice = np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3)
+            tables.append(shape.distance(corner[n] + pitch[n] * lattice))
+            table[n] = first, *counts
             first += tables[-1].size
-            reach[n] = np.maximum(np.abs(low), np.abs(high))
-        else:
-            reach[n] = size[n]
-        if grid.is_slab:
-            upright = int(np.argmax(np.abs(rest[g][2])))
-            if kind[n] in (BOX, ELLIPSOID):
-                size[n, upright] = ENDLESS
-            elif kind[n] == CYLINDER and upright == 2:
-                size[n, 1] = ENDLESS
     return Shapes(
-        kind,
-        size,
-        reach,
+        np.array([shape.code for shape in seen], np.int64),
+        np.array([shape.size for shape in seen]).reshape(-1, 3),
+        np.array([shape.reach for shape in seen]).reshape(-1, 3),
         np.asarray(model.geom_body)[chosen].astype(np.int64),
         np.array(chosen, np.int64),
         np.concatenate(tables) if tables else np.zeros(1),
@@ -106,3 +81,14 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
         corner,
         pitch,
     )
+
+
+def own_shape(model: SolidModel, geom: int, grid: Grid) -> Shape:
+    """A geometry of `model`; in a slab what is of it in the plane, endless along z."""
+    shape = model.geom_shape[geom]
+    return shape.endless(*model.rest_pose(geom)) if grid.is_slab else shape
+
+
+def seen_shape(model: SolidModel, geom: int, grid: Grid) -> Shape:
+    """The same as the fluid sees it: thick enough to be watertight."""
+    return own_shape(model, geom, grid).thickened(WATERTIGHT[grid.is_slab] * grid.spacing)

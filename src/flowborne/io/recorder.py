@@ -11,6 +11,7 @@ from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.io.atomic import write_atomically, write_json
 from flowborne.io.run_folder import RunFolder
+from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
@@ -170,17 +171,16 @@ def write_model(
 def _geoms(solid: SolidModel) -> list[dict[str, Any]]:
     """The geometries in the order of geom_position."""
     listed = []
-    for geom, kind in enumerate(solid.geom_type):
+    for geom, shape in enumerate(solid.geom_shape):
         entry: dict[str, Any] = {
-            "type": kind,
+            "type": shape.kind,
             "size": solid.geom_size[geom].tolist(),
             "body": int(solid.geom_body[geom]),
             "rgba": solid.geom_rgba[geom].tolist(),
             "covered": bool(solid.geom_covered[geom]),
         }
-        if kind == "mesh":
-            vertices, faces = solid.mesh_of(geom)
-            entry |= {"vertices": vertices.tolist(), "faces": faces.tolist()}
+        if isinstance(shape, ShapeMesh):
+            entry |= {"vertices": shape.vertices.tolist(), "faces": shape.faces.tolist()}
         listed.append(entry)
     return listed
 

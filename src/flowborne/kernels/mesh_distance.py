@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.triangles import (
     closest_on_triangle,
     closest_on_triangle_reference,
@@ -15,48 +14,37 @@ from flowborne.kernels.triangles import (
 
 
 @njit(nogil=True, cache=True)
-def sample_mesh(
-    vertices: Array, faces: NDArray[np.int64], corner: Array, pitch: float, counts: Array
-) -> Array:
-    """Signed distance to a closed mesh on a lattice; the sign is that of the winding number
-    (van Oosterom and Strackee 1983)."""
-    n1, n2, n3 = int(counts[0]), int(counts[1]), int(counts[2])
-    samples = np.empty(n1 * n2 * n3)
-    p = np.empty(3)
-    for i in range(n1):
-        for j in range(n2):
-            for k in range(n3):
-                p[0] = corner[0] + pitch * i
-                p[1] = corner[1] + pitch * j
-                p[2] = corner[2] + pitch * k
-                nearest, angle = 1e30, 0.0
-                for t in range(faces.shape[0]):
-                    a, b, c = vertices[faces[t, 0]], vertices[faces[t, 1]], vertices[faces[t, 2]]
-                    closest = closest_on_triangle(p, a, b, c)
-                    nearest = min(nearest, squared_distance(p, a, b, c, closest))
-                    u, v, w = a - p, b - p, c - p
-                    lu, lv, lw = np.sqrt(u.dot(u)), np.sqrt(v.dot(v)), np.sqrt(w.dot(w))
-                    triple = (
-                        u[0] * (v[1] * w[2] - v[2] * w[1])
-                        + u[1] * (v[2] * w[0] - v[0] * w[2])
-                        + u[2] * (v[0] * w[1] - v[1] * w[0])
-                    )
-                    below = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv
-                    angle += 2.0 * np.arctan2(triple, below)
-                away = np.sqrt(nearest)
-                samples[(i * n2 + j) * n3 + k] = -away if angle > 2.0 * np.pi else away
-    return samples
+def distances_to_mesh(points: Array, vertices: Array, faces: Integers) -> Array:
+    """(n,) signed distances of points (n, 3) to a closed mesh, negative inside, m.
+
+    The sign is that of the winding number (van Oosterom and Strackee 1983).
+    """
+    distance = np.empty(len(points))
+    for n in range(len(points)):
+        p = points[n]
+        nearest, angle = 1e30, 0.0
+        for t in range(faces.shape[0]):
+            a, b, c = vertices[faces[t, 0]], vertices[faces[t, 1]], vertices[faces[t, 2]]
+            closest = closest_on_triangle(p, a, b, c)
+            nearest = min(nearest, squared_distance(p, a, b, c, closest))
+            u, v, w = a - p, b - p, c - p
+            lu, lv, lw = np.sqrt(u.dot(u)), np.sqrt(v.dot(v)), np.sqrt(w.dot(w))
+            triple = (
+                u[0] * (v[1] * w[2] - v[2] * w[1])
+                + u[1] * (v[2] * w[0] - v[0] * w[2])
+                + u[2] * (v[0] * w[1] - v[1] * w[0])
+            )
+            below = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv
+            angle += 2.0 * np.arctan2(triple, below)
+        away = np.sqrt(nearest)
+        distance[n] = -away if angle > 2.0 * np.pi else away
+    return distance
 
 
-def sample_mesh_reference(
-    vertices: Array, faces: NDArray[np.int64], corner: Array, pitch: float, counts: Array
-) -> Array:
-    """`sample_mesh` in NumPy."""
-    shape = tuple(int(n) for n in counts)
-    lattice = corner + pitch * np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 3)
-    samples = np.empty(len(lattice))
-    for n, p in enumerate(lattice):
-        corners = vertices[faces]
+def distances_to_mesh_reference(points: Array, vertices: Array, faces: Integers) -> Array:
+    """`distances_to_mesh` in NumPy."""
+    corners, distance = vertices[faces], np.empty(len(points))
+    for n, p in enumerate(points):
         closest = [closest_on_triangle_reference(p, one) @ one for one in corners]
         away = np.linalg.norm(np.array(closest) - p, axis=1).min()
         u, v, w = np.moveaxis(corners - p, 1, 0)
@@ -65,5 +53,5 @@ def sample_mesh_reference(
         below = lu * lv * lw
         for one, other, length in ((u, v, lw), (v, w, lu), (w, u, lv)):
             below += np.einsum("td,td->t", one, other) * length
-        samples[n] = -away if np.arctan2(triple, below).sum() > np.pi else away
-    return samples
+        distance[n] = -away if np.arctan2(triple, below).sum() > np.pi else away
+    return distance

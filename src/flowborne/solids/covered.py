@@ -7,30 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.slab import Mesh
-
 Array = NDArray[np.float64]
-
-AROUND = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)], np.float64) - 1.0
-"""The 26 directions to the neighbours of a cell."""
-
-
-def outline_points(kind: str, size: Array, mesh: Mesh | None) -> Array:
-    """(n, 3) points all over the surface of a geometry, in its frame, m."""
-    if mesh is not None:
-        return mesh[0]
-    toward = AROUND / np.linalg.norm(AROUND, axis=1, keepdims=True)
-    if kind == "sphere":
-        return size[0] * toward
-    if kind == "ellipsoid":
-        return toward * size
-    if kind == "capsule":
-        return size[0] * toward + np.sign(AROUND) * [0.0, 0.0, size[1]]
-    if kind == "cylinder":
-        across = np.linalg.norm(AROUND[:, :2], axis=1, keepdims=True)
-        ring = AROUND[:, :2] / np.maximum(across, 1.0)
-        return np.concatenate([size[0] * ring, size[1] * AROUND[:, 2:]], axis=1)
-    return AROUND * size
 
 
 def winding(points: Array, vertices: Array, triangles: NDArray[np.int64]) -> Array:

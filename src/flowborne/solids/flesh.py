@@ -13,10 +13,10 @@ from scipy.sparse import block_diag, coo_array, csr_array, diags_array, eye_arra
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
+from flowborne.shapes.thickness import thinnest
 from flowborne.solids.cage import node_weights
 from flowborne.solids.mjcf import element_name, rest_poses
 from flowborne.solids.scratch import Compiled, Scratch, scratch
-from flowborne.solids.thickness import thinnest
 from flowborne.solids.tissue import right_handed, volumes
 from flowborne.solids.twists import cross, twists_about_origin
 

@@ -10,7 +10,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.slab import Mesh, Section, section
+from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.section import Section
+from flowborne.shapes.shape import Mesh, Shape
 
 Array = NDArray[np.float64]
 
@@ -195,6 +197,11 @@ def mesh_of(mj: mujoco.MjModel, geom: int) -> Mesh | None:
     return vertices.astype(np.float64), faces.astype(np.int64)
 
 
+def geom_shape(mj: mujoco.MjModel, geom: int) -> Shape:
+    """A geometry that displaces fluid, in its own frame."""
+    return shape_of(kind_of(mj, geom), mj.geom_size[geom], mesh_of(mj, geom))
+
+
 def is_closed(mesh: Mesh) -> bool:
     """Whether every edge is used once in each direction and the enclosed volume is positive."""
     vertices, faces = mesh
@@ -220,14 +227,14 @@ def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:
 
 def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> Section:
     """Cross-section of a geometry at its rest pose; ValueError that names it when there is none."""
-    kind, mesh = kind_of(mj, geom), mesh_of(mj, geom)
+    shape = geom_shape(mj, geom)
     try:
-        return section(kind, mj.geom_size[geom], rotation, float(position[2]), mesh)
+        return shape.section(rotation, float(position[2]))
     except ValueError as error:
         name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
         raise ValueError(
-            f"geom '{name}' ({kind}) {error}. In a slab every geom crosses z = 0 with a local axis "
-            "along z: turn or move it."
+            f"geom '{name}' ({shape.kind}) {error}. In a slab every geom crosses z = 0 "
+            "with a local axis along z: turn or move it."
         ) from error
 
 

@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.shapes.section import Section
 from flowborne.solids import displaced, mjcf
-from flowborne.solids.covered import covered, outline_points
+from flowborne.solids.covered import covered
 from flowborne.solids.flesh import flesh_of, points_of_flesh
-from flowborne.solids.slab import Mesh, Section
 from flowborne.solids.state import SolidState
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ class SolidModel:
                    for bones in flesh
     centroid       (nbody, 3) centroid of that volume in the body's frame, m
     geom_id        (ngeom,) MuJoCo's number
-    geom_type      (ngeom,) "sphere", "capsule", "cylinder", "box", "ellipsoid" or "mesh"
+    geom_shape     (ngeom,) each in its own frame
     geom_size      (ngeom, 3) MuJoCo's half sizes, m
     geom_body      (ngeom,) body
     geom_offset    (ngeom, 3) centre in the body's frame, m
@@ -203,16 +203,11 @@ class SolidModel:
         """Number of a body. Raises ValueError for an unknown name."""
         return _index(self.body_names, name, "body")
 
-    def mesh_of(self, geom: int) -> Mesh:
-        """Vertices (k, 3) in the geometry's frame and faces (m, 3) of a mesh geometry."""
-        mesh = mjcf.mesh_of(self.mj, int(self.geom_id[geom]))
-        if mesh is None:
-            raise ValueError(f"geom '{self.geom_names[geom]}' is no mesh.")
-        return mesh
-
-    def rest_geom_rotation(self) -> Array:
-        """(ngeom, 3, 3) geometries' frames to the world's at rest."""
-        return np.asarray(mjcf.rest_poses(self.mj)[3][self.geom_id])
+    def rest_pose(self, geom: int) -> tuple[Array, float]:
+        """A geometry at rest: (3, 3) its frame to the world's, and the height of its centre, m."""
+        _, _, position, rotation = mjcf.rest_poses(self.mj)
+        g = int(self.geom_id[geom])
+        return rotation[g], float(position[g, 2])
 
     def section_of(self, geom: int) -> Section:
         """Cross-section of a slab's geometry, in the geometry's frame."""
@@ -255,7 +250,7 @@ class SolidModel:
         self.ngeom = len(chosen)
         names = _names(mj, mujoco.mjtObj.mjOBJ_GEOM, mj.ngeom)
         self.geom_names = tuple(names[g] for g in chosen)
-        self.geom_type = tuple(mjcf.kind_of(mj, g) for g in chosen)
+        self.geom_shape = tuple(mjcf.geom_shape(mj, g) for g in chosen)
         self.geom_size: Array = np.array(mj.geom_size[self.geom_id])
         self.geom_body: NDArray[np.int64] = mj.geom_bodyid[self.geom_id].astype(np.int64)
         self.geom_offset: Array = np.array(mj.geom_pos[self.geom_id])
@@ -264,11 +259,11 @@ class SolidModel:
         self.geom_covered: NDArray[np.bool_] = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
             _, _, position, rotation = mjcf.rest_poses(mj)
-            outlines = []
-            for geom, g in enumerate(self.geom_id):
-                points = outline_points(self.geom_type[geom], mj.geom_size[g], mjcf.mesh_of(mj, g))
-                outlines.append(position[g] + points @ rotation[g].T)
-            self.geom_covered = covered(outlines, self.flesh.rest, self.flesh.surface)
+            places = [
+                position[g] + shape.landmarks() @ rotation[g].T
+                for shape, g in zip(self.geom_shape, self.geom_id, strict=True)
+            ]
+            self.geom_covered = covered(places, self.flesh.rest, self.flesh.surface)
 
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
@@ -285,18 +280,17 @@ class SolidModel:
 
     def _solid(self, geom: int, position: Array, rotation: Array) -> displaced.Solid:
         """The geometry at rest, in the world's frame; a slab's geometry is checked on the way."""
-        g, kind, size = int(self.geom_id[geom]), self.geom_type[geom], self.geom_size[geom]
-        mesh = mjcf.mesh_of(self.mj, g)
+        g, shape = int(self.geom_id[geom]), self.geom_shape[geom]
         if self.slab:
             cut = mjcf.slab_section(self.mj, g, position, rotation)
             volume, centre = cut.area, cut.centroid
         else:
-            volume, centre = displaced.volume(kind, size, mesh), displaced.centroid(mesh)
+            volume, centre = shape.volume, shape.centroid
         middle = position + rotation @ self.mj.geom_aabb[g, :3]
         half = np.abs(rotation) @ self.mj.geom_aabb[g, 3:]
         centroid = position + rotation @ centre
         return displaced.Solid(
-            kind, size, position, rotation, middle - half, middle + half, mesh, volume, centroid
+            shape, position, rotation, middle - half, middle + half, volume, centroid
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.slab import Section, section
+from flowborne.shapes.section import Section
 from flowborne.view.run import Run, State
 
 Array = NDArray[np.float64]
@@ -21,12 +21,8 @@ class Outlines:
         state = run.state(0)
         self._corners = [
             _loop(
-                section(
-                    geom.kind,
-                    geom.size,
-                    state["geom_rotation"][n].astype(float),
-                    float(state["geom_position"][n, 2]),
-                    geom.mesh,
+                geom.shape.section(
+                    state["geom_rotation"][n].astype(float), float(state["geom_position"][n, 2])
                 )
             )
             for n, geom in enumerate(run.geoms)

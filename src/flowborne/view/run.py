@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from flowborne.fluid.grid import Grid
 from flowborne.io.history import history_columns, history_rows
 from flowborne.io.run_folder import STATE_NAME, RunFolder
+from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.shape import Shape
 
 Array = NDArray[np.float64]
 State = dict[str, NDArray[Any]]
@@ -25,18 +27,17 @@ PLOTTED = ("objective", "tried_objective", "angle_", "position_")
 
 @dataclass(frozen=True)
 class Geom:
-    """One drawn geometry of a body; sizes as MuJoCo has them.
+    """One drawn geometry of a body.
 
+    shape    in its own frame
+    body     number of the body
     rgba     colour that the model gives it
-    mesh     vertices (k, 3) in the geometry's frame and faces (m, 3), or None
     covered  whether flesh is all around it
     """
 
-    kind: str
-    size: Array
+    shape: Shape
     body: int
     rgba: Array
-    mesh: tuple[Array, NDArray[np.int64]] | None
     covered: bool = False
 
 
@@ -171,7 +172,8 @@ def _geom(entry: dict[str, Any]) -> Geom:
         mesh = (np.asarray(entry["vertices"], float), np.asarray(entry["faces"], np.int64))
     size, rgba = np.asarray(entry["size"], float), np.asarray(entry["rgba"], float)
     covered = bool(entry.get("covered", False))
-    return Geom(entry["type"], size, int(entry["body"]), rgba, mesh, covered)
+    shape = shape_of(entry["type"], size, mesh)
+    return Geom(shape, int(entry["body"]), rgba, covered)
 
 
 def _flesh(entry: dict[str, Any] | None) -> Flesh | None:

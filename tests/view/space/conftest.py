@@ -10,6 +10,7 @@ import pytest
 
 import flowborne
 from flowborne.fluid.grid import Grid
+from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom, Run
 
 MODEL = """
@@ -124,7 +125,7 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
             "slab": False,
             "gravity": np.zeros(3),
             "geoms": tuple(
-                Geom(kind, np.array(size), n + 1, plain, None)
+                Geom(shape_of(kind, np.array(size), None), n + 1, plain)
                 for n, (kind, size) in enumerate(geoms)
             ),
             "frames_per_second": 24.0,

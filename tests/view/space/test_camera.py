@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.grid import Grid
+from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom, Run
 from flowborne.view.space.camera import (
     FILLED,
@@ -116,6 +117,6 @@ def test_the_maps_axes_are_a_frame_and_x_leads_to_the_right_and_nearer() -> None
 def test_outermost_places_reach_as_far_as_the_geometry(
     kind: str, size: tuple[float, ...], reach: tuple[float, ...]
 ) -> None:
-    places = outermost(Geom(kind, np.array(size), 1, np.ones(4), None))
+    places = outermost(Geom(shape_of(kind, np.array(size), None), 1, np.ones(4)))
     np.testing.assert_allclose(places.max(axis=0), reach)
     np.testing.assert_allclose(places.min(axis=0), -np.array(reach))

@@ -21,6 +21,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.io.history import History
 from flowborne.io.recorder import Recorder, write_model
 from flowborne.io.run_folder import RunFolder
+from flowborne.shapes.box import ShapeBox
 from flowborne.solids.flesh import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import Tissue, add_flesh
@@ -274,7 +275,7 @@ def test_the_way_out_ends_where_the_line_first_leaves_the_skin() -> None:
 
 def test_a_part_of_a_body_outside_flesh_still_counts() -> None:
     places, triangles = ball(0.2)
-    box = Geom("box", np.array([0.5, 0.1, 0.1]), 1, np.ones(4), None)
+    box = Geom(ShapeBox(np.array([0.5, 0.1, 0.1])), 1, np.ones(4))
     skin = Skin([box], [mesh_of(box)], Flesh(triangles, (1,)))
     state = {
         "geom_position": np.zeros((1, 3)),

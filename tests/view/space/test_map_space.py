@@ -86,7 +86,7 @@ def test_a_body_has_the_models_colour_where_it_gives_one(things: Path) -> None:
     with closing(Picture(Run.read(things))) as picture:
         pixels = drawn(picture, 2)
         state = picture.run.state(2)
-        kinds = [geom.kind for geom in picture.run.geoms]
+        kinds = [geom.shape.kind for geom in picture.run.geoms]
         blue = of_hue(pixels, "#3399e6")
         assert blue[pixel_of(picture, 2, state["geom_position"][kinds.index("sphere")])]
         amber = of_hue(pixels, style.ACCENT)

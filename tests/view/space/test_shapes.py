@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom
 from flowborne.view.space.camera import outermost
 from flowborne.view.space.shapes import mesh_of
@@ -29,7 +30,7 @@ TETRAHEDRON = (
 )
 def test_a_mesh_is_the_geometry(kind: str, volume: float) -> None:
     mesh = TETRAHEDRON if kind == "mesh" else None
-    geom = Geom(kind, np.array([A, B, C]), 1, np.ones(4), mesh)
+    geom = Geom(shape_of(kind, np.array([A, B, C]), mesh), 1, np.ones(4))
     drawn = mesh_of(geom)
     assert drawn.volume == pytest.approx(volume, rel=0.02)
     points, reach = np.asarray(drawn.points), outermost(geom)

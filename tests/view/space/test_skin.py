@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom
 from flowborne.view.space.shapes import mesh_of
 from flowborne.view.space.skin import Skin
@@ -16,7 +17,7 @@ PLACE = np.array([3.0, 4.0, 5.0])
 
 
 def geom(kind: str, size: tuple[float, float, float], body: int = 1) -> Geom:
-    return Geom(kind, np.array(size), body, np.ones(4), None)
+    return Geom(shape_of(kind, np.array(size), None), body, np.ones(4))
 
 
 def skin_of(*geoms: Geom) -> Skin:

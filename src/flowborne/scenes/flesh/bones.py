@@ -10,26 +10,18 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from flowborne.kernels.distance import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, distances
 from flowborne.scenes.wording import suggestion
+from flowborne.shapes.mesh import ShapeMesh
+from flowborne.shapes.shape import Shape
 from flowborne.solids.mjcf import (
     compiled_quietly,
     displacing_geoms,
     element_name,
-    kind_of,
-    mesh_of,
+    geom_shape,
     rest_poses,
 )
 
 Array = NDArray[np.float64]
-
-KINDS = {
-    "sphere": SPHERE,
-    "capsule": CAPSULE,
-    "cylinder": CYLINDER,
-    "box": BOX,
-    "ellipsoid": ELLIPSOID,
-}
 
 
 @dataclass(frozen=True)
@@ -37,31 +29,29 @@ class Part:
     """One geometry of a bone.
 
     bone      number of the bone
-    kind      as MJCF spells it
-    size      (3,) MuJoCo's half sizes, m
+    shape     in its own frame
     position  (3,) centre, m
     rotation  (3, 3) geometry's frame to the world's
     low, high (3,) corners of a box around it in world axes, m
     thinnest  smallest half size, m
-    mesh      closed surface in the geometry's frame, for a mesh
+    surface   the surface of a mesh, to search by its cells; None for other kinds
     """
 
     bone: int
-    kind: str
-    size: Array
+    shape: Shape
     position: Array
     rotation: Array
     low: Array
     high: Array
     thinnest: float
-    mesh: pv.PolyData | None
+    surface: pv.PolyData | None
 
     def distance(self, points: Array) -> Array:
         """(n,) signed distances of points (n, 3), negative inside, m."""
         local = np.ascontiguousarray((points - self.position) @ self.rotation)
-        if self.mesh is None:
-            return distances(KINDS[self.kind], self.size, local)
-        cloud = pv.PolyData(local).compute_implicit_distance(self.mesh)
+        if self.surface is None:
+            return self.shape.distance(local)
+        cloud = pv.PolyData(local).compute_implicit_distance(self.surface)
         return np.asarray(cloud["implicit_distance"], dtype=np.float64)
 
 
@@ -128,17 +118,18 @@ def bones_of(spec: mujoco.MjSpec, names: Sequence[str]) -> Bones:
 
 
 def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: Array) -> Part:
-    kind, size, mesh = kind_of(mj, geom), np.array(mj.geom_size[geom]), mesh_of(mj, geom)
+    shape = geom_shape(mj, geom)
     middle, half = mj.geom_aabb[geom].reshape(2, 3)
     centre, reach = position + rotation @ middle, np.abs(rotation) @ half
     return Part(
         bone,
-        kind,
-        size,
+        shape,
         position,
         rotation,
         centre - reach,
         centre + reach,
         float(half.min()),
-        None if mesh is None else pv.PolyData.from_regular_faces(*mesh),
+        pv.PolyData.from_regular_faces(*shape.triangles())
+        if isinstance(shape, ShapeMesh)
+        else None,
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 
 from flowborne.scenes.flesh.bones import Bones
-from flowborne.solids.slab import Mesh
+from flowborne.shapes.shape import Mesh
 
 MOST_SAMPLES = 2_000_000
 """Where a lattice would have more samples than this, it is coarser than asked for."""

@@ -16,7 +16,7 @@ from flowborne.scenes.flesh.bones import Bones, bones_of
 from flowborne.scenes.flesh.contour import contour
 from flowborne.scenes.flesh.mesher import tetrahedra_within
 from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
-from flowborne.solids.slab import Mesh
+from flowborne.shapes.shape import Mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.jit import numba_thread_count
 from flowborne.scenes.flesh import mesh_run
-from flowborne.solids.slab import Mesh
+from flowborne.shapes.shape import Mesh
 from flowborne.solids.tissue import right_handed
 
 Array = NDArray[np.float64]

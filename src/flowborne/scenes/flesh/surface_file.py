@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flowborne.scenes.flesh.bones import Bones
 from flowborne.scenes.flesh.contour import contour
-from flowborne.solids.slab import Mesh
+from flowborne.shapes.shape import Mesh
 
 Array = NDArray[np.float64]
 

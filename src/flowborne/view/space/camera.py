@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from flowborne.shapes.shape import DIRECTIONS
 from flowborne.view.run import Geom, Run
 
 Array = NDArray[np.float64]
@@ -51,9 +52,6 @@ TOWARD = np.array(
 RIGHT = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0.0])
 UP = np.cross(TOWARD, RIGHT)
 """Axes of the map in the world: towards the camera, to the right, and upwards."""
-
-_DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-_DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,28 +124,17 @@ def swept(run: Run, geoms: Sequence[int]) -> Array:
 def _swept_by_flesh(run: Run) -> Array:
     """(frames, k, 3) vertices that are in any frame the farthest in one of 26 directions, m."""
     vertices = run.every("flesh_vertices")
-    farthest = [np.argmax(places @ _DIRECTIONS.T, axis=0) for places in vertices]
+    farthest = [np.argmax(places @ DIRECTIONS.T, axis=0) for places in vertices]
     return vertices[:, np.unique(farthest)]
 
 
 def outermost(geom: Geom) -> Array:
-    """(k, 3) places on a geometry's surface that lie farthest out, in its own frame.
-
-    The corners of a box, and of the others what is farthest in 26 directions.
-    """
-    a, b, c = geom.size
-    if geom.mesh is not None:
-        vertices = geom.mesh[0]
-        return np.asarray(vertices[np.unique(np.argmax(vertices @ _DIRECTIONS.T, axis=0))])
-    if geom.kind == "box":
-        return np.array(list(product((-a, a), (-b, b), (-c, c))))
-    if geom.kind == "ellipsoid":
-        return np.asarray(geom.size * _DIRECTIONS)
-    along = np.sign(_DIRECTIONS[:, 2:]) * [0.0, 0.0, b]
-    if geom.kind == "cylinder":
-        across = _DIRECTIONS[:, :2] / np.maximum(np.hypot(*_DIRECTIONS[:, :2].T), 1e-9)[:, None]
-        return np.asarray(along + a * np.column_stack([across, np.zeros(len(across))]))
-    return np.asarray(a * _DIRECTIONS + (along if geom.kind == "capsule" else 0.0))
+    """(k, 3) places on a geometry's surface, in its own frame: of many those that are the farthest
+    in one of 26 directions."""
+    places = geom.shape.landmarks()
+    if len(places) <= len(DIRECTIONS):
+        return places
+    return np.asarray(places[np.unique(np.argmax(places @ DIRECTIONS.T, axis=0))])
 
 
 def _followed(places: Array, calm: float) -> Array:

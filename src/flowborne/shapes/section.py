@@ -8,9 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Mesh = tuple[Array, NDArray[np.int64]]
-"""Vertices (k, 3) and faces (m, 3), outward by the right-hand rule."""
-
 ALIGNED = 1e-6
 """Largest sine of the angle by which a local axis may be off the z axis."""
 
@@ -98,40 +95,6 @@ def cross(a: Array, b: Array) -> Array:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def section(kind: str, size: Array, rotation: Array, height: float, mesh: Mesh | None) -> Section:
-    """Cross-section at z = 0 of a geometry whose centre is at z = `height`.
-
-    kind      "sphere", "capsule", "cylinder", "box", "ellipsoid" or "mesh"
-    size      (3,) MuJoCo's half sizes, m
-    rotation  (3, 3) geometry's frame to the world's
-    mesh      vertices in the geometry's frame and faces, for a mesh
-    raises    ValueError when no local axis is along z or the geometry misses the plane z = 0
-    """
-    x, y, z = rotation
-    foot = -height * z
-    none = np.zeros((0, 2, 2))
-    if kind == "mesh":
-        if mesh is None:
-            raise ValueError("mesh has no triangles")
-        return mesh_section(mesh, z, height, np.stack([x, y]), foot)
-    if kind == "sphere":
-        radius = chord(size[0], height)
-        return Section("ellipse", (radius, radius), foot, np.stack([x, y]), none)
-    if kind in ("capsule", "cylinder"):
-        return round_section(kind, size, z, height)
-    k = upright_axis(z)
-    first, second = (k + 1) % 3, (k + 2) % 3
-    sign = np.sign(z[k])
-    axes = np.stack([np.eye(3)[first], sign * np.eye(3)[second]])
-    half = np.array([size[first], size[second]])
-    if kind == "ellipsoid":
-        half = half * chord(size[k], height) / size[k]
-        return Section("ellipse", (float(half[0]), float(half[1])), foot, axes, none)
-    if abs(height) >= size[k]:
-        raise ValueError("misses the plane z = 0")
-    return Section("rectangle", (float(half[0]), float(half[1])), foot, axes, none)
-
-
 def chord(radius: float, height: float) -> float:
     """Radius of the circle that a plane at `height` cuts from a sphere."""
     if abs(height) >= radius:
@@ -145,49 +108,3 @@ def upright_axis(z: Array) -> int:
     if np.hypot(z[(k + 1) % 3], z[(k + 2) % 3]) > ALIGNED:
         raise ValueError("has no local axis along z")
     return k
-
-
-def round_section(kind: str, size: Array, z: Array, height: float) -> Section:
-    """Cross-section of a capsule or cylinder (local z is its axis): upright or lying."""
-    radius, half_length = float(size[0]), float(size[1])
-    foot, none = -height * z, np.zeros((0, 2, 2))
-    if np.hypot(z[0], z[1]) <= ALIGNED:
-        beyond = max(abs(height) - half_length, 0.0)
-        if kind == "cylinder" and beyond > 0.0:
-            raise ValueError("misses the plane z = 0")
-        cut = chord(radius, beyond)
-        axes = np.array([[1.0, 0.0, 0.0], [0.0, np.sign(z[2]), 0.0]])
-        return Section("ellipse", (cut, cut), foot, axes, none)
-    if abs(z[2]) > ALIGNED:
-        raise ValueError("has no local axis along z")
-    cut = chord(radius, height)
-    along = np.array([0.0, 0.0, 1.0])
-    axes = np.stack([along, np.cross(z, along)])
-    family = "stadium" if kind == "capsule" else "rectangle"
-    return Section(family, (half_length, cut), foot, axes, none)
-
-
-def mesh_section(mesh: Mesh, z: Array, height: float, axes: Array, foot: Array) -> Section:
-    """Cross-section of a closed mesh: one oriented segment for each triangle that is cut.
-
-    A vertex in the plane counts as just above it, so that the outline closes.
-    """
-    vertices, faces = mesh
-    level = vertices @ z + height
-    above = level[faces] >= 0.0
-    cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
-    if cut.size == 0:
-        raise ValueError("misses the plane z = 0")
-    plane = (vertices - foot) @ axes.T
-    segments = np.empty((cut.size, 2, 2))
-    for n, triangle in enumerate(faces[cut]):
-        for i in range(3):
-            a, b = triangle[i], triangle[(i + 1) % 3]
-            up = level[b] >= 0.0
-            if (level[a] >= 0.0) != up:
-                share = level[a] / (level[a] - level[b])
-                segments[n, 0 if up else 1] = plane[a] + share * (plane[b] - plane[a])
-    section = Section("segments", (0.0, 0.0), foot, axes, segments)
-    if section.area < 0.0:
-        segments = segments[:, ::-1]
-    return Section("segments", (0.0, 0.0), foot, axes, np.ascontiguousarray(segments))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from flowborne.shapes.thickness import thinnest
 from flowborne.solids.flesh import outer_surface
-from flowborne.solids.thickness import thinnest
 from flowborne.validation.flesh_bars import bar_mesh
 
 

@@ -1,0 +1,138 @@
+"""The contract of a geometry."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.kernels.distance import distances
+from flowborne.shapes.section import Section
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Mesh = tuple[Array, Integers]
+"""Vertices (k, 3) and faces (m, 3), outward by the right-hand rule."""
+
+ENDLESS = 1e30
+"""Half extent of a shape along an axis on which it has no ends, m."""
+
+FINENESS = 8
+"""A shape's longest side is divided into this many patches at least."""
+
+AROUND = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)], np.float64) - 1.0
+"""The 26 directions to the neighbours of a cell."""
+
+DIRECTIONS = AROUND / np.linalg.norm(AROUND, axis=1, keepdims=True)
+"""The same as unit vectors."""
+
+
+class Shape(ABC):
+    """A solid in its own frame, about its origin; lengths in m. Never changed after it is made.
+
+    kind  name, as MJCF spells it
+    code  number of the kind for `kernels.distance.signed_distance`
+    size  (3,) half sizes as MuJoCo has them, m
+    """
+
+    kind: ClassVar[str]
+    code: ClassVar[int]
+    size: Array
+
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """Volume, m^3."""
+
+    @property
+    @abstractmethod
+    def centroid(self) -> Array:
+        """(3,) centroid, m."""
+
+    @property
+    @abstractmethod
+    def reach(self) -> Array:
+        """(3,) half extents of a box about the origin around it, m; 0 where it is endless."""
+
+    @property
+    @abstractmethod
+    def thickness(self) -> float:
+        """Thickness of its thinnest part, m."""
+
+    @abstractmethod
+    def distance(self, points: Array) -> Array:
+        """(n,) signed distances of points (n, 3), negative inside, m."""
+
+    @abstractmethod
+    def section(self, rotation: Array, height: float) -> Section:
+        """Cross-section at z = 0 when the origin is at z = `height` m.
+
+        rotation  (3, 3) its frame to the world's
+        raises    ValueError when no local axis is along z, or it misses the plane z = 0
+        """
+
+    @abstractmethod
+    def crossings(self, origins: Array, direction: Array) -> tuple[Integers, Array, Array]:
+        """Where lines from origins (n, 3) along direction (3,) enter (+1) and leave (-1) it.
+
+        returns  (k,) numbers of the lines, (k,) places in directions from the origin, (k,) signs
+        """
+
+    @abstractmethod
+    def patches(self) -> tuple[Array, Array]:
+        """Flat patches of the surface: centres (n, 3) in m and outward area vectors (n, 3), m^2.
+
+        None is longer than an eighth of the shape.
+        """
+
+    @abstractmethod
+    def triangles(self) -> Mesh:
+        """The surface to draw, closed; what is round has 32 sides."""
+
+    @abstractmethod
+    def landmarks(self) -> Array:
+        """(k, 3) places all over the surface, the outermost among them, m."""
+
+    @abstractmethod
+    def thickened(self, half: float) -> Shape:
+        """The same, at least 2 `half` m thick everywhere; no longer and no wider."""
+
+    @abstractmethod
+    def endless(self, rotation: Array, height: float) -> Shape:
+        """What a slab holds of it, placed as for `section`: the same along the world's z."""
+
+
+class Primitive(Shape):
+    """A convex shape about its origin that its half sizes say all of.
+
+    size  (3,) half sizes as MuJoCo has them, m; those that the kind does not need say nothing
+    """
+
+    def __init__(self, size: Array) -> None:
+        self.size = np.array(size, np.float64)
+
+    @property
+    def centroid(self) -> Array:
+        return np.zeros(3)
+
+    def distance(self, points: Array) -> Array:
+        return distances(self.code, self.size, points)
+
+    def crossings(self, origins: Array, direction: Array) -> tuple[Integers, Array, Array]:
+        enter, leave = self.interval(origins, direction)
+        hit = np.flatnonzero(leave > enter)
+        one = np.ones(hit.size)
+        places, signs = (enter[hit], leave[hit]), (one, -one)
+        return np.tile(hit, 2), np.concatenate(places), np.concatenate(signs)
+
+    @abstractmethod
+    def interval(self, o: Array, d: Array) -> tuple[Array, Array]:
+        """Part (enter, leave) of each line o + t d inside it; leave <= enter where it misses."""
+
+    def thickened(self, half: float) -> Shape:
+        return type(self)(np.maximum(self.size, half))
+
+    def endless(self, rotation: Array, height: float) -> Shape:
+        return self
