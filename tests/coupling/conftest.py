@@ -14,14 +14,22 @@ from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
 
+from .meshes import meshed_mjcf
+
 Cut = Callable[..., Geometry]
 
 
 def cut_grid(
-    grid: Grid, *bodies: str, q: np.ndarray | None = None, boundaries: Boundaries | None = None
+    grid: Grid,
+    *bodies: str,
+    q: np.ndarray | None = None,
+    boundaries: Boundaries | None = None,
+    meshes: bool = False,
 ) -> Geometry:
-    """The grid cut by bodies (MJCF elements) in their rest pose, or at q."""
-    world = make_world(mjcf(*bodies), grid, boundaries=boundaries or Boundaries())
+    """The grid cut by bodies (MJCF elements) in their rest pose, or at q; `meshes` in place of
+    boxes."""
+    model = (meshed_mjcf if meshes else mjcf)(*bodies)
+    world = make_world(model, grid, boundaries=boundaries or Boundaries())
     if q is not None:
         world.solid.q[:] = q
     return cut_by_bodies(world)

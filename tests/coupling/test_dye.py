@@ -18,14 +18,25 @@ from flowborne.scenes.inflow import FactorSteady
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
 
+from .meshes import Model, meshed_mjcf
+
 CELLS = 32
 H = 1.0 / CELLS
 SQUARE = Grid.slab(CELLS, CELLS, H, (0.0, 0.0))
-PLATE = '<geom type="box" size="{thin} {long} 0.1"/>'
+ROOM = Grid((16, 16, 4), 1.0 / 16.0, (0.0, 0.0, -0.125))
+PLATE = '<geom type="box" size="{thin} {long} 0.2"/>'
+MODELS = pytest.mark.parametrize("model", [mjcf, meshed_mjcf], ids=["box", "mesh"])
 DISC = '<geom type="sphere" size="0.12"/>'
 
 
-def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = None) -> World:
+def moved(
+    geom: str,
+    shift: float,
+    turn: float,
+    boundaries: Boundaries | None = None,
+    model: Model = mjcf,
+    grid: Grid = SQUARE,
+) -> World:
     """A body that moves along x and turns, by sinusoids of 1 s and 0.77 s; dye wherever it is."""
     body = f"""<body pos="0.5 0.5 0"><joint type="slide" axis="1 0 0"/>
       <joint type="hinge" axis="0 0 1"/>{geom}</body>"""
@@ -34,13 +45,17 @@ def moved(geom: str, shift: float, turn: float, boundaries: Boundaries | None = 
         TrajectorySinusoid(np.array([1]), turn, 0.77),
     )
     return make_world(
-        mjcf(body), SQUARE, boundaries=boundaries or Boundaries(), motions=motions, scalars=("dye",)
+        model(body),
+        SQUARE,
+        boundaries=boundaries or Boundaries(),
+        motions=motions,
+        scalars=("dye",),
     )
 
 
 def ahead_of(world: World) -> Array:
     """(nx, ny, 1) distance of the cells' centres in front of the plate's mid-plane, m."""
-    x, y, _ = np.meshgrid(*SQUARE.cell_coordinates(), indexing="ij")
+    x, y, _ = np.meshgrid(*world.flow()[0].grid.cell_coordinates(), indexing="ij")
     place, angle = world.solid.q
     return np.cos(angle) * (x - 0.5 - place) + np.sin(angle) * (y - 0.5)
 
@@ -51,10 +66,12 @@ def outside(world: World) -> Array:
     return d[1:, 1:] + d[1:, :-1] + d[:-1, 1:] + d[:-1, :-1] > 0.0
 
 
-def piston() -> World:
+def piston(model: Model, solid: bool = False) -> World:
     """A piston of thickness h/4 that moves and turns between two open sides, dye on its right."""
     sides = Boundaries(x_min=BoundaryOpen(), x_max=BoundaryOpen())
-    world = moved(PLATE.format(thin=H / 8, long=0.8), 0.1, 0.35, sides)
+    grid = ROOM if solid else SQUARE
+    plate = PLATE.format(thin=grid.spacing / 8, long=0.8)
+    world = moved(plate, 0.1, 0.35, sides, model, grid)
     world.flow()[1].scalars["dye"][:] = ahead_of(world) > 0.0
     return world
 
@@ -69,9 +86,12 @@ TOO_FAST = pytest.mark.xfail(
     [(1000, 1 / 128), pytest.param(100, 1 / 32, marks=TOO_FAST)],
     ids=["0.6 cells a step", "2.4 cells a step"],
 )
-def test_dye_never_crosses_a_thin_plate_from_wall_to_wall(steps: int, dt: float) -> None:
+@MODELS
+def test_dye_never_crosses_a_thin_plate_from_wall_to_wall(
+    steps: int, dt: float, model: Model
+) -> None:
     """But for what is left of the leak-proof solve."""
-    world = piston()
+    world = piston(model)
     _, state = world.flow()
     for _ in range(steps):
         report = step(world, dt)
@@ -84,7 +104,11 @@ def test_dye_never_crosses_a_thin_plate_from_wall_to_wall(steps: int, dt: float)
     assert state.scalars["dye"][ahead_of(world) > 2.0 * H].mean() > 0.95
 
 
-def test_no_fluid_crosses_a_thin_plate_from_wall_to_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+@MODELS
+@pytest.mark.parametrize("solid", [False, True], ids=["slab", "room"])
+def test_no_fluid_crosses_a_thin_plate_from_wall_to_wall(
+    monkeypatch: pytest.MonkeyPatch, model: Model, solid: bool
+) -> None:
     """What is before it changes by what leaves through the side there."""
     kept = {}
 
@@ -93,13 +117,14 @@ def test_no_fluid_crosses_a_thin_plate_from_wall_to_wall(monkeypatch: pytest.Mon
         return kept["flux"], kept["cells"]
 
     monkeypatch.setattr(flow, "leak_proof_flux", remembered)
-    world, dt = piston(), 1 / 128
+    world, dt = piston(model, solid), 1 / 128
+    volume = world.flow()[0].grid.cell_volume
     step(world, dt)
     for _ in range(60):
         there = kept["cells"][ahead_of(world) > 0.0].sum()
         step(world, dt)
         left = there - kept["cells"][ahead_of(world) > 0.0].sum()
-        assert abs(left - dt * kept["flux"][0][-1].sum()) < 1e-8 * H * H, world.steps
+        assert abs(left - dt * kept["flux"][0][-1].sum()) < 1e-8 * volume, world.steps
 
 
 @pytest.mark.parametrize(

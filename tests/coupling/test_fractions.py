@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
@@ -203,9 +204,10 @@ def test_cells_deep_inside_a_body_have_no_row(cut: Cut) -> None:
     assert np.unique(found.cells).size == found.cells.size
 
 
+@pytest.mark.parametrize("meshes", [False, True], ids=["box", "mesh"])
 @pytest.mark.parametrize("thickness", [1.0, 0.25, 0.01])
 def test_a_thin_plate_closes_an_unbroken_line_of_faces_at_every_angle(
-    cut: Cut, thickness: float
+    cut: Cut, thickness: float, meshes: bool
 ) -> None:
     """Every face between cells on two sides of the plate's mid-plane is closed."""
     n, length = 32, 0.6
@@ -214,7 +216,7 @@ def test_a_thin_plate_closes_an_unbroken_line_of_faces_at_every_angle(
     x, y = np.meshgrid(*grid.cell_coordinates()[:2], indexing="ij")
     plate = f'<body><joint/><geom type="box" size="{length / 2} {thickness * h / 2} 1"/></body>'
     for angle in np.linspace(0.0, np.pi, 37):
-        opened = cut(grid, plate, q=np.array([angle])).open
+        opened = cut(grid, plate, q=np.array([angle]), meshes=meshes).open
         along = np.cos(angle) * x + np.sin(angle) * y
         across = np.cos(angle) * y - np.sin(angle) * x
         for axis in (0, 1):
@@ -224,3 +226,25 @@ def test_a_thin_plate_closes_an_unbroken_line_of_faces_at_every_angle(
             inner = np.delete(np.delete(opened[axis][:, :, 0], -1, axis), 0, axis)
             assert between.any() or abs(np.sin(2 * angle)) < 1e-9
             assert not inner[between].any(), f"at {np.degrees(angle):.0f} degrees"
+
+
+@pytest.mark.parametrize("meshes", [False, True], ids=["box", "mesh"])
+@pytest.mark.parametrize("thickness", [1.0, 0.1])
+def test_a_thin_plate_in_a_room_closes_an_unbroken_sheet_of_faces_however_it_is_turned(
+    cut: Cut, thickness: float, meshes: bool
+) -> None:
+    n, half = 20, 0.3
+    h = 1.0 / n
+    grid = Grid((n, n, n), h, (-0.5, -0.5, -0.5))
+    x = np.stack(np.meshgrid(*grid.cell_coordinates(), indexing="ij"), axis=-1)
+    for turn in Rotation.random(12, np.random.default_rng(3)):
+        a, b, c, w = turn.as_quat()
+        plate = f"""<body quat="{w} {a} {b} {c}"><joint/>
+          <geom type="box" size="{half} {half} {0.5 * thickness * h}"/></body>"""
+        opened, place = cut(grid, plate, meshes=meshes).open, x @ turn.as_matrix()
+        for axis in range(3):
+            low, high = np.delete(place, -1, axis), np.delete(place, 0, axis)
+            between = low[..., 2] * high[..., 2] < 0.0
+            between &= (np.abs(0.5 * (low + high)[..., :2]) < half - 0.75 * h).all(axis=-1)
+            inner = np.delete(np.delete(opened[axis], -1, axis), 0, axis)
+            assert not inner[between].any(), turn.as_euler("xyz", degrees=True).round()

@@ -16,6 +16,8 @@ from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world, set_velocity
 
+from .meshes import Model, meshed_mjcf
+
 STEPS = 1000
 CELLS = 32
 H = 1.0 / CELLS
@@ -151,11 +153,12 @@ def through_plate(world: World, half_length: float) -> tuple[float, float]:
     return found, silhouette
 
 
-def test_less_than_a_hundredth_leaks_through_a_thin_plate_in_a_stream() -> None:
+@pytest.mark.parametrize("model", [mjcf, meshed_mjcf], ids=["box", "mesh"])
+def test_less_than_a_hundredth_leaks_through_a_thin_plate_in_a_stream(model: Model) -> None:
     """Thickness h/4, moving and turning for 1000 steps."""
     half_length = 0.2
     world = make_world(
-        mjcf(plate(half_length)),
+        model(plate(half_length)),
         SQUARE,
         boundaries=CHANNEL,
         motions=(

@@ -55,7 +55,9 @@ def test_way_inward() -> None:
     random = np.random.default_rng(7)
     vertices = random.normal(size=(30, 3))
     triangles = np.array([random.choice(30, 3, replace=False) for _ in range(60)])
-    expected = way_inward_reference(vertices, triangles)
-    assert np.isinf(expected).any()
-    assert np.isfinite(expected).sum() > 20
-    np.testing.assert_allclose(way_inward(vertices, triangles), expected, rtol=1e-9)
+    for limit in (np.inf, 0.5):
+        expected = way_inward_reference(vertices, triangles, limit)
+        assert np.isinf(expected).any()
+        assert np.isfinite(expected).sum() > (20 if limit > 1.0 else 5)
+        found = way_inward(vertices, triangles, limit)
+        np.testing.assert_allclose(found, expected, rtol=1e-9)

@@ -11,7 +11,7 @@ import pyvista as pv
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.closed_fractions import add_closed, face_closed
-from flowborne.kernels.mesh_distance import sample_mesh
+from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import BESIDE, ON_SKIN, sample_skin, skin_box, skin_weights
 
@@ -73,7 +73,7 @@ def box_of(skin: Skin, grid: Grid) -> Integers:
 
 def sample(skin: Skin, grid: Grid, box: Integers) -> tuple[Array, Array]:
     """Distances, and whether the skin is within BAND cells."""
-    phi = sample_skin(*skin, box, np.array(grid.origin), grid.spacing, grid.is_slab)
+    phi = sample_skin(*skin, box, np.array(grid.origin), grid.spacing, grid.is_slab, BAND)
     return phi, np.abs(phi) < BAND * grid.spacing
 
 
@@ -99,8 +99,8 @@ def order_of(errors: list[float], edges: list[float]) -> float:
 def assert_as_all_pairs(skin: Skin, grid: Grid) -> None:
     """Against the closest of all triangles at every node, and the solid angle for the sign."""
     phi, nearest = sample(skin, grid, everywhere(grid))
-    counts = np.array(grid.shape) + 1.0
-    exact = sample_mesh(*skin, np.array(grid.origin), grid.spacing, counts).reshape(phi.shape)
+    places = nodes(grid, everywhere(grid)).reshape(-1, 3)
+    exact = distances_to_mesh(places, *skin).reshape(phi.shape)
     h = grid.spacing
     near = np.abs(exact) < BAND * h
     off = np.abs(exact) > 1e-7 * h

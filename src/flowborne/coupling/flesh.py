@@ -14,6 +14,7 @@ import numpy as np
 from flowborne.coupling.shapes import WATERTIGHT
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
+from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import sample_skin, skin_box, skin_weights
 from flowborne.solids.flesh import Flesh
 
@@ -54,7 +55,7 @@ def skins_on(grid: Grid, flesh: Flesh | None, vertices: Array) -> Skins:
             box[2] = 0, 2
         if np.any(box[:, 1] - box[:, 0] < 2):
             box[:] = 0
-        phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab)
+        phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab, BAND)
         boxes.append(box)
         starts.append(first)
         distances.append(phi.ravel() - max(0.0, 0.5 * (thinnest - flesh.thickness[f])))

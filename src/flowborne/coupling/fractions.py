@@ -17,12 +17,14 @@ from flowborne.kernels.closed_fractions import add_closed, count_beside, list_cl
 from flowborne.kernels.coupling_rows import flesh_rows, list_cells
 from flowborne.kernels.node_distance import (
     BAND,
+    NEAR,
     allow_for_curvature,
     merge,
     node_box,
     sample_body,
 )
 from flowborne.kernels.sides import CLOSED
+from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.volumes import open_parts
 
 ITS_FOLDS = 2
@@ -115,17 +117,49 @@ def around_bodies(
             box[2] = 0, 2
         if np.any(box[:, 1] - box[:, 0] < 2):
             box[:] = 0
-        phi = np.empty(box[:, 1] - box[:, 0])
-        sample_body(
-            phi, box, geoms, shapes.kind, shapes.size, position, rotation, shapes.tables,
-            shapes.table, shapes.corner, shapes.pitch, origin, h, grid.is_slab,
-        )  # fmt: skip
+        plain = np.array([g for g in geoms if g not in shapes.skins], np.int64)
+        phi = sampled(shapes, plain, box, position, rotation, grid)
+        for g in np.setdiff1d(geoms, plain):
+            own = skin_distance(shapes, g, box, position, rotation, grid)
+            np.minimum(phi, own, out=phi)
         yield int(body), box, phi
     for n, start in enumerate(skins.start):
         box = np.ascontiguousarray(skins.box[n])
         counts = box[:, 1] - box[:, 0]
         phi = skins.distance[start : start + counts.prod()].reshape(counts)
         yield first_skin + n, box, phi
+
+
+def sampled(
+    shapes: Shapes, geoms: Integers, box: Integers, position: Array, rotation: Array, grid: Grid
+) -> Array:
+    """(box shape) distance to the nearest of some geometries at the nodes of a box, m."""
+    phi = np.empty(box[:, 1] - box[:, 0])
+    sample_body(
+        phi, box, geoms, shapes.kind, shapes.size, position, rotation, shapes.tables,
+        shapes.table, shapes.corner, shapes.pitch, np.array(grid.origin), grid.spacing,
+        grid.is_slab,
+    )  # fmt: skip
+    return phi
+
+
+def skin_distance(
+    shapes: Shapes, geom: int, box: Integers, position: Array, rotation: Array, grid: Grid
+) -> Array:
+    """(box shape) distance to a geometry with a skin at the nodes of a box, m.
+
+    In a slab that to the triangles themselves; in a room the same within NEAR cells, and farther
+    away what its table has.
+    """
+    vertices, faces = shapes.skins[geom]
+    placed = position[geom] + vertices @ rotation[geom].T
+    band, h = BAND if grid.is_slab else NEAR, grid.spacing
+    near = sample_skin(placed, faces, box, np.array(grid.origin), h, grid.is_slab, band)
+    if grid.is_slab:
+        return near
+    far = np.abs(sampled(shapes, np.array([geom]), box, position, rotation, grid))
+    beyond = np.copysign(np.maximum(far, NEAR * h), near)
+    return np.where(np.abs(near) < NEAR * h, near, beyond)
 
 
 def geometry(

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
-from flowborne.shapes.mesh import ShapeMesh
-from flowborne.shapes.shape import Shape
+from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.model import SolidModel
 
 WATERTIGHT = {True: np.sqrt(2.0) / 2.0 * 1.01, False: np.sqrt(3.0) / 2.0 * 1.01}
@@ -30,10 +29,11 @@ class Shapes:
     reach   (ng, 3) half extents of the bounding box in the geometry's frame, m
     body    (ng,) body that the geometry belongs to, ascending
     source  (ng,) index of the geometry in the model
-    tables  samples of the distance to each mesh, flat, one after another
+    tables  samples of the distance to those without a formula, in a room; flat, one after another
     table   (ng, 4) first sample, then counts along x, y, z
     corner  (ng, 3) first sample's place in the geometry's frame, m
     pitch   (ng,) distance between samples, m
+    skins   geometry -> vertices and faces to which distances near by are exact
     """
 
     kind: NDArray[np.int64]
@@ -45,10 +45,7 @@ class Shapes:
     table: NDArray[np.int64]
     corner: Array
     pitch: Array
-
-
-MESH_SAMPLES = 40
-"""Samples of a mesh's distance table along its longest side."""
+    skins: dict[int, Mesh]
 
 
 def shapes(model: SolidModel, grid: Grid) -> Shapes:
@@ -61,15 +58,13 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
     tables: list[Array] = []
     first = 0
     for n, shape in enumerate(seen):
-        if isinstance(shape, ShapeMesh):
-            low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
-            pitch[n] = float((high - low).max()) / MESH_SAMPLES
-            corner[n] = low - 3.0 * pitch[n]
-            counts = np.ceil((high - low) / pitch[n]).astype(np.int64) + 7
-            lattice = np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3)
-            tables.append(shape.distance(corner[n] + pitch[n] * lattice))
-            table[n] = first, *counts
-            first += tables[-1].size
+        sampled = None if grid.is_slab else shape.samples(grid.spacing)
+        if sampled is not None:
+            corner[n], pitch[n], values = sampled
+            table[n] = first, *values.shape
+            tables.append(values.ravel())
+            first += values.size
+    skins = {n: shape.skin() for n, shape in enumerate(seen)}
     return Shapes(
         np.array([shape.code for shape in seen], np.int64),
         np.array([shape.size for shape in seen]).reshape(-1, 3),
@@ -80,6 +75,7 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
         table,
         corner,
         pitch,
+        {n: skin for n, skin in skins.items() if skin is not None},
     )
 
 

@@ -88,14 +88,16 @@ def lower_squares(
     a: Point,
     b: Point,
     c: Point,
+    band: float,
 ) -> None:
-    """Lower the squared distance to the skin, in cells, to that of one triangle around it."""
-    first_i = first_node(min(a[0], b[0], c[0]) - BAND, counts[0])
-    last_i = first_node(max(a[0], b[0], c[0]) + BAND, counts[0])
-    first_j = first_node(min(a[1], b[1], c[1]) - BAND, counts[1])
-    last_j = first_node(max(a[1], b[1], c[1]) + BAND, counts[1])
-    first_k = first_node(min(a[2], b[2], c[2]) - BAND, counts[2])
-    last_k = first_node(max(a[2], b[2], c[2]) + BAND, counts[2])
+    """Lower the squared distance to the skin, in cells, to that of one triangle, at the nodes that
+    are up to `band` cells beside it."""
+    first_i = first_node(min(a[0], b[0], c[0]) - band, counts[0])
+    last_i = first_node(max(a[0], b[0], c[0]) + band, counts[0])
+    first_j = first_node(min(a[1], b[1], c[1]) - band, counts[1])
+    last_j = first_node(max(a[1], b[1], c[1]) + band, counts[1])
+    first_k = first_node(min(a[2], b[2], c[2]) - band, counts[2])
+    last_k = first_node(max(a[2], b[2], c[2]) + band, counts[2])
     nx = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
     ny = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
     nz = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -115,18 +117,25 @@ def lower_squares(
 
 @njit(nogil=True, cache=True)
 def sample_skin(
-    vertices: Array, triangles: Integers, box: Integers, origin: Array, h: float, flat: bool
+    vertices: Array,
+    triangles: Integers,
+    box: Integers,
+    origin: Array,
+    h: float,
+    flat: bool,
+    band: float,
 ) -> Array:
     """(box shape) signed distance to a skin at the nodes of its box, m, negative inside.
 
-    Exact within BAND cells of the skin, beyond them BAND cells outside and -BAND cells inside;
-    never 0, for what is on the skin is inside (ON_SKIN).
+    Exact within `band` cells of the skin, beyond them as large as that; never 0, for what is
+    on the skin is inside (ON_SKIN).
 
     vertices   (n, 3) m
     triangles  (k, 3) vertices of each, counterclockwise from outside; together a closed surface
     box        (3, 2) node ranges, may cut the skin off
     flat       a slab: its nodes lie at z = 0, and only triangles that reach there count for the
                distance, so the ends of a prism may be at any height
+    band       cells
     Where flesh overlaps itself the distance is the one to the nearest sheet, covered ones included.
     """
     shape = (box[0, 1] - box[0, 0], box[1, 1] - box[1, 0], box[2, 1] - box[2, 0])
@@ -134,7 +143,7 @@ def sample_skin(
     places = (vertices - origin) / h - box[:, 0]
     if flat:
         places[:, 2] = vertices[:, 2] / h
-    phi = np.full(shape, BAND**2)
+    phi = np.full(shape, band**2)
     winding = np.zeros(shape, np.int64)
     for t in range(triangles.shape[0]):
         n, m, o = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -143,7 +152,7 @@ def sample_skin(
         c = (places[o, 0], places[o, 1], places[o, 2])
         add_crossings(winding, counts, a, b, c)
         if not flat or min(a[2], b[2], c[2]) <= 0.0 <= max(a[2], b[2], c[2]):
-            lower_squares(phi, counts, a, b, c)
+            lower_squares(phi, counts, a, b, c, band)
     for i in range(counts[0]):
         for j in range(counts[1]):
             for k in range(counts[2]):

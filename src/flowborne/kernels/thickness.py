@@ -6,6 +6,10 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Point
+from flowborne.kernels.skin import BESIDE, triangles_by_cell
+
+MOST_CELLS = 128.0
+"""Cells along the longest side of a body in which its triangles are looked up, at most."""
 
 
 @njit(nogil=True, cache=True)
@@ -28,26 +32,37 @@ def apart(vertices: Array, a: int, b: int) -> Point:
 
 
 @njit(nogil=True, cache=True)
-def way_inward(vertices: Array, triangles: Integers) -> Array:
+def way_inward(vertices: Array, triangles: Integers, limit: float) -> Array:
     """(k,) distance from the middle of each triangle straight inward to another one, m.
 
     The ray meets a triangle where the volumes that it spans with its edges have one sign (Möller
-    and Trumbore 1997). Infinite where there is no other side.
+    and Trumbore 1997). Infinite where there is no other side, or it is farther than `limit` m.
     """
+    middles = np.empty((len(triangles), 3))
+    longest = 0.0
+    for d in range(3):
+        for n in range(len(triangles)):
+            a, b, c = triangles[n]
+            middles[n, d] = (vertices[a, d] + vertices[b, d] + vertices[c, d]) / 3.0
+        longest = max(longest, np.ptp(vertices[:, d]))
+    edge = max(min(limit, longest) / BESIDE, longest / MOST_CELLS)
+    number, start, listed = triangles_by_cell(middles, vertices, triangles, edge)
     way = np.full(len(triangles), np.inf)
     for n in range(len(triangles)):
         a, b, c = triangles[n]
         inward = crossed(apart(vertices, a, c), apart(vertices, a, b))
         length = np.sqrt(along(inward, inward))
-        for m in range(len(triangles)):
+        middle = middles[n, 0], middles[n, 1], middles[n, 2]
+        for at in range(start[number[n]], start[number[n] + 1]):
+            m = listed[at]
             p, q, r = triangles[m]
             e, f = apart(vertices, p, q), apart(vertices, p, r)
             side = crossed(inward, f)
             volume = along(e, side)
             if m == n or volume == 0.0:
                 continue
-            i, j, k = apart(vertices, p, a), apart(vertices, p, b), apart(vertices, p, c)
-            gap = (i[0] + j[0] + k[0]) / 3.0, (i[1] + j[1] + k[1]) / 3.0, (i[2] + j[2] + k[2]) / 3.0
+            first = vertices[p]
+            gap = middle[0] - first[0], middle[1] - first[1], middle[2] - first[2]
             u = along(gap, side) / volume
             if u < 0.0 or u > 1.0:
                 continue
@@ -56,12 +71,12 @@ def way_inward(vertices: Array, triangles: Integers) -> Array:
             if v < 0.0 or u + v > 1.0:
                 continue
             t = length * along(f, up) / volume
-            if 0.0 < t < way[n]:
+            if 0.0 < t < way[n] and t <= limit:
                 way[n] = t
     return way
 
 
-def way_inward_reference(vertices: Array, triangles: Integers) -> Array:
+def way_inward_reference(vertices: Array, triangles: Integers, limit: float) -> Array:
     """`way_inward` in NumPy, triangle by triangle through the plane of every other one."""
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     middle, inward = (a + b + c) / 3.0, np.cross(c - a, b - a)
@@ -73,6 +88,6 @@ def way_inward_reference(vertices: Array, triangles: Integers) -> Array:
             hit = middle[n] + t[:, None] * inward[n]
         sides = [np.cross(q - p, hit - p) for p, q in ((a, b), (b, c), (c, a))]
         within = np.all([np.einsum("td,td->t", side, normal) >= 0.0 for side in sides], axis=0)
-        within &= (t > 0.0) & (np.arange(len(a)) != n)
+        within &= (t > 0.0) & (t <= limit) & (np.arange(len(a)) != n)
         way[n] = t[within].min(initial=np.inf)
     return way

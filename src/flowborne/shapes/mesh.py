@@ -6,9 +6,16 @@ import numpy as np
 
 from flowborne.kernels.distance import MESH
 from flowborne.kernels.mesh_distance import distances_to_mesh
+from flowborne.kernels.node_distance import BAND
+from flowborne.kernels.skin import sample_skin
+from flowborne.kernels.thickness import way_inward
 from flowborne.shapes.section import Section, cross
-from flowborne.shapes.shape import FINENESS, Array, Integers, Mesh, Shape
+from flowborne.shapes.shape import FINENESS, Array, Integers, Mesh, Samples, Shape, lattice
 from flowborne.shapes.thickness import thinnest
+
+UNDETERMINED = 0.02
+"""Mean square of the normals' part along a direction up to which they do not determine a vertex's
+motion along it: all of them are within some 8 degrees of a plane across."""
 
 
 class ShapeMesh(Shape):
@@ -21,7 +28,7 @@ class ShapeMesh(Shape):
     kind, code = "mesh", MESH
 
     def __init__(self, vertices: Array, faces: Integers) -> None:
-        self.vertices, self.faces = vertices, faces
+        self.vertices, self.faces = welded(vertices, faces)
         self.size = 0.5 * np.ptp(vertices, axis=0)
 
     @property
@@ -54,6 +61,16 @@ class ShapeMesh(Shape):
     def distance(self, points: Array) -> Array:
         return distances_to_mesh(points, self.vertices, self.faces)
 
+    def samples(self, spacing: float) -> Samples:
+        """As far apart as the grid's nodes: what is near the surface is not taken from them."""
+        corner, counts = lattice(self.reach, spacing, BAND * spacing)
+        box = np.stack([np.zeros_like(counts), counts], axis=1)
+        found = sample_skin(self.vertices, self.faces, box, corner, spacing, False, BAND)
+        return Samples(corner, spacing, found)
+
+    def skin(self) -> Mesh:
+        return self.vertices, self.faces
+
     def section(self, rotation: Array, height: float) -> Section:
         """One oriented segment for each triangle that is cut.
 
@@ -62,19 +79,19 @@ class ShapeMesh(Shape):
         x, y, z = rotation
         axes, foot = np.stack([x, y]), -height * z
         level = self.vertices @ z + height
-        above = level[self.faces] >= 0.0
-        cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
-        if cut.size == 0:
+        edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]]
+        above = level[edges] >= 0.0
+        rising, falling = (
+            edges[~above[..., 0] & above[..., 1]],
+            edges[above[..., 0] & ~above[..., 1]],
+        )
+        if len(rising) == 0:
             raise ValueError("misses the plane z = 0")
+        ends = np.stack([rising, falling], axis=1)
+        low, high = ends.min(axis=2), ends.max(axis=2)  # the same numbers from both triangles
+        share = (level[low] / (level[low] - level[high]))[..., None]
         plane = (self.vertices - foot) @ axes.T
-        segments = np.empty((cut.size, 2, 2))
-        for n, triangle in enumerate(self.faces[cut]):
-            for i in range(3):
-                a, b = triangle[i], triangle[(i + 1) % 3]
-                up = level[b] >= 0.0
-                if (level[a] >= 0.0) != up:
-                    share = level[a] / (level[a] - level[b])
-                    segments[n, 0 if up else 1] = plane[a] + share * (plane[b] - plane[a])
+        segments = plane[low] + share * (plane[high] - plane[low])
         if cross(segments[:, 0], segments[:, 1]).sum() < 0.0:
             segments = segments[:, ::-1]
         return Section("segments", (0.0, 0.0), foot, axes, np.ascontiguousarray(segments))
@@ -116,7 +133,63 @@ class ShapeMesh(Shape):
         return self.vertices
 
     def thickened(self, half: float) -> Shape:
-        return self
+        """Each thin side moves outward, by moving its corners along the normals of thin sides."""
+        offset = np.maximum(half - 0.5 * way_inward(self.vertices, self.faces, 2.0 * half), 0.0)
+        if not offset.any():
+            return self
+        return ShapeMesh(self.vertices + offsets(self.vertices, self.faces, offset), self.faces)
 
     def endless(self, rotation: Array, height: float) -> Shape:
-        return self
+        """The sides of a prism, whose ends are missing."""
+        section = self.section(rotation, height)
+        points, number = np.unique(section.segments.reshape(-1, 2), axis=0, return_inverse=True)
+        start, end = number.reshape(-1, 2).T
+        ring, rise = (
+            section.centre + points @ section.axes,
+            np.ptp(points, axis=0).max() * rotation[2],
+        )
+        above = len(points)
+        sides = [
+            np.stack([start, end, end + above], axis=1),
+            np.stack([start, end + above, start + above], axis=1),
+        ]
+        return ShapeMesh(np.concatenate([ring - rise, ring + rise]), np.concatenate(sides))
+
+
+def welded(vertices: Array, faces: Integers) -> Mesh:
+    """The same surface without vertices that stand twice, nor triangles without area."""
+    places, number = np.unique(vertices, axis=0, return_inverse=True)
+    if len(places) == len(vertices):
+        return vertices, faces
+    joined = number.ravel()[faces]
+    whole = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
+    return places, joined[whole]
+
+
+def offsets(vertices: Array, faces: Integers, distance: Array) -> Array:
+    """(k, 3) how vertices move so that each triangle moves outward by its `distance` (m,), m.
+
+    The least-squares solution of n . d = distance over the triangles of a vertex, weighted by
+    their angles there; n is their normal. Directions that they hardly determine are left out, and
+    no vertex moves farther than the corner of a cube.
+    """
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    matrix, rhs = np.zeros((len(vertices), 3, 3)), np.zeros((len(vertices), 3))
+    weight, most = np.zeros(len(vertices)), np.zeros(len(vertices))
+    for k in range(3):
+        a, b = (corners[:, (k + n) % 3] - corners[:, k] for n in (1, 2))
+        angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+        outer = normal[:, :, None] * normal[:, None, :]
+        np.add.at(matrix, faces[:, k], angle[:, None, None] * outer)
+        np.add.at(rhs, faces[:, k], (angle * distance)[:, None] * normal)
+        np.add.at(weight, faces[:, k], angle)
+        np.maximum.at(most, faces[:, k], distance)
+    value, vector = np.linalg.eigh(matrix / weight[:, None, None])
+    known = value > UNDETERMINED
+    part = np.einsum("vij,vi->vj", vector, rhs / weight[:, None])
+    part = np.where(known, part / np.where(known, value, 1.0), 0.0)
+    moved = np.einsum("vij,vj->vi", vector, part)
+    length = np.linalg.norm(moved, axis=1)
+    return moved * np.minimum(1.0, np.sqrt(3.0) * most / np.maximum(length, 1e-300))[:, None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,19 @@ AROUND = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)], np.float64
 
 DIRECTIONS = AROUND / np.linalg.norm(AROUND, axis=1, keepdims=True)
 """The same as unit vectors."""
+
+
+class Samples(NamedTuple):
+    """Distances on a lattice in a shape's frame.
+
+    corner  (3,) place of the first, m
+    pitch   m between two
+    values  (nx, ny, nz) m
+    """
+
+    corner: Array
+    pitch: float
+    values: Array
 
 
 class Shape(ABC):
@@ -64,6 +77,14 @@ class Shape(ABC):
     @abstractmethod
     def distance(self, points: Array) -> Array:
         """(n,) signed distances of points (n, 3), negative inside, m."""
+
+    def samples(self, spacing: float) -> Samples | None:
+        """Distances for a grid of `spacing` m to look up; None of a kind that has a formula."""
+        return None
+
+    def skin(self) -> Mesh | None:
+        """Triangles to which the distance near by is exact; None of a kind that has none."""
+        return None
 
     @abstractmethod
     def section(self, rotation: Array, height: float) -> Section:
@@ -136,3 +157,9 @@ class Primitive(Shape):
 
     def endless(self, rotation: Array, height: float) -> Shape:
         return self
+
+
+def lattice(reach: Array, pitch: float, margin: float) -> tuple[Array, Integers]:
+    """First place (3,) and counts (3,) of a lattice `margin` m beyond the half extents `reach`."""
+    corner = -np.ceil((reach + margin) / pitch) * pitch
+    return corner, np.rint(-2.0 * corner / pitch).astype(np.int64) + 1

@@ -25,7 +25,11 @@ def thinnest(vertices: Array, triangles: Indices, slab: bool) -> float:
     area = np.linalg.norm(normal, axis=1)
     if slab:
         area[np.abs(normal[:, 2]) > 0.5 * area] = 0.0
-    way = way_inward(vertices, triangles)
+    longest = float(np.ptp(vertices, axis=0).max())
+    for halvings in range(5, -2, -1):
+        way = way_inward(vertices, triangles, longest / 2.0**halvings)
+        if area[np.isfinite(way)].sum() >= RIMS * area.sum():
+            break
     order = np.argsort(way)
     part = np.cumsum(area[order]) / area.sum()
     return float(way[order][np.searchsorted(part, RIMS)])
