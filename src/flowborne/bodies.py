@@ -7,7 +7,7 @@ from flowborne.scenes.human.skeleton import SIDES
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.effort import holding
-from flowborne.solids.flesh import Flesh, flesh_of
+from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
 from flowborne.solids.flesh_solve import prescribe_flesh, symmetric_factor
 from flowborne.solids.model import SolidModel
@@ -30,7 +30,6 @@ __all__ = [
     "Tissue",
     "add_flesh",
     "assemble_flesh",
-    "flesh_of",
     "halfway_momentum",
     "holding",
     "human_mjcf",

@@ -169,7 +169,7 @@ class Measures:
         flesh = self._model.flesh
         if flesh is None:
             return {}
-        ratios = flesh.volume_ratios(flesh.vertices(q))
+        ratios = flesh.volume_ratios(q)
         return {
             "flesh_least_detF": float(ratios.min()),
             "flesh_inside_out": float((ratios <= 0.0).sum()),

@@ -35,8 +35,8 @@ def cube(young: float, density: float, gravity: tuple[float, float, float] = GRA
     points[:, 0] -= 0.5 * SIDE
     spec = mujoco.MjSpec()
     tissue = Tissue(young, 0.3, density, damping=0.02, law=Law.STABLE_NEO_HOOKEAN)
-    add_flesh(spec, "cube", points, elements, tissue, [""] * len(points))
-    return SolidModel.with_flesh(spec, gravity=gravity)
+    grown = add_flesh(spec, "cube", points, elements, tissue, [""] * len(points))
+    return SolidModel.with_flesh(spec, [grown], gravity=gravity)
 
 
 def rigid_cube(density: float) -> SolidModel:
@@ -65,8 +65,8 @@ def leg(young: float = 2e4, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0
     ]
     spec = mujoco.MjSpec.from_string(LEG)
     tissue = Tissue(young, 0.3, 1000.0, damping=0.01, law=Law.STABLE_NEO_HOOKEAN)
-    add_flesh(spec, "leg", points, elements, tissue, holders)
-    return SolidModel.with_flesh(spec, gravity=gravity)
+    grown = add_flesh(spec, "leg", points, elements, tissue, holders)
+    return SolidModel.with_flesh(spec, [grown], gravity=gravity)
 
 
 def mean_velocity(world: World) -> Array:
@@ -201,8 +201,10 @@ def test_a_thin_plate_of_flesh_lets_nothing_through_at_any_angle(thickness: floa
     for angles in np.random.default_rng(3).uniform(0.0, 2.0 * np.pi, (12, 3)):
         turn = Rotation.from_euler("xyz", angles).as_matrix()
         spec = mujoco.MjSpec()
-        add_flesh(spec, "plate", points @ turn.T, elements, Tissue(1e5, 0.3, 1000.0), [""] * 162)
-        plate = World.at_rest(Setup(SolidModel.with_flesh(spec), Fluid(ROOM, 1000.0)))
+        grown = add_flesh(
+            spec, "plate", points @ turn.T, elements, Tissue(1e5, 0.3, 1000.0), [""] * 162
+        )
+        plate = World.at_rest(Setup(SolidModel.with_flesh(spec, [grown]), Fluid(ROOM, 1000.0)))
         opened = cut_by_bodies(plate).open
         place = x @ turn
         for axis in range(3):

@@ -109,8 +109,8 @@ def fleshy() -> World:
     points += np.array([0.42, 0.46, 0.52]) - points.mean(axis=0)
     spec = mujoco.MjSpec()
     tissue = Tissue(2e3, 0.3, 500.0, damping=0.02, law=Law.STABLE_NEO_HOOKEAN)
-    add_flesh(spec, "cube", points, elements, tissue, [""] * len(points))
-    model = SolidModel.with_flesh(spec, gravity=(0.0, 0.0, 0.0))
+    grown = add_flesh(spec, "cube", points, elements, tissue, [""] * len(points))
+    model = SolidModel.with_flesh(spec, [grown], gravity=(0.0, 0.0, 0.0))
     return swirling(World.at_rest(Setup(model, Fluid(CUBE, 1000.0))))
 
 

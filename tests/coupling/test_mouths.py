@@ -259,13 +259,13 @@ def fleshy(grid: Grid, angle: float) -> World:
     spec = mujoco.MjSpec.from_string(mjcf('<body name="bone"><geom size="0.1"/></body>'))
     tissue = Tissue(1e9, 0.3, 1000.0, law=Law.STABLE_NEO_HOOKEAN)
     held = ["bone" if inside else "" for inside in outer < 0.5]
-    add_flesh(spec, "ball", points, elements, tissue, held)
+    grown = add_flesh(spec, "ball", points, elements, tissue, held)
     x, y = np.cos(angle), np.sin(angle)
     mouth = Mouth(
         "the mouth", 1, (RADIUS * x, RADIUS * y, 0.0), (x, y, 0.0), HALF, RATE, FactorSteady()
     )
     fluid = Fluid(grid, 1000.0, boundaries=Boundaries(*(OPEN,) * 6))
-    model = SolidModel.with_flesh(spec, gravity=(0.0, 0.0, 0.0))
+    model = SolidModel.with_flesh(spec, [grown], gravity=(0.0, 0.0, 0.0))
     return World.at_rest(Setup(model, fluid, mouths=(mouth,)))
 
 

@@ -130,10 +130,10 @@ def limb():
     tissue = Tissue(young=1e4, poisson=0.3, density=1000.0)
     inside = np.abs(points - [0.4, 0.0, 0.0]).max(axis=1) < 0.21
     held = inside & (np.abs(points[:, 1:]).max(axis=1) < 0.1)
-    add_flesh(spec, "limb", points, elements, tissue, ["bone" if h else "" for h in held])
+    first = add_flesh(spec, "limb", points, elements, tissue, ["bone" if h else "" for h in held])
     apart = points + np.array([0.0, 2.0, 0.0])
-    add_flesh(spec, "lump", apart, elements, tissue, [""] * len(points))
-    return SolidModel.with_flesh(spec)
+    second = add_flesh(spec, "lump", apart, elements, tissue, [""] * len(points))
+    return SolidModel.with_flesh(spec, [first, second])
 
 
 def test_a_state_holds_the_skin_where_it_is(tmp_path):
@@ -147,8 +147,8 @@ def test_a_state_holds_the_skin_where_it_is(tmp_path):
     state = np.load(recorder.folder.state(0))
     written = json.loads(recorder.folder.model.read_text())
     skin = state["flesh_vertices"]
-    inner = 3 * 2  # of the 5 x 3 x 3 points of each
-    assert skin.shape == (2 * 45 - inner, 3)
+    inner = 7 * 3 * 3  # of the 9 x 5 x 5 nodes of each
+    assert skin.shape == (2 * (225 - inner), 3)
     assert skin.dtype == np.float32
     vertices = kinematics(model, world.solid.q).vertices
     triangles = np.array(written["flesh"]["triangles"])

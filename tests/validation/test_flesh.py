@@ -1,28 +1,42 @@
-"""Cases D1, D4 and D5, short."""
+"""Cases D1, D4 and D5, short, and bars that would lock."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array
 
+from flowborne.solids.flesh_dynamics import static_forces
+from flowborne.solids.flesh_solve import symmetric_factor
 from flowborne.validation import flesh as case
-from flowborne.validation.flesh_bars import quadratic_bar, tetrahedral_bar
+from flowborne.validation.flesh_bars import bar_of, tissue_table
+from flowborne.validation.worlds import NOWHERE
 
 
-def test_D1_quadratic_cells_come_near_and_nearer() -> None:
-    findings = case.flags(True)
-    for finding in findings[:4]:
+def test_D1_comes_near_and_nearer() -> None:
+    """CSM1 and CSM2, in a slab and in a room: within 2 % of cells that are as long as wide."""
+    for finding in case.flags(True):
         assert finding.series is not None
         assert finding.series.falls
-        assert abs(float(finding.value) / float(finding.reference) - 1.0) < 0.04
+        assert finding.passed, f"{finding.quantity}: {finding.value}"
 
 
-def test_D1_linear_tetrahedra_are_too_stiff() -> None:
-    """They lock: at 70 cells along the bar, four across, a quarter of the sinking is missing."""
-    for finding in case.flags(True)[4:]:
-        assert finding.series is not None
-        assert finding.series.falls
-        assert abs(float(finding.value)) < 0.8 * abs(float(finding.reference))
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4, 0.45, 0.49])
+@pytest.mark.parametrize("cells", [(16, 1), (16, 1, 1)])
+def test_a_skin_one_element_thick_bends_as_a_plate(cells: tuple[int, ...], poisson: float) -> None:
+    """Its end sinks by 4 F L^3 (1 - nu^2) / (E t^3) under a load F along it, to 5 %."""
+    length, thickness, young = 1.0, 0.05, 1e6
+    tissue = tissue_table(young, poisson, 1000.0)
+    bar = bar_of(cells, (length, thickness), tissue, NOWHERE)
+    depth = 1.0 if len(cells) == 2 else length / cells[0]
+    free = np.flatnonzero(~bar.fixed)
+    K, _ = static_forces(bar.model, bar.model.mj.qpos0, np.zeros(bar.model.nv))
+    sinking = np.zeros(bar.model.nv)
+    load = bar.load((0.0, -depth, 0.0))
+    sinking[free] = symmetric_factor(csc_array(K[free][:, free])).solve(load[free])
+    q = bar.model.integrate(bar.model.mj.qpos0, sinking, 1e-6)
+    expected = 4.0 * (1.0 - poisson**2) * (length / thickness) ** 3 / young
+    assert -1e6 * bar.end(q)[1] == pytest.approx(expected, rel=0.05)
 
 
 def test_D4_large_deflections() -> None:
@@ -35,7 +49,7 @@ def test_D5_vibrations() -> None:
         assert finding.passed, f"{finding.quantity}: {finding.value}"
 
 
-def test_D5_frequency_of_the_centred_step_is_that_of_average_acceleration() -> None:
+def test_D5_frequency_in_time_is_that_of_average_acceleration() -> None:
     """tan(omega' dt / 2) = omega dt / 2, Newmark's beta = 1/4."""
     order, ratio, _ = case.in_time((20, 40), 2)
     assert order.series is not None
@@ -46,17 +60,10 @@ def test_D5_frequency_of_the_centred_step_is_that_of_average_acceleration() -> N
         assert found == pytest.approx(expected, rel=3e-4)
 
 
-def test_D5_tetrahedra_and_quadratic_cells_agree_where_nothing_locks() -> None:
-    """A short, thick bar without Poisson's ratio."""
-    size, tissue = (1.0, 0.5), case.Tissue(1e5, 0.0, 1000.0)
-    cells = quadratic_bar((8, 4), size, tissue, case.NOWHERE)
-    found = [
-        float(case.modes(bar, 1)[0][0])
-        for bar in (
-            cells,
-            tetrahedral_bar((16, 8), size, tissue, case.NOWHERE, np.zeros_like),
-            tetrahedral_bar((32, 16), size, tissue, case.NOWHERE, np.zeros_like),
-        )
-    ]
-    assert found[1] > found[2] > found[0]
-    assert found[2] == pytest.approx(found[0], rel=0.02)
+def test_D5_triangles_and_tetrahedra_agree() -> None:
+    """A short, thick bar in plane strain."""
+    found = []
+    for cells in ((8, 4), (8, 4, 1)):
+        bar = bar_of(cells, (1.0, 0.5), tissue_table(1e5, 0.4, 1000.0), NOWHERE)
+        found.append(float(case.modes(bar, 1)[0][0]))
+    assert found[1] == pytest.approx(found[0], rel=0.005)

@@ -18,7 +18,7 @@ from flowborne.io.run_folder import RunFolder
 from flowborne.solids.flesh import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import Tissue, add_flesh
-from flowborne.validation.flesh_bars import bar_mesh
+from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
 from flowborne.view import style
 from flowborne.view.map_slab import MapSlab
 from flowborne.view.outlines import skin_loops
@@ -38,11 +38,11 @@ RISE = 0.3
 def fin(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a run of two frames: flesh 0.9 m x 0.2 m around a bone. Not to be written into."""
     spec = mujoco.MjSpec.from_string(BONE)
-    points, elements = bar_mesh((18, 4, 1), (0.9, 0.2, 1.0))
+    points, elements = flat_mesh((18, 4), (0.9, 0.2))
     held = (np.abs(points[:, 1]) < 0.01) & (np.abs(points[:, 0] - 0.3) < 0.12)
     tissue = Tissue(young=1e4, poisson=0.3, density=1000.0)
-    add_flesh(spec, "fin", points, elements, tissue, ["bone" if h else "" for h in held])
-    model = SolidModel.with_flesh(spec, slab=True)
+    grown = add_flesh(spec, "fin", points, elements, tissue, ["bone" if h else "" for h in held])
+    model = SolidModel.with_flesh(spec, [grown], slab=True)
     folder = RunFolder.create(tmp_path_factory.mktemp("runs") / "fin")
     folder.scene.write_text('name = "fin"\ndimensions = 2\n')
     History.create(folder.history, ["frame", "time_s"]).close()

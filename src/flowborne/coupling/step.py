@@ -250,7 +250,7 @@ def equations_under(
         guess = np.where(command.prescribed, command.final_velocity, world.solid.v)
         system = assemble(setup.solid, world.solid, force, dt, before, guess)
         return prescribe(system, command.prescribed, command.final_velocity)
-    flesh = assemble_flesh(setup.solid, world.solid, force, dt, setup.centred_flesh, before)
+    flesh = assemble_flesh(setup.solid, world.solid, force, dt, before)
     return prescribe_flesh(flesh, command.prescribed, command.final_velocity)
 
 

@@ -59,7 +59,6 @@ class Setup:
     motions  prescribed motions of some dofs
     winds    simple winds (paper eq. 2, or a uniform force)
     mouths   patches of skin through which fluid is expelled; a fluid that feels the bodies is there
-    centred_flesh  whether flesh vibrates without loss (see `assemble_flesh`)
     trial    whether steps are hypothetical, and may be longer than those of the world itself
     """
 
@@ -68,7 +67,6 @@ class Setup:
     motions: tuple[Trajectory, ...] = ()
     winds: tuple[Wind, ...] = ()
     mouths: tuple[Mouth, ...] = ()
-    centred_flesh: bool = False
     trial: bool = False
 
     @cached_property

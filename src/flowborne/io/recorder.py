@@ -15,7 +15,6 @@ from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue import volumes
 
 Array = NDArray[np.float64]
 
@@ -115,9 +114,7 @@ def centres(solid: SolidModel, pose: Kinematics) -> Array:
     flesh = solid.flesh
     if flesh is None:
         return pose.centroid
-    quarters = np.repeat(0.25 * volumes(flesh.rest, flesh.elements), 4)
-    around = np.bincount(flesh.elements.ravel(), quarters, minlength=len(flesh.rest))
-    carried = flesh.carried * around[:, None]
+    carried = flesh.carried * flesh.volumes[:, None]
     volume = (solid.volume + carried.sum(axis=0))[:, None]
     moment = solid.volume[:, None] * pose.centroid + carried.T @ pose.vertices
     return np.where(volume > 0.0, moment / np.where(volume > 0.0, volume, 1.0), pose.centroid)

@@ -32,6 +32,7 @@ from flowborne.solids import mjcf
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
+from flowborne.solids.tissue import Grown
 
 Array = NDArray[np.float64]
 
@@ -57,7 +58,8 @@ def load_model(scene: Scene) -> SolidModel:
         raise SceneError(f"there is no model file {path}. Correct solids.model.")
     try:
         if scene.flesh:
-            return SolidModel.with_flesh(fleshed(scene), gravity=(x, y, z))
+            spec, grown = fleshed(scene)
+            return SolidModel.with_flesh(spec, grown, slab=scene.is_slab, gravity=(x, y, z))
         return SolidModel.from_file(
             path,
             slab=scene.is_slab,
@@ -75,17 +77,17 @@ def bones_of(scene: Scene) -> mujoco.MjSpec:
     assert scene.solids is not None
     assert scene.model_path is not None
     solids = scene.solids
-    spec, _ = mjcf.bones_of(scene.model_path, (x, y, z), solids.density, solids.densities)
-    return spec
+    return mjcf.bones_of(
+        scene.model_path, scene.is_slab, (x, y, z), solids.density, solids.densities
+    )[0]
 
 
-def fleshed(scene: Scene) -> mujoco.MjSpec:
+def fleshed(scene: Scene) -> tuple[mujoco.MjSpec, list[Grown]]:
     """The model of a scene with its flesh. Raises ValueError when it cannot be made."""
     from flowborne.scenes.flesh.grow import grow
 
     spec = bones_of(scene)
-    grow(spec, scene.flesh, scene.folder)
-    return spec
+    return spec, grow(spec, scene.flesh, scene.folder)
 
 
 def _sentence(text: str) -> str:

@@ -231,11 +231,13 @@ def assemble(
 ) -> SolidSystem:
     """System of the bodies alone at `state`, with gravity, springs, limits and contact.
 
-        A = M + E + Ja^T Da Ja      b = smooth - shift + Ja^T Da aref + dry friction
+        A = M + dt/2 D + dt^2/4 K + Ja^T Da Ja      b = f + Ja^T Da aref + dry friction
 
-    E and the shift are the implicit part of springs and dampers of joints and tendons (MuJoCo's
-    integrator "discrete"); Ja are the active rows, first those of MuJoCo's own solution under
-    `applied`.
+    K and D are those of springs and dampers of joints and tendons; Ja are the active rows, first
+    those of MuJoCo's own solution under `applied`. Positions move by dt v before v changes, so that
+    f, the forces there, are half-way between the velocities, and this is Newmark's average
+    acceleration: second order in dt, and springs lose no energy. MuJoCo's own step, with
+    A = M + dt D + dt^2 K, damps an oscillation of frequency omega by omega dt / 2 in each radian.
 
     applied  (nv,) generalised force, N or N m
     dt       s
@@ -246,38 +248,41 @@ def assemble(
              when None
     raises   ValueError when the model has flesh
     """
-    if model.mj.nflex:
+    if model.flesh is not None:
         raise ValueError("bones alone were asked for, and the model has flesh. Use assemble_flesh.")
     s = scratch(model)
     s.set_time_step(dt)
     s.forward(state.q, state.v, applied)
     mass = s.mass_matrix().copy()
-    A, force = _smooth(model, s, mass, state.v)
+    A, force = _smooth(model, s, mass)
     rows, zones = rows_of(model, s)
     v, still = state.v.copy(), A @ state.v
-    centred, impulse = None, still + dt * force
+    middle, impulse = None, still + dt * force
     if before is not None:
-        centred = halfway(model, s, before, state, dt, still, mass, force + s.bias)
-        impulse, _ = centred.impulse(v if guess is None else guess)
+        middle = halfway(model, s, before, state, dt, still, mass, force + s.bias)
+        impulse, _ = middle.impulse(v if guess is None else guess)
     full = _with_rows(A, impulse, v, dt, rows, zones)
-    return SolidSystem(full[0], full[1], dt, v, (A, impulse), rows, zones, centred, impulse, v)
+    return SolidSystem(full[0], full[1], dt, v, (A, impulse), rows, zones, middle, impulse, v)
 
 
-def _smooth(model: SolidModel, s: Scratch, mass: Array, v: Array) -> tuple[Array, Array]:
+def _smooth(model: SolidModel, s: Scratch, mass: Array) -> tuple[Array, Array]:
     """A and b without constraint rows; after mj_forward, with its mass matrix (nv, nv)."""
     data = s.data
-    A, force = mass, s.smooth.copy()
-    if data.efm_active:
-        A = mass.copy()
-        A.flat[:: model.nv + 1] += data.efm_diag
-        force -= data.efm_ck * v
-        for t in data.efm_tid[: data.nefmT]:
-            first, count = s.mj.ten_J_rowadr[t], s.mj.ten_J_rownnz[t]
-            row = np.zeros(model.nv)
-            row[s.mj.ten_J_colind[first : first + count]] = data.ten_J[first : first + count]
-            A += data.efm_ts[t] * np.outer(row, row)
-            force -= data.efm_tk[t] * data.ten_velocity[t] * row
-    return A, force
+    if not data.efm_active:
+        return mass, s.smooth.copy()
+    A = mass.copy()
+    A.flat[:: model.nv + 1] += centred(data.efm_diag, data.efm_ck, s.dt)
+    for t in data.efm_tid[: data.nefmT]:
+        first, count = s.mj.ten_J_rowadr[t], s.mj.ten_J_rownnz[t]
+        row = np.zeros(model.nv)
+        row[s.mj.ten_J_colind[first : first + count]] = data.ten_J[first : first + count]
+        A += centred(data.efm_ts[t], data.efm_tk[t], s.dt) * np.outer(row, row)
+    return A, s.smooth.copy()
+
+
+def centred(implicit: Array, stiff: Array, dt: float) -> Array:
+    """dt/2 D + dt^2/4 K of MuJoCo's dt D + dt^2 K and dt K."""
+    return 0.5 * implicit - 0.25 * dt * stiff
 
 
 def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:

@@ -1,7 +1,12 @@
-"""The flesh of a model: its vertices, elements and surface, and where they are."""
+"""The flesh of a model: its nodes, elements and skin, and where they are.
+
+The fluid meets the skin at vertices. In rooms they are the nodes; in a slab each node in the plane
+z = 0 has one at either end of a prism of unit depth.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -9,15 +14,16 @@ from typing import Protocol
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, coo_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 from flowborne.shapes.thickness import thinnest
-from flowborne.solids.cage import node_weights
-from flowborne.solids.mjcf import element_name, rest_poses
+from flowborne.solids.elasticity import Elasticity
+from flowborne.solids.elements import EDGES, measures, parts
+from flowborne.solids.mjcf import rest_poses
 from flowborne.solids.scratch import Compiled, Scratch, scratch
-from flowborne.solids.tissue import right_handed, volumes
+from flowborne.solids.tissue import Grown
 from flowborne.solids.twists import cross, twists_about_origin
 
 Array = NDArray[np.float64]
@@ -34,22 +40,23 @@ class Jointed(Compiled, Protocol):
 
 @dataclass(frozen=True)
 class Flesh:
-    """What of a model is flesh. A point rides on a body of its own, or on the bone that holds it.
+    """What of a model is flesh. A node is a body of its own, or rides on the bone that holds it.
 
     model       the model
     names       of its fleshes
-    body        (np,) body that each point rides on
-    offset      (np, 3) the point in that body's frame, m
-    weights     (n, np) that make vertices of points: the identity for tetrahedra, interpolation
-                for flesh that a grid of cells carries
-    rest        (n, 3) vertices at rest, m
-    elements    (m, 4) tetrahedra of vertices, right-handed
+    body        (np,) body that each node is or rides on
+    offset      (np, 3) the node in that body's frame, m
+    weights     (n, np) which node each vertex goes with, and lift (n, 3), how far from it, m
+    rest        (n, 3) vertices at rest, m; the first are the nodes but for their lift
+    elements    (m, 10) nodes of quadratic tetrahedra, or (m, 6) of triangles in a slab
     surface     (k, 3) triangles of vertices, outward; none around a bone that is all inside
     of_surface  (k,) number of the flesh in `names` that each belongs to
     of_element  (m,) the same of elements
-    dofs        (nv,) dofs that move points of flesh alone; the others are those of bones
-    moved       (2, k) pairs of a point and a dof that moves it
+    dofs        (nv,) dofs that move nodes alone; the others are those of bones
+    moved       (2, k) pairs of a node and a dof that moves it
     carried     (n, nbody) share of each bone in carrying a vertex, from 0 to 1, together 1
+    elasticity  forces between the nodes
+    damping     s, Rayleigh's: the damping matrix is this times the stiffness matrix
     """
 
     model: Jointed
@@ -57,6 +64,7 @@ class Flesh:
     body: Indices
     offset: Array
     weights: csr_array
+    lift: Array
     rest: Array
     elements: Indices
     surface: Indices
@@ -65,6 +73,8 @@ class Flesh:
     dofs: NDArray[np.bool_]
     moved: Indices
     carried: Array
+    elasticity: Elasticity
+    damping: float
 
     def vertices(self, q: Array) -> Array:
         """(n, 3) places of the vertices at positions q (nq,), m."""
@@ -80,19 +90,27 @@ class Flesh:
 
     def placed(self, s: Scratch) -> Array:
         """(n, 3) the vertices where `s` has been placed, m."""
-        return np.asarray(self.weights @ self._points(s))
+        return np.asarray(self.weights @ self.nodes(s) + self.lift)
 
     def moving(self, s: Scratch) -> csr_array:
         """(3n, nv) `jacobian` where `s` has been placed."""
-        places = self._points(s)
+        return csr_array(kron(self.weights, eye_array(3), format="csr") @ self.moving_nodes(s))
+
+    def nodes(self, s: Scratch) -> Array:
+        """(np, 3) the nodes where `s` has been placed, m."""
+        return _placed(s.xpos, s.xmat.reshape(-1, 3, 3), self.body, self.offset)
+
+    def moving_nodes(self, s: Scratch) -> csr_array:
+        """(3np, nv) from v to the velocities of the nodes where `s` has been placed."""
+        places = self.nodes(s)
         twists = twists_about_origin(s.cdof, s.subtree_com[self.model.dof_root])
-        point, dof = self.moved
-        velocity = twists[dof, :3] + cross(twists[dof, 3:], places[point])
-        row = (3 * point[:, None] + np.arange(3)).ravel()
+        node, dof = self.moved
+        velocity = twists[dof, :3] + cross(twists[dof, 3:], places[node])
+        row = (3 * node[:, None] + np.arange(3)).ravel()
         shape = (3 * len(places), self.model.nv)
-        points = csr_array((velocity.ravel(), (row, np.repeat(dof, 3))), shape=shape)
-        points.eliminate_zeros()
-        return csr_array(self.spread @ points)
+        moving = csr_array((velocity.ravel(), (row, np.repeat(dof, 3))), shape=shape)
+        moving.eliminate_zeros()
+        return moving
 
     def of_vertices(self, velocity: Array) -> Array:
         """(nv,) velocity of the free points from that of vertices (n, 3), each point being one."""
@@ -104,10 +122,6 @@ class Flesh:
         spread[dof[own]] = (axis * carried[point[own]]).sum(axis=1)
         return spread
 
-    def _points(self, s: Scratch) -> Array:
-        """(np, 3) the points where `s` has been placed."""
-        return _placed(s.xpos, s.xmat.reshape(-1, 3, 3), self.body, self.offset)
-
     @cached_property
     def places(self) -> NDArray[np.bool_]:
         """(nq,) places in q of points of flesh alone."""
@@ -117,77 +131,90 @@ class Flesh:
         return own
 
     @cached_property
-    def spread(self) -> csr_array:
-        """(3n, 3np) `weights` for each of three components.
-
-        In a slab a vertex has the mean velocity of its column along z, and what pushes it pushes
-        the whole column.
-        """
-        weights = self.weights
-        if self.model.slab:
-            _, column = np.unique(self.rest[:, :2].round(9), axis=0, return_inverse=True)
-            one = np.ones(len(column))
-            members = csr_array((one, (np.arange(len(column)), column.ravel())))
-            weights = csr_array(
-                members @ diags_array(1.0 / members.sum(axis=0)) @ members.T @ weights
-            )
-        return csr_array(kron(weights, eye_array(3), format="csr"))
-
-    @cached_property
     def thickness(self) -> tuple[float, ...]:
         """Of each flesh at rest but for its rims, m."""
         every = range(len(self.names))
         skins = [self.surface[self.of_surface == f] for f in every]
         return tuple(thinnest(self.rest, skin, self.model.slab) for skin in skins)
 
-    def volume_ratios(self, vertices: Array) -> Array:
-        """(m,) det F of each element: its volume over that at rest, negative when inside out."""
-        return volumes(vertices, self.elements) / volumes(self.rest, self.elements)
+    @cached_property
+    def volumes(self) -> Array:
+        """(n,) volume of flesh around each vertex at rest, m^3; m^2 in a slab."""
+        nodes, linear = self.elasticity.rest, parts(self.elements)
+        corners = linear.shape[1]
+        share = np.repeat(measures(nodes, linear) / corners, corners)
+        around = np.bincount(linear.ravel(), share, len(nodes))
+        return np.asarray(self.weights @ (around / self.weights.sum(axis=0)))
+
+    def volume_ratios(self, q: Array) -> Array:
+        """(m,) least det F of each element, negative when inside out, at positions q (nq,)."""
+        s = scratch(self.model)
+        s.place(q)
+        return self.elasticity.volume_ratios(self.nodes(s))
 
 
-def flesh_of(model: Jointed) -> Flesh:
-    """The flesh of a model that has some. Raises ValueError when it has none."""
-    mj = model.mj
-    if mj.nflex == 0:
-        raise ValueError("the model has no flesh. Give it a flex of tetrahedra.")
-    caged = [bool(mj.flex_interp[f]) for f in range(mj.nflex)]
-    parts = [_points(mj, f) if caged[f] else _own(mj, f) for f in range(mj.nflex)]
-    body = np.concatenate([p[0] for p in parts]).astype(np.int64)
-    offset = np.concatenate([p[1] for p in parts])
-    weights = csr_array(block_diag([p[2] for p in parts], format="csr"))
-    position, rotation, _, _ = rest_poses(mj)
-    rest = np.asarray(weights @ _placed(position, rotation, body, offset))
-    elements = [_elements(mj, f, rest) for f in range(mj.nflex)]
-    free = points_of_flesh(mj)
-    surfaces = [outer_surface(rest, e) for e in elements]
-    every = np.concatenate(elements)
+def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
+    """The flesh of a model that has some."""
+    mj, position, rotation = model.mj, *rest_poses(model.mj)[:2]
+    first = np.cumsum([0, *(len(g.nodes) for g in grown)])
+    nodes = np.concatenate([g.nodes for g in grown])
+    body = np.concatenate([bodies_of(mj, g) for g in grown])
+    offset = np.einsum("nji,nj->ni", rotation[body], nodes - position[body])
+    elements = [g.elements + start for g, start in zip(grown, first[:-1], strict=True)]
+    every, count = np.concatenate(elements), len(nodes)
+    moduli = np.concatenate([np.tile(g.tissue.moduli, (len(g.elements), 1)) for g in grown])
+    laws = np.repeat([int(g.tissue.law) for g in grown], [len(e) for e in elements])
+    weights, lift = csr_array(eye_array(count)), np.zeros((count, 3))
+    surfaces = [outer_surface(nodes, parts(e)) for e in elements if not model.slab]
+    if model.slab:
+        weights = csr_array(vstack([weights, weights]))
+        lift = np.repeat([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]], count, axis=0)
+        surfaces = [prism(parts(e), count) for e in elements]
+    own = points_of_flesh(mj, grown)
+    bones = int((~own).sum())
+    carried = _carried(bones, nodes, parts(every), np.where(own[body], -1, body))
     return Flesh(
         model,
-        tuple(element_name(mj, mujoco.mjtObj.mjOBJ_FLEX, f) for f in range(mj.nflex)),
+        tuple(g.name for g in grown),
         body,
         offset,
         weights,
-        rest,
+        lift,
+        np.asarray(weights @ nodes + lift),
         every,
         np.concatenate(surfaces),
-        np.repeat(np.arange(mj.nflex), [len(t) for t in surfaces]),
-        np.repeat(np.arange(mj.nflex), [len(e) for e in elements]),
-        _flesh_dofs(mj),
+        np.repeat(np.arange(len(grown)), [len(t) for t in surfaces]),
+        np.repeat(np.arange(len(grown)), [len(e) for e in elements]),
+        own[mj.dof_bodyid],
         _moved(mj, body),
-        np.asarray(weights @ _carried(mj, rest, every, weights, np.where(free[body], -1, body))),
+        np.asarray(weights @ carried),
+        Elasticity(nodes, every, moduli, laws),
+        grown[0].tissue.damping,
     )
 
 
-def points_of_flesh(mj: mujoco.MjModel) -> NDArray[np.bool_]:
-    """(nbody of MuJoCo,) bodies that are a point of flesh and nothing else."""
-    holding = np.zeros(mj.nbody, bool)
-    holding[mj.flex_vertbodyid[mj.flex_vertbodyid >= 0]] = True
-    holding[mj.flex_nodebodyid[mj.flex_nodebodyid >= 0]] = True
-    sliding = np.zeros(mj.nbody, np.int64)
-    slides = mj.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
-    np.add.at(sliding, mj.jnt_bodyid[slides], 1)
-    own = (mj.body_geomnum == 0) & (mj.body_dofnum > 0) & (sliding == mj.body_dofnum)
-    return np.asarray(holding & own)
+def points_of_flesh(mj: mujoco.MjModel, grown: Sequence[Grown]) -> NDArray[np.bool_]:
+    """(nbody of MuJoCo,) bodies that are a node of flesh and nothing else."""
+    own = np.zeros(mj.nbody, bool)
+    for g in grown:
+        own[bodies_of(mj, g)[g.free]] = True
+    return own
+
+
+def bodies_of(mj: mujoco.MjModel, grown: Grown) -> Indices:
+    """(n,) MuJoCo's numbers of the bodies that nodes are or ride on."""
+    number = {name: mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name) for name in grown.bodies}
+    return np.array([number[name] for name in grown.bodies], np.int64)
+
+
+def prism(triangles: Indices, count: int) -> Indices:
+    """(k, 3) the outward skin of a prism over triangles (m, 3) of `count` nodes, whose vertices are
+    the nodes at its lower end and then those at its upper one."""
+    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, at, shared = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    a, b = sides[np.sort(at[shared == 1])].T
+    walls = [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
+    return np.concatenate([triangles[:, ::-1], triangles + count, *walls])
 
 
 def surface_of(elements: Indices) -> Indices:
@@ -218,31 +245,6 @@ def _placed(position: Array, rotation: Array, body: Indices, offset: Array) -> A
     return np.asarray(position[body] + np.einsum("nij,nj->ni", rotation[body], offset))
 
 
-def _own(mj: mujoco.MjModel, flex: int) -> tuple[Indices, Array, csr_array]:
-    first, count = mj.flex_vertadr[flex], mj.flex_vertnum[flex]
-    chosen = slice(first, first + count)
-    return mj.flex_vertbodyid[chosen], mj.flex_vert[chosen], eye_array(count, format="csr")
-
-
-def _points(mj: mujoco.MjModel, flex: int) -> tuple[Indices, Array, csr_array]:
-    first, count = mj.flex_nodeadr[flex], mj.flex_nodenum[flex]
-    chosen = slice(first, first + count)
-    return mj.flex_nodebodyid[chosen], mj.flex_node[chosen], node_weights(mj, flex)
-
-
-def _elements(mj: mujoco.MjModel, flex: int, rest: Array) -> Indices:
-    """The tetrahedra of a flex; MuJoCo's compiler turns them left-handed."""
-    first, count = mj.flex_elemdataadr[flex], mj.flex_elemnum[flex]
-    corners = mj.flex_elem[first : first + 4 * count].reshape(-1, 4)
-    return right_handed(rest, np.asarray(corners + mj.flex_vertadr[flex], dtype=np.int64))
-
-
-def _flesh_dofs(mj: mujoco.MjModel) -> NDArray[np.bool_]:
-    """Dofs of points of flesh that hang on the world."""
-    hung = points_of_flesh(mj) & (mj.body_parentid == 0)
-    return np.asarray(hung[mj.dof_bodyid])
-
-
 def _moved(mj: mujoco.MjModel, body: Indices) -> Indices:
     """(2, k) pairs of a point, riding on `body` (np,), and a dof that moves it."""
     chains: list[list[int]] = [[]]
@@ -255,22 +257,19 @@ def _moved(mj: mujoco.MjModel, body: Indices) -> Indices:
     return np.array(pairs, np.int64).reshape(-1, 2).T
 
 
-def _carried(
-    mj: mujoco.MjModel, rest: Array, elements: Indices, weights: csr_array, bone: Indices
-) -> Array:
-    """(np, bones) share of each bone in carrying a point: harmonic along the elements' edges.
+def _carried(bones: int, rest: Array, simplices: Indices, bone: Indices) -> Array:
+    """(np, bones) share of each bone in carrying a node: harmonic along the simplices' edges.
 
-    bone  (np,) bone that holds the point, -1 for none; points that no bone is joined to are the
+    bone  (np,) bone that holds the node, -1 for none; nodes that no bone is joined to are the
           world's
     """
-    bones = int((~points_of_flesh(mj)).sum())
-    pairs = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
-    edges = np.unique(np.sort(elements[:, pairs].reshape(-1, 2), axis=1), axis=0)
+    pairs = EDGES[simplices.shape[1]]
+    edges = np.unique(np.sort(simplices[:, pairs].reshape(-1, 2), axis=1), axis=0)
     strength = 1.0 / np.square(rest[edges[:, 0]] - rest[edges[:, 1]]).sum(axis=1)
     count = len(rest)
     links = coo_array((strength, (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
     links = links + links.T
-    laplacian = csr_array(weights.T @ (diags_array(links.sum(axis=1)) - links) @ weights)
+    laplacian = csr_array(diags_array(links.sum(axis=1)) - links)
     held, free = np.flatnonzero(bone >= 0), np.flatnonzero(bone < 0)
     share = np.zeros((len(bone), bones))
     share[held, bone[held]] = 1.0

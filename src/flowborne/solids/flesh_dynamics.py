@@ -1,25 +1,20 @@
-"""Bones and flesh as one sparse linear system A (v+ - v) = dt b, assembled by MuJoCo.
+"""Bones and flesh as one sparse linear system A (v+ - v) = dt b.
 
-MuJoCo's arrays after its stages up to the smooth forces, with K and D the stiffness and damping of
-joints, tendons and flesh, and c the flesh's damping time:
-
-    efm_K = dt (dt + c) K of flesh
-    efm_diag = dt D + dt^2 K of joints
-    efm_c = -dt K v of all
-
-K of flesh is the derivative of its forces where it is stretched. Where it is compressed it leaves
-out the stiffness that compression takes away, and A stays positive definite.
+MuJoCo assembles bones, joints and tendons, `elasticity` the flesh. Its stiffness is the derivative
+of its forces where that is positive; what compression takes away is left out, and A stays positive
+definite.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, dia_array
 
-from flowborne.solids.dynamics import AT_REST, SETTLED, Rows, Zones, rows_of
+from flowborne.solids.dynamics import AT_REST, SETTLED, Rows, Zones, centred, rows_of
 from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import Scratch, scratch
@@ -91,19 +86,13 @@ def assemble_flesh(
     state: SolidState,
     applied: Array,
     dt: float,
-    centred: bool = False,
     before: SolidState | None = None,
 ) -> FleshSystem:
     """System of bones and flesh at `state`, with gravity, springs, dampers, limits and contact.
 
-        A = M + dt D + dt^2 K      b = f - dt K v                 forces of the end of the step
-        A = M + dt/2 D + dt^2/4 K  b = f                          centred
+        A = M + dt/2 D + dt^2/4 K      b = f
 
-    The first is MuJoCo's (integrator "discrete"): first order, an oscillation of frequency omega
-    loses omega dt / 2 of its amplitude in each radian. Centred is Newmark's average acceleration
-    for positions that move by dt v before v changes: second order, without loss. Large swings need
-    a little damping in the tissue then, or its fast modes grow. Rows are those of the first in
-    both.
+    As in `assemble`, with the K and D of flesh besides.
 
     applied  (nv,) generalised force, N or N m
     dt       s
@@ -112,14 +101,13 @@ def assemble_flesh(
     s = scratch(model)
     s.set_time_step(dt)
     s.smooth_forces(state.q, state.v, applied)
-    K, D = _stiffness(s, dt), _damping(s, dt)
     M = sparse_mass(model, s)
-    force = s.smooth.copy()
-    if centred:
-        A = M + 0.25 * dt**2 * K + 0.5 * dt * D
-    else:
-        A = M + dt**2 * K + dt * D
-        force += s.data.efm_c
+    A = M + _jointed(s, centred, dt)
+    K, elastic = _flesh(model, s)
+    assert model.flesh is not None
+    damping = model.flesh.damping
+    A = A + (0.25 * dt**2 + 0.5 * dt * damping) * K
+    force = s.smooth + elastic - damping * (K @ state.v)
     v = state.v.copy()
     still = A @ v
     centre, own = None, still + dt * force
@@ -138,7 +126,18 @@ def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_arra
     """Stiffness K (nv, nv), N/m or N m, and the forces (nv,) at rest at q (nq,), without rows."""
     s = scratch(model)
     s.smooth_forces(q, np.zeros(model.nv), applied)
-    return csc_array(_stiffness(s, s.dt)), s.smooth.copy()
+    joints = _jointed(s, lambda _, stiff, dt: stiff / dt, s.dt)
+    K, elastic = _flesh(model, s)
+    return csc_array(joints + K), s.smooth + elastic
+
+
+def _flesh(model: SolidModel, s: Scratch) -> tuple[csr_array, Array]:
+    """K (nv, nv) and the forces (nv,) of flesh, where `s` has been placed."""
+    assert model.flesh is not None
+    places, J = model.flesh.nodes(s), model.flesh.moving_nodes(s)
+    elasticity = model.flesh.elasticity
+    K = J.T @ (elasticity.stiffness(places) @ J)
+    return csr_array(K), J.T @ elasticity.forces(places).ravel()
 
 
 def sparse_mass(model: SolidModel, s: Scratch) -> csr_array:
@@ -148,28 +147,11 @@ def sparse_mass(model: SolidModel, s: Scratch) -> csr_array:
     return csr_array(lower + lower.T - dia_array((lower.diagonal(), 0), shape=(nv, nv)))
 
 
-def _stiffness(s: Scratch, dt: float) -> csr_array:
-    """K of flesh, joints and tendons."""
-    data, joints = s.data, s.data.efm_ck / dt
-    K = _flesh_stiffness(s) / (dt * (dt + _damping_time(s)))
-    return K + _diagonal(joints) + _tendons(s, s.data.efm_tk / dt, data.efm_tid[: data.nefmT])
-
-
-def _damping(s: Scratch, dt: float) -> csr_array:
-    """D of flesh, joints and tendons."""
-    data, c = s.data, _damping_time(s)
-    D = _flesh_stiffness(s) * (c / (dt * (dt + c)))
-    tendons = _tendons(s, data.efm_ts / dt - data.efm_tk, data.efm_tid[: data.nefmT])
-    return D + _diagonal(data.efm_diag / dt - data.efm_ck) + tendons
-
-
-def _flesh_stiffness(s: Scratch) -> csr_array:
-    """efm_K, which is stored without gaps between rows."""
-    data, nv = s.data, s.mj.nv
-    if data.nefmK == 0:
-        return csr_array((nv, nv))
-    entries = (data.efm_K_val.copy(), data.efm_K_colind.copy(), _starts(data.efm_K_rownnz))
-    return csr_array(entries, shape=(nv, nv))
+def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float) -> csr_array:
+    """What `part` makes of MuJoCo's dt D + dt^2 K and dt K of joints and tendons."""
+    data = s.data
+    tendons = _tendons(s, part(data.efm_ts, data.efm_tk, dt), data.efm_tid[: data.nefmT])
+    return csr_array(tendons + _diagonal(part(data.efm_diag, data.efm_ck, dt)))
 
 
 def _tendons(s: Scratch, strength: Array, active: NDArray[np.int32]) -> csr_array:
@@ -182,10 +164,6 @@ def _tendons(s: Scratch, strength: Array, active: NDArray[np.int32]) -> csr_arra
     )
     chosen = J[active]
     return csr_array(chosen.T @ _diagonal(strength[active]) @ chosen)
-
-
-def _damping_time(s: Scratch) -> float:
-    return float(s.mj.flex_damping[0]) if s.mj.nflex else 0.0
 
 
 def _diagonal(values: Array) -> dia_array:

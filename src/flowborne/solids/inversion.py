@@ -48,12 +48,11 @@ class Inversion:
 
 def inversion(flesh: Flesh, q: Array) -> Inversion | None:
     """What is inside out at positions q (nq,); None when nothing is."""
-    vertices = flesh.vertices(q)
-    ratios = flesh.volume_ratios(vertices)
+    ratios = flesh.volume_ratios(q)
     wrong = np.flatnonzero(~(ratios > 0.0))
     if wrong.size == 0:
         return None
     worst = int(wrong[np.argmin(ratios[wrong])])
-    middle = vertices[flesh.elements[worst]].mean(axis=0)
+    middle = flesh.vertices(q)[flesh.elements[worst]].mean(axis=0)
     name = flesh.names[int(flesh.of_element[worst])]
     return Inversion(wrong, len(ratios), worst, float(ratios[worst]), middle, name)

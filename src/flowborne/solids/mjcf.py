@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -30,6 +29,10 @@ KINDS = {
     mujoco.mjtGeom.mjGEOM_MESH: "mesh",
     mujoco.mjtGeom.mjGEOM_SDF: "sdf",
 }
+ARENA = 1 << 26
+"""Bytes of MuJoCo's working memory beside that for pairs of bodies: it would take memory quadratic
+in the number of dofs."""
+
 CONTACT_ONLY = ("plane", "hfield")
 
 
@@ -45,24 +48,17 @@ def compiled(
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    spec, mj = bones_of(source, gravity, density, densities)
-    if slab:
-        where = _named(source)
-        _set_slab_inertias(spec, mj)
-        try:
-            mj = spec.compile()
-        except ValueError as error:
-            raise ValueError(f"{where} cannot be made a slab: {error}.") from error
-    return mj
+    return bones_of(source, slab, gravity, density, densities)[1]
 
 
 def bones_of(
     source: str | Path,
+    slab: bool,
     gravity: tuple[float, float, float],
     density: float | None,
     densities: Mapping[str, float],
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    """An MJCF file or text, as `compiled`, before it is made a slab or flesh grows on it."""
+    """An MJCF file or text, as `compiled`, before flesh grows on it."""
     where = _named(source)
     try:
         if isinstance(source, Path):
@@ -78,6 +74,12 @@ def bones_of(
     except ValueError as error:
         raise ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.") from error
     _refuse_unsupported(mj, where)
+    if slab:
+        _set_slab_inertias(spec, mj)
+        try:
+            mj = spec.compile()
+        except ValueError as error:
+            raise ValueError(f"{where} cannot be made a slab: {error}.") from error
     return spec, mj
 
 
@@ -88,42 +90,18 @@ def _named(source: str | Path) -> str:
 def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> mujoco.MjModel:
     """MuJoCo's model of bones and flesh; switched off is what `compiled` switches off.
 
-    raises ValueError for a bad model, and for a flex that is not an elastic solid
+    raises ValueError for a bad model, and for one with a flex
     """
     spec = spec.copy()
     _set_options(spec, gravity)
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # dense takes room for (nv, nv) arrays
+    spec.memory = ARENA + 2 * len(spec.bodies) ** 2  # 4 bytes for each pair that might collide
     try:
-        mj = compiled_quietly(spec)
+        mj = spec.compile()
     except ValueError as error:
         raise ValueError(f"the model with flesh cannot be read: {error}. Mend it there.") from error
-    for flex in spec.flexes:
-        if flex.dim != 3:
-            raise ValueError(
-                f"flex '{flex.name}' has elements of dimension {flex.dim}. "
-                'Flesh is made of tetrahedra: give it dim="3".'
-            )
-        if flex.edgestiffness or flex.edgedamping or mj.flex_edgeequality[flex.id]:
-            raise ValueError(
-                f"flex '{flex.name}' has springs, dampers or constraints along its edges. "
-                "Give it elasticity instead."
-            )
-        if not flex.young > 0.0:
-            raise ValueError(
-                f"flex '{flex.name}' has Young's modulus {flex.young:g} N/m^2. "
-                "Give it a positive one."
-            )
-    damping = sorted({float(flex.damping) for flex in spec.flexes})
-    if len(damping) > 1:
-        raise ValueError(f"the fleshes have damping times of {damping} s. Give all the same.")
+    _refuse_unsupported(mj, "the model with flesh")
     return mj
-
-
-def compiled_quietly(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """MuJoCo's model, without its warning of flesh without forces: it overlooks elasticity."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "flex .* is not rigid", UserWarning)
-        return spec.compile()
 
 
 def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> None:
@@ -148,8 +126,9 @@ def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> No
 def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
     if mj.nflex:
         raise ValueError(
-            f"{where} has {mj.nflex} flex element(s). Remove them, and describe the flesh by "
-            "[[flesh]] tables of the scene, or add it with solids.tissue.add_flesh."
+            f"{where}: flex '{element_name(mj, mujoco.mjtObj.mjOBJ_FLEX, 0)}' is not simulated, as "
+            "MuJoCo's flexes lock in bending and the fluid does not see them. Remove it from the "
+            "model, and describe the flesh by a [[flesh]] table of the scene."
         )
     for geom in displacing_geoms(mj):
         name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,7 @@ from flowborne.solids import displaced, mjcf
 from flowborne.solids.covered import covered
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.state import SolidState
+from flowborne.solids.tissue import Grown
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ class SolidModel:
     slab           whether the solids are cross-sections at z = 0
     gravity        (3,) m/s^2
     nq, nv         numbers of positions and velocities
-    nbody, ngeom   numbers of bodies (0 is the world), without points of flesh, and of geometries
+    nbody, ngeom   numbers of bodies (0 is the world), without nodes of flesh, and of geometries
     flesh          what of the model is flesh, or None
     body_names, joint_names, dof_names, geom_names
                    nameless elements are called by kind and number; the dofs of a free joint have
@@ -57,8 +58,8 @@ class SolidModel:
     moves          (nbody, nv) whether a dof moves a body
     conserved      (nv,) dofs along which the bodies' momentum changes by outer forces alone
     armature       (nv,) inertia of the joints themselves, kg m^2 or kg
-    body_mass      (nbody + points,) kg; points of flesh come after the bodies
-    subtree_mass   (nbody + points,) kg, of the body and all below
+    body_mass      (nbody + nodes,) kg; nodes of flesh come after the bodies
+    subtree_mass   (nbody + nodes,) kg, of the body and all below
     volume         (nbody,) displaced volume, m^3 (area in a slab), each region counted once where
                    geometries of a body overlap; see displaced.united. 0 for the world body, and
                    for bones in flesh
@@ -73,16 +74,16 @@ class SolidModel:
     geom_covered   (ngeom,) whether flesh is all around it at rest, so that no fluid touches it
     """
 
-    def __init__(self, mj: mujoco.MjModel, slab: bool) -> None:
+    def __init__(self, mj: mujoco.MjModel, slab: bool, grown: Sequence[Grown] = ()) -> None:
         self.mj = mj
         self.slab = slab
         self.gravity: Array = np.array(mj.opt.gravity)
-        self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), _bones(mj)
+        self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), _bones(mj, grown)
         self.body_mass: Array = np.array(mj.body_mass)
         self.subtree_mass: Array = np.array(mj.body_subtreemass)
         self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, self.nbody)
         self._set_dofs()
-        self.flesh = flesh_of(self) if mj.nflex else None
+        self.flesh = flesh_of(self, grown) if grown else None
         self._set_geoms()
         self._set_displaced()
 
@@ -123,16 +124,25 @@ class SolidModel:
     def with_flesh(
         cls,
         spec: mujoco.MjSpec,
+        grown: Sequence[Grown],
         *,
         slab: bool = False,
         gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
     ) -> SolidModel:
         """Model of bones and flesh, for `assemble_flesh`.
 
-        slab    flesh is a prism along z, from z = -0.5 to 0.5 m
+        grown   what `add_flesh` gave for each flesh of `spec`
+        slab    flesh is made of triangles in the plane z = 0, per unit depth
         raises  ValueError when it is bad
         """
-        return cls(mjcf.compiled_with_flesh(spec, gravity), slab)
+        corners = {g.elements.shape[1] for g in grown}
+        if corners != {6 if slab else 10}:
+            made = "triangles at z = 0" if slab else "tetrahedra"
+            raise ValueError(f"flesh is made of {made} here. Give add_flesh such elements.")
+        damping = sorted({g.tissue.damping for g in grown})
+        if len(damping) > 1:
+            raise ValueError(f"the fleshes have damping times of {damping} s. Give all the same.")
+        return cls(mjcf.compiled_with_flesh(spec, gravity), slab, grown)
 
     @classmethod
     def empty(cls, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SolidModel:
@@ -294,14 +304,14 @@ class SolidModel:
         )
 
 
-def _bones(mj: mujoco.MjModel) -> int:
-    """Number of bodies before the points of flesh. Raises ValueError when some come after."""
-    flesh = np.flatnonzero(points_of_flesh(mj)) if mj.nflex else np.zeros(0, np.int64)
+def _bones(mj: mujoco.MjModel, grown: Sequence[Grown]) -> int:
+    """Number of bodies before the nodes of flesh. Raises ValueError when some come after."""
+    flesh = np.flatnonzero(points_of_flesh(mj, grown))
     bones = int(flesh[0]) if flesh.size else int(mj.nbody)
     if flesh.size and flesh.size != mj.nbody - bones:
         later = next(b for b in range(bones, mj.nbody) if b not in flesh)
         name = mjcf.element_name(mj, mujoco.mjtObj.mjOBJ_BODY, later)
-        raise ValueError(f"body '{name}' comes after points of flesh. Put all flesh after it.")
+        raise ValueError(f"body '{name}' comes after nodes of flesh. Put all flesh after it.")
     return bones
 
 

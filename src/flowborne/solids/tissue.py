@@ -1,8 +1,9 @@
-"""Growing flesh onto the bones of an MJCF model: elastic tetrahedra, held by bones at points.
+"""Growing flesh onto the bones of an MJCF model: quadratic elements, held by bones at nodes.
 
-A point that no bone holds becomes a body of its own that hangs on the world by three slides. Under
-a bone, as MuJoCo's own flexcomp has it, it would ride in that bone's frame, and the bone's row and
-column would be full in both the mass and the stiffness matrix.
+Linear tetrahedra lock: one layer of them across a bending skin is several times too stiff, and more
+so the nearer Poisson's ratio is to 1/2. A node that no bone holds becomes a body of its own that
+hangs on the world by slides. Under a bone it would ride in that bone's frame, and the bone's row
+and column would be full in both the mass and the stiffness matrix.
 """
 
 from __future__ import annotations
@@ -15,26 +16,31 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.mjcf import compiled_quietly
+from flowborne.kernels import elastic
+from flowborne.solids.elements import lumped, measures, with_middles
+from flowborne.solids.mjcf import ARENA
 
 Array = NDArray[np.float64]
-Tetrahedra = NDArray[np.int64]
+Indices = NDArray[np.int64]
 
 WORLD = "world"
+
+TOGETHER = 250
+"""Nodes that are added to a model at once: MuJoCo looks through all of it at each addition."""
 
 LEAST_INERTIA = 1e-12
 """MuJoCo refuses moving bodies of less than 1e-15 kg m^2, even those that only slide."""
 
 
 class Law(IntEnum):
-    """How stress follows strain, numbered as MuJoCo's `elastic3d`; small strains see no difference.
+    """How stress follows strain; small strains see no difference. See kernels.elastic.
 
     SAINT_VENANT_KIRCHHOFF  gives way when crushed, and may stay inside out
     STABLE_NEO_HOOKEAN      turns right side out again
     """
 
-    SAINT_VENANT_KIRCHHOFF = 0
-    STABLE_NEO_HOOKEAN = 1
+    SAINT_VENANT_KIRCHHOFF = elastic.SAINT_VENANT_KIRCHHOFF
+    STABLE_NEO_HOOKEAN = elastic.STABLE_NEO_HOOKEAN
 
 
 @dataclass(frozen=True)
@@ -53,65 +59,90 @@ class Tissue:
     damping: float = 0.0
     law: Law = Law.SAINT_VENANT_KIRCHHOFF
 
+    @property
+    def moduli(self) -> tuple[float, float]:
+        """Lame's constants mu and lambda, N/m^2."""
+        mu = 0.5 * self.young / (1.0 + self.poisson)
+        return mu, 2.0 * mu * self.poisson / (1.0 - 2.0 * self.poisson)
 
-def volumes(points: Array, tetrahedra: Tetrahedra) -> Array:
-    """(m,) signed volumes of tetrahedra (m, 4) of points (n, 3), m^3."""
-    corners = points[tetrahedra]
-    return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0)
 
+@dataclass(frozen=True)
+class Grown:
+    """Flesh whose nodes are bodies of a model, or ride on them.
 
-def right_handed(points: Array, tetrahedra: Tetrahedra) -> Tetrahedra:
-    """(m, 4) the same tetrahedra, those of negative volume with two corners exchanged."""
-    left = volumes(points, tetrahedra) < 0.0
-    return np.where(left[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
+    name      its own
+    nodes     (n, 3) at rest in world axes, m: the points it was made of, then middles of edges
+    elements  (m, 10) nodes of tetrahedra, or (m, 6) of triangles in a slab
+    bodies    n names of the bodies that the nodes are or ride on
+    free      (n,) nodes that are bodies of their own
+    tissue    what it is made of
+    """
+
+    name: str
+    nodes: Array
+    elements: Indices
+    bodies: tuple[str, ...]
+    free: NDArray[np.bool_]
+    tissue: Tissue
 
 
 def add_flesh(
     spec: mujoco.MjSpec,
     name: str,
     points: Array,
-    tetrahedra: Tetrahedra,
+    simplices: Indices,
     tissue: Tissue,
     holders: Sequence[str],
-) -> None:
-    """Add flesh to a model; its mass is lumped to its points by volume.
+) -> Grown:
+    """Add flesh to a model, for `SolidModel.with_flesh`; its mass is lumped to its nodes.
 
-    points      (n, 3) at rest, in world axes, m
-    tetrahedra  (m, 4) points of each element, of positive volume
-    holders     n names: the body that holds the point, "" for none. The mass of held points is
-                given to the body that holds them
-    raises      ValueError for an element without volume, and for a holder that is no body
+    points     (n, 3) at rest, in world axes, m; z = 0 in a slab
+    simplices  (m, 4) points of each tetrahedron, or (m, 3) of each triangle in a slab, of positive
+               volume or area; the middles of their edges become nodes
+    holders    n names: the body that holds the point, "" for none. A body that holds both ends of
+               an edge holds its middle. The mass of held nodes is given to the body that holds them
+    raises     ValueError for an element without volume, and for a holder that is no body
     """
-    volume = volumes(points, tetrahedra)
+    volume = measures(points, simplices)
     if not volume.min() > 0.0:
         worst = int(volume.argmin())
-        place = ", ".join(f"{x:.4g}" for x in points[tetrahedra[worst]].mean(axis=0))
+        place = ", ".join(f"{x:.4g}" for x in points[simplices[worst]].mean(axis=0))
+        said = f"volume {volume[worst]:g} m^3"
+        if simplices.shape[1] == 3:
+            said = f"area {volume[worst]:g} m^2"
         raise ValueError(
-            f"flesh '{name}': element {worst} at ({place}) m has the volume {volume[worst]:g} m^3. "
+            f"flesh '{name}': element {worst} at ({place}) m has the {said}. "
             "Order its corners right-handed, or leave it out."
         )
-    mass = np.bincount(
-        tetrahedra.ravel(), np.repeat(0.25 * tissue.density * volume, 4), len(points)
-    )
+    edges, elements = with_middles(len(points), simplices)
+    nodes = np.concatenate([points, points[edges].mean(axis=1)])
+    both = [holders[a] if holders[a] == holders[b] else "" for a, b in edges.tolist()]
+    held_by = [*holders, *both]
+    mass = tissue.density * lumped(nodes, elements)
     inertia = 0.4 * mass * (0.75 * mass / (np.pi * tissue.density)) ** (2.0 / 3.0)
-    frames = _frames(spec, name, holders)
-    bodies, offsets = [], np.zeros_like(points)
-    for i, holder in enumerate(holders):
-        if holder:
-            position, rotation = frames[holder]
-            offsets[i] = rotation.T @ (points[i] - position)
-        bodies.append(holder or _hang(spec, f"{name}:{i}", points[i], mass[i], inertia[i]))
+    frames = _frames(spec, name, held_by)
     for holder in sorted(frames.keys() - {WORLD}):
-        held = np.array([h == holder for h in holders])
-        _load(spec, holder, offsets[held], mass[held], inertia[held])
-    _flex(spec, name, tissue, bodies, offsets, tetrahedra)
+        position, rotation = frames[holder]
+        held = np.array([h == holder for h in held_by])
+        _load(spec, holder, (nodes[held] - position) @ rotation, mass[held], inertia[held])
+    free = np.array([not holder for holder in held_by])
+    loose = np.flatnonzero(free)
+    for some in np.split(loose, range(TOGETHER, len(loose), TOGETHER)):
+        spec.attach(
+            _hung(some, nodes, mass, inertia, "xyz"[: simplices.shape[1] - 1]),
+            prefix=f"{name}:",
+            frame=spec.worldbody.add_frame(),
+        )
+    spec.memory = ARENA
+    bodies = tuple(holder or f"{name}:{i}" for i, holder in enumerate(held_by))
+    return Grown(name, nodes, elements, bodies, free, tissue)
 
 
 def _frames(
     spec: mujoco.MjSpec, name: str, holders: Sequence[str]
 ) -> dict[str, tuple[Array, Array]]:
     """Position and rotation at rest of the bodies that hold flesh."""
-    mj = compiled_quietly(spec.copy())
+    mj = spec.copy().compile()
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     frames = {}
@@ -125,23 +156,23 @@ def _frames(
     return frames
 
 
-def _hang(spec: mujoco.MjSpec, name: str, place: Array, mass: float, inertia: float) -> str:
-    """A point of flesh that moves freely."""
-    body = spec.worldbody.add_body(name=name, pos=place)
-    body.mass, body.explicitinertial = mass, True
-    body.inertia = np.full(3, max(inertia, LEAST_INERTIA))
-    body.ipos = np.zeros(3)  # left out, it becomes the body's own place, once more
-    for axis, direction in zip("xyz", np.eye(3), strict=True):
-        joint = body.add_joint(name=f"{name}:{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE)
-        joint.axis, joint.limited = direction, mujoco.mjtLimited.mjLIMITED_FALSE
-        # the model's defaults for its own joints are none of flesh's
-        joint.stiffness[:] = joint.damping[:] = joint.armature = joint.frictionloss = 0.0
-    return name
+def _hung(some: Indices, nodes: Array, mass: Array, inertia: Array, axes: str) -> mujoco.MjSpec:
+    """A model of some nodes of flesh that move freely along some axes, named by their numbers."""
+    spec = mujoco.MjSpec()
+    for i in some.tolist():
+        body = spec.worldbody.add_body(name=f"{i}", pos=nodes[i])
+        body.mass, body.explicitinertial = mass[i], True
+        body.inertia = np.full(3, max(inertia[i], LEAST_INERTIA))
+        body.ipos = np.zeros(3)  # left out, it becomes the body's own place, once more
+        for axis, direction in zip(axes, np.eye(3), strict=False):
+            joint = body.add_joint(name=f"{i}:{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE)
+            joint.axis, joint.limited = direction, mujoco.mjtLimited.mjLIMITED_FALSE
+    return spec
 
 
 def _load(spec: mujoco.MjSpec, holder: str, offsets: Array, mass: Array, inertia: Array) -> None:
-    """Give a bone the mass of the points that it holds, at `offsets` (n, 3) in its frame."""
-    mj = compiled_quietly(spec.copy())
+    """Give a bone the mass of the nodes that it holds, at `offsets` (n, 3) in its frame."""
+    mj = spec.copy().compile()
     b = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, holder)
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, mj.body_iquat[b])
@@ -156,20 +187,3 @@ def _load(spec: mujoco.MjSpec, holder: str, offsets: Array, mass: Array, inertia
     body.mass, body.ipos, body.explicitinertial = masses.sum(), centre, True
     body.iquat, body.inertia = (1.0, 0.0, 0.0, 0.0), np.zeros(3)
     body.fullinertia = about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-
-
-def _flex(
-    spec: mujoco.MjSpec,
-    name: str,
-    tissue: Tissue,
-    bodies: Sequence[str],
-    offsets: Array,
-    tetrahedra: Tetrahedra,
-) -> None:
-    flex = spec.add_flex(name=name)
-    flex.dim, flex.vertbody = 3, list(bodies)
-    flex.vert, flex.elem = offsets.ravel().tolist(), tetrahedra.ravel().tolist()
-    flex.young, flex.poisson, flex.damping = tissue.young, tissue.poisson, tissue.damping
-    flex.elastic3d = int(tissue.law)
-    flex.contype = flex.conaffinity = 0
-    flex.selfcollide = mujoco.mjtFlexSelf.mjFLEXSELF_NONE

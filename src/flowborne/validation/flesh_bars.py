@@ -1,20 +1,24 @@
-"""Bars of flesh for the cases, and where they come to rest."""
+"""Bars of flesh for the cases, grown from a model and a table, and where they come to rest."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, dia_array
 
-from flowborne import SolidModel, Tissue
-from flowborne.bodies import Flesh, add_flesh, flesh_of, static_forces, symmetric_factor
+from flowborne import SolidModel
+from flowborne.bodies import Flesh, static_forces, symmetric_factor
+from flowborne.flesh import FleshMesh, FleshTable, grow, mesh_bytes
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
+Root = Callable[[Array], Array]
 
 SETTLED = 1e-7
 """A bar is at rest when a turn of Newton's method moves nothing by more than this of its length."""
@@ -25,6 +29,9 @@ SPLIT = np.array(
     [[0, 1, 3, 7], [0, 5, 1, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 6, 4, 7]]
 )
 """Six right-handed tetrahedra of a cell whose corner b is at (b & 1, b >> 1 & 1, b >> 2)."""
+
+CLAMP = '<mujoco><worldbody>{beside}<body name="clamp"/></worldbody></mujoco>'
+"""A body that does not move, to hold a bar."""
 
 
 def bar_mesh(
@@ -39,14 +46,29 @@ def bar_mesh(
         indexing="ij",
     )
     number = np.arange((nx + 1) * (ny + 1) * (nz + 1)).reshape(nx + 1, ny + 1, nz + 1)
-    corners = [
+    boxes = [
         number[i : nx + i, j : ny + j, k : nz + k].ravel()
         for k in (0, 1)
         for j in (0, 1)
         for i in (0, 1)
     ]
-    elements = np.stack(corners, axis=1)[:, SPLIT].reshape(-1, 4)
+    elements = np.stack(boxes, axis=1)[:, SPLIT].reshape(-1, 4)
     return np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1), elements
+
+
+def flat_mesh(cells: tuple[int, int], size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+    """Points (n, 3) and triangles (m, 3) of a bar in the plane z = 0, as `bar_mesh`, two to a
+    cell."""
+    x, y = np.meshgrid(
+        np.linspace(0.0, size[0], cells[0] + 1),
+        np.linspace(-0.5 * size[1], 0.5 * size[1], cells[1] + 1),
+        indexing="ij",
+    )
+    number = np.arange(x.size).reshape(x.shape)
+    a, b = number[:-1, :-1].ravel(), number[1:, :-1].ravel()
+    c, d = number[1:, 1:].ravel(), number[:-1, 1:].ravel()
+    elements = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), elements
 
 
 @dataclass(frozen=True)
@@ -67,12 +89,12 @@ class Bar:
     def end(self, q: Array) -> Array:
         """(3,) how far the middle of the end face has moved at positions q (nq,), m."""
         rest = self.flesh.rest
-        middle = (self.share > 0.0) & (np.abs(rest[:, 1]) < 1e-9 * np.ptp(rest[:, 0]))
+        middle = self._face() & (np.abs(rest[:, 1]) < 1e-9 * np.ptp(rest[:, 0]))
         return np.asarray((self.flesh.vertices(q) - rest)[middle].mean(axis=0))
 
     def turned(self, q: Array) -> float:
         """Angle that the end face has turned by, rad."""
-        face = np.flatnonzero(self.share)
+        face = np.flatnonzero(self._face())
         height, now = self.flesh.rest[face, 1], self.flesh.vertices(q)[face]
         top, bottom = (np.isclose(height, edge) for edge in (height.max(), height.min()))
         across = now[top].mean(axis=0) - now[bottom].mean(axis=0)
@@ -83,113 +105,76 @@ class Bar:
         pushed = np.outer(self.share, force).ravel()
         return np.asarray(self.flesh.jacobian(self.model.mj.qpos0).T @ pushed)
 
+    def _face(self) -> NDArray[np.bool_]:
+        x = self.flesh.rest[:, 0]
+        return np.isclose(x, x.max())
 
-def tetrahedral_bar(
-    cells: tuple[int, int],
+
+def straight(y: Array) -> Array:
+    """The root of a bar that starts at x = 0, at heights y (n,)."""
+    return np.zeros_like(y)
+
+
+def bar_of(
+    cells: tuple[int, ...],
     size: tuple[float, float],
-    tissue: Tissue,
+    tissue: FleshTable,
     gravity: Vector,
-    root: Callable[[Array], Array],
+    root: Root = straight,
 ) -> Bar:
-    """A bar one cell thick in z, six tetrahedra to a cell, held where it starts.
+    """A bar that is held where it starts.
 
-    root  x at which the bar starts, at heights y (n,)
+    cells   of its length and thickness, in a slab; and of its depth, each as deep as it is long
+    tissue  table of its material
+    root    x at which the bar starts, at heights y (n,)
     """
-    points, elements = bar_mesh((*cells, 1), (*size, size[0] / cells[0]))
+    if len(cells) == 2:
+        points, elements = flat_mesh((cells[0], cells[1]), size)
+    else:
+        depth = cells[2] * size[0] / cells[0]
+        points, elements = bar_mesh((cells[0], cells[1], cells[2]), (*size, depth))
     held = points[:, 0] == 0.0
     points[:, 0] += root(points[:, 1]) * (1.0 - points[:, 0] / size[0])
-    spec = mujoco.MjSpec()
-    add_flesh(spec, "bar", points, elements, tissue, ["world" if h else "" for h in held])
-    return _bar(spec, gravity, _composite([1.0, 1.0], cells[1]), [1.0, 1.0])
+    mesh = FleshMesh(points, elements, tuple("clamp" if h else "" for h in held))
+    model = grown_from(mesh, tissue, "", gravity)
+    flesh = model.flesh
+    assert flesh is not None
+    fixed = model.mj.jnt_axis[model.mj.dof_jntid, 2] > 0.5
+    return Bar(model, flesh, fixed, _end_share(flesh))
 
 
-QUADRATIC = """<mujoco><worldbody><flexcomp name="bar" type="grid" dim="3" dof="quadratic"
-count="{points}" cellcount="{cells}" spacing="{spacing}" pos="{middle} 0 0" mass="{mass}"
-radius="{radius}"><elasticity young="{young}" poisson="{poisson}" damping="{damping}"/>
-<contact selfcollide="none" contype="0" conaffinity="0"/><pin gridrange="0 0 0 0 {last} 2"/>
-</flexcomp></worldbody></mujoco>"""
+def grown_from(mesh: FleshMesh, tissue: FleshTable, beside: str, gravity: Vector) -> SolidModel:
+    """A model with the flesh that a table grows from a mesh that "clamp" holds.
 
-
-def quadratic_bar(
-    cells: tuple[int, int], size: tuple[float, float], tissue: Tissue, gravity: Vector
-) -> Bar:
-    """A bar one cell thick in z that cells of 27 nodes carry, held at x = 0.
-
-    MuJoCo shares all the mass that it is told among the nodes that are not held, so it is not told
-    that of the held face, a sixth of a cell.
-    """
-    across = np.array([*cells, 1])
-    lengths = np.array([*size, size[0] / cells[0]])
-    mass = tissue.density * lengths.prod() * (1.0 - 1.0 / (6.0 * cells[0]))
-    text = QUADRATIC.format(
-        points=_words(2 * across + 1),
-        cells=_words(across),
-        spacing=_words(0.5 * lengths / across),
-        middle=0.5 * size[0],
-        mass=mass,
-        radius=1e-3 * lengths.min(),
-        young=tissue.young,
-        poisson=tissue.poisson,
-        damping=tissue.damping,
-        last=2 * cells[1],
-    )
-    simpson = [1.0, 4.0, 1.0]
-    spec = mujoco.MjSpec.from_string(text)
-    return _bar(spec, gravity, _composite(simpson, cells[1]), simpson)
-
-
-IN_SLAB = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>{beside}
-<flexcomp name="bar" type="grid" dim="3" dof="quadratic" count="{points}" cellcount="{cells}"
-spacing="{spacing}" pos="{middle}" mass="{mass}" radius="{radius}">
-<elasticity young="{young}" poisson="{poisson}" damping="{damping}"/>
-<contact selfcollide="none" contype="0" conaffinity="0"/><pin gridrange="0 0 0 2 {last} 2"/>
-</flexcomp></worldbody></mujoco>"""
-
-SLICE = 0.01
-"""Depth of a slab's bar, m: it is as stiff and as heavy as a metre would be. The fluid of a slab
-pushes the vertices at z = 0 alone, and the middle of a deep bar would give way to it."""
-
-
-def bar_in_slab(
-    cells: tuple[int, int],
-    size: tuple[float, float],
-    end: tuple[float, float],
-    tissue: Tissue,
-    beside: str,
-) -> SolidModel:
-    """A bar along x in a slab that cells of 27 nodes carry, one thick in z, and what it hangs on.
-
-    cells   of its free part, along and across; one more, all of it held, is on its near side
-    size    length and thickness of the free part, m
-    end     middle of its end, m
     beside  MJCF of the world body's other elements
     """
-    across = np.array([cells[0] + 1, cells[1], 1])
-    lengths = np.array([size[0] * across[0] / cells[0], size[1], SLICE])
-    mass = tissue.density * size[0] * size[1] * (1.0 - 1.0 / (6.0 * cells[0]))
-    text = IN_SLAB.format(
-        beside=beside,
-        points=_words(2 * across + 1),
-        cells=_words(across),
-        spacing=_words(0.5 * lengths / across),
-        middle=_words(np.array([end[0] - 0.5 * lengths[0], end[1], 0.0])),
-        mass=mass,
-        radius=1e-3 * lengths.min(),
-        young=tissue.young / SLICE,
-        poisson=tissue.poisson,
-        damping=tissue.damping,
-        last=2 * cells[1],
-    )
-    return SolidModel.with_flesh(
-        mujoco.MjSpec.from_string(text), slab=True, gravity=(0.0, 0.0, 0.0)
+    slab = mesh.elements.shape[1] == 3
+    spec = mujoco.MjSpec.from_string(CLAMP.format(beside=beside))
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "bar.vtu").write_bytes(mesh_bytes(mesh, ""))
+        grown = grow(spec, (tissue,), Path(folder))
+    return SolidModel.with_flesh(spec, grown, slab=slab, gravity=gravity)
+
+
+def tissue_table(young: float, poisson: float, density: float, damping: float = 0.0) -> FleshTable:
+    """Table of a St. Venant-Kirchhoff material, undamped unless said otherwise."""
+    return FleshTable(
+        name="bar",
+        bones=("clamp",),
+        mesh="bar.vtu",
+        young=young,
+        poisson=poisson,
+        density=density,
+        damping=damping,
+        law="st-venant-kirchhoff",
     )
 
 
 def equilibrium(bar: Bar, applied: Array, start: Array | None = None) -> Array:
     """(nq,) positions at which the bar is at rest under generalised forces (nv,) and its weight.
 
-    Newton's method with MuJoCo's stiffness, damped where a step would raise the energy. It
-    converges linearly, as that stiffness is not the derivative of compressed elements' forces.
+    Newton's method, damped where a step would raise the energy. It converges linearly, as the
+    stiffness is not the derivative of compressed elements' forces.
 
     start   (nq,) positions to start from; at rest when None
     raises  ArithmeticError when it does not settle
@@ -216,24 +201,17 @@ def equilibrium(bar: Bar, applied: Array, start: Array | None = None) -> Array:
     raise ArithmeticError(f"the bar does not come to rest in {TURNS} turns of Newton's method")
 
 
-def _bar(spec: mujoco.MjSpec, gravity: Vector, along_y: list[float], along_z: list[float]) -> Bar:
-    model = SolidModel.with_flesh(spec, gravity=gravity)
-    flesh = flesh_of(model)
-    face = np.flatnonzero(np.isclose(flesh.rest[:, 0], flesh.rest[:, 0].max()))
-    ordered = face[np.lexsort((flesh.rest[face, 2].round(9), flesh.rest[face, 1].round(9)))]
-    share = np.zeros(len(flesh.rest))
-    share[ordered] = np.outer(along_y, along_z).ravel()
-    fixed = model.mj.jnt_axis[model.mj.dof_jntid, 2] > 0.5
-    return Bar(model, flesh, fixed, share / share.sum())
-
-
-def _composite(rule: list[float], cells: int) -> list[float]:
-    """Weights of a quadrature rule with points on both ends, cell after cell."""
-    weights = np.zeros((len(rule) - 1) * cells + 1)
-    for i in range(cells):
-        weights[(len(rule) - 1) * i :][: len(rule)] += rule
-    return list(weights)
-
-
-def _words(values: Array | NDArray[np.int64]) -> str:
-    return " ".join(f"{value:.17g}" for value in values)
+def _end_share(flesh: Flesh) -> Array:
+    """(n,) consistent nodal loads: Simpson's rule on edges, a third at each middle on triangles."""
+    x, share = flesh.rest[:, 0], np.zeros(len(flesh.rest))
+    at_end = np.isclose(x, x.max())
+    for element in flesh.elements:
+        nodes = element[at_end[element]]
+        apex = np.isin(nodes, element[: 3 if len(element) == 6 else 4])
+        if apex.sum() == 2 and len(element) == 6:
+            (a, b), (m,) = nodes[apex], nodes[~apex]
+            share[[a, b, m]] += np.linalg.norm(flesh.rest[a] - flesh.rest[b]) * np.array([1, 1, 4])
+        elif apex.sum() == 3:
+            a, b, c = flesh.rest[nodes[apex]]
+            share[nodes[~apex]] += np.linalg.norm(np.cross(b - a, c - a))
+    return share / share.sum()

@@ -58,8 +58,8 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     held = (np.hypot(*points[:, 1:].T) < 0.01) & (np.abs(points[:, 0]) > 0.04)
     bones = [("upper", "lower")[int(x > 0.0)] for x in points[:, 0]]
     holders = [bone if h else "" for bone, h in zip(bones, held, strict=True)]
-    add_flesh(spec, "arm", points, elements, Tissue(3e4, 0.3, 1000.0, 0.01), holders)
-    model = SolidModel.with_flesh(spec, gravity=(0.0, 0.0, 0.0))
+    grown = add_flesh(spec, "arm", points, elements, Tissue(3e4, 0.3, 1000.0, 0.01), holders)
+    model = SolidModel.with_flesh(spec, [grown], gravity=(0.0, 0.0, 0.0))
     world = World.at_rest(Setup(model, Fluid(Grid((16, 12, 16), 0.05, (-0.4, -0.3, -0.4)), 1000.0)))
     folder = RunFolder.create(tmp_path_factory.mktemp("runs") / "arm")
     folder.scene.write_text('name = "arm"\n[output]\npicture = "vorticity"\n')

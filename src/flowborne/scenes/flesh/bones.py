@@ -14,7 +14,6 @@ from flowborne.scenes.wording import suggestion
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Shape
 from flowborne.solids.mjcf import (
-    compiled_quietly,
     displacing_geoms,
     element_name,
     geom_shape,
@@ -99,7 +98,7 @@ def bones_of(spec: mujoco.MjSpec, names: Sequence[str]) -> Bones:
 
     raises  ValueError for an unknown body and for one without such a geom
     """
-    mj = compiled_quietly(spec.copy())
+    mj = spec.copy().compile()
     known = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, b) for b in range(mj.nbody)]
     _, _, position, rotation = rest_poses(mj)
     displacing = displacing_geoms(mj)

@@ -20,8 +20,7 @@ from flowborne.scenes.flesh.mesh import (
 )
 from flowborne.scenes.flesh.mesh_file import read_mesh, recipe_of
 from flowborne.scenes.schema_flesh import FleshTable
-from flowborne.solids.mjcf import compiled_quietly
-from flowborne.solids.tissue import Law, Tissue, add_flesh
+from flowborne.solids.tissue import Grown, Law, Tissue, add_flesh
 
 LAWS = {
     "neo-hookean": Law.STABLE_NEO_HOOKEAN,
@@ -29,15 +28,22 @@ LAWS = {
 }
 
 
-def grow(spec: mujoco.MjSpec, tables: tuple[FleshTable, ...], folder: Path) -> None:
+def grow(spec: mujoco.MjSpec, tables: tuple[FleshTable, ...], folder: Path) -> list[Grown]:
     """Add the flesh of `tables` to a model; their files are found from `folder`.
 
+    returns what `SolidModel.with_flesh` asks for
     raises  ValueError for flesh that cannot be meshed, or read
     """
     meshes = [meshed(spec, table, folder) for table in tables]
-    for table, (mesh, _) in zip(tables, meshes, strict=True):
-        tissue = Tissue(table.young, table.poisson, table.density, table.damping, LAWS[table.law])
-        add_flesh(spec, table.name, mesh.points, mesh.tetrahedra, tissue, mesh.holders)
+    return [
+        add_flesh(spec, table.name, mesh.points, mesh.elements, tissue_of(table), mesh.holders)
+        for table, (mesh, _) in zip(tables, meshes, strict=True)
+    ]
+
+
+def tissue_of(table: FleshTable) -> Tissue:
+    """What the flesh of a table is made of."""
+    return Tissue(table.young, table.poisson, table.density, table.damping, LAWS[table.law])
 
 
 def meshed(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, str]:
@@ -72,7 +78,7 @@ def _mesh(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
 
 def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
     """What decides a mesh, as JSON: the bones' shapes and places at rest, and how it is made."""
-    mj = compiled_quietly(spec.copy())
+    mj = spec.copy().compile()
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     shapes = hashlib.sha256()

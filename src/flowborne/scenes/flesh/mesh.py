@@ -34,15 +34,16 @@ JOINT = 0.5
 
 @dataclass(frozen=True)
 class FleshMesh:
-    """Elastic tetrahedra around bones, in world axes at rest.
+    """Elastic elements around bones, in world axes at rest.
 
-    points      (n, 3) m
-    tetrahedra  (m, 4) points of the elastic elements, right-handed; none is inside a bone
-    holders     n names: the bone that holds the point, "" for none
+    points    (n, 3) m
+    elements  (m, 4) points of tetrahedra, right-handed, none of them inside a bone; (m, 3) of
+              triangles in the plane z = 0 of a slab
+    holders   n names: the bone that holds the point, "" for none
     """
 
     points: Array
-    tetrahedra: Indices
+    elements: Indices
     holders: tuple[str, ...]
 
 
@@ -122,7 +123,7 @@ def _check_held(mesh: FleshMesh, bones: Bones, size: float) -> None:
             f"bone '{idle[0]}' holds no point of flesh that has edges of {size:g} m. "
             "Make the size smaller, or leave the bone out."
         )
-    parts = _connected(mesh.tetrahedra, len(mesh.points))
+    parts = _connected(mesh.elements, len(mesh.points))
     held = np.array([bool(name) for name in mesh.holders])
     loose = ~np.isin(parts, parts[held])
     if loose.any():

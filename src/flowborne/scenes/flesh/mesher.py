@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flowborne.kernels.jit import numba_thread_count
 from flowborne.scenes.flesh import mesh_run
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.tissue import right_handed
+from flowborne.solids.elements import oriented
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -56,4 +56,4 @@ def tetrahedra_within(
             )
         with np.load(made) as mesh:
             points, tetrahedra = mesh["points"], mesh["tetrahedra"].astype(np.int64)
-    return points, right_handed(points, tetrahedra)
+    return points, oriented(points, tetrahedra)

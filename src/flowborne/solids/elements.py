@@ -1,0 +1,108 @@
+"""Quadratic simplices: tetrahedra of 10 nodes in rooms, triangles of 6 in plane strain in slabs.
+
+Nodes are the corners and the middles of the edges. Shape functions in barycentric coordinates L:
+L_i (2 L_i - 1) at corners, 4 L_i L_j between them (Zienkiewicz and Taylor, section 8.8).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+EDGES = {
+    3: np.array([[0, 1], [0, 2], [1, 2]]),
+    4: np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]),
+}
+"""Ends of the edges of a triangle and a tetrahedron, by their corners."""
+
+PARTS = {
+    6: np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]]),
+    10: np.array(
+        [
+            [0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3],
+            [4, 5, 6, 8], [4, 7, 5, 8], [5, 9, 6, 8], [5, 7, 9, 8],
+        ]
+    ),
+}  # fmt: skip
+"""Linear simplices that make up a quadratic one, with its orientation, by its nodes."""
+
+CORNER = {6: 1.0 / 19.0, 10: 1.0 / 36.0}
+"""Part of an element's mass at each corner: as the diagonal of the consistent mass matrix has it
+(Hinton, Rock and Zienkiewicz 1976)."""
+
+CENTRAL = {3: 2.0 / 3.0, 4: 0.25 + 0.15 * np.sqrt(5.0)}
+"""Largest barycentric coordinate of each quadrature point, one for each corner, second order."""
+
+
+def measures(points: Array, simplices: Indices) -> Array:
+    """(m,) signed volumes (m^3) of tetrahedra (m, 4) or areas (m^2) of triangles (m, 3) in the
+    plane z = 0, of points (n, 3)."""
+    corners = points[simplices]
+    sides = corners[:, 1:] - corners[:, :1]
+    if simplices.shape[1] == 3:
+        return np.asarray(0.5 * np.linalg.det(sides[..., :2]))
+    return np.asarray(np.linalg.det(sides) / 6.0)
+
+
+def oriented(points: Array, simplices: Indices) -> Indices:
+    """The same simplices, those of negative measure with two corners exchanged."""
+    left = measures(points, simplices) < 0.0
+    swapped = np.concatenate([simplices[:, :-2], simplices[:, :-3:-1]], axis=1)
+    return np.where(left[:, None], swapped, simplices)
+
+
+def with_middles(count: int, simplices: Indices) -> tuple[Indices, Indices]:
+    """Quadratic elements of simplices of `count` points.
+
+    returns  (e, 2) ends of the edges, whose middles follow the points as nodes; (m, 6) or (m, 10)
+             nodes of the elements
+    """
+    ends = np.sort(simplices[:, EDGES[simplices.shape[1]]], axis=2)
+    edges, middle = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    middles = count + middle.reshape(len(simplices), -1)
+    return edges, np.concatenate([simplices, middles], axis=1)
+
+
+def parts(elements: Indices) -> Indices:
+    """Linear simplices of the nodes, those of each element in turn."""
+    split = PARTS[elements.shape[1]]
+    return np.asarray(elements[:, split].reshape(-1, split.shape[1]))
+
+
+def corners(elements: Indices) -> Indices:
+    """(m, 3) or (m, 4) the corners of quadratic elements."""
+    return np.asarray(elements[:, : 3 if elements.shape[1] == 6 else 4])
+
+
+def lumped(points: Array, elements: Indices) -> Array:
+    """(n,) volume (m^3, m^2 of triangles) of each node (n, 3)."""
+    volume, own = measures(points, corners(elements)), CORNER[elements.shape[1]]
+    at_corners = corners(elements).shape[1]
+    share = np.full(elements.shape[1], own)
+    share[at_corners:] = (1.0 - at_corners * own) / (elements.shape[1] - at_corners)
+    found = np.bincount(elements.ravel(), np.outer(volume, share).ravel(), len(points))
+    return np.asarray(found, dtype=np.float64)
+
+
+def shape_gradients(points: Array, elements: Indices) -> tuple[Array, Array]:
+    """Gradients (m, q + 1, k, 3) of the shape functions at the quadrature points, of which there
+    are q, and at the centroid, 1/m; volume (m,) of the elements, m^3, or m^2 of triangles."""
+    simplices = corners(elements)
+    count = simplices.shape[1]
+    sides = (points[simplices[:, 1:]] - points[simplices[:, :1]])[..., : count - 1]
+    slope = np.zeros((len(elements), count, 3))
+    slope[:, 1:, : count - 1] = np.swapaxes(np.linalg.inv(sides), 1, 2)
+    slope[:, 0] = -slope[:, 1:].sum(axis=1)
+    other = (1.0 - CENTRAL[count]) / (count - 1)
+    L = np.full((count + 1, count), other)
+    L[:count] += (CENTRAL[count] - other) * np.eye(count)
+    L[count] = 1.0 / count
+    i, j = EDGES[count].T
+    at_corners = (4.0 * L - 1.0)[None, :, :, None] * slope[:, None]
+    between = 4.0 * (
+        L[None, :, i, None] * slope[:, None, j] + L[None, :, j, None] * slope[:, None, i]
+    )
+    return np.concatenate([at_corners, between], axis=2), measures(points, simplices)
