@@ -15,8 +15,13 @@ def check_flesh(draft: Draft) -> Iterator[str]:
     scene = draft.scene
     if not scene.flesh:
         return
-    if scene.is_slab:
-        yield f"{draft.at('flesh')}: flesh has 3 dimensions. Set dimensions = 3."
+    for index, table in enumerate(scene.flesh):
+        if scene.is_slab and (table.thickness is not None or table.surface is not None):
+            yield (
+                f"{draft.at('flesh', index)}: flesh is meshed in 3 dimensions alone. Set "
+                "dimensions = 3, or give a mesh of triangles at z = 0 in place of its thickness "
+                "or surface."
+            )
     if scene.solids is None:
         yield (
             f"{draft.at('flesh')}: flesh grows on the bodies of a model file. "
@@ -41,7 +46,7 @@ def check_flesh_places(draft: Draft, model: SolidModel, start: SolidState) -> It
     vertices = kinematics(model, start.q).vertices
     for flesh, name in enumerate(model.flesh.names):
         own = vertices[model.flesh.surface[model.flesh.of_surface == flesh]].reshape(-1, 3)
-        for axis in range(3):
+        for axis in range(len(domain.lower)):
             low, high = own[:, axis].min(), own[:, axis].max()
             first, last = domain.lower[axis], domain.upper[axis]
             if low < first or high > last:

@@ -20,9 +20,11 @@ class FleshTable(Table):
     thickness  m: it is a skin as thick as this around the bones
     surface    instead of a thickness: file of a closed surface (.obj, .stl, .ply) in the axes of
                the model at rest; the flesh fills it
-    size       m: length of the elements' edges
+    size       m: length of the elements' edges. One element through its thickness is enough for
+               flesh to bend as it should
     mesh       file (.vtu) of elements that were made of all this before: made anew where it was
-               made otherwise. Without a thickness and a surface it is used as it is
+               made otherwise. Without a thickness and a surface it is used as it is, in two
+               dimensions a mesh of triangles at z = 0
     young      N/m^2, Young's modulus
     poisson    Poisson's ratio
     density    kg/m^3

@@ -11,11 +11,14 @@ import pytest
 from flowborne.io.run_folder import RunFolder
 from flowborne.scenes.build import build
 from flowborne.scenes.flesh import grow
+from flowborne.scenes.flesh.mesh import FleshMesh
+from flowborne.scenes.flesh.mesh_file import mesh_bytes
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.save import scene_files
 from flowborne.scenes.scene_copy import scene_to_resume, write_scene
 from flowborne.simulation import BlowUpError, Simulation
 from flowborne.solids.inversion import inversion
+from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
 
 MODEL = """<mujoco><default><joint damping="3" limited="true" range="-1 1"/>
 <geom type="capsule" fromto="0 0 0 .3 0 0" size=".08" contype="0" conaffinity="0"/></default>
@@ -109,7 +112,7 @@ MESSAGES = {
     "neither": (("thickness = 0.08\n", ""), "neither a thickness nor a surface"),
     "no size": (("size = 0.16\n", ""), "no size of elements"),
     "no surface": (("thickness = 0.08", 'surface = "none.stl"'), "none.stl"),
-    "two dimensions": (('figure = "none"', "dimensions = 2"), "flesh has 3 dimensions"),
+    "two dimensions": (('figure = "none"', "dimensions = 2"), "meshed in 3 dimensions alone"),
     "outside": (("upper = [1.2, 0.6, 0.6]", "upper = [0.6, 0.6, 0.6]"), "outside the domain"),
 }
 
@@ -120,6 +123,32 @@ def test_wrong_flesh_is_told_with_its_place(write: Write, case: str) -> None:
     problems = check_scene(write(change))
     assert any(expected in problem for problem in problems), problems
     assert all("scene.toml" in problem for problem in problems)
+
+
+def test_flesh_in_two_dimensions_is_a_mesh_of_triangles(write: Write, tmp_path: Path) -> None:
+    points, elements = flat_mesh((8, 2), (0.3, 0.2))
+    held = np.abs(points[:, 1]) < 0.05
+    mesh = FleshMesh(points, elements, tuple("upper" if h else "" for h in held))
+    (tmp_path / "fin.vtu").write_bytes(mesh_bytes(mesh, ""))
+    path = write(
+        ('figure = "none"', "dimensions = 2"),
+        ("lower = [-0.6, -0.6, -0.6]", "lower = [-0.6, -0.6]"),
+        ("upper = [1.2, 0.6, 0.6]", "upper = [1.2, 0.6]"),
+        ('z_max = "open"', 'y_max = "open"'),
+        ('bones = ["upper", "lower"]\nthickness = 0.08\nsize = 0.16', FIN),
+    )
+    (tmp_path / "arm.xml").write_text(MODEL.replace('axis="0 1 0"', 'axis="0 0 1"'))
+    world = build(load_scene(path)).world
+    flesh = world.setup.solid.flesh
+    assert flesh is not None
+    assert flesh.elements.shape[1] == 6
+    assert Simulation(load_scene(path)).advance_frame()
+    tetrahedra = FleshMesh(*bar_mesh((2, 1, 1), (0.3, 0.2, 0.2)), ("upper",) * 12)
+    (tmp_path / "fin.vtu").write_bytes(mesh_bytes(tetrahedra, ""))
+    assert any("triangles at z = 0" in problem for problem in check_scene(path))
+
+
+FIN = 'bones = ["upper"]\nmesh = "fin.vtu"'
 
 
 def test_two_fleshes_have_names_and_one_damping(write: Write) -> None:

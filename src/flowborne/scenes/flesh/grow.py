@@ -12,6 +12,7 @@ import numpy as np
 
 from flowborne.scenes.flesh.mesh import (
     FIDELITY,
+    HELD,
     JOINT,
     THICKNESSES,
     FleshMesh,
@@ -97,7 +98,7 @@ def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
         "shapes": shapes.hexdigest(),
         "thickness": table.thickness,
         "size": table.size,
-        "rules": [FIDELITY, THICKNESSES, JOINT],
+        "rules": [FIDELITY, THICKNESSES, HELD, JOINT],
     }
     if table.surface is not None:
         path = folder / table.surface

@@ -17,6 +17,7 @@ from flowborne.scenes.flesh.contour import contour
 from flowborne.scenes.flesh.mesher import tetrahedra_within
 from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
 from flowborne.shapes.shape import Mesh
+from flowborne.solids.elements import with_middles
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -24,12 +25,14 @@ Indices = NDArray[np.int64]
 FIDELITY = 0.1
 """How far a face may be off the surface that it follows, in edges."""
 
-THICKNESSES = 0.25
+THICKNESSES = 0.6
 """As FIDELITY, in thicknesses of the skin or of the thinnest bone's half."""
 
+HELD = 0.5
+"""How far outside a bone it still holds points, as a part of the distance that faces may be off."""
 
 JOINT = 0.5
-"""How close to a second bone points are let go, in edges."""
+"""How close to a second bone points are let go, in edges as long as most are."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,9 @@ def _fleshed(outside: Mesh, bones: Bones, size: float, tolerance: float) -> Fles
     flesh = elements[bones.distance(points[elements].mean(axis=1)) > 0.0]
     used, renumbered = np.unique(flesh, return_inverse=True)
     points = points[used]
-    holders = _holders(bones, points, tolerance, JOINT * size)
+    ends = points[with_middles(len(points), renumbered.reshape(-1, 4))[0]]
+    edge = float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
+    holders = _holders(bones, points, HELD * tolerance, JOINT * edge)
     mesh = FleshMesh(points, renumbered.reshape(-1, 4), holders)
     _check_held(mesh, bones, size)
     return mesh
