@@ -190,7 +190,11 @@ def _lost(heights: Array, n: int) -> float:
 
 
 def flag_in_time(quick: bool) -> list[Finding]:
-    """CSM3: the bar of CSM1 let go at rest, by its small vibrations and by its large ones."""
+    """CSM3: the bar of CSM1 let go at rest, by its small vibrations and by its large ones.
+
+    Nothing damps it. At 50 steps a second its fast modes grow in the large swings and take over
+    after some seconds; at 100 they do not in 10 s.
+    """
     known = reference("D5", "CSM3 cross-check, Hz")
     small, large = known["f1 of Euler-Bernoulli with E/(1-nu^2)"], known["large amplitude"]
     grids = FLAG_CELLS[:2] if quick else FLAG_CELLS[:3]
@@ -198,7 +202,7 @@ def flag_in_time(quick: bool) -> list[Finding]:
     values = [float(modes(bar, 1)[0][0]) for bar in bars]
     series = _series([g[0] for g in grids], values, small)
     findings = [near("f1 of CSM3's bar, Hz", values[-1], small, relative=0.02, series=series)]
-    steps, seconds = ((50, 100), 3.0) if quick else ((50, 100, 200), 10.0)
+    steps, seconds = ((50, 100), 3.0) if quick else ((100, 200), 10.0)
     runs = []
     for n in steps:
         heights = swing(bars[1], bars[1].model.rest().q, 1.0 / n, int(seconds * n))

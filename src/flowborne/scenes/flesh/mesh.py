@@ -31,7 +31,7 @@ THICKNESSES = 0.6
 HELD = 0.5
 """How far outside a bone it still holds points, as a part of the distance that faces may be off."""
 
-JOINT = 0.5
+JOINT = 0.75
 """How close to a second bone points are let go, in edges as long as most are."""
 
 
