@@ -257,7 +257,7 @@ def fleshy(grid: Grid, angle: float) -> World:
     outer = np.abs(points).max(axis=1)
     points *= (RADIUS * outer / np.maximum(np.linalg.norm(points, axis=1), 1e-9))[:, None]
     spec = mujoco.MjSpec.from_string(mjcf('<body name="bone"><geom size="0.1"/></body>'))
-    tissue = Tissue(1e9, 0.3, 1000.0, law=Law.STABLE_NEO_HOOKEAN)
+    tissue = Tissue(1e10, 0.3, 1000.0, law=Law.STABLE_NEO_HOOKEAN)
     held = ["bone" if inside else "" for inside in outer < 0.5]
     grown = add_flesh(spec, "ball", points, elements, tissue, held)
     x, y = np.cos(angle), np.sin(angle)

@@ -31,7 +31,7 @@ def test_D3_FSI1_on_44_cells() -> None:
 def test_D3_stiff_flesh_feels_what_a_rigid_flag_does() -> None:
     """Nor does it matter that its forces come by way of its vertices."""
     rigid = flags.CFD[0]
-    stiff = replace(rigid, tissue=flags.flag_tissue(0.5e9, 1e3))
+    stiff = replace(rigid, tissue=flags.flag_tissue(0.5e9, 1e3, flags.SETTLING))
     found = []
     for flow in (rigid, stiff):
         world = flags.channel(44, flow)

@@ -12,9 +12,16 @@ from numpy.typing import NDArray
 
 from flowborne.scenes.flesh import mesh_run
 from flowborne.scenes.flesh.bones import bones_of
-from flowborne.scenes.flesh.mesh import FleshMesh, skin_mesh, surface_mesh
+from flowborne.scenes.flesh.mesh import (
+    FIDELITY,
+    HELD,
+    JOINT,
+    FleshMesh,
+    skin_mesh,
+    surface_mesh,
+)
 from flowborne.scenes.flesh.mesh_file import mesh_bytes, read_mesh, recipe_of
-from flowborne.solids.elements import measures
+from flowborne.solids.elements import measures, with_middles
 from flowborne.solids.flesh import outer_surface
 from flowborne.solids.mjcf import is_closed
 from flowborne.solids.model import SolidModel
@@ -67,14 +74,16 @@ def test_outer_surface_is_closed_and_at_the_thickness(ball: FleshMesh, arm: Fles
 
 def test_points_on_bones_are_held_by_them(arm: FleshMesh) -> None:
     distances = bones_of(mujoco.MjSpec.from_string(ARM), BONES).distances(arm.points)
+    ends = arm.points[with_middles(len(arm.points), arm.elements)[0]]
+    joint = JOINT * np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+    on_bone = HELD * FIDELITY * 0.12
     for holder, distance in zip(arm.holders, distances, strict=True):
         if holder:
             assert BONES.index(holder) == distance.argmin()
-            assert distance.min() <= 0.1 * 0.12
-            assert distance.max() > 0.5 * 0.12
+            assert distance.min() <= on_bone
+            assert distance.max() > joint
         else:
-            at_the_joint = distance.max() <= 0.5 * 0.12
-            assert at_the_joint or distance.min() > 0.1 * 0.12
+            assert distance.max() <= joint or distance.min() > on_bone
     assert {*arm.holders} == {"", *BONES}
 
 
