@@ -6,6 +6,7 @@ All that a script needs is here, and on the pages beside it:
     boundaries    what the sides of a domain do
     executors     where the trials of a decision run
     exporters     runs as files for other programs
+    flesh         flesh as a [[flesh]] table grows it
     gradients     how a gradient is estimated
     machine       threads, memory, seconds by part
     motions       joints that are told how to move
@@ -87,6 +88,7 @@ __all__ = [
     "executors",
     "export",
     "exporters",
+    "flesh",
     "gradients",
     "load_scene",
     "machine",
@@ -107,6 +109,7 @@ PAGES = (
     "boundaries",
     "executors",
     "exporters",
+    "flesh",
     "gradients",
     "machine",
     "motions",
