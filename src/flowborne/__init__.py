@@ -14,6 +14,7 @@ All that a script needs is here, and on the pages beside it:
     operators     the operators of a step, one by one
     pictures      pictures and plots
     rules         how far to go down a gradient
+    shapes        geometries of one's own
     winds         simple winds
     worlds        worlds made and stepped in code
 
@@ -99,6 +100,7 @@ __all__ = [
     "pictures",
     "rules",
     "run",
+    "shapes",
     "step",
     "winds",
     "worlds",
@@ -117,6 +119,7 @@ PAGES = (
     "operators",
     "pictures",
     "rules",
+    "shapes",
     "winds",
     "worlds",
 )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flowborne.coupling.motion import Trajectory, velocity_after
 from flowborne.errors import SceneError
 from flowborne.scenes.build_drives import driven, servo_of
+from flowborne.scenes.build_shapes import placed_shapes
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.formula import Formula
 from flowborne.scenes.schema import Scene
@@ -59,13 +60,20 @@ def load_model(scene: Scene) -> SolidModel:
     try:
         if scene.flesh:
             spec, grown = fleshed(scene)
-            return SolidModel.with_flesh(spec, grown, slab=scene.is_slab, gravity=(x, y, z))
+            return SolidModel.with_flesh(
+                spec,
+                grown,
+                slab=scene.is_slab,
+                gravity=(x, y, z),
+                shapes=placed_shapes(scene),
+            )
         return SolidModel.from_file(
             path,
             slab=scene.is_slab,
             gravity=(x, y, z),
             density=scene.solids.density,
             densities=scene.solids.densities,
+            shapes=placed_shapes(scene),
         )
     except ValueError as error:
         raise SceneError(_sentence(str(error))) from None
@@ -77,9 +85,9 @@ def bones_of(scene: Scene) -> mujoco.MjSpec:
     assert scene.solids is not None
     assert scene.model_path is not None
     solids = scene.solids
-    return mjcf.bones_of(
-        scene.model_path, scene.is_slab, (x, y, z), solids.density, solids.densities
-    )[0]
+    given = solids.density, solids.densities, placed_shapes(scene)
+    spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given)
+    return spec
 
 
 def fleshed(scene: Scene) -> tuple[mujoco.MjSpec, list[Grown]]:

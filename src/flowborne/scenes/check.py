@@ -19,7 +19,11 @@ def cross_check(draft: Draft) -> list[str]:
     unusable = [*check_clip(draft), *check_flesh(draft)]
     problems += unusable
     scene = draft.scene
-    if not scene.has_bodies or unusable or not draft.sound("dimensions", "gravity", "clip"):
+    if (
+        not scene.has_bodies
+        or unusable
+        or not draft.sound("dimensions", "gravity", "clip", "shapes")
+    ):
         return problems
     try:
         model = load_model(scene)

@@ -31,6 +31,7 @@ NEEDS_BODIES = (
     "clip",
     "constants",
     "flesh",
+    "shapes",
     "initial",
     "motion",
     "wind",
@@ -86,6 +87,11 @@ PLACED = "Place the clip by offset and heading in [clip]"
 def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     """Names, initial state, motions and winds against the model."""
     scene = draft.scene
+    if scene.shapes and scene.solids is None:
+        yield (
+            f"{draft.at('shapes')}: they are on bodies of a model file. "
+            "Add [solids] with a model, or drop [[shapes]]."
+        )
     named = []
     for body in () if scene.solids is None else scene.solids.densities:
         named += unknown_body(draft, model, body, "solids", "densities")

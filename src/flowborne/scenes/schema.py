@@ -26,6 +26,7 @@ from flowborne.scenes.schema_mouths import MouthTable
 from flowborne.scenes.schema_solids import (
     InitialTable,
     MotionTable,
+    ShapeTable,
     SolidsTable,
     WindFacesTable,
     WindForceTable,
@@ -120,6 +121,7 @@ class Scene(Table):
     sources: tuple[SourceTable, ...] = ()
     dye: tuple[DyeTable, ...] = ()
     solids: SolidsTable | None = None
+    shapes: tuple[ShapeTable, ...] = ()
     flesh: tuple[FleshTable, ...] = ()
     human: HumanTable | None = None
     clip: ClipTable | None = None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from flowborne.scenes.fields import (
     FUNCTION,
@@ -16,6 +16,7 @@ from flowborne.scenes.fields import (
     JointValues,
     NotNegative,
     Number,
+    OwnTable,
     Parameters,
     Positive,
     Table,
@@ -24,6 +25,7 @@ from flowborne.scenes.fields import (
 )
 from flowborne.scenes.schema_drives import EXACT, ServoTable
 from flowborne.scenes.schema_fluid import check_table
+from flowborne.shapes.own import SHAPES
 
 
 class SolidsTable(Table):
@@ -37,6 +39,44 @@ class SolidsTable(Table):
     model: Text
     density: Positive | None = None
     densities: dict[str, Positive] = Field(default_factory=dict)
+
+
+class ShapeTable(Table, OwnTable):
+    """[[shapes]]: a geometry of the user's own on a body; every further key is a parameter of it.
+
+    kind      as it is registered, in a file that `plugins` names
+    body      of the model
+    position  of its origin in the body's frame, m
+    euler     turns about its own x, y and z one after the other, degrees
+    axis      direction of its z in the body's frame, in place of euler
+    density   kg/m^3; that of the model's geoms unless given
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    registry = SHAPES
+
+    body: Text
+    position: Vector = (0.0, 0.0, 0.0)
+    euler: Vector | None = None
+    axis: Vector | None = None
+    density: Positive | None = None
+
+    @field_validator("kind")
+    @classmethod
+    def _registered(cls, kind: str) -> str:
+        if kind not in SHAPES:
+            listed = ", ".join(SHAPES.kinds) or "none"
+            raise ValueError(f"'{kind}' is not known. Plugins have registered: {listed}")
+        return kind
+
+    @model_validator(mode="after")
+    def _check_turn(self) -> Self:
+        if self.euler is not None and self.axis is not None:
+            raise ValueError("has both euler and axis. Keep one of them")
+        if self.axis is not None and not any(self.axis):
+            raise ValueError("has an axis of no length. Give its direction")
+        return self
 
 
 class InitialTable(Table):

@@ -75,6 +75,9 @@ class ShapeBox(Primitive):
     def landmarks(self) -> Array:
         return np.asarray(AROUND * self.size)
 
+    def outermost(self) -> Array:
+        return np.asarray(CORNERS * self.size)
+
     def endless(self, rotation: Array, height: float) -> Shape:
         size = self.size.copy()
         size[int(np.argmax(np.abs(rotation[2])))] = ENDLESS

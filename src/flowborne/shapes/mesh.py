@@ -10,7 +10,16 @@ from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.thickness import way_inward
 from flowborne.shapes.section import Section, cross
-from flowborne.shapes.shape import FINENESS, Array, Integers, Mesh, Samples, Shape, lattice
+from flowborne.shapes.shape import (
+    DIRECTIONS,
+    FINENESS,
+    Array,
+    Integers,
+    Mesh,
+    Samples,
+    Shape,
+    lattice,
+)
 from flowborne.shapes.thickness import thinnest
 
 UNDETERMINED = 0.02
@@ -68,7 +77,7 @@ class ShapeMesh(Shape):
         found = sample_skin(self.vertices, self.faces, box, corner, spacing, False, BAND)
         return Samples(corner, spacing, found)
 
-    def skin(self) -> Mesh:
+    def skin(self) -> Mesh | None:
         return self.vertices, self.faces
 
     def section(self, rotation: Array, height: float) -> Section:
@@ -131,6 +140,10 @@ class ShapeMesh(Shape):
 
     def landmarks(self) -> Array:
         return self.vertices
+
+    def outermost(self) -> Array:
+        farthest = np.unique(np.argmax(self.vertices @ DIRECTIONS.T, axis=0))
+        return np.asarray(self.vertices[farthest])
 
     def thickened(self, half: float) -> Shape:
         """Each thin side moves outward, by moving its corners along the normals of thin sides."""

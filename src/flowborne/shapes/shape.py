@@ -114,7 +114,11 @@ class Shape(ABC):
 
     @abstractmethod
     def landmarks(self) -> Array:
-        """(k, 3) places all over the surface, the outermost among them, m."""
+        """(k, 3) places all over the surface, m."""
+
+    @abstractmethod
+    def outermost(self) -> Array:
+        """(k, 3) places on the surface that lie farthest out, a few in every direction, m."""
 
     @abstractmethod
     def thickened(self, half: float) -> Shape:
@@ -148,6 +152,9 @@ class Primitive(Shape):
         places, signs = (enter[hit], leave[hit]), (one, -one)
         return np.tile(hit, 2), np.concatenate(places), np.concatenate(signs)
 
+    def outermost(self) -> Array:
+        return self.landmarks()
+
     @abstractmethod
     def interval(self, o: Array, d: Array) -> tuple[Array, Array]:
         """Part (enter, leave) of each line o + t d inside it; leave <= enter where it misses."""
@@ -163,3 +170,8 @@ def lattice(reach: Array, pitch: float, margin: float) -> tuple[Array, Integers]
     """First place (3,) and counts (3,) of a lattice `margin` m beyond the half extents `reach`."""
     corner = -np.ceil((reach + margin) / pitch) * pitch
     return corner, np.rint(-2.0 * corner / pitch).astype(np.int64) + 1
+
+
+def lattice_points(corner: Array, pitch: float, counts: Integers) -> Array:
+    """(n, 3) places on a lattice, z fastest, m."""
+    return corner + pitch * np.stack([i.ravel() for i in np.indices(tuple(counts))], axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.shapes.shape import Mesh, Shape
+from flowborne.solids.own_shapes import Own, add_shapes, own_shape
 
 Array = NDArray[np.float64]
 
@@ -35,6 +37,8 @@ in the number of dofs."""
 
 CONTACT_ONLY = ("plane", "hfield")
 
+NONE: Own = {}
+
 
 def compiled(
     source: str | Path,
@@ -42,13 +46,14 @@ def compiled(
     gravity: tuple[float, float, float],
     density: float | None,
     densities: Mapping[str, float],
+    shapes: Sequence[PlacedShape] = (),
 ) -> mujoco.MjModel:
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    return bones_of(source, slab, gravity, density, densities)[1]
+    return bones_of(source, slab, gravity, density, densities, shapes)[1]
 
 
 def bones_of(
@@ -57,6 +62,7 @@ def bones_of(
     gravity: tuple[float, float, float],
     density: float | None,
     densities: Mapping[str, float],
+    shapes: Sequence[PlacedShape] = (),
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """An MJCF file or text, as `compiled`, before flesh grows on it."""
     where = _named(source)
@@ -65,14 +71,18 @@ def bones_of(
             spec = mujoco.MjSpec.from_file(str(source))
         else:
             spec = mujoco.MjSpec.from_string(source)
-        _set_options(spec, gravity)
-        for geom in spec.geoms:
-            given = densities.get(geom.parent.name, density)
-            if given is not None:
-                geom.density, geom.mass = given, np.nan
+    except ValueError as error:
+        raise _unreadable(where, error) from error
+    _set_options(spec, gravity)
+    add_shapes(spec, shapes)
+    for geom in spec.geoms:
+        given = densities.get(geom.parent.name, density)
+        if given is not None:
+            geom.density, geom.mass = given, np.nan
+    try:
         mj = spec.compile()
     except ValueError as error:
-        raise ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.") from error
+        raise _unreadable(where, error) from error
     _refuse_unsupported(mj, where)
     if slab:
         _set_slab_inertias(spec, mj)
@@ -81,6 +91,10 @@ def bones_of(
         except ValueError as error:
             raise ValueError(f"{where} cannot be made a slab: {error}.") from error
     return spec, mj
+
+
+def _unreadable(where: str, error: ValueError) -> ValueError:
+    return ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.")
 
 
 def _named(source: str | Path) -> str:
@@ -176,9 +190,15 @@ def mesh_of(mj: mujoco.MjModel, geom: int) -> Mesh | None:
     return vertices.astype(np.float64), faces.astype(np.int64)
 
 
-def geom_shape(mj: mujoco.MjModel, geom: int) -> Shape:
-    """A geometry that displaces fluid, in its own frame."""
-    return shape_of(kind_of(mj, geom), mj.geom_size[geom], mesh_of(mj, geom))
+def geom_shape(mj: mujoco.MjModel, geom: int, own: Own = NONE) -> Shape:
+    """A geometry that displaces fluid, in its own frame; `own` are those of the user's own."""
+    mesh = mesh_of(mj, geom)
+    if mesh is not None:
+        number = int(mj.geom_dataid[geom])
+        geometry = own.get(element_name(mj, mujoco.mjtObj.mjOBJ_MESH, number))
+        if geometry is not None:
+            return own_shape(mj, number, geometry, mesh)
+    return shape_of(kind_of(mj, geom), mj.geom_size[geom], mesh)
 
 
 def is_closed(mesh: Mesh) -> bool:

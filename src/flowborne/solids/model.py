@@ -11,10 +11,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, mjcf
 from flowborne.solids.covered import covered
 from flowborne.solids.flesh import flesh_of, points_of_flesh
+from flowborne.solids.own_shapes import own_by_mesh
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue import Grown
 
@@ -74,8 +76,15 @@ class SolidModel:
     geom_covered   (ngeom,) whether flesh is all around it at rest, so that no fluid touches it
     """
 
-    def __init__(self, mj: mujoco.MjModel, slab: bool, grown: Sequence[Grown] = ()) -> None:
+    def __init__(
+        self,
+        mj: mujoco.MjModel,
+        slab: bool,
+        grown: Sequence[Grown] = (),
+        shapes: Sequence[PlacedShape] = (),
+    ) -> None:
         self.mj = mj
+        self._own = own_by_mesh(shapes)
         self.slab = slab
         self.gravity: Array = np.array(mj.opt.gravity)
         self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), _bones(mj, grown)
@@ -96,6 +105,7 @@ class SolidModel:
         gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
         density: float | None = None,
         densities: Mapping[str, float] = MappingProxyType({}),
+        shapes: Sequence[PlacedShape] = (),
     ) -> SolidModel:
         """Model of an MJCF file.
 
@@ -103,9 +113,11 @@ class SolidModel:
         gravity  (3,) m/s^2, in place of the file's own
         density  kg/m^3, in place of every geom's own density or mass
         densities  body -> kg/m^3 of its geoms, in place of `density`
+        shapes   geometries of one's own, besides those of the file
         raises   ValueError when the model is bad
         """
-        return cls(mjcf.compiled(Path(path), slab, gravity, density, densities), slab)
+        mj = mjcf.compiled(Path(path), slab, gravity, density, densities, shapes)
+        return cls(mj, slab, shapes=shapes)
 
     @classmethod
     def from_string(
@@ -116,9 +128,11 @@ class SolidModel:
         gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
         density: float | None = None,
         densities: Mapping[str, float] = MappingProxyType({}),
+        shapes: Sequence[PlacedShape] = (),
     ) -> SolidModel:
         """Model of an MJCF text; as `from_file`."""
-        return cls(mjcf.compiled(xml, slab, gravity, density, densities), slab)
+        mj = mjcf.compiled(xml, slab, gravity, density, densities, shapes)
+        return cls(mj, slab, shapes=shapes)
 
     @classmethod
     def with_flesh(
@@ -128,11 +142,13 @@ class SolidModel:
         *,
         slab: bool = False,
         gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+        shapes: Sequence[PlacedShape] = (),
     ) -> SolidModel:
         """Model of bones and flesh, for `assemble_flesh`.
 
         grown   what `add_flesh` gave for each flesh of `spec`
         slab    flesh is made of triangles in the plane z = 0, per unit depth
+        shapes  geometries of one's own that `add_shapes` gave to it
         raises  ValueError when it is bad
         """
         corners = {g.elements.shape[1] for g in grown}
@@ -142,7 +158,7 @@ class SolidModel:
         damping = sorted({g.tissue.damping for g in grown})
         if len(damping) > 1:
             raise ValueError(f"the fleshes have damping times of {damping} s. Give all the same.")
-        return cls(mjcf.compiled_with_flesh(spec, gravity), slab, grown)
+        return cls(mjcf.compiled_with_flesh(spec, gravity), slab, grown, shapes)
 
     @classmethod
     def empty(cls, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SolidModel:
@@ -260,7 +276,7 @@ class SolidModel:
         self.ngeom = len(chosen)
         names = _names(mj, mujoco.mjtObj.mjOBJ_GEOM, mj.ngeom)
         self.geom_names = tuple(names[g] for g in chosen)
-        self.geom_shape = tuple(mjcf.geom_shape(mj, g) for g in chosen)
+        self.geom_shape = tuple(mjcf.geom_shape(mj, g, self._own) for g in chosen)
         self.geom_size: Array = np.array(mj.geom_size[self.geom_id])
         self.geom_body: NDArray[np.int64] = mj.geom_bodyid[self.geom_id].astype(np.int64)
         self.geom_offset: Array = np.array(mj.geom_pos[self.geom_id])

@@ -9,7 +9,7 @@ import pytest
 
 from flowborne.fluid.grid import Grid
 from flowborne.shapes.kinds import shape_of
-from flowborne.view.run import Geom, Run
+from flowborne.view.run import Run
 from flowborne.view.space.camera import (
     FILLED,
     FILLED_BY_FLUID,
@@ -17,7 +17,6 @@ from flowborne.view.space.camera import (
     TOWARD,
     UP,
     camera_of,
-    outermost,
     swept,
 )
 
@@ -117,6 +116,6 @@ def test_the_maps_axes_are_a_frame_and_x_leads_to_the_right_and_nearer() -> None
 def test_outermost_places_reach_as_far_as_the_geometry(
     kind: str, size: tuple[float, ...], reach: tuple[float, ...]
 ) -> None:
-    places = outermost(Geom(shape_of(kind, np.array(size), None), 1, np.ones(4)))
+    places = shape_of(kind, np.array(size), None).outermost()
     np.testing.assert_allclose(places.max(axis=0), reach)
     np.testing.assert_allclose(places.min(axis=0), -np.array(reach))

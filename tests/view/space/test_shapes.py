@@ -7,7 +7,6 @@ import pytest
 
 from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom
-from flowborne.view.space.camera import outermost
 from flowborne.view.space.shapes import mesh_of
 
 A, B, C = 0.2, 0.5, 0.3
@@ -33,7 +32,7 @@ def test_a_mesh_is_the_geometry(kind: str, volume: float) -> None:
     geom = Geom(shape_of(kind, np.array([A, B, C]), mesh), 1, np.ones(4))
     drawn = mesh_of(geom)
     assert drawn.volume == pytest.approx(volume, rel=0.02)
-    points, reach = np.asarray(drawn.points), outermost(geom)
+    points, reach = np.asarray(drawn.points), geom.shape.outermost()
     np.testing.assert_allclose(points.max(axis=0), reach.max(axis=0), atol=2e-3)
     np.testing.assert_allclose(points.min(axis=0), reach.min(axis=0), atol=2e-3)
     outward = np.sum((points - points.mean(axis=0)) * drawn.point_data["Normals"], axis=1)

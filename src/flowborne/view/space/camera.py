@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from flowborne.shapes.shape import DIRECTIONS
-from flowborne.view.run import Geom, Run
+from flowborne.view.run import Run
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ def swept(run: Run, geoms: Sequence[int]) -> Array:
     if geoms:
         centres, turns = run.every("geom_position"), run.every("geom_rotation")
         placed += [
-            centres[:, n, None] + outermost(run.geoms[n]) @ np.swapaxes(turns[:, n], 1, 2)
+            centres[:, n, None] + run.geoms[n].shape.outermost() @ np.swapaxes(turns[:, n], 1, 2)
             for n in geoms
         ]
     return np.concatenate(placed, axis=1) if placed else np.zeros((len(run), 1, 3))
@@ -126,15 +126,6 @@ def _swept_by_flesh(run: Run) -> Array:
     vertices = run.every("flesh_vertices")
     farthest = [np.argmax(places @ DIRECTIONS.T, axis=0) for places in vertices]
     return vertices[:, np.unique(farthest)]
-
-
-def outermost(geom: Geom) -> Array:
-    """(k, 3) places on a geometry's surface, in its own frame: of many those that are the farthest
-    in one of 26 directions."""
-    places = geom.shape.landmarks()
-    if len(places) <= len(DIRECTIONS):
-        return places
-    return np.asarray(places[np.unique(np.argmax(places @ DIRECTIONS.T, axis=0))])
 
 
 def _followed(places: Array, calm: float) -> Array:
