@@ -254,7 +254,7 @@ def cases(monkeypatch):
     asked = []
     results = {"K1": Result("K1", "pass", "K1"), "K2": Result("K2", "fail", "K2")}
 
-    def run_all(names, quick=None, on_result=None):
+    def run_all(names, quick=None, on_result=None, report=None):
         asked.append((names, quick))
         chosen = [results[name] for name in names or results]
         for result in chosen:

@@ -27,7 +27,7 @@ def test_I6_moment_converges_to_munk_and_force_to_none() -> None:
 @pytest.mark.parametrize("ratio", [2.0, 0.5])
 def test_I7_period_hanging_and_standing(ratio: float) -> None:
     exact = case.small_period(ratio, 1.017337)
-    assert case.swing(48, ratio, 5.0, exact) == pytest.approx(exact, rel=0.02)
+    assert case.swing(case.NARROW, 48, ratio, 5.0, exact) == pytest.approx(exact, rel=0.02)
 
 
 @pytest.mark.parametrize("solid", [False, True])

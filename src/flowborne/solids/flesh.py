@@ -230,13 +230,18 @@ def surface_of(elements: Indices) -> Indices:
 def outer_surface(points: Array, elements: Indices) -> Indices:
     """(k, 3) outward triangles around tetrahedra (m, 4) of points (n, 3), those of holes left out.
 
-    What flesh encloses, bones for the most part, counts as inside.
+    What flesh encloses, bones for the most part, counts as inside. A sheet is what hangs together
+    by edges: where flesh is thin, the one around a bone may have corners in common with the outer.
     """
     triangles = surface_of(elements)
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
-    count = len(points)
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    sheet = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    count = len(triangles)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, edge, around = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    by_edge = np.argsort(edge, kind="stable")
+    of_two = around[edge[by_edge]] == 2  # where sheets touch along an edge it has four
+    one, other = (by_edge[of_two] // 3).reshape(-1, 2).T
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    sheet = connected_components(graph, directed=False)[1]
     enclosed = np.bincount(sheet, np.linalg.det(points[triangles]))
     return np.asarray(triangles[enclosed[sheet] > 0.0])
 
