@@ -1,9 +1,9 @@
 """Compiling the kernels of the pressure solver in a second process.
 
-A first run compiles for more than half a minute on two cores. The pressure solver is more than half
-of that and needs nothing of the rest, so another process compiles it for the cache on disc. It
-begins where a step comes last, with the iteration: meanwhile this process compiles what the step
-begins with, and finds in the cache what the other has done by then.
+A first run compiles for about 70 s on one core. The pressure solver is more than half of that and
+needs nothing of the rest, so another process compiles it for the cache on disc. It begins where a
+step comes last, with the iteration: meanwhile this process compiles what the step begins with, and
+finds in the cache what the other has done by then.
 """
 
 from __future__ import annotations
