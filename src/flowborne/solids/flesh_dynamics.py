@@ -92,7 +92,9 @@ def assemble_flesh(
 
         A = M + dt/2 D + dt^2/4 K      b = f
 
-    As in `assemble`, with the K and D of flesh besides.
+    As in `assemble`, with the K and D of flesh besides, whose part is dt^2/2 K: no energy is lost
+    with any part from a quarter on, and twice as much keeps steps stable while flesh is up to twice
+    as stiff as at their start. With a quarter the swimmer's legs tore in the eighth frame.
 
     applied  (nv,) generalised force, N or N m
     dt       s
@@ -106,7 +108,7 @@ def assemble_flesh(
     K, elastic = _flesh(model, s)
     assert model.flesh is not None
     damping = model.flesh.damping
-    A = A + (0.25 * dt**2 + 0.5 * dt * damping) * K
+    A = A + (0.5 * dt**2 + 0.5 * dt * damping) * K
     force = s.smooth + elastic - damping * (K @ state.v)
     v = state.v.copy()
     still = A @ v
