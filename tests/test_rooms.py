@@ -18,7 +18,7 @@ BELOW = {
     "solvers": {"kernels"},
     "fluid": {"kernels", "solvers"},
     "shapes": {"kernels"},
-    "solids": {"kernels", "shapes"},
+    "solids": {"kernels", "solvers", "shapes"},
     "coupling": {"kernels", "solvers", "fluid", "shapes", "solids"},
 }
 """Rooms that each of these may import from, besides itself; single modules are free."""

@@ -9,7 +9,7 @@ from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.effort import holding
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
-from flowborne.solids.flesh_solve import prescribe_flesh, symmetric_factor
+from flowborne.solids.flesh_solve import prescribe_flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import (
     halfway_momentum,
@@ -20,6 +20,7 @@ from flowborne.solids.momentum import (
 )
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue import Tissue, add_flesh
+from flowborne.solvers.cholesky import symmetric_factor
 
 __all__ = [
     "SIDES",

@@ -19,6 +19,7 @@ from flowborne.kernels.sparse_rows import (
     row_gram_along,
     sum_rows,
 )
+from flowborne.solvers.cholesky import cholesky, ordering_of
 from flowborne.solvers.mobility import dense_mobility, factored_mobility
 
 SHAPE, SIZE = (5, 4, 6), 7
@@ -90,13 +91,11 @@ def test_dense_response() -> None:
 def test_factored_response() -> None:
     random, n = np.random.default_rng(5), 11
     T = csr_array(random.standard_normal((SIZE, n)) * (random.random((SIZE, n)) < 0.4))
-    lower = csc_array(np.tril(random.standard_normal((n, n)), -1) * (random.random((n, n)) < 0.3))
-    start, row = lower.indptr.astype(np.int32), lower.indices.astype(np.int32)
+    half = random.standard_normal((n, n)) * (random.random((n, n)) < 0.3)
+    A = csr_array(half @ half.T + np.eye(n))
     mobility = factored_mobility(
         T,
-        (start, row, lower.data),
-        random.uniform(0.5, 2.0, n),
-        random.permutation(n),
+        cholesky(A, np.arange(n), ordering_of(csc_array(A))),
         0.1 * random.standard_normal((n, 2)),
         np.zeros((SIZE, 0)),
     )

@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csc_array
 
 from flowborne.solids.flesh_dynamics import static_forces
-from flowborne.solids.flesh_solve import symmetric_factor
+from flowborne.solvers.cholesky import symmetric_factor
 from flowborne.validation import flesh as case
 from flowborne.validation.flesh_bars import bar_of, tissue_table
 from flowborne.validation.worlds import NOWHERE

@@ -23,8 +23,9 @@ from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.flesh_solve import PrescribedFlesh, symmetric_factor
+from flowborne.solids.flesh_solve import PrescribedFlesh
 from flowborne.solids.prescribed import Driven, PrescribedSystem
+from flowborne.solvers.cholesky import symmetric_factor
 
 TOLERANCE = 1e-12
 """Relative residual of the viscous solve."""

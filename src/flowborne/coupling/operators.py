@@ -83,7 +83,7 @@ def mobility_of(kinematics: Kinematics, driven: Driven) -> Mobility:
         return dense_mobility(rigid_response(kinematics, driven))
     twist = twist_rows(kinematics)
     free = csr_array(jacobian(kinematics)[:, driven.free])
-    return factored_mobility(free, *driven.factors(), free @ driven.soft(twist))
+    return factored_mobility(free, driven.factor, driven.constraints(), free @ driven.soft(twist))
 
 
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:

@@ -37,11 +37,13 @@ Vectors = tuple[Array, Array, Array, Array, Array]
 Rows = tuple[Integers, Integers, Integers, Array]
 """Sparse rows J: flat cell of each, where each begins, columns and values of the entries."""
 
-MobilityArrays = tuple[
-    Array, Indices, Indices, Array, Indices, Indices, Array, Array, Integers, Array
-]
-"""Dense A^-1; rows of T (start, column, value); columns of L below its diagonal (start, row,
-value); D; the order P; Y (see `solvers.mobility`)."""
+Blocks = tuple[Integers, Integers, Indices, Integers, Indices]
+"""Columns of a sparse L in blocks with the same rows: the first column of each (s+1,), where its
+rows below begin (s+1,), those rows, where its values begin (s+1,), and the block of each column."""
+
+MobilityArrays = tuple[Array, Indices, Indices, Array, Array, Blocks, Integers, Array]
+"""Dense A^-1; rows of T (start, column, value); values of L and its blocks; the order P; Y (see
+`solvers.mobility`)."""
 
 Point = tuple[float, float, float]
 """In kernels; a row of an array serves as well."""

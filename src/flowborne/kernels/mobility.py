@@ -4,32 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Indices, MobilityArrays
+from flowborne.kernels.arrays import Array, MobilityArrays
+from flowborne.kernels.cholesky import lower_reference, solve_factored
 from flowborne.kernels.jit import kernel
-
-
-@kernel
-def solve_factored(x: Array, start: Indices, row: Indices, value: Array, diagonal: Array) -> None:
-    """x = (L D L^T)^-1 x, in place."""
-    n = x.size
-    for j in range(n):
-        known = x[j]
-        if known != 0.0:
-            for e in range(start[j], start[j + 1]):
-                x[row[e]] -= value[e] * known
-    for j in range(n):
-        x[j] /= diagonal[j]
-    for j in range(n - 1, -1, -1):
-        total = x[j]
-        for e in range(start[j], start[j + 1]):
-            total -= value[e] * x[row[e]]
-        x[j] = total
 
 
 @kernel
 def respond(load: Array, mobility: MobilityArrays) -> Array:
     """(k,) A^-1 load."""
-    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = mobility
+    dense, t_start, t_column, t_value, value, blocks, order, taken = mobility
     size = load.size
     motion = np.zeros(size)
     if t_start.size == 1:
@@ -42,13 +25,13 @@ def respond(load: Array, mobility: MobilityArrays) -> Array:
         if load[a] != 0.0:
             for e in range(t_start[a], t_start[a + 1]):
                 force[t_column[e]] += t_value[e] * load[a]
-    turned = np.empty(order.size)
+    turned = np.empty((1, order.size))
     for i in range(order.size):
-        turned[order[i]] = force[i]
-    solve_factored(turned, start, row, value, diagonal)
+        turned[0, order[i]] = force[i]
+    solve_factored(turned, value, blocks)
     answer = np.empty(order.size)
     for i in range(order.size):
-        answer[i] = turned[order[i]]
+        answer[i] = turned[0, order[i]]
     for c in range(taken.shape[1]):
         part = 0.0
         for i in range(order.size):
@@ -63,11 +46,10 @@ def respond(load: Array, mobility: MobilityArrays) -> Array:
 
 def respond_reference(load: Array, mobility: MobilityArrays) -> Array:
     """`respond` in NumPy, by dense matrices."""
-    dense, t_start, t_column, t_value, start, row, value, diagonal, order, taken = mobility
+    dense, t_start, t_column, t_value, value, blocks, order, taken = mobility
     if t_start.size == 1:
         return np.asarray(dense @ load)
-    T, L = np.zeros((load.size, order.size)), np.eye(order.size)
+    T, L = np.zeros((load.size, order.size)), lower_reference(value, blocks)
     np.add.at(T, (np.repeat(np.arange(load.size), np.diff(t_start)), t_column), t_value)
-    L[row, np.repeat(np.arange(order.size), np.diff(start))] = value
-    factored = (L @ np.diag(diagonal) @ L.T)[np.ix_(order, order)]
+    factored = (L @ L.T)[np.ix_(order, order)]
     return np.asarray(T @ (np.linalg.inv(factored) - taken @ taken.T) @ T.T @ load)

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 class FleshSystem:
     """A v+ = impulse, for bones and flesh; constraint rows apart, so that A stays as it is.
 
+    model    what it is of
     A        (nv, nv) sparse, symmetric positive definite, without the rows
     impulse  (nv,) A v + dt b, without the rows
     dt       s
@@ -35,7 +36,8 @@ class FleshSystem:
     halfway  the forces half-way through the step, and own (nv,), the impulse that they give here
     """
 
-    A: csc_array
+    model: SolidModel
+    A: csr_array
     impulse: Array
     dt: float
     v: Array
@@ -121,7 +123,7 @@ def assemble_flesh(
     if s.data.nefc:
         s.forward(state.q, state.v, applied)
         rows, zones = rows_of(model, s)
-    return FleshSystem(csc_array(A), own, dt, v, rows, zones, centre, own)
+    return FleshSystem(model, csr_array(A), own, dt, v, rows, zones, centre, own)
 
 
 def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_array, Array]:

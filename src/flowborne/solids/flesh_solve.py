@@ -19,14 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
 from flowborne.solids.flesh_dynamics import FleshSystem
+from flowborne.solids.flesh_order import ordered
+from flowborne.solvers.cholesky import Cholesky, cholesky
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Lower = tuple[NDArray[np.int32], NDArray[np.int32], Array]
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class PrescribedFlesh:
     hold: Array
     velocity: Array
     free: NDArray[np.int64]
-    factor: Any
+    factor: Cholesky
     rows: tuple[Array, Any]
     limited: Mask
     push: Array
@@ -59,6 +58,8 @@ class PrescribedFlesh:
     def answer(self, impulse: Array) -> Array:
         """B_FF^-1 of generalised impulses (nv,) or (nv, k), zero on prescribed dofs."""
         change = np.zeros_like(impulse)
+        if not impulse.any():
+            return change
         change[self.free] = _solve(self.factor, self.rows, impulse[self.free])
         return change
 
@@ -78,20 +79,12 @@ class PrescribedFlesh:
             return None
         return _solved(replace(self, system=system))
 
-    def factors(self) -> tuple[Lower, Array, NDArray[np.int64], Array]:
-        """B_FF^-1 = P^T (L D L^T)^-1 P - Y' Y'^T by its parts: L below its diagonal by columns
-        (start, row, value), D, the place of each free dof in L, and Y' (nf, k)."""
-        L, order = self.factor.L, self.factor.perm_c
-        if not np.array_equal(order, self.factor.perm_r):
-            raise ArithmeticError("the matrix of bones and flesh is not positive definite")
-        column = np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))
-        below = L.indices > column
-        start = np.concatenate([[0], np.cumsum(np.bincount(column[below], minlength=L.shape[1]))])
-        lower = start.astype(np.int32), L.indices[below], L.data[below]
+    def constraints(self) -> Array:
+        """(nf, k) Y' with B_FF^-1 = A_FF^-1 - Y' Y'^T."""
         Y, small = self.rows
-        if small is not None:
-            Y = solve_triangular(np.tril(small[0]), Y.T, lower=True).T
-        return lower, self.factor.U.diagonal(), order.astype(np.int64), Y
+        if small is None:
+            return Y
+        return np.asarray(solve_triangular(np.tril(small[0]), Y.T, lower=True).T)
 
     def soft(self, jacobian: Array) -> Array:
         """(nf, m) Z with Z Z^T the part of B_FF^-1 that moves bones, flesh following at its ease.
@@ -150,16 +143,16 @@ def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> Presc
     )
 
 
-def _factored(system: FleshSystem, prescribed: Mask) -> tuple[NDArray[np.int64], Any]:
+def _factored(system: FleshSystem, prescribed: Mask) -> tuple[NDArray[np.int64], Cholesky]:
     free = np.flatnonzero(~prescribed)
-    return free, symmetric_factor(csc_array(system.A[free][:, free]))
+    return free, cholesky(system.A, free, ordered(system.model, free))
 
 
 def _solved(driven: PrescribedFlesh) -> PrescribedFlesh:
     """With the active rows of its system in the factor, and the velocity that they give."""
     system, free, factor = driven.system, driven.free, driven.factor
     J, D, _ = system.acting()
-    Y = factor.solve(np.ascontiguousarray(J[:, free].T)) if len(D) else np.zeros((len(free), 0))
+    Y = factor.solve(J[:, free].T) if len(D) else np.zeros((len(free), 0))
     rows = Y, cho_factor(np.diag(1.0 / D) + J[:, free] @ Y, lower=True) if len(D) else None
     velocity = np.where(driven.prescribed, driven.hold, 0.0)
     velocity[free] = _solve(factor, rows, _remaining(system, velocity)[free])
@@ -172,19 +165,9 @@ def _remaining(system: FleshSystem, v_plus: Array) -> Array:
     return np.asarray(system.impulse + push - system.A @ v_plus - J.T @ (D * (J @ v_plus)))
 
 
-def _solve(factor: Any, rows: tuple[Array, Any], right: Array) -> Array:
-    found = factor.solve(np.ascontiguousarray(right))
+def _solve(factor: Cholesky, rows: tuple[Array, Any], right: Array) -> Array:
+    found = factor.solve(right)
     Y, small = rows
     if small is not None:
         found -= Y @ cho_solve(small, Y.T @ right)
-    return np.asarray(found)
-
-
-def symmetric_factor(matrix: csc_array) -> Any:
-    """SuperLU of a symmetric positive definite matrix, in an order that keeps it sparse.
-
-    The symmetric order holds only while every pivot is taken from the diagonal.
-    """
-    return splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    return found

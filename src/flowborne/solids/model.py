@@ -19,6 +19,7 @@ from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.own_shapes import own_by_mesh
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue import Grown
+from flowborne.solvers.cholesky import Ordering
 
 Array = NDArray[np.float64]
 
@@ -73,6 +74,7 @@ class SolidModel:
     geom_offset    (ngeom, 3) centre in the body's frame, m
     geom_rotation  (ngeom, 3, 3) geometry's frame to the body's
     geom_rgba      (ngeom, 4) colour
+    orderings      of its sparse factors, by the dofs that are free; see `flesh_order`
     geom_covered   (ngeom,) whether flesh is all around it at rest, so that no fluid touches it
     """
 
@@ -85,6 +87,7 @@ class SolidModel:
     ) -> None:
         self.mj = mj
         self._own = own_by_mesh(shapes)
+        self.orderings: dict[bytes, Ordering] = {}
         self.slab = slab
         self.gravity: Array = np.array(mj.opt.gravity)
         self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), _bones(mj, grown)

@@ -1,6 +1,6 @@
 """The matrix A^-1 of a term of low rank, whole or by its factors.
 
-    A^-1 = T ( (P^T L D L^T P)^-1 - Y Y^T ) T^T
+    A^-1 = T ( (P^T L L^T P)^-1 - Y Y^T ) T^T
 
 T leads from the unknowns of a factorised matrix to the k columns; Y takes out the motions of those
 unknowns that constraints hold.
@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from flowborne.kernels.arrays import Array, Indices, Integers, MobilityArrays
+from flowborne.kernels.arrays import Array, MobilityArrays
 from flowborne.kernels.mobility import respond
+from flowborne.solvers.cholesky import Cholesky
 
 
 @dataclass(frozen=True)
@@ -61,31 +62,28 @@ def dense_mobility(matrix: Array) -> Mobility:
     """Of a dense A^-1 (k, k)."""
     whole = np.ascontiguousarray(matrix)
     share, axes = np.linalg.eigh(whole) if len(whole) else (np.zeros(0), whole)
-    arrays = (
-        whole, START, NONE, np.zeros(0), START, NONE, np.zeros(0), np.zeros(0),
-        np.zeros(0, np.int64), np.zeros((0, 0)),
-    )  # fmt: skip
+    none = np.zeros(0, np.int64)
+    blocks = none, none, NONE, none, NONE
+    arrays = whole, START, NONE, np.zeros(0), np.zeros(0), blocks, none, np.zeros((0, 0))
     return Mobility(arrays, axes * np.sqrt(np.maximum(share, 0.0)))
 
 
 def factored_mobility(
     jacobian: csr_array,
-    lower: tuple[Indices, Indices, Array],
-    diagonal: Array,
-    order: Integers,
+    factor: Cholesky,
     taken: Array,
     compliant: Array,
 ) -> Mobility:
     """Of a factorised matrix.
 
     jacobian  (k, n) T
-    lower     columns of L (n, n) below its diagonal of ones: start, row, value
-    diagonal  (n,) D;  order  (n,) index of each unknown in L
+    factor    L, and P
     taken     (n, c) Y;  compliant  see `Mobility`
     """
     starts, columns = jacobian.indptr.astype(np.int32), jacobian.indices.astype(np.int32)
+    ordering, Y = factor.ordering, np.ascontiguousarray(taken)
     arrays = (
-        np.zeros((0, 0)), starts, columns, jacobian.data, *lower, diagonal,
-        order.astype(np.int64), np.ascontiguousarray(taken),
+        np.zeros((0, 0)), starts, columns, jacobian.data,
+        factor.value, ordering.blocks, ordering.place, Y,
     )  # fmt: skip
     return Mobility(arrays, np.ascontiguousarray(compliant))

@@ -1,0 +1,209 @@
+"""L L^T of a sparse symmetric positive definite matrix, by blocks of columns with the same rows.
+
+A block of columns first..last has its own triangle (w, w) and, below it, the rows (m,) that all of
+them share: m values of each column in turn, so that the innermost loops run along memory. After
+Ng and Peyton (1993), with each block's update given to the blocks on its right at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.kernels.arrays import Array, Blocks, Indices, Integers
+from flowborne.kernels.jit import kernel
+
+
+@kernel
+def factorise(
+    value: Array, blocks: Blocks, place: Integers, start: Indices, row: Indices, entry: Array
+) -> int:
+    """L of a matrix by columns (start, row, entry), whose unknown i is number place[i] in L, or is
+    left out where that is -1.
+
+    value    of L, set; see `Blocks`
+    returns  0; 1 when the matrix has an entry that the blocks have no room for, 2 when it is not
+             positive definite
+    """
+    first, below, rows, at, owner = blocks
+    n, count = owner.size, first.size - 1
+    where = np.full(n, -1, np.int32)
+    column = np.empty(n, np.int32)
+    for i in range(place.size):
+        if place[i] >= 0:
+            column[place[i]] = i
+    value[:] = 0.0
+    most = 0
+    for s in range(count):
+        begin, end, r0, m = first[s], first[s + 1], below[s], below[s + 1] - below[s]
+        w, most = end - begin, max(most, m)
+        for k in range(m):
+            where[rows[r0 + k]] = k
+        for c in range(begin, end):
+            own, lower = at[s] + (c - begin) * w, at[s] + w * w + (c - begin) * m
+            for e in range(start[column[c]], start[column[c] + 1]):
+                r = place[row[e]]
+                if r >= end:
+                    k = where[r]
+                    if not (0 <= k < m and rows[r0 + k] == r):
+                        return 1
+                    value[lower + k] = entry[e]
+                elif r >= c:
+                    value[own + r - begin] = entry[e]
+    update = np.empty(most * most)
+    for s in range(count):
+        m, w = below[s + 1] - below[s], first[s + 1] - first[s]
+        if not factor_block(value[at[s] : at[s + 1]], w, m):
+            return 2
+        panel = value[at[s] + w * w : at[s + 1]]
+        multiply_panel(update, panel, w, m)
+        give_update(value, blocks, s, update, where)
+    return 0
+
+
+@kernel
+def factor_block(block: Array, w: int, m: int) -> bool:
+    """Cholesky's factor of a block's triangle (columns in turn), and L below it, in place; False
+    when the triangle is not positive definite."""
+    for c in range(w):
+        own = block[c * w + c : (c + 1) * w]
+        lower = block[w * w + c * m : w * w + (c + 1) * m]
+        if not own[0] > 0.0:
+            return False
+        root = np.sqrt(own[0])
+        inverse = 1.0 / root
+        own[0] = root
+        for r in range(1, w - c):
+            own[r] *= inverse
+        for k in range(m):
+            lower[k] *= inverse
+        for d in range(c + 1, w):
+            share = own[d - c]
+            later = block[d * w + d : (d + 1) * w]
+            beneath = block[w * w + d * m : w * w + (d + 1) * m]
+            for r in range(w - d):
+                later[r] -= share * own[d - c + r]
+            for k in range(m):
+                beneath[k] -= share * lower[k]
+    return True
+
+
+@kernel
+def multiply_panel(update: Array, panel: Array, w: int, m: int) -> None:
+    """update[i, j] = sum over the columns of panel (w, m) of panel[:, i] panel[:, j] for j >= i."""
+    for i in range(m):
+        wanted = update[i * m + i : (i + 1) * m]
+        size = m - i
+        wanted[:] = 0.0
+        c = 0
+        while c + 3 < w:
+            p0 = panel[c * m + i : (c + 1) * m]
+            p1 = panel[(c + 1) * m + i : (c + 2) * m]
+            p2 = panel[(c + 2) * m + i : (c + 3) * m]
+            p3 = panel[(c + 3) * m + i : (c + 4) * m]
+            a0, a1, a2, a3 = p0[0], p1[0], p2[0], p3[0]
+            for k in range(size):
+                wanted[k] += (a0 * p0[k] + a1 * p1[k]) + (a2 * p2[k] + a3 * p3[k])
+            c += 4
+        while c < w:
+            p0 = panel[c * m + i : (c + 1) * m]
+            a0 = p0[0]
+            for k in range(size):
+                wanted[k] += a0 * p0[k]
+            c += 1
+
+
+@kernel
+def give_update(value: Array, blocks: Blocks, s: int, update: Array, where: Indices) -> None:
+    """Take the update of block s from the columns that its rows are."""
+    first, below, rows, at, owner = blocks
+    shared = rows[below[s] : below[s + 1]]
+    m, target, begin, end, w, height, inner = shared.size, -1, 0, 0, 0, 0, 0
+    for i in range(m):
+        c = shared[i]
+        if owner[c] != target:
+            target = owner[c]
+            begin, end = first[target], first[target + 1]
+            w, height, inner = end - begin, below[target + 1] - below[target], i
+            for k in range(height):
+                where[rows[below[target] + k]] = k
+            while inner < m and shared[inner] < end:
+                inner += 1
+        mine = update[i * m : (i + 1) * m]
+        own = value[at[target] + (c - begin) * w : at[target] + (c - begin + 1) * w]
+        start = at[target] + w * w + (c - begin) * height
+        lower = value[start : start + height]
+        for j in range(i, inner):
+            own[shared[j] - begin] -= mine[j]
+        for j in range(inner, m):
+            lower[where[shared[j]]] -= mine[j]
+
+
+@kernel
+def solve_factored(x: Array, value: Array, blocks: Blocks) -> None:
+    """x = (L L^T)^-1 x for every row of x (k, n), in place."""
+    first, below, rows, at, _ = blocks
+    count, most = first.size - 1, 0
+    for s in range(count):
+        most = max(most, below[s + 1] - below[s])
+    work = np.empty(most)
+    for s in range(count):
+        shared = rows[below[s] : below[s + 1]]
+        for b in range(x.shape[0]):
+            forwards(x[b], first[s], first[s + 1], shared, value[at[s] : at[s + 1]], work)
+    for s in range(count - 1, -1, -1):
+        shared = rows[below[s] : below[s + 1]]
+        for b in range(x.shape[0]):
+            backwards(x[b], first[s], first[s + 1], shared, value[at[s] : at[s + 1]], work)
+
+
+@kernel
+def forwards(x: Array, begin: int, end: int, shared: Indices, block: Array, work: Array) -> None:
+    """L y = x for the columns of one block begin..end, and what they take from the others."""
+    w, m = end - begin, shared.size
+    here, part = x[begin:end], work[:m]
+    part[:] = 0.0
+    for c in range(w):
+        own, lower = block[c * w : (c + 1) * w], block[w * w + c * m : w * w + (c + 1) * m]
+        here[c] /= own[c]
+        for r in range(c + 1, w):
+            here[r] -= own[r] * here[c]
+        for k in range(m):
+            part[k] += lower[k] * here[c]
+    for k in range(m):
+        x[shared[k]] -= part[k]
+
+
+@kernel
+def backwards(x: Array, begin: int, end: int, shared: Indices, block: Array, work: Array) -> None:
+    """L^T y = x for the columns of one block begin..end, when the later ones are known."""
+    w, m = end - begin, shared.size
+    here, part = x[begin:end], work[:m]
+    for k in range(m):
+        part[k] = x[shared[k]]
+    for c in range(w - 1, -1, -1):
+        own, lower = block[c * w : (c + 1) * w], block[w * w + c * m : w * w + (c + 1) * m]
+        t0, t1, t2, t3 = 0.0, 0.0, 0.0, 0.0
+        for k in range(0, m - 3, 4):
+            t0 += lower[k] * part[k]
+            t1 += lower[k + 1] * part[k + 1]
+            t2 += lower[k + 2] * part[k + 2]
+            t3 += lower[k + 3] * part[k + 3]
+        for k in range(m - m % 4, m):
+            t0 += lower[k] * part[k]
+        total = here[c] - ((t0 + t1) + (t2 + t3))
+        for r in range(c + 1, w):
+            total -= own[r] * here[r]
+        here[c] = total / own[c]
+
+
+def lower_reference(value: Array, blocks: Blocks) -> Array:
+    """(n, n) L of its blocks, dense."""
+    first, below, rows, at, owner = blocks
+    L = np.zeros((owner.size, owner.size))
+    for s in range(first.size - 1):
+        columns, shared = np.arange(first[s], first[s + 1]), rows[below[s] : below[s + 1]]
+        w = columns.size
+        own = value[at[s] : at[s] + w * w].reshape(w, w)
+        L[np.ix_(columns, columns)] = np.tril(own.T)
+        L[np.ix_(shared, columns)] = value[at[s] + w * w : at[s + 1]].reshape(w, -1).T
+    return L
