@@ -11,11 +11,12 @@ from flowborne import Array, Faces, Grid
 from flowborne.boundaries import Boundaries, BoundaryNoSlip
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.friction import TOLERANCE
-from flowborne.coupling.viscous_solve import Answer, ViscousSystem, walls_of
+from flowborne.coupling.viscous_solve import ViscousSystem, walls_of
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
 from flowborne.operators import cut_by_bodies, faces_of
+from flowborne.solvers.answers import DenseAnswer
 from flowborne.solvers.conjugate_gradients import spread
 from flowborne.validation.viscous import measured
 from flowborne.validation.worlds import PERIODIC, RING, mjcf
@@ -110,7 +111,7 @@ def case_of(
         walls_of(parts, cut.distance, cut.nearest, grid),
         size,
         size // 6,
-        lambda drag: Answer(mobility, drag.toarray()),
+        lambda drag: DenseAnswer(mobility, drag.toarray()),
         grid,
         boundaries,
         dt,
@@ -426,12 +427,12 @@ def test_bodies_answer_friction_as_their_equation_of_motion_says() -> None:
     root, pull = random.standard_normal((2, 6, 6))
     root[:, 4:] = 0.0
     mobility, drag, push = root @ root.T, pull @ pull.T, random.standard_normal(6)
-    answer = Answer(mobility, drag)
+    answer = DenseAnswer(mobility, drag)
     change, impulse = answer.to(push)
     np.testing.assert_allclose(impulse, push - drag @ change, atol=1e-12)
     np.testing.assert_allclose(change, mobility @ impulse, atol=1e-12)
     np.testing.assert_allclose(answer.change(push), change, atol=1e-12)
-    assert not Answer(np.zeros((6, 6)), drag).yields
+    assert not DenseAnswer(np.zeros((6, 6)), drag).yields
 
 
 def test_V8_torque_between_cylinders_and_spin_down() -> None:

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flowborne.solids.driven import within_limits
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.model import SolidModel
-from flowborne.solids.prescribed import PrescribedSystem, prescribe, within_limits
+from flowborne.solids.prescribed import PrescribedSystem, prescribe
 from flowborne.solids.state import SolidState
 
 CREATURE = SolidModel.from_string("""<mujoco><worldbody><geom type="plane" size="5 5 .1"/>

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
 
 from flowborne.coupling.flesh import skin_at
 from flowborne.coupling.fractions import Geometry
@@ -13,19 +12,15 @@ from flowborne.coupling.mouths import Jet, skin_slip
 from flowborne.coupling.operators import (
     boundary_velocity,
     generalised,
-    jacobian,
     pressure_push,
-    rigid_response,
 )
-from flowborne.coupling.viscous_solve import Answer, Answering, ViscousSystem, Walls, walls_of
+from flowborne.coupling.viscous_solve import ViscousSystem, Walls, walls_of
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
+from flowborne.solids.driven import Driven
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.flesh_solve import PrescribedFlesh
-from flowborne.solids.prescribed import Driven, PrescribedSystem
-from flowborne.solvers.cholesky import symmetric_factor
 
 TOLERANCE = 1e-12
 """Relative residual of the viscous solve."""
@@ -71,7 +66,7 @@ def diffuse(
     )
     walls = on_flesh(walls_of(parts, cut.distance, cut.nearest, grid), cut, bodies, grid)
     system = ViscousSystem(
-        parts, walls, size, bodies, lambda drag: answering(pose, driven, drag), grid, sides, dt
+        parts, walls, size, bodies, lambda drag: driven.answering(pose, drag), grid, sides, dt
     )
     slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
     smooth, impulse, converged = system.solve(pushed, moving, TOLERANCE, slip)
@@ -91,35 +86,3 @@ def on_flesh(walls: Walls, cut: Geometry, bodies: int, grid: Grid) -> Walls:
     columns[flesh, :3] = 6 * bodies + 3 * corner + axis[:, None]
     arm[flesh, :3] = weight
     return replace(walls, columns=columns, arm=arm)
-
-
-def answering(pose: Kinematics, driven: Driven, drag: csr_array) -> Answering:
-    """How bones, or bones and flesh, answer a drag (k, k), kg."""
-    if isinstance(driven, PrescribedSystem):
-        return Answer(rigid_response(pose, driven), drag.toarray())
-    return FleshAnswer(pose, driven, drag)
-
-
-class FleshAnswer:
-    """How bones and flesh answer friction: N = T (A + T^T D T)^-1 T^T, factorised anew.
-
-    drag  (k, k) D, kg
-    """
-
-    def __init__(self, pose: Kinematics, driven: PrescribedFlesh, drag: csr_array) -> None:
-        system, free = driven.system, driven.free
-        self.drag, self.jacobian = drag, csr_array(jacobian(pose)[:, free])
-        J, D, _ = system.acting()
-        held = csr_array(J[:, free])
-        A = system.A[free][:, free] + held.T @ (D[:, None] * held)
-        self.factor = symmetric_factor(csc_array(A + self.jacobian.T @ drag @ self.jacobian))
-        self.yields = free.size > 0
-
-    def change(self, push: Array) -> Array:
-        """See `Answering`."""
-        return np.asarray(self.jacobian @ self.factor.solve(self.jacobian.T @ push))
-
-    def to(self, push: Array) -> tuple[Array, Array]:
-        """See `Answering`."""
-        change = self.change(push)
-        return change, push - self.drag @ change

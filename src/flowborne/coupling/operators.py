@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
@@ -20,25 +19,11 @@ from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.prescribed import Driven, PrescribedSystem
-from flowborne.solvers.mobility import Mobility, dense_mobility, factored_mobility
 
 
 def twists(kinematics: Kinematics, v: Array) -> Array:
     """(nbody, 6) twist of every body at generalised velocity v (nv,)."""
     return kinematics.twist_jacobian @ v
-
-
-def jacobian(kinematics: Kinematics) -> csr_array:
-    """(k, nv) T, from v to the motion of everything."""
-    both = [csr_array(twist_rows(kinematics)), kinematics.vertex_jacobian]
-    return csr_array(vstack(both, format="csr"))
-
-
-def twist_rows(kinematics: Kinematics) -> Array:
-    """(6 nbody, nv) from v to all twists."""
-    bodies, components, dofs = kinematics.twist_jacobian.shape
-    return kinematics.twist_jacobian.reshape(bodies * components, dofs)
 
 
 def boundary_velocity(kinematics: Kinematics, v: Array) -> Array:
@@ -69,21 +54,6 @@ def on_bodies(kinematics: Kinematics, carried: Array, push: Array) -> Array:
     force, place = push[6 * bodies :].reshape(-1, 3), kinematics.vertices
     wrench = np.concatenate([force, np.cross(place, force)], axis=1)
     return push[: 6 * bodies].reshape(-1, 6) + carried.T @ wrench
-
-
-def rigid_response(kinematics: Kinematics, driven: PrescribedSystem) -> Array:
-    """(6 nbody, 6 nbody) T A^-1 T^T of bodies without flesh."""
-    twist = twist_rows(kinematics)
-    return np.asarray(twist @ driven.inverse @ twist.T)
-
-
-def mobility_of(kinematics: Kinematics, driven: Driven) -> Mobility:
-    """The motion that a unit impulsive push gives: M = T A^-1 T^T, eq. (9) with v eliminated."""
-    if isinstance(driven, PrescribedSystem):
-        return dense_mobility(rigid_response(kinematics, driven))
-    twist = twist_rows(kinematics)
-    free = csr_array(jacobian(kinematics)[:, driven.free])
-    return factored_mobility(free, driven.factor, driven.constraints(), free @ driven.soft(twist))
 
 
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:

@@ -28,7 +28,6 @@ from flowborne.coupling.operators import (
     add_flux,
     boundary_velocity,
     generalised,
-    mobility_of,
     pressure_push,
 )
 from flowborne.coupling.report import Outcome
@@ -39,8 +38,8 @@ from flowborne.fluid.projection import accelerated, face_weights, subtract_press
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.faces import largest_open
 from flowborne.kernels.outflow import outflow
+from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.prescribed import Driven, within_limits
 from flowborne.solvers.mobility import Mobility
 from flowborne.solvers.pressure import NO_REACTION, LowRankTerm, PressureSystem
 
@@ -164,7 +163,7 @@ def solve_together(
     fluid, state = world.flow()
     moved_by = accelerated(cut.open, mass, fluid.grid)
     weights = face_weights(cut.open, moved_by, fluid.grid, fluid.boundaries)
-    mobility = mobility_of(pose, driven)
+    mobility = driven.mobility(pose)
     yielding = give_way(cut, mobility, fluid.grid)
     matrix = PressureSystem(weights, fluid.boundaries.periodic(), reaction=yielding)
     pressure = dt * state.pressure
@@ -196,7 +195,7 @@ def solve_together(
             break
         if changed is not None:
             if not changed.answers_as(driven):
-                term = replace(term, mobility=mobility_of(pose, changed))
+                term = replace(term, mobility=changed.mobility(pose))
                 smooth, viscous, smoothed = diffuse(
                     world, velocity, mass, cut, jets, pose, changed, dt
                 )

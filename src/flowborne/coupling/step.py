@@ -36,13 +36,11 @@ from flowborne.coupling.stream import winds_on
 from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.grid import Array, Faces
-from flowborne.solids.dynamics import Kinematics, assemble, kinematics
-from flowborne.solids.flesh_dynamics import assemble_flesh
-from flowborne.solids.flesh_solve import prescribe_flesh
+from flowborne.solids.driven import Driven, drive
+from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.following import follow
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum
-from flowborne.solids.prescribed import Driven, prescribe
 from flowborne.solids.state import SolidState
 
 
@@ -245,13 +243,8 @@ def equations_under(
     world: World, before: SolidState, force: Array, command: JointCommand, dt: float
 ) -> Driven:
     """As `equations`, under a generalised force (nv,)."""
-    setup = world.setup
-    if setup.solid.flesh is None:
-        guess = np.where(command.prescribed, command.final_velocity, world.solid.v)
-        system = assemble(setup.solid, world.solid, force, dt, before, guess)
-        return prescribe(system, command.prescribed, command.final_velocity)
-    flesh = assemble_flesh(setup.solid, world.solid, force, dt, before)
-    return prescribe_flesh(flesh, command.prescribed, command.final_velocity)
+    told, goal = command.prescribed, command.final_velocity
+    return drive(world.setup.solid, world.solid, force, dt, before, told, goal)
 
 
 def buoyant_push(model: SolidModel, pose: Kinematics, density: float) -> Array:

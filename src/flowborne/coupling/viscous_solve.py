@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +29,8 @@ from flowborne.fluid.viscosity import ViscousFaces
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.viscosity import TIED
 from flowborne.kernels.viscous_operator import apply_component
+from flowborne.solvers.answers import Answering
 from flowborne.solvers.conjugate_gradients import conjugate_gradients, spread
-
-ROUNDING = 1e-15
-"""Relative size of eigenvalues of M that are rounding errors."""
 
 MOST = 20
 """Iterations for each cell along the longest edge of the domain, at most; and at least as many as
@@ -134,21 +131,6 @@ def walls_across(
         point=point,
         gap=np.concatenate([system.gap, np.zeros((moved.size, 3))]),
     )
-
-
-class Answering(Protocol):
-    """How the bodies answer friction that grows with their velocity: N = (M^-1 + D)^-1."""
-
-    yields: bool
-    """Whether friction moves anything."""
-
-    def change(self, push: Array) -> Array:
-        """(k,) change N J0 of the motion for an impulse J0 (k,) on bodies that keep theirs."""
-        ...
-
-    def to(self, push: Array) -> tuple[Array, Array]:
-        """(k,) the same, and (k,) the impulse J that they feel as they give way."""
-        ...
 
 
 class ViscousSystem:
@@ -282,38 +264,3 @@ class ViscousSystem:
                 parts[axis][edge(axis, -1)] = parts[axis][edge(axis, 0)]
             first += count
         return parts[0], parts[1], parts[2]
-
-
-class Answer:
-    """How rigid bodies answer friction, however large M or the drag are.
-
-    With M = R R^T the drag D and  z = (1 + R^T D R)^-1 R^T J0,  an impulse J0 on bodies that keep
-    their twist is  J = J0 - D R z  on bodies that change theirs by R z. J is taken from z where the
-    bodies can move, which is free of the cancellation in J0 - D R z.
-
-    mobility  (k, k) M, positive semidefinite, 1/kg
-    drag      (k, k) D, positive semidefinite, kg
-    """
-
-    def __init__(self, mobility: Array, drag: Array) -> None:
-        share, axes = np.linalg.eigh(mobility)
-        moving = share > ROUNDING * len(share) * np.abs(share).max()
-        self.root = axes[:, moving] * np.sqrt(share[moving])
-        self.lift = axes[:, moving] / np.sqrt(share[moving])
-        self.held = axes[:, ~moving]
-        self.drag = drag
-        self.inside = np.linalg.cholesky(np.eye(len(self.root.T)) + self.root.T @ drag @ self.root)
-        part = np.linalg.solve(self.inside, self.root.T)
-        self.compliance: Array = part.T @ part
-        self.yields = bool(self.compliance.any())
-
-    def change(self, push: Array) -> Array:
-        """See `Answering`; by N (k, k), exactly symmetric."""
-        return np.asarray(self.compliance @ push)
-
-    def to(self, push: Array) -> tuple[Array, Array]:
-        """See `Answering`."""
-        z = np.linalg.solve(self.inside.T, np.linalg.solve(self.inside, self.root.T @ push))
-        change = self.root @ z
-        impulse = self.lift @ z + self.held @ (self.held.T @ (push - self.drag @ change))
-        return change, impulse

@@ -8,7 +8,7 @@ from functools import cache, cached_property
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
@@ -84,6 +84,19 @@ class Kinematics:
         then angular velocity."""
         twists = np.ascontiguousarray(twists_about_origin(self.cdof, self.dof_centre).T)
         return np.where(self.moves[:, None, :], twists, 0.0)
+
+    @cached_property
+    def twist_rows(self) -> Array:
+        """(6 nbody, nv) the same, the twists of all bodies in turn."""
+        bodies, components, dofs = self.twist_jacobian.shape
+        return self.twist_jacobian.reshape(bodies * components, dofs)
+
+    @cached_property
+    def jacobian(self) -> csr_array:
+        """(k, nv) T, from v to the motion of everything: all twists, then the velocities of all
+        vertices."""
+        both = [csr_array(self.twist_rows), self.vertex_jacobian]
+        return csr_array(vstack(both, format="csr"))
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.sparse import csr_array
 
+from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh_dynamics import FleshSystem
 from flowborne.solids.flesh_order import ordered
+from flowborne.solvers.answers import SparseAnswer
 from flowborne.solvers.cholesky import Cholesky, cholesky
+from flowborne.solvers.mobility import Mobility, factored_mobility
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -79,14 +83,28 @@ class PrescribedFlesh:
             return None
         return _solved(replace(self, system=system))
 
-    def constraints(self) -> Array:
+    def mobility(self, pose: Kinematics) -> Mobility:
+        """The motion that a unit impulsive push gives: M = T B_FF^-1 T^T."""
+        T = csr_array(pose.jacobian[:, self.free])
+        return factored_mobility(
+            T, self.factor, self._constraints(), T @ self._soft(pose.twist_rows)
+        )
+
+    def answering(self, pose: Kinematics, drag: csr_array) -> SparseAnswer:
+        """How bones and flesh answer a drag (k, k), kg."""
+        J, D, _ = self.system.acting()
+        held = csr_array(J[:, self.free])
+        B = self.system.A[self.free][:, self.free] + held.T @ (D[:, None] * held)
+        return SparseAnswer(csr_array(B), csr_array(pose.jacobian[:, self.free]), drag)
+
+    def _constraints(self) -> Array:
         """(nf, k) Y' with B_FF^-1 = A_FF^-1 - Y' Y'^T."""
         Y, small = self.rows
         if small is None:
             return Y
         return np.asarray(solve_triangular(np.tril(small[0]), Y.T, lower=True).T)
 
-    def soft(self, jacobian: Array) -> Array:
+    def _soft(self, jacobian: Array) -> Array:
         """(nf, m) Z with Z Z^T the part of B_FF^-1 that moves bones, flesh following at its ease.
 
         jacobian  (6 nbody, nv) from v to the twists of the bones

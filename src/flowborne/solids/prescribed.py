@@ -13,18 +13,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.sparse import csr_array
 
-from flowborne.solids.dynamics import SolidSystem
-from flowborne.solids.flesh_solve import PrescribedFlesh
+from flowborne.solids.dynamics import Kinematics, SolidSystem
+from flowborne.solvers.answers import DenseAnswer
+from flowborne.solvers.mobility import Mobility, dense_mobility
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-OVER = 1e-9
-"""Share by which a drive may exceed its limit, or a dof its velocity, before that counts."""
-
-AT_ONCE = 6
-"""Turns in which all drives that are wrong change; after them one at a time does."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +72,16 @@ class PrescribedSystem:
         """Whether both give the same answer to any impulse."""
         return isinstance(other, PrescribedSystem) and np.array_equal(self.inverse, other.inverse)
 
+    def mobility(self, pose: Kinematics) -> Mobility:
+        """The motion that a unit impulsive push gives: M = T A^-1 T^T."""
+        return dense_mobility(self._response(pose))
 
-Driven = PrescribedSystem | PrescribedFlesh
-"""Bones alone, or bones and flesh, some of whose dofs are prescribed."""
+    def answering(self, pose: Kinematics, drag: csr_array) -> DenseAnswer:
+        """How the bodies answer a drag (k, k), kg."""
+        return DenseAnswer(self._response(pose), drag.toarray())
+
+    def _response(self, pose: Kinematics) -> Array:
+        return np.asarray(pose.twist_rows @ self.inverse @ pose.twist_rows.T)
 
 
 def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedSystem:
@@ -88,35 +91,6 @@ def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedS
     """
     none = np.zeros(len(hold), bool)
     return _solved(system, prescribed, hold, none, np.zeros(len(hold)))
-
-
-def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) -> Driven | None:
-    """The system with the drives that the solution implies; None when it has them already.
-
-    A drive either keeps its dof at `hold` with a force within its limit, or pushes with all that
-    it has towards a velocity that the dof does not reach: one that needs more is released, one
-    whose dof runs past `hold` takes it up again. Together it is a linear complementarity problem
-    of a positive definite matrix; changing one drive at a time, the first, ends for certain
-    (Murty 1974), and all at once ends sooner as a rule.
-
-    limit     (nv,) largest |generalised force| of each drive, inf for none
-    v_plus    (nv,) velocity of the solution
-    actuator  (nv,) force that its drives supply, as `driven.actuator` gives it
-    """
-    over = driven.prescribed & (np.abs(actuator) > limit * (1.0 + OVER))
-    past = driven.limited
-    if past.any():
-        room = OVER * (np.abs(v_plus) + np.abs(driven.hold))
-        past = past & (np.sign(driven.push) * (v_plus - driven.hold) > room)
-    wrong = (over | past).nonzero()[0]
-    if wrong.size == 0:
-        return None
-    if driven.turns >= AT_ONCE:
-        wrong = wrong[:1]
-    prescribed, limited, push = driven.prescribed.copy(), driven.limited.copy(), driven.push.copy()
-    prescribed[wrong], limited[wrong] = past[wrong], over[wrong]
-    push[wrong] = np.where(over[wrong], np.sign(actuator[wrong]) * limit[wrong], 0.0)
-    return driven.redriven(prescribed, limited, push)
 
 
 def _solved(
