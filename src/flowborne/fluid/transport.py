@@ -59,7 +59,9 @@ SUBSTEPS = 100
 
 SMALL, TINY = 0.2, 0.05
 """Parts of a cell below which control volumes begin to be mixed with their neighbours, and are
-wholly mixed."""
+wholly mixed, at the Courant number COURANT; in proportion to it at smaller ones, where less of a
+control volume is exchanged in a step. Otherwise short steps mix as often as they are many, and
+friction grows with their number."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,10 @@ class Transport:
     def courant(self, grid: Grid) -> float:
         """Largest part of a whole cell that crosses its faces in the step, the axes added up."""
         return self.dt * self.crossing / grid.cell_volume
+
+    def substeps(self, grid: Grid) -> int:
+        """In how many the step is done."""
+        return min(max(1, int(np.ceil(self.courant(grid) / COURANT))), SUBSTEPS)
 
 
 @dataclass(frozen=True)
@@ -182,7 +188,7 @@ def carry_component(
     along     what else it is given in the step, m/s^2; beside bodies it is set to 0; None for
               nothing
     """
-    count = min(max(1, int(np.ceil(transport.courant(grid) / COURANT))), SUBSTEPS)
+    count = transport.substeps(grid)
     dt = transport.dt / count
     flow = Flow(component, transport, inlets, grid, sides)
     if along is not None:
@@ -237,6 +243,8 @@ class Flow:
         self.crossings = crossings(transport.flux, self.ends[0], self.marks, component, grid, sides)
         # friction 2 mu A / d over the depth d = V / A of a small control volume, dt / m times
         self.held = 2.0 * transport.viscosity * transport.dt * grid.face_area**2
+        exchanged = transport.courant(grid) / transport.substeps(grid) / COURANT
+        self.limit = min(exchanged, 1.0) * grid.cell_volume
 
     def fill(self, u: Array) -> None:
         """Give control volumes that hold nothing yet the velocity around them, in place."""
@@ -306,13 +314,13 @@ class Flow:
 
     def settle(self, later: Array) -> None:
         """Share amounts between small control volumes and those beside them, in place."""
-        merged, cell = self.high, self.grid.cell_volume
+        merged = self.high
         if self.small.size:
             merged = self.merged
             np.copyto(merged, self.high)
             join_small(later, merged, self.small, self.targets, self.shares, self.nothing)
         if self.listed.size:
-            limits = TINY * cell, SMALL * cell, self.held, self.nothing
+            limits = TINY * self.limit, SMALL * self.limit, self.held, self.nothing
             level(later, merged, self.listed, *limits, self.shape, self.wraps)
             follow_targets(later, self.whole, self.whole_targets)
             fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)

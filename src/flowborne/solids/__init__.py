@@ -1,7 +1,7 @@
 """The articulated body and its flesh: model, assembled A and b, prescribed joints, effort, wind.
 
 A model with flesh is assembled sparsely (tissue, elements, elasticity, flesh, flesh_dynamics,
-flesh_solve).
+flesh_order, flesh_solve); `driven` is what the coupling sees of either.
 
 Knows no fluid. Paper: sections 2 and 3 (eqs. 1-4), rigid clusters of sections 3.3 and 5.
 """

@@ -1,4 +1,4 @@
-"""Linear solvers on operators: conjugate gradients, multigrid, deflation.
+"""Linear solvers: conjugate gradients, multigrid and deflation on operators, sparse Cholesky.
 
 The large system is a weighted cell Laplacian K with a term of low rank, K + J A^-1 J^T: rows J in
 some of the cells and a symmetric positive semidefinite A^-1 between their columns. What the columns
