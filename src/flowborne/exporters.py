@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from flowborne.io.atomic import replaced_whole, write_atomically
 from flowborne.io.exporters import EXPORTERS, Exporter, Written, endings
-from flowborne.io.open_run import OpenRun, StateArray
+from flowborne.io.open_run import OpenRun
+from flowborne.io.state_arrays import StateArray
 
 __all__ = [
     "Exporter",

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import flowborne as fb
-from flowborne.io import open_run as module
+from flowborne.io.state_arrays import StateArray
 
 
 @pytest.fixture(scope="module")
@@ -41,14 +41,14 @@ def test_only_what_is_asked_for_is_read(folder: Path, monkeypatch: pytest.Monkey
     pytest.importorskip("xarray")
     run = fb.open_run(folder)
     read: list[tuple[str, int]] = []
-    of_state = module.StateArray._read
+    of_state = StateArray._read
 
-    def counted(self: module.StateArray, number: int) -> np.ndarray:
+    def counted(self: StateArray, number: int) -> np.ndarray:
         read.append((self._name, number))
         return of_state(self, number)
 
     found = run.dataset()
-    monkeypatch.setattr(module.StateArray, "_read", counted)
+    monkeypatch.setattr(StateArray, "_read", counted)
     pressure = found["pressure"].isel(time=2, x=slice(3, 7))
     assert read == []
     assert_array_equal(pressure.values, run.state(2)["pressure"][3:7])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray
@@ -10,11 +11,8 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from flowborne.io.open_run import StateArray
-
-if TYPE_CHECKING:
-    from flowborne.fluid.grid import Grid
-    from flowborne.io.open_run import OpenRun
+from flowborne.fluid.grid import Grid
+from flowborne.io.state_arrays import StateArray
 
 
 class LazyStates(BackendArray):
@@ -36,25 +34,35 @@ class LazyStates(BackendArray):
         return np.asarray(self._array[int(first)][rest])
 
 
-def dataset_of(run: OpenRun) -> xarray.Dataset:
-    """All arrays of a run; see `OpenRun.dataset`."""
+def dataset_of(
+    arrays: Mapping[str, StateArray],
+    frames: Sequence[int],
+    bodies: Sequence[str],
+    grid: Grid | None,
+    about: Mapping[str, Any],
+) -> xarray.Dataset:
+    """The arrays of a run, see `OpenRun.dataset`.
+
+    frames  number of the frame of each state
+    bodies  names
+    grid    of the fluid, None without
+    about   attributes of the whole
+    """
     variables = {}
-    for name, array in run.arrays.items():
+    for name, array in arrays.items():
         if name != "time":
             data = indexing.LazilyIndexedArray(LazyStates(array))
-            about = {"units": array.quantity.unit, "long_name": array.quantity.meaning}
-            dimensions = ("time", *array.quantity.dimensions)
-            variables[name] = xarray.Variable(dimensions, data, about)
+            meaning = {"units": array.quantity.unit, "long_name": array.quantity.meaning}
+            variables[name] = xarray.Variable(("time", *array.quantity.dimensions), data, meaning)
     coordinates: dict[str, Any] = {
-        "time": ("time", run.times, {"units": "s"}),
-        "frame": ("time", np.array(run.frames)),
-        "body": ("body", list(run.bodies)),
+        "time": ("time", np.asarray(arrays["time"]), {"units": "s"}),
+        "frame": ("time", np.array(frames)),
+        "body": ("body", list(bodies)),
         "axis": ("axis", list("xyz")),
     }
-    if run.grid is not None:
-        coordinates |= _places(run.grid)
-    whole: dict[str, Any] = {"scene": run.name, "frames_per_second": run.frames_per_second}
-    return xarray.Dataset(variables, coordinates, whole | {"slab": int(run.is_slab)})
+    if grid is not None:
+        coordinates |= _places(grid)
+    return xarray.Dataset(variables, coordinates, about)
 
 
 def _places(grid: Grid) -> dict[str, Any]:

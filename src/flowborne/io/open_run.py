@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import re
 import tomllib
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,83 +17,12 @@ from flowborne.fluid.grid import Grid
 from flowborne.io.history import history_columns, history_rows
 from flowborne.io.optional import optional
 from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError
+from flowborne.io.state_arrays import DYE, StateArray, quantity
 
 if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[np.float64]
-
-
-class Quantity(NamedTuple):
-    """What an array of the states is.
-
-    dimensions  names of its axes in one state
-    unit        "1" where it has none; in a slab forces are per metre of depth
-    meaning     in a few words
-    """
-
-    dimensions: tuple[str, ...]
-    unit: str
-    meaning: str
-
-
-QUANTITIES = {
-    "time": Quantity((), "s", "time"),
-    "q": Quantity(("position_number",), "m, rad or 1", "generalised positions as MuJoCo has them"),
-    "v": Quantity(("dof",), "m/s or rad/s", "generalised velocities as MuJoCo has them"),
-    "geom_position": Quantity(("geom", "axis"), "m", "origin of each geometry"),
-    "geom_rotation": Quantity(("geom", "row", "column"), "1", "geometry's frame to the world's"),
-    "body_position": Quantity(("body", "axis"), "m", "origin of each body's frame"),
-    "body_rotation": Quantity(("body", "row", "column"), "1", "body's frame to the world's"),
-    "fluid_centre": Quantity(("body", "axis"), "m", "centroid of a body and its flesh"),
-    "fluid_force": Quantity(("body", "axis"), "N", "force of fluid and winds on a body"),
-    "flesh_vertices": Quantity(("vertex", "axis"), "m", "vertices on the skin of flesh"),
-    "velocity_x": Quantity(("x_face", "y", "z"), "m/s", "velocity on the faces across x"),
-    "velocity_y": Quantity(("x", "y_face", "z"), "m/s", "velocity on the faces across y"),
-    "velocity_z": Quantity(("x", "y", "z_face"), "m/s", "velocity on the faces across z"),
-    "pressure": Quantity(("x", "y", "z"), "Pa", "pressure in the cells"),
-    "open": Quantity(("x", "y", "z"), "1", "part of each cell that no body takes up"),
-}
-"""The arrays of a state by name; `scalar_<dye>` are as `open`."""
-
-DYE = re.compile(r"scalar_(.+)")
-
-
-class StateArray:
-    """One array of all states, read from the files as it is asked for.
-
-    `array[3]` and `array[-1]` are those of one state; `array[2:9]` and `numpy.asarray(array)` those
-    of several, one after the other along the first axis.
-
-    quantity  what it is, in which unit
-    shape     (n, ...), n the number of states
-    dtype     of its numbers
-    """
-
-    def __init__(self, states: tuple[Path, ...], name: str, quantity: Quantity) -> None:
-        self._states, self._name, self.quantity = states, name, quantity
-        first = self._read(0)
-        self.shape: tuple[int, ...] = (len(states), *first.shape)
-        self.dtype = first.dtype
-
-    def __len__(self) -> int:
-        """Number of states."""
-        return len(self._states)
-
-    def __getitem__(self, number: int | slice) -> NDArray[Any]:
-        """(...) of one state, or (k, ...) of a slice of them."""
-        if isinstance(number, slice):
-            chosen = range(len(self))[number]
-            empty = np.empty((0, *self.shape[1:]), self.dtype)
-            return np.stack([self._read(n) for n in chosen]) if chosen else empty
-        return self._read(number)
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        return self[:].astype(self.dtype if dtype is None else dtype, copy=False)
-
-    def _read(self, number: int) -> NDArray[Any]:
-        with np.load(self._states[number]) as file:
-            return np.asarray(file[self._name])
 
 
 class OpenRun:
@@ -177,7 +105,7 @@ class OpenRun:
 
     @cached_property
     def arrays(self) -> Mapping[str, StateArray]:
-        """Name -> array of all states, lazily; see QUANTITIES for shapes and units."""
+        """Name -> array of all states, lazily; see state_arrays.QUANTITIES for shapes and units."""
         with np.load(self._states[0]) as file:
             names = tuple(file.files)
         return MappingProxyType(
@@ -211,7 +139,9 @@ class OpenRun:
         optional("xarray", "xarray", "xarray", "data sets")
         from flowborne.io.dataset import dataset_of
 
-        return dataset_of(self)
+        about: dict[str, Any] = {"scene": self.name, "frames_per_second": self.frames_per_second}
+        about["slab"] = int(self.is_slab)
+        return dataset_of(self.arrays, self.frames, self.bodies, self.grid, about)
 
 
 def open_run(folder: str | Path) -> OpenRun:
@@ -221,10 +151,3 @@ def open_run(folder: str | Path) -> OpenRun:
     raises  RunFolderError when it is none, or has no state yet
     """
     return OpenRun(folder)
-
-
-def quantity(name: str) -> Quantity:
-    """What an array of the states is."""
-    if dye := DYE.fullmatch(name):
-        return Quantity(("x", "y", "z"), "1", f"dye '{dye[1]}' in the cells")
-    return QUANTITIES[name]
