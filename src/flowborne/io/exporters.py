@@ -13,6 +13,9 @@ FORMATS = {
     ".bvh": "bvh",
     ".csv": "table",
     ".parquet": "table",
+    ".usd": "usd",
+    ".usda": "usd",
+    ".usdc": "usd",
 }
 """Ending -> module of flowborne.formats that registers it, imported when it is first asked for."""
 
