@@ -13,7 +13,7 @@ import flowborne as fb
 from flowborne.formats.creature import Creature
 
 pytest.importorskip("pxr")
-from pxr import Gf, Usd, UsdGeom, UsdSkel, UsdValidation
+from pxr import Gf, Usd, UsdGeom, UsdSkel, UsdValidation, UsdVol
 
 FAR = 1e-5
 """Distance from the run that is accepted, in sizes of the creature."""
@@ -157,6 +157,21 @@ def test_paths_go_through_the_bones_and_the_camera_sees_them(name: str, stages: 
     low, high = creature.bounds
     corners = np.where(np.indices((2, 2, 2)).reshape(3, -1).T, low, high)
     assert all(camera.frustum.Intersects(Gf.Vec3d(*corner)) for corner in corners)
+
+
+@pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke")])
+def test_dye_is_a_volume_in_files_beside(name: str, dye: str, stages: Stages) -> None:
+    tinyvdb = pytest.importorskip("tinyvdb")
+    creature, stage = stages[name]
+    volume = UsdVol.Volume.Get(stage, f"/Run/Dye/{dye}")
+    field = UsdVol.OpenVDBAsset.Get(stage, volume.GetFieldPath("density"))
+    assert field.GetFieldNameAttr().Get() == dye
+    for frame in range(len(creature.run)):
+        with tinyvdb.open(field.GetFilePathAttr().Get(frame).resolvedPath) as file:
+            file.read_grids()
+            (found,) = (file.grid(n) for n in range(file.grid_count) if file.grid(n).name == dye)
+            values = creature.run.state(frame)[f"scalar_{dye}"]
+            assert found.active_voxel_count() == (values != 0.0).sum()
 
 
 def test_a_missing_library_is_one_message(

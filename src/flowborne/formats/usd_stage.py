@@ -13,13 +13,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdSkel, UsdVol, Vt
 from scipy.spatial.transform import Rotation
 
 from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Skin, Surface
@@ -47,9 +47,12 @@ TOWARD = np.array([-0.45, 0.85, -0.3])
 """Direction in which the camera looks in a room."""
 
 
-def write_stage(run: OpenRun, path: Path) -> None:
-    """Write the run to `path`. Raises SceneError when it has no bodies."""
-    creature = Creature(run)
+def write_stage(creature: Creature, path: Path, volumes: Sequence[str]) -> None:
+    """Write the run of a creature to `path`.
+
+    volumes  names of the files with the dyes of each state, from the stage's folder; empty without
+    """
+    run = creature.run
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -66,6 +69,7 @@ def write_stage(run: OpenRun, path: Path) -> None:
     _flesh(stage, creature)
     _forces(stage, creature)
     _paths(stage, creature)
+    _dye(stage, run, volumes)
     _camera(stage, creature)
     stage.Save()
 
@@ -159,6 +163,24 @@ def _paths(stage: Usd.Stage, creature: Creature) -> None:
         curves = _curves(stage, ROOT.AppendChild("Paths"), creature, counts)
         curves.GetPrim().SetCustomData({"bones": list(creature.skeleton.names)})
         _set_points(curves, places.reshape(-1, 3))
+
+
+def _dye(stage: Usd.Stage, run: OpenRun, volumes: Sequence[str]) -> None:
+    """A volume for each dye, whose field is in the file of the frame."""
+    if run.grid is None or not volumes:
+        return
+    above, names = _scope(stage, "Dye"), Names()
+    for dye in run.dyes:
+        volume = UsdVol.Volume.Define(stage, above.AppendChild(names.of(dye)))
+        volume.GetPrim().SetDisplayName(dye)
+        volume.CreateExtentAttr(_vectors(np.array([run.grid.origin, run.grid.upper])))
+        field = UsdVol.OpenVDBAsset.Define(stage, volume.GetPath().AppendChild("field"))
+        field.CreateFieldNameAttr(dye)
+        field.CreateFieldDataTypeAttr("float")
+        file = field.CreateFilePathAttr()
+        for frame, name in zip(run.frames, volumes, strict=True):
+            file.Set(name, frame)
+        volume.CreateFieldRelationship("density", field.GetPath())
 
 
 def _camera(stage: Usd.Stage, creature: Creature) -> None:
