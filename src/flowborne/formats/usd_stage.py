@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdSkel, UsdVol, Vt
 from scipy.spatial.transform import Rotation
 
-from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Skin, Surface
+from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Surface
+from flowborne.formats.morphs import strongest
 from flowborne.io.open_run import OpenRun
 from flowborne.quaternions import continuous
 from flowborne.version import __version__
@@ -112,7 +113,7 @@ def _creature(stage: Usd.Stage, creature: Creature) -> None:
         mesh = _mesh(stage, path, skin.name, skin.faces, SKIN_COLOUR)
         mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
         _set_points(mesh, skin.rest)
-        _bind(mesh, *influences(skin, INFLUENCES), rigid=False)
+        _bind(mesh, *strongest(skin, INFLUENCES), rigid=False)
     names = Names()
     for surface in creature.surfaces:
         if surface.bone < 0:
@@ -230,14 +231,6 @@ def joint_paths(skeleton: Skeleton) -> list[str]:
         own = names.of(name)
         paths.append(own if parent < 0 else f"{paths[parent]}/{own}")
     return paths
-
-
-def influences(skin: Skin, most: int) -> tuple[NDArray[np.int64], Array]:
-    """Bones (k, m) and their weights (k, m), together 1, that carry most of each vertex."""
-    count = min(most, int((skin.weights > 0.0).sum(axis=1).max()))
-    bones = np.argsort(-skin.weights, axis=1, kind="stable")[:, :count]
-    weights = np.take_along_axis(skin.weights, bones, axis=1)
-    return bones, weights / weights.sum(axis=1, keepdims=True)
 
 
 def _scope(stage: Usd.Stage, name: str) -> Sdf.Path:

@@ -16,6 +16,7 @@ FORMATS = {
     ".usd": "usd",
     ".usda": "usd",
     ".usdc": "usd",
+    ".glb": "glb",
     ".vdb": "vdb",
 }
 """Ending -> module of flowborne.formats that registers it, imported when it is first asked for."""
