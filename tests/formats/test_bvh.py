@@ -124,14 +124,3 @@ def test_only_what_slides_has_places_of_its_own(crane: Path, tmp_path: Path) -> 
 def test_a_walk_is_its_clip(walk: Path, tmp_path: Path) -> None:
     fb.export(walk, tmp_path / "out.bvh")
     assert "left_knee" in read_bvh(tmp_path / "out.bvh", 0.01).names
-
-
-def test_a_run_without_bodies_is_refused(tmp_path: Path) -> None:
-    fluid = tmp_path / "fluid.toml"
-    fluid.write_text(
-        "dimensions = 2\n[domain]\nlower = [0, 0]\nupper = [1, 1]\nresolution = 8\n[fluid]\n"
-    )
-    fb.run(fluid, tmp_path / "fluid", frames=2, film=False)
-    with pytest.raises(fb.SceneError, match=r"fluid has no bodies. Add \[solids\] or \[human\]"):
-        fb.export(tmp_path / "fluid", tmp_path / "out.bvh")
-    assert not (tmp_path / "out.bvh").exists()

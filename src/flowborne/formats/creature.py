@@ -109,10 +109,9 @@ class Creature:
     """
 
     def __init__(self, run: OpenRun) -> None:
-        scene = load_scene(run.folder / "scene.toml")
-        if not scene.has_bodies:
+        if not has_bodies(run):
             raise SceneError(f"{run.folder} has no bodies. Add [solids] or [human] to its scene.")
-        self.run, self.model = run, load_model(scene)
+        self.run, self.model = run, load_model(load_scene(run.folder / "scene.toml"))
         self._numbers = _bones(self.model)
 
     @cached_property
@@ -199,6 +198,11 @@ class Creature:
         points += [skin.rest for skin in self.skins]
         every = np.concatenate(points or [self.skeleton.rest[0]])
         return float(np.ptp(every, axis=0).max())
+
+
+def has_bodies(run: OpenRun) -> bool:
+    """Whether the scene of a run has a model."""
+    return not {"solids", "human"}.isdisjoint(run.scene)
 
 
 def in_parents(parents: Integers, position: Array, rotation: Array) -> tuple[Array, Array]:

@@ -140,7 +140,7 @@ def _forces(stage: Usd.Stage, creature: Creature) -> None:
     """Arrows from the centroid of each body, all to one scale, and the forces in numbers."""
     run = creature.run
     force = run.every("fluid_force")[:, 1:]
-    greatest = float(np.linalg.norm(force, axis=2).max())
+    greatest = float(np.linalg.norm(force, axis=2).max(initial=0.0))
     if greatest == 0.0:
         return
     scale = LONGEST * creature.size / greatest

@@ -18,6 +18,7 @@ FORMATS = {
     ".usdc": "usd",
     ".glb": "glb",
     ".vdb": "vdb",
+    ".vtkhdf": "vtkhdf",
 }
 """Ending -> module of flowborne.formats that registers it, imported when it is first asked for."""
 
