@@ -11,14 +11,15 @@ from flowborne.registry import Registry
 
 FORMATS = {
     ".bvh": "bvh",
-    ".csv": "table",
-    ".parquet": "table",
     ".usd": "usd",
     ".usda": "usd",
     ".usdc": "usd",
     ".glb": "glb",
+    ".abc": "abc",
     ".vdb": "vdb",
     ".vtkhdf": "vtkhdf",
+    ".csv": "table",
+    ".parquet": "table",
 }
 """Ending -> module of flowborne.formats that registers it, imported when it is first asked for."""
 
