@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,7 @@ name = "skin"
 bones = ["head", "tail"]
 thickness = 0.12
 size = 0.25
+mesh = "fish.vtu"
 young = 1e5
 poisson = 0.4
 density = 1000.0
@@ -101,6 +103,7 @@ def fish(runs: Path) -> Path:
     """Two bones in flesh that swim in a room with dye, and a buoy that stays."""
     (runs / "fish.xml").write_text(FISH_MODEL)
     (runs / "fish.toml").write_text(FISH)
+    shutil.copy(Path(__file__).with_name("fish.vtu"), runs)
     fb.run(runs / "fish.toml", runs / "fish", film=False)
     return runs / "fish"
 

@@ -13,7 +13,7 @@ import flowborne as fb
 from flowborne.formats.creature import Creature
 
 pytest.importorskip("pxr")
-from pxr import Gf, Usd, UsdGeom, UsdSkel, UsdValidation, UsdVol
+from pxr import Gf, Usd, UsdGeom, UsdShade, UsdSkel, UsdValidation, UsdVol
 
 FAR = 1e-5
 """Distance from the run that is accepted, in sizes of the creature."""
@@ -110,6 +110,18 @@ def test_surfaces_go_with_their_bodies(name: str, stages: Stages) -> None:
             assert_allclose(points, where, atol=FAR * creature.size)
         skinned += 1
     assert skinned == sum(surface.bone >= 0 for surface in creature.surfaces)
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_surfaces_have_the_models_colours(name: str, stages: Stages) -> None:
+    creature, stage = stages[name]
+    colours = {surface.name: surface.rgba[:3] for surface in creature.surfaces}
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh) and prim.GetDisplayName() in colours:
+            material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+            shader, _, _ = material.ComputeSurfaceSource()
+            seen = shader.GetInput("diffuseColor").Get()
+            assert_allclose(seen, colours[prim.GetDisplayName()], atol=1e-6)
 
 
 def test_flesh_is_where_the_run_has_it_and_bound_to_its_bones(stages: Stages) -> None:

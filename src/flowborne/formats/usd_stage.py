@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdSkel, UsdVol, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, UsdVol, Vt
 from scipy.spatial.transform import Rotation
 
 from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Surface
@@ -40,6 +40,9 @@ LONGEST = 0.5
 
 THIN = 0.005
 """Width of a curve, in sizes of the creature."""
+
+ROUGH = 0.8
+"""Roughness of every surface, from 0 to 1."""
 
 LENS, FILM, ASPECT = 50.0, 36.0, 16.0 / 9.0
 """Focal length and width of the picture, both in mm, and its width over its height."""
@@ -256,7 +259,26 @@ def _mesh(
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.astype(np.int32).ravel()))
     mesh.CreateDisplayColorAttr(_vectors(rgba[None, :3]))
     mesh.CreateDisplayOpacityAttr([float(rgba[3])])
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(_material(stage, rgba))
     return mesh
+
+
+def _material(stage: Usd.Stage, rgba: Array) -> UsdShade.Material:
+    """The plain surface of a colour, made when it is first asked for."""
+    red, green, blue, opacity = (float(part) for part in rgba)
+    name = "colour_" + "".join(f"{round(255.0 * float(part)):02x}" for part in rgba)
+    path = _scope(stage, "Materials").AppendChild(name)
+    if stage.GetPrimAtPath(path):
+        return UsdShade.Material.Get(stage, path)
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(red, green, blue))
+    shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(opacity)
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(ROUGH)
+    surface = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput().ConnectToSource(surface)
+    return material
 
 
 def _curves(
