@@ -7,12 +7,12 @@ from pathlib import Path
 
 from flowborne.formats.creature import Creature
 from flowborne.io.atomic import replaced_whole
-from flowborne.io.exporters import EXPORTERS
+from flowborne.io.exporters import provided
 from flowborne.io.open_run import OpenRun
 from flowborne.io.optional import optional
 
 
-@EXPORTERS.register(".abc")
+@provided(".abc")
 @dataclass(frozen=True)
 class ExporterAbc:
     """Geometries under transforms that move, flesh as a mesh that deforms; see `abc_archive`."""

@@ -12,7 +12,7 @@ from flowborne.errors import SceneError
 from flowborne.formats.creature import Array, Creature
 from flowborne.io.bvh import write_clip
 from flowborne.io.clip import Clip
-from flowborne.io.exporters import EXPORTERS
+from flowborne.io.exporters import provided
 from flowborne.io.open_run import OpenRun
 from flowborne.scenes.motion_out import export_bvh
 
@@ -24,7 +24,7 @@ SLIDING = 1e-6
 with channels of its own for it."""
 
 
-@EXPORTERS.register(".bvh")
+@provided(".bvh")
 @dataclass(frozen=True)
 class ExporterBvh:
     """The clip's own file where the run follows one, else a joint for each body.

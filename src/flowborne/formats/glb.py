@@ -8,7 +8,7 @@ from pathlib import Path
 from flowborne.formats.creature import Creature
 from flowborne.formats.morphs import morphed
 from flowborne.io.atomic import replaced_whole
-from flowborne.io.exporters import EXPORTERS, Written
+from flowborne.io.exporters import Written, provided
 from flowborne.io.open_run import OpenRun
 from flowborne.io.optional import optional
 
@@ -19,7 +19,7 @@ NEAR = 1e-6
 """Distance from the run at which flesh has enough morph targets, in sizes of the creature."""
 
 
-@EXPORTERS.register(".glb")
+@provided(".glb")
 @dataclass(frozen=True)
 class ExporterGlb:
     """Skinned meshes on a skeleton that moves; flesh has morph targets for what skinning lacks.

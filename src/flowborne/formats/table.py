@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.io.atomic import replaced_whole, write_text
-from flowborne.io.exporters import EXPORTERS
+from flowborne.io.exporters import provided
 from flowborne.io.open_run import OpenRun
 from flowborne.io.optional import optional
 
@@ -53,7 +53,7 @@ def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:
     }
 
 
-@EXPORTERS.register(".csv")
+@provided(".csv")
 @dataclass(frozen=True)
 class ExporterCsv:
     """A row per frame under the names of history.csv, which end in their unit; numbers exact."""
@@ -67,7 +67,7 @@ class ExporterCsv:
         write_text(path, text.getvalue())
 
 
-@EXPORTERS.register(".parquet")
+@provided(".parquet")
 @dataclass(frozen=True)
 class ExporterParquet:
     """The same columns, each with its unit in the metadata of its field.

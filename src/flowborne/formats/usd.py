@@ -8,14 +8,14 @@ from pathlib import Path
 from flowborne.formats.creature import Creature
 from flowborne.formats.vdb import write_dye
 from flowborne.io.atomic import replaced_whole
-from flowborne.io.exporters import EXPORTERS, Written
+from flowborne.io.exporters import Written, provided
 from flowborne.io.open_run import OpenRun
 from flowborne.io.optional import optional
 
 
-@EXPORTERS.register(".usd")
-@EXPORTERS.register(".usda")
-@EXPORTERS.register(".usdc")
+@provided(".usd")
+@provided(".usda")
+@provided(".usdc")
 @dataclass(frozen=True)
 class ExporterUsd:
     """Skeleton, surfaces, flesh, forces, paths, camera and dye; see `usd_stage`.

@@ -12,11 +12,11 @@ from flowborne.errors import SceneError
 from flowborne.fluid.grid import Grid
 from flowborne.formats.vdb_file import VdbGrid, vdb_bytes
 from flowborne.io.atomic import write_atomically
-from flowborne.io.exporters import EXPORTERS, Written
+from flowborne.io.exporters import Written, provided
 from flowborne.io.open_run import OpenRun
 
 
-@EXPORTERS.register(".vdb")
+@provided(".vdb")
 @dataclass(frozen=True)
 class ExporterVdb:
     """smoke.vdb stands for smoke_0000.vdb, smoke_0001.vdb and so on, a file for each state.

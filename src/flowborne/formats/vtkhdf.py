@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flowborne.io.atomic import replaced_whole
-from flowborne.io.exporters import EXPORTERS
+from flowborne.io.exporters import provided
 from flowborne.io.open_run import OpenRun
 from flowborne.io.optional import optional
 
 
-@EXPORTERS.register(".vtkhdf")
+@provided(".vtkhdf")
 @dataclass(frozen=True)
 class ExporterVtkHdf:
     """Blocks fluid, bodies, forces and flesh, each where the run has it; see `vtkhdf_file`."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 from flowborne.io.open_run import OpenRun
 from flowborne.registry import Registry
+
+Class = TypeVar("Class", bound=type)
 
 FORMATS = {
     ".bvh": "bvh",
@@ -45,6 +48,11 @@ class Exporter(Protocol):
 
 EXPORTERS: Registry[Exporter] = Registry("exporter", ("write",), keys=("file",))
 """All exporters that are in use, by the ending of the files that they write: ".csv"."""
+
+
+def provided(ending: str) -> Callable[[Class], Class]:
+    """Class decorator of flowborne's own exporters; a user's for the same ending stays."""
+    return EXPORTERS.register(ending) if ending not in EXPORTERS else lambda exporter: exporter
 
 
 def endings() -> tuple[str, ...]:
