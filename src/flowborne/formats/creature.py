@@ -15,7 +15,7 @@ from flowborne.errors import SceneError
 from flowborne.io.open_run import OpenRun
 from flowborne.io.recorder import on_skin
 from flowborne.scenes.bodies import load_model
-from flowborne.scenes.load import load_scene
+from flowborne.scenes.load import scene_of_run
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import BALL, HINGE, SolidModel
 
@@ -111,7 +111,7 @@ class Creature:
     def __init__(self, run: OpenRun) -> None:
         if not has_bodies(run):
             raise SceneError(f"{run.folder} has no bodies. Add [solids] or [human] to its scene.")
-        self.run, self.model = run, load_model(load_scene(run.folder / "scene.toml"))
+        self.run, self.model = run, load_model(scene_of_run(run.folder / "scene.toml"))
         self._numbers = _bones(self.model)
 
     @cached_property
