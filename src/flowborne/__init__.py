@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from flowborne.fluid.grid import Array, Faces, Grid
     from flowborne.fluid.state import FluidState
     from flowborne.frame_report import FrameReport
-    from flowborne.io.open_run import OpenRun
+    from flowborne.io.open_run import OpenRun, open_run
     from flowborne.io.run_folder import RunFolderError
     from flowborne.running import RunInterrupted, RunResult, run
     from flowborne.scenes.load import load_scene
@@ -96,6 +96,7 @@ __all__ = [
     "make_world",
     "motions",
     "objectives",
+    "open_run",
     "operators",
     "pictures",
     "rules",
@@ -160,6 +161,7 @@ _PLACES = {
     "export": "flowborne.exporting",
     "load_scene": "flowborne.scenes.load",
     "make_world": "flowborne.worlds",
+    "open_run": "flowborne.io.open_run",
     "run": "flowborne.running",
     "step": "flowborne.coupling.step",
 }

@@ -185,18 +185,21 @@ def export(
         typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the exporter."),
     ] = None,
 ) -> None:
-    """Write a run for another program: .bvh is its motion on the skeleton of its clip."""
+    """Write a run for another program; docs/exporters.md says what the endings stand for."""
     from flowborne.exporting import export as export_run
     from flowborne.scenes.load import value_of
 
     parameters = {key: value_of(text) for key, text in _overrides(settings or []).items()}
     try:
-        export_run(folder, out, parameters)
+        written = export_run(folder, out, parameters)
     except PartError as error:
         raise InputError(str(error)) from error
     except OSError as error:
         raise cannot_write(out, error) from error
-    print(f"written: {out}")
+    first, last = written.files[0], written.files[-1]
+    print(f"written: {first}" if first == last else f"written: {first} to {last}")
+    if written.note:
+        print(f"  {written.note}")
 
 
 @app.command()

@@ -1,15 +1,27 @@
 """Runs as files for other programs, and how to add a kind of file.
 
 An exporter is a dataclass with `write(run, path)`, registered by the ending of its files. It is
-used by `flowborne export`, by `flowborne.export`, and by `exports` in a scene's `[output]`.
+used by `flowborne export`, by `flowborne.export`, and by `exports` in a scene's `[output]`. One
+that is registered for an ending of flowborne's own takes its place. docs/exporters.md lists those
+that flowborne brings.
 """
 
 from __future__ import annotations
 
-from flowborne.io.atomic import write_atomically
-from flowborne.io.exporters import EXPORTERS, Exporter, endings
+from flowborne.io.atomic import replaced_whole, write_atomically
+from flowborne.io.exporters import EXPORTERS, Exporter, Written, endings
 from flowborne.io.open_run import OpenRun
+from flowborne.io.state_arrays import StateArray
 
-__all__ = ["Exporter", "OpenRun", "endings", "register", "write_atomically"]
+__all__ = [
+    "Exporter",
+    "OpenRun",
+    "StateArray",
+    "Written",
+    "endings",
+    "register",
+    "replaced_whole",
+    "write_atomically",
+]
 
 register = EXPORTERS.register

@@ -2,49 +2,51 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from flowborne.errors import PartError, SceneError
-from flowborne.io.exporters import BVH, EXPORTERS, endings
+from flowborne.io.exporters import EXPORTERS, Written, can_write, endings
 from flowborne.io.open_run import OpenRun
-from flowborne.io.run_folder import RunFolder
+from flowborne.io.run_folder import RunFolder, RunFolderError
 
 
-def export(run: str | Path, out: str | Path, parameters: Mapping[str, Any] | None = None) -> None:
+def export(
+    run: str | Path, out: str | Path, parameters: Mapping[str, Any] | None = None
+) -> Written:
     """Write a run as a file; the ending of its name says as what.
 
-    run         folder of the run
+    run         folder of the run; one that goes on, or was stopped, gives the frames that it has
     out         file to write
     parameters  of the exporter
-    raises      SceneError when nothing writes such files, or the run lacks what they hold;
-                RunFolderError when `run` is no run; PartError when an exporter of one's own fails;
-                OSError when the file cannot be written
+    returns     the files that were written, and what there is to tell of them
+    raises      SceneError when nothing writes such files, the run lacks what they hold, or a
+                library is missing; RunFolderError when `run` is no run; PartError when an exporter
+                of one's own fails; OSError when the file cannot be written
     """
-    from flowborne.scenes.load import load_scene
+    from flowborne.scenes.load import scene_of_run
 
     folder, path = RunFolder.existing(Path(run)), Path(out)
-    load_scene(folder.scene)  # brings the plugins
+    scene_of_run(folder.scene)  # brings the plugins
     ending = path.suffix
-    if ending == BVH:
-        from flowborne.scenes.motion_out import export_bvh
-
-        export_bvh(folder.path, path)
-        return
-    if ending not in EXPORTERS:
+    if not can_write(ending):
         raise SceneError(
             f"{path.name}: nothing writes '{ending}' files. End its name with one of "
             f"{', '.join(endings())}."
         )
+    if not path.absolute().parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     try:
         exporter = EXPORTERS.make(ending, parameters or {})
     except ValueError as error:
         raise SceneError(f"{path.name}: exporter {error}.") from error
     opened = OpenRun(folder.path)
     try:
-        exporter.write(opened, path)
-    except OSError:
+        return exporter.write(opened, path) or Written((path,))
+    except (OSError, RunFolderError, SceneError):
         raise
     except Exception as error:
         raise PartError.failed(f"exporter of '{ending}' files", error) from error

@@ -262,12 +262,15 @@ class _Run:
         """Write the files that the scene asks for; their names, and what to tell of the others."""
         from flowborne.exporting import export
 
-        exported, failed = [], ""
+        exported: list[str] = []
+        failed = ""
         for table in self.simulation.scene.output.exports:
             try:
-                export(self.folder.path, self.folder.path / table.file, table.parameters)
-                exported.append(table.file)
-            except (OSError, PartError, SceneError) as error:
+                out = self.folder.path / table.file
+                written = export(self.folder.path, out, table.parameters)
+                names = (str(file.relative_to(self.folder.path)) for file in written.files)
+                exported += names
+            except (OSError, PartError, RunFolderError, SceneError) as error:
                 failed += f"; no {table.file}: {error}"
         return exported, failed
 

@@ -44,6 +44,7 @@ def test_replacing_removes_only_what_a_run_writes(tmp_path):
     (path / "states" / ".000003.npz.partial").write_text("torn")
     RunFolder.create(path, replace=True)
     assert files_in(path) == ["notes.txt", "states/drawing.png", "summary.json"]
+    assert not (path / "meshes").exists()
 
 
 def test_somebody_elses_folder_is_refused_even_with_replace(tmp_path):

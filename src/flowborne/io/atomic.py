@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 
@@ -39,6 +41,18 @@ def write_atomically(
         raise
     if durable:
         sync_folder(path.parent)
+
+
+@contextmanager
+def replaced_whole(path: Path) -> Iterator[Path]:
+    """Context with a file to write by name, which takes the place of `path` once it is whole.
+
+    It has the name of `path`, in a folder beside it that is gone in the end.
+    """
+    with TemporaryDirectory(dir=path.absolute().parent, prefix=f".{path.name}.") as folder:
+        new = Path(folder) / path.name
+        yield new
+        os.replace(new, path)
 
 
 def write_text(path: Path, text: str) -> None:

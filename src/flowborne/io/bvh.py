@@ -116,20 +116,32 @@ def write_bvh(
     write_atomically(Path(path), lambda stream: stream.write(whole))
 
 
-def write_clip(path: str | Path, clip: Clip, unit: float = 1.0) -> None:
+def write_clip(
+    path: str | Path, clip: Clip, unit: float = 1.0, sliding: Mapping[str, Array] | None = None
+) -> None:
     """Write a clip as a BVH file: y up, facing +z, channels Zrotation Xrotation Yrotation.
 
-    unit    m per length of the file
-    raises  OSError
+    unit     m per length of the file
+    sliding  joint -> (frames, 3) m, places in the parent's axes of joints other than the root that
+             do not stay where their offset is
+    raises   OSError
     """
     back = TO_WORLD["y"].T
-    columns = [clip.translation @ back.T / unit]
-    for joint in range(len(clip.names)):
+    moving = {clip.names[0]: clip.translation} | dict(sliding or {})
+    columns = []
+    for joint, name in enumerate(clip.names):
+        if name in moving:
+            columns.append(moving[name] @ back.T / unit)
         local = _in_axes(clip.rotations[:, joint], back)
         columns.append(angles_of(local, ZXY, np.zeros(3)))
     offsets = clip.offsets @ back.T / unit
     ends = {name: back @ end / unit for name, end in clip.ends.items()}
-    lines = ["HIERARCHY", *_block(clip, offsets, ends, 0, 0), "MOTION", f"Frames: {clip.frames}"]
+    lines = [
+        "HIERARCHY",
+        *_block(clip, offsets, ends, set(moving), 0, 0),
+        "MOTION",
+        f"Frames: {clip.frames}",
+    ]
     lines.append(f"Frame Time: {clip.frame_time:.10g}")
     lines += [_spaced(row, 8) for row in np.concatenate(columns, axis=1)]
     write_text(Path(path), "\n".join(lines) + "\n")
@@ -230,11 +242,11 @@ def _runs(marked: Mask) -> list[tuple[int, int]]:
 
 
 def _block(
-    clip: Clip, offsets: Array, ends: Mapping[str, Array], joint: int, depth: int
+    clip: Clip, offsets: Array, ends: Mapping[str, Array], moving: set[str], joint: int, depth: int
 ) -> list[str]:
-    """Lines of a joint and all below it."""
+    """Lines of a joint and all below it; those in `moving` have position channels."""
     name, inner = clip.names[joint], "\t" * (depth + 1)
-    places = "6 Xposition Yposition Zposition" if joint == 0 else "3"
+    places = "6 Xposition Yposition Zposition" if name in moving else "3"
     lines = [
         f"{'ROOT' if joint == 0 else 'JOINT'} {name}",
         "{",
@@ -243,7 +255,7 @@ def _block(
     ]
     lines = ["\t" * depth + line for line in lines]
     for child in np.flatnonzero(clip.parents == joint):
-        lines += _block(clip, offsets, ends, int(child), depth + 1)
+        lines += _block(clip, offsets, ends, moving, int(child), depth + 1)
     if name in ends:
         tip = f"{inner}\tOFFSET {_spaced(ends[name], 8)}"
         lines += [f"{inner}End Site", f"{inner}{{", tip, f"{inner}}}"]

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.io.history import history_columns, history_rows
+from flowborne.io.optional import optional
 from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError
+from flowborne.io.state_arrays import DYE, StateArray, quantity
+
+if TYPE_CHECKING:
+    import xarray
 
 Array = NDArray[np.float64]
 
@@ -25,8 +32,11 @@ class OpenRun:
     raises  RunFolderError when it is none, or has no state yet
 
     scene              the scene as run: its file as nested dictionaries
+    name               of the scene
     bodies             names of the bodies, the world's first
     joints             names of the joints
+    dyes               names of the dyes
+    frames             number of the frame of each state, 0 for the start
     frames_per_second  of the run
     """
 
@@ -45,13 +55,25 @@ class OpenRun:
         if not names:
             raise RunFolderError(f"{folder} has no frame yet; let the run go on with --resume")
         self._states = tuple(files.states / name for name in names)
+        self.name = str(self.scene.get("name", files.path.name))
         self.bodies: tuple[str, ...] = tuple(self._model["bodies"])
         self.joints: tuple[str, ...] = tuple(self._model["joints"])
+        self.frames = tuple(int(path.stem) for path in self._states)
         self.frames_per_second = float(self._model["frames_per_second"])
 
     def __len__(self) -> int:
         """Number of states: that of the frames, and the start."""
         return len(self._states)
+
+    @property
+    def is_slab(self) -> bool:
+        """Whether it is a run in two dimensions, in which forces are per metre of depth."""
+        return bool(self._model["slab"])
+
+    @property
+    def dyes(self) -> tuple[str, ...]:
+        found = (DYE.fullmatch(name) for name in self.arrays)
+        return tuple(match[1] for match in found if match)
 
     @cached_property
     def grid(self) -> Grid | None:
@@ -81,6 +103,15 @@ class OpenRun:
         """(n,) s of every state."""
         return self.every("time")
 
+    @cached_property
+    def arrays(self) -> Mapping[str, StateArray]:
+        """Name -> array of all states, lazily; see state_arrays.QUANTITIES for shapes and units."""
+        with np.load(self._states[0]) as file:
+            names = tuple(file.files)
+        return MappingProxyType(
+            {name: StateArray(self._states, name, quantity(name)) for name in names}
+        )
+
     def state(self, number: int) -> dict[str, NDArray[Any]]:
         """Arrays of a state by name, in single precision; negative numbers count from the end.
 
@@ -96,8 +127,27 @@ class OpenRun:
 
         raises  KeyError when the states have none of that name
         """
-        values = []
-        for path in self._states:
-            with np.load(path) as file:
-                values.append(file[name])
-        return np.asarray(values, float)
+        return np.asarray(self.arrays[name], float)
+
+    def dataset(self) -> xarray.Dataset:
+        """All arrays as an xarray data set, which reads a state when its numbers are asked for.
+
+        Each has its dimensions, and its unit and meaning as attributes; times, bodies, and places
+        of cells and faces are coordinates.
+        raises  SceneError when xarray is not installed
+        """
+        optional("xarray", "xarray", "xarray", "data sets")
+        from flowborne.io.dataset import dataset_of
+
+        about: dict[str, Any] = {"scene": self.name, "frames_per_second": self.frames_per_second}
+        about["slab"] = int(self.is_slab)
+        return dataset_of(self.arrays, self.frames, self.bodies, self.grid, about)
+
+
+def open_run(folder: str | Path) -> OpenRun:
+    """What a run has left behind: times, poses, skin of flesh, fields and history, read lazily.
+
+    folder  of a run, which may still be going on
+    raises  RunFolderError when it is none, or has no state yet
+    """
+    return OpenRun(folder)

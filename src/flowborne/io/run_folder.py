@@ -190,8 +190,12 @@ class RunFolder:
         )
 
     def _remove_run(self) -> None:
-        for path in [*self._state_files(), *self._named_files()]:
+        paths = [*self._state_files(), *self._named_files()]
+        for path in paths:
             path.unlink()
+        for folder in {path.parent for path in paths} - {self.path, self.states}:
+            if not any(folder.iterdir()):
+                folder.rmdir()
 
     def _remove_partial(self) -> None:
         """Remove what a killed run had half-written."""

@@ -76,6 +76,17 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, str] | None = N
     return scene
 
 
+def scene_of_run(path: Path) -> Scene:
+    """The scene of a run folder, which was checked whole before it was run: read, and no more.
+
+    raises  SceneError with what its file alone has wrong
+    """
+    draft, problems = _understood(_read(path), path)
+    if draft is None or problems:
+        raise SceneError(problems)
+    return draft.scene
+
+
 def check_scene(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> list[str]:
     """Everything that is wrong with a scene; an empty list when it is fine."""
     return _examine(name_or_path, overrides)[1]
@@ -91,15 +102,20 @@ def _examine(
             override(raw, key, text)
     except SceneError as error:
         return None, error.problems
+    draft, problems = _understood(raw, path)
+    if draft is None:
+        return None, problems
+    return draft.scene, problems + cross_check(draft)
+
+
+def _understood(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str]]:
+    """The scene as far as its file alone says, with its plugins loaded, and what is wrong there."""
     raw.setdefault("name", path.stem)
     join_elbows(raw)
     problems = load_plugins(raw, path.parent, path.name)
     problems += inline_keyframes(raw, path.parent, path.name)
     draft, more = _validate(raw, path)
-    problems += more
-    if draft is None:
-        return None, problems
-    return draft.scene, problems + cross_check(draft)
+    return draft, problems + more
 
 
 def find(name_or_path: str | Path) -> Path:

@@ -37,7 +37,9 @@ def export_bvh(run: Path, path: Path) -> None:
     scene = load_scene(folder.scene)
     capture = capture_of(scene)
     if capture is None or scene.clip is None:
-        raise SceneError(f"{run} follows no clip, and a BVH needs one. Add [clip] to its scene.")
+        raise SceneError(
+            f"{run} follows no clip, and there is none to give back. Add [clip] to its scene."
+        )
     states = sorted(p for p in folder.states.iterdir() if STATE_NAME.fullmatch(p.name))
     if len(states) < 2:
         raise SceneError(f"{run} has no motion yet. Let the run go on with --resume.")

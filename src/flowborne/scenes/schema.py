@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import tomli_w
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
-from flowborne.io.exporters import EXPORTERS, endings
+from flowborne.io.exporters import EXPORTERS, can_write, endings
 from flowborne.io.run_folder import FIXED_NAMES
 from flowborne.scenes.fields import Count, Number, Positive, Table, Text, Vector, filled
 from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
@@ -67,15 +67,12 @@ class ExportTable(Table):
         ending = Path(self.file).suffix
         if self.file in FIXED_NAMES:
             raise ValueError(f"is {self.file}, a file of the run itself. Take another name")
-        if ending in EXPORTERS:
-            EXPORTERS.check(ending, self.parameters)
-        elif ending not in endings():
+        if not can_write(ending):
             raise ValueError(
                 f"is {self.file}, and nothing writes '{ending}' files. End it with one of "
                 f"{', '.join(endings())}"
             )
-        elif self.parameters:
-            raise ValueError(f"of kind '{ending}' takes no keys but file. Drop the others")
+        EXPORTERS.check(ending, self.parameters)
         return self
 
 

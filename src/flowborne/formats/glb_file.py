@@ -1,0 +1,194 @@
+"""The nodes of a glTF file: lengths in m, y up by a turn of the root node."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pygltflib as gl
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from flowborne.formats.creature import SKIN_COLOUR, Array, Creature, Integers, Skin, Surface
+from flowborne.formats.morphs import MorphedSkin
+from flowborne.quaternions import continuous
+from flowborne.version import __version__
+
+Y_UP = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
+"""Quaternion (x, y, z, w) from z up to y up."""
+
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+"""Numbers in an element -> glTF's word."""
+
+COMPONENTS = {"float32": gl.FLOAT, "uint32": gl.UNSIGNED_INT, "uint16": gl.UNSIGNED_SHORT}
+
+
+def write_glb(creature: Creature, skins: Mapping[str, MorphedSkin], path: Path) -> None:
+    """Write the creature to `path`; `skins` are those of its flesh by name."""
+    file = _File(creature.run.name, creature.run.frames_per_second)
+    joints = file.add_skeleton(creature)
+    for surface in creature.surfaces:
+        file.add_surface(surface, skinned=joints)
+    for skin in creature.skins:
+        file.add_flesh(skin, skins[skin.name])
+    file.save(path)
+
+
+class _File:
+    """A glTF file as it grows: its JSON part, its binary part, and one animation."""
+
+    def __init__(self, name: str, frames_per_second: float) -> None:
+        about = {"scene": name, "frames_per_second": frames_per_second}
+        asset = gl.Asset(version="2.0", generator=f"flowborne {__version__}", extras=about)
+        self._gltf = gl.GLTF2(asset=asset, scene=0, scenes=[gl.Scene(name=name, nodes=[0])])
+        self._gltf.nodes.append(gl.Node(name=name, rotation=Y_UP, children=[]))
+        self._animation = gl.Animation(name=name)
+        self._bytes = bytearray()
+        self._times, self._rate = -1, frames_per_second
+
+    def add_skeleton(self, creature: Creature) -> int:
+        """Nodes of the bones with their motion, and the skin that all meshes share."""
+        skeleton = creature.skeleton
+        frames = np.array(creature.run.frames, np.float32)
+        self._times = self._numbers(frames / np.float32(self._rate), bounds=True)
+        first = len(self._gltf.nodes)
+        place, turn = skeleton.rest_local()
+        at_rest = Rotation.from_matrix(turn).as_quat()
+        for bone, name in enumerate(skeleton.names):
+            self._gltf.nodes.append(
+                gl.Node(
+                    name=name,
+                    translation=place[bone].tolist(),
+                    rotation=at_rest[bone].tolist(),
+                    children=[],
+                )
+            )
+            parent = int(skeleton.parents[bone])
+            above = self._gltf.nodes[0 if parent < 0 else first + parent]
+            above.children.append(first + bone)
+        place, turn = skeleton.local()
+        quaternions = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_quat()
+        quaternions = continuous(quaternions.reshape(*turn.shape[:2], 4))
+        for bone in range(len(skeleton.names)):
+            self._animate(first + bone, "translation", place[:, bone])
+            self._animate(first + bone, "rotation", quaternions[:, bone])
+        inverse = np.zeros((len(skeleton.names), 4, 4))  # columns one after the other
+        position, rotation = skeleton.rest
+        inverse[:, :3, :3] = rotation
+        inverse[:, 3, :3] = -np.einsum("nji,nj->ni", rotation, position)
+        inverse[:, 3, 3] = 1.0
+        bound = self._numbers(inverse.reshape(-1, 16).astype(np.float32))
+        nodes = list(range(first, first + len(skeleton.names)))
+        self._gltf.skins.append(
+            gl.Skin(name="skeleton", joints=nodes, skeleton=first, inverseBindMatrices=bound)
+        )
+        return len(self._gltf.skins) - 1
+
+    def add_surface(self, surface: Surface, skinned: int) -> None:
+        """A geometry on its bone, or one that stays."""
+        attributes = gl.Attributes(POSITION=self._points(surface.vertices))
+        if surface.bone < 0:
+            self._mesh(surface.name, attributes, surface.faces, surface.rgba, None)
+            return
+        count = len(surface.vertices)
+        bones, shares = np.full((count, 1), surface.bone), np.ones((count, 1))
+        self._carry(attributes, bones, shares)
+        self._mesh(surface.name, attributes, surface.faces, surface.rgba, skinned)
+
+    def add_flesh(self, skin: Skin, morphed: MorphedSkin) -> None:
+        """A flesh on its bones, with its morph targets and what is left of error."""
+        attributes = gl.Attributes(POSITION=self._points(skin.rest))
+        self._carry(attributes, morphed.bones, morphed.shares)
+        node, mesh = self._mesh(skin.name, attributes, skin.faces, SKIN_COLOUR, 0)
+        mesh.extras = {"error_m": morphed.error, "error_by_skinning_alone_m": morphed.unmorphed}
+        if len(morphed.targets):
+            mesh.primitives[0].targets = [
+                {"POSITION": self._points(target)} for target in morphed.targets
+            ]
+            mesh.weights = [0.0] * len(morphed.targets)
+            self._animate(node, "weights", morphed.weights.reshape(-1, 1))
+
+    def save(self, path: Path) -> None:
+        """Write the file."""
+        gltf = self._gltf
+        gltf.animations.append(self._animation)
+        gltf.buffers.append(gl.Buffer(byteLength=len(self._bytes)))
+        gltf.set_binary_blob(bytes(self._bytes))
+        gltf.save_binary(str(path))
+
+    def _mesh(
+        self, name: str, attributes: gl.Attributes, faces: Integers, rgba: Array, skin: int | None
+    ) -> tuple[int, gl.Mesh]:
+        """A node with a mesh of triangles; number of the node, and the mesh."""
+        gltf = self._gltf
+        colour = gl.PbrMetallicRoughness(
+            baseColorFactor=rgba.tolist(), metallicFactor=0.0, roughnessFactor=0.8
+        )
+        blend = "BLEND" if rgba[3] < 1.0 else "OPAQUE"
+        gltf.materials.append(
+            gl.Material(name=name, pbrMetallicRoughness=colour, alphaMode=blend, alphaCutoff=None)
+        )
+        corners = self._numbers(faces.astype(np.uint32).reshape(-1), target=gl.ELEMENT_ARRAY_BUFFER)
+        part = gl.Primitive(
+            attributes=attributes, indices=corners, material=len(gltf.materials) - 1
+        )
+        mesh = gl.Mesh(name=name, primitives=[part])
+        gltf.meshes.append(mesh)
+        gltf.nodes.append(gl.Node(name=name, mesh=len(gltf.meshes) - 1, skin=skin))
+        node = len(gltf.nodes) - 1
+        # a skinned mesh takes no transform but its bones', so it stands beside the root
+        if skin is None:
+            gltf.nodes[0].children.append(node)
+        else:
+            gltf.scenes[0].nodes.append(node)
+        return node, mesh
+
+    def _carry(self, attributes: gl.Attributes, bones: Integers, shares: Array) -> None:
+        """Bones (k, m <= 4) and shares (k, m) of the vertices."""
+        joints, weights = np.zeros((len(bones), 4)), np.zeros((len(bones), 4))
+        joints[:, : bones.shape[1]], weights[:, : bones.shape[1]] = bones, shares
+        joints[weights == 0.0] = 0.0
+        attributes.JOINTS_0 = self._numbers(joints.astype(np.uint16), target=gl.ARRAY_BUFFER)
+        attributes.WEIGHTS_0 = self._numbers(weights.astype(np.float32), target=gl.ARRAY_BUFFER)
+
+    def _animate(self, node: int, path: str, values: Array) -> None:
+        """Values of a property of a node in every frame; rotations are (x, y, z, w)."""
+        made = gl.AnimationSampler(
+            input=self._times,
+            output=self._numbers(values.astype(np.float32)),
+            interpolation="LINEAR",
+        )
+        self._animation.samplers.append(made)
+        target = gl.AnimationChannelTarget(node=node, path=path)
+        self._animation.channels.append(
+            gl.AnimationChannel(sampler=len(self._animation.samplers) - 1, target=target)
+        )
+
+    def _points(self, points: Array) -> int:
+        """Accessor of places (k, 3) with their bounds."""
+        return self._numbers(points.astype(np.float32), target=gl.ARRAY_BUFFER, bounds=True)
+
+    def _numbers(
+        self, values: NDArray[Any], *, target: int | None = None, bounds: bool = False
+    ) -> int:
+        """Accessor of an array (k,) or (k, m), one element a row."""
+        rows = np.ascontiguousarray(values.reshape(len(values), -1))
+        self._bytes += bytes(-len(self._bytes) % 4)
+        view = gl.BufferView(
+            buffer=0, byteOffset=len(self._bytes), byteLength=rows.nbytes, target=target
+        )
+        self._bytes += rows.tobytes()
+        self._gltf.bufferViews.append(view)
+        accessor = gl.Accessor(
+            bufferView=len(self._gltf.bufferViews) - 1,
+            componentType=COMPONENTS[str(rows.dtype)],
+            count=len(rows),
+            type=TYPES[rows.shape[1]],
+        )
+        if bounds:
+            accessor.min = rows.min(axis=0).tolist()
+            accessor.max = rows.max(axis=0).tolist()
+        self._gltf.accessors.append(accessor)
+        return len(self._gltf.accessors) - 1

@@ -1,0 +1,98 @@
+"""The history of a run as a table: CSV, and Parquet with the unit of each column."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.io.atomic import replaced_whole, write_text
+from flowborne.io.exporters import provided
+from flowborne.io.open_run import OpenRun
+from flowborne.io.optional import optional
+
+UNITS = {
+    "s": "s",
+    "m": "m",
+    "rad": "rad",
+    "m/s": "m/s",
+    "rad/s": "rad/s",
+    "1/s": "1/s",
+    "N": "N",
+    "Nm": "N m",
+    "Ns": "N s",
+    "J": "J",
+    "m3": "m^3",
+}
+"""What may end the name of a column after its last underscore, and the unit that it stands for."""
+
+COUNTS = ("frame", "solver_iterations", "contacts", "flesh_inside_out")
+"""Columns of whole numbers."""
+
+
+def unit_of(column: str) -> str:
+    """Unit of a column of the history; "1" where it has none, "" where an objective decides."""
+    if column.startswith(("objective", "tried_objective")):
+        return ""
+    if column == "effort":
+        return "N m s"
+    if column.startswith("seconds_"):
+        return "s"
+    return UNITS.get(column.rpartition("_")[2], "1")
+
+
+def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:
+    """The history, counts as whole numbers."""
+    return {
+        name: values.astype(np.int64) if name in COUNTS and np.isfinite(values).all() else values
+        for name, values in run.history.items()
+    }
+
+
+@provided(".csv")
+@dataclass(frozen=True)
+class ExporterCsv:
+    """A row per frame under the names of history.csv, which end in their unit; numbers exact."""
+
+    def write(self, run: OpenRun, path: Path) -> None:
+        columns = _columns(run)
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(columns)
+        table.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+        write_text(path, text.getvalue())
+
+
+@provided(".parquet")
+@dataclass(frozen=True)
+class ExporterParquet:
+    """The same columns, each with its unit in the metadata of its field.
+
+    Metadata of the whole: scene, frames_per_second, and slab, 1 where forces, torques, impulses,
+    work and volumes are per metre of depth.
+    """
+
+    def write(self, run: OpenRun, path: Path) -> None:
+        arrow = optional("pyarrow", "pyarrow", "parquet", "'.parquet' files")
+        parquet = optional("pyarrow.parquet", "pyarrow", "parquet", "'.parquet' files")
+        columns = _columns(run)
+        whole = {
+            "scene": run.name,
+            "frames_per_second": repr(run.frames_per_second),
+            "slab": str(int(run.is_slab)),
+        }
+        schema = arrow.schema(
+            [
+                arrow.field(
+                    name, arrow.from_numpy_dtype(values.dtype), True, {"unit": unit_of(name)}
+                )
+                for name, values in columns.items()
+            ],
+            whole,
+        )
+        with replaced_whole(path) as new:
+            parquet.write_table(arrow.table(columns, schema=schema), new)

@@ -1,0 +1,24 @@
+"""A run as one VTKHDF file for ParaView, by h5py."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from flowborne.io.atomic import replaced_whole
+from flowborne.io.exporters import provided
+from flowborne.io.open_run import OpenRun
+from flowborne.io.optional import optional
+
+
+@provided(".vtkhdf")
+@dataclass(frozen=True)
+class ExporterVtkHdf:
+    """Blocks fluid, bodies, forces and flesh, each where the run has it; see `vtkhdf_file`."""
+
+    def write(self, run: OpenRun, path: Path) -> None:
+        optional("h5py", "h5py", "vtk", f"'{path.suffix}' files")
+        from flowborne.formats.vtkhdf_file import write_vtkhdf
+
+        with replaced_whole(path) as new:
+            write_vtkhdf(run, new)

@@ -1,0 +1,77 @@
+"""OpenVDB volumes, read back by tinyvdb: every number is the run's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import flowborne as fb
+from flowborne.formats.vdb import cell_velocity
+from flowborne.formats.vdb_file import VdbGrid, vdb_bytes
+
+tinyvdb = pytest.importorskip("tinyvdb")
+
+
+def voxels_of(grid: Any, active: np.ndarray, components: int = 1) -> np.ndarray:
+    """The field of a grid whose leaves are those that hold `active` voxels, in the file's order:
+    by node of 4096^3 voxels, by node of 128^3, by leaf of 8^3. (tinyvdb's own lists end after 64
+    leaves.)"""
+    nodes = [grid.tree.node(number) for number in range(grid.tree.num_nodes)]
+    leaves = [node for node in nodes if node.type == "leaf"]
+    assert sum(leaf.active_voxel_count for leaf in leaves) == active.sum()
+    corners = {tuple(corner) for corner in (np.argwhere(active) // 8).tolist()}
+    order = sorted(corners, key=lambda c: ([n // 512 for n in c], [n // 16 for n in c], c))
+    found = np.zeros([8 * -(-n // 8) for n in active.shape] + [components], np.float32)
+    for (i, j, k), leaf in zip(order, leaves, strict=True):
+        part = np.frombuffer(leaf.data, np.float32).reshape(8, 8, 8, components)
+        found[8 * i : 8 * i + 8, 8 * j : 8 * j + 8, 8 * k : 8 * k + 8] = part
+    return found[tuple(slice(0, n) for n in active.shape)].squeeze()
+
+
+@pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke")])
+def test_volumes_are_exact(
+    name: str, dye: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    run = fb.open_run(request.getfixturevalue(name))
+    assert run.grid is not None
+    written = fb.export(run.folder, tmp_path / "water.vdb")
+    assert [path.name for path in written.files] == [f"water_{n:04d}.vdb" for n in range(len(run))]
+    for number, path in enumerate(written.files):
+        with tinyvdb.open(str(path)) as file:
+            file.read_grids()
+            grids = {file.grid(n).name: file.grid(n) for n in range(file.grid_count)}
+            assert set(grids) == {dye, "velocity"}
+            state = run.state(number)
+            wanted = state[f"scalar_{dye}"]
+            assert_array_equal(voxels_of(grids[dye], wanted != 0.0), wanted.squeeze())
+            everywhere = np.ones(run.grid.shape, bool)
+            velocity = voxels_of(grids["velocity"], everywhere, 3)
+            assert_array_equal(velocity, cell_velocity(run.grid, state).squeeze())
+            for grid in grids.values():
+                assert_allclose(grid.transform["voxel_size"], run.grid.spacing)
+                first = [along[0] for along in run.grid.cell_coordinates()]
+                assert_allclose(grid.transform["translation"], first)
+
+
+def test_fields_of_many_nodes_are_exact(tmp_path: Path) -> None:
+    """Several nodes of each kind, leaves that are full, empty and cut by the end of the field."""
+    random = np.random.default_rng(7)
+    values = random.normal(size=(150, 9, 131)).astype(np.float32)
+    active = random.random(values.shape) < 0.01
+    active[:8, :8, :8], active[64:96] = True, False
+    kept = np.where(active, values, np.float32(0.0))
+    grid = VdbGrid("noise", "fog volume", kept, active, 0.25, (1.0, 2.0, 3.0))
+    (tmp_path / "noise.vdb").write_bytes(vdb_bytes([grid]))
+    with tinyvdb.open(str(tmp_path / "noise.vdb")) as file:
+        file.read_grids()
+        assert_array_equal(voxels_of(file.grid(0), active), kept)
+
+
+def test_a_run_without_fluid_is_refused(walk: Path, tmp_path: Path) -> None:
+    with pytest.raises(fb.SceneError, match=r"has no fluid. Add \[domain\] and \[fluid\]"):
+        fb.export(walk, tmp_path / "water.vdb")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,167 @@
+"""VTKHDF, read back by VTK's own reader: every number is the run's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import vtkmodules.vtkCommonDataModel
+from numpy.testing import assert_allclose, assert_array_equal
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkIOHDF import vtkHDFReader
+
+import flowborne as fb
+from flowborne.formats.creature import Creature
+from flowborne.formats.vdb import cell_velocity
+from flowborne.formats.vtkhdf_file import vorticity
+from flowborne.io.open_run import OpenRun
+
+pytest.importorskip("h5py")
+
+FAR = 1e-5
+"""Distance from the run that is accepted, in sizes of the creature."""
+
+
+class Read:
+    """A file as VTK reads it."""
+
+    def __init__(self, path: Path) -> None:
+        self._reader = vtkHDFReader()
+        self._reader.SetFileName(str(path))
+        self._reader.UpdateInformation()
+        about, steps = self._reader.GetOutputInformation(0), vtkStreamingDemandDrivenPipeline
+        count = about.Length(steps.TIME_STEPS())
+        self.times = [about.Get(steps.TIME_STEPS(), n) for n in range(count)]
+
+    def blocks(self, number: int) -> dict[str, Any]:
+        """Name -> block of a step."""
+        self._reader.UpdateTimeStep(self.times[number])
+        whole = self._reader.GetOutputDataObject(0)
+        name = vtkmodules.vtkCommonDataModel.vtkCompositeDataSet.NAME()
+        return {
+            whole.GetMetaData(n).Get(name): whole.GetBlock(n)
+            for n in range(whole.GetNumberOfBlocks())
+        }
+
+
+def cells(block: Any, name: str) -> np.ndarray:
+    return vtk_to_numpy(block.GetCellData().GetArray(name))
+
+
+def points(block: Any) -> np.ndarray:
+    return vtk_to_numpy(block.GetPoints().GetData())
+
+
+@pytest.fixture
+def opened(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[OpenRun, Read]:
+    """The run of the parameter, and its file."""
+    folder = request.getfixturevalue(request.param)
+    fb.export(folder, tmp_path / "run.vtkhdf")
+    return fb.open_run(folder), Read(tmp_path / "run.vtkhdf")
+
+
+Opened = tuple[OpenRun, Read]
+every = pytest.mark.parametrize("opened", ["chain", "fish", "walk"], indirect=True)
+wet = pytest.mark.parametrize("opened", ["chain", "fish"], indirect=True)
+
+
+@every
+def test_times_and_blocks_are_the_runs(opened: Opened) -> None:
+    run, read = opened
+    assert_allclose(read.times, run.times, rtol=1e-12)
+    wanted = {"bodies", "forces"}
+    wanted |= {"fluid"} if run.grid is not None else set()
+    wanted |= {"flesh"} if run.skin is not None else set()
+    assert set(read.blocks(0)) == wanted
+
+
+@wet
+def test_fields_are_exact(opened: Opened) -> None:
+    run, read = opened
+    grid = run.grid
+    assert grid is not None
+    for number in range(len(run)):
+        block, state = read.blocks(number)["fluid"], run.state(number)
+        assert_allclose(block.GetBounds()[::2], grid.origin)
+        assert_allclose(block.GetBounds()[1::2], grid.upper)
+        velocity = cell_velocity(grid, state)
+        wanted = {"velocity": velocity, "vorticity": vorticity(grid, velocity).astype(np.float32)}
+        wanted |= {name: state[name] for name in ("pressure", "open")}
+        wanted |= {dye: state[f"scalar_{dye}"] for dye in run.dyes}
+        assert block.GetCellData().GetNumberOfArrays() == len(wanted)
+        for name, field in wanted.items():
+            flat = (
+                field.reshape(*grid.shape, -1)
+                .transpose(2, 1, 0, 3)
+                .reshape(-1, field[0, 0, 0].size)
+            )
+            assert_array_equal(cells(block, name).reshape(flat.shape), flat)
+
+
+@every
+def test_bodies_are_where_the_run_has_them(opened: Opened) -> None:
+    run, read = opened
+    creature = Creature(run)
+    model = creature.model
+    for number in range(len(run)):
+        block, state = read.blocks(number)["bodies"], run.state(number)
+        wanted = [
+            shape.triangles()[0] @ state["geom_rotation"][n].T + state["geom_position"][n]
+            for n, shape in enumerate(model.geom_shape)
+        ]
+        assert_allclose(points(block), np.concatenate(wanted), atol=FAR * creature.size)
+        geometry = cells(block, "geometry")
+        assert_array_equal(cells(block, "body"), model.geom_body[geometry])
+        assert block.GetNumberOfPolys() == sum(len(s.triangles()[1]) for s in model.geom_shape)
+
+
+@every
+def test_forces_are_the_runs(opened: Opened) -> None:
+    run, read = opened
+    for number in range(len(run)):
+        block, state = read.blocks(number)["forces"], run.state(number)
+        force = vtk_to_numpy(block.GetPointData().GetArray("force"))
+        assert_array_equal(force, state["fluid_force"][1:])
+        assert_array_equal(points(block), state["fluid_centre"][1:])
+
+
+@pytest.mark.parametrize("opened", ["fish"], indirect=True)
+def test_flesh_is_where_the_run_has_it_with_its_stresses(opened: Opened) -> None:
+    run, read = opened
+    creature = Creature(run)
+    flesh = creature.model.flesh
+    assert flesh is not None
+    for number in range(len(run)):
+        block, state = read.blocks(number)["flesh"], run.state(number)
+        found = points(block)
+        skin = found[np.unique(flesh.surface)]
+        assert_allclose(skin, state["flesh_vertices"], atol=FAR * creature.size)
+        assert block.GetNumberOfCells() == len(flesh.elements)
+        stress = cells(block, "stress").reshape(-1, 3, 3)
+        assert_allclose(stress, np.swapaxes(stress, 1, 2), atol=1e-5 * np.abs(stress).max() + 1e-6)
+        least = run.history["flesh_least_detF"][number - 1] if number else 1.0
+        assert cells(block, "volume_ratio").min() == pytest.approx(least, abs=1e-5)
+        pull = cells(block, "von_mises")
+        assert pull.max() < 1.0 if number == 0 else pull.max() > 100.0
+
+
+@pytest.mark.parametrize("opened", ["fish"], indirect=True)
+def test_vtk_knows_the_nodes_of_the_elements(opened: Opened) -> None:
+    """Middles of edges lie between their ends at rest, in VTK's order."""
+    _, read = opened
+    block = read.blocks(0)["flesh"]
+    cell = block.GetCell(0)
+    for edge in range(cell.GetNumberOfEdges()):
+        ends = [np.array(cell.GetEdge(edge).GetPoints().GetPoint(n)) for n in range(3)]
+        assert_allclose(ends[2], 0.5 * (ends[0] + ends[1]), atol=1e-6)
+
+
+def test_vorticity_of_a_turn_is_twice_its_rate() -> None:
+    grid = fb.Grid((4, 5, 6), 0.5)
+    x, y, z = np.meshgrid(*grid.cell_coordinates(), indexing="ij")
+    rate = np.array([0.3, -0.2, 0.5])
+    velocity = np.cross(rate, np.stack([x, y, z], axis=-1)).astype(np.float32)
+    assert_allclose(vorticity(grid, velocity), np.broadcast_to(2.0 * rate, (4, 5, 6, 3)), atol=1e-5)
