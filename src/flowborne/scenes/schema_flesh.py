@@ -13,7 +13,8 @@ class FleshTable(Table):
     """[[flesh]]: an elastic body that bones hold, meshed with tetrahedra.
 
     Where it is thinner with its bones than 1.75 cells of the fluid's grid, the fluid sees all of it
-    thicker by what is missing there, so that it does not leak.
+    thicker by what is missing there, so that it does not leak. Where a mirror plane exchanges
+    bones, as left and right ones, the elements are each other's mirror images too.
 
     name       the flesh's own
     bones      bodies of the model that lie inside and hold it

@@ -20,6 +20,7 @@ from flowborne.scenes.flesh.mesh import (
     surface_mesh,
 )
 from flowborne.scenes.flesh.mesh_file import read_mesh, recipe_of
+from flowborne.scenes.flesh.symmetry import SAME
 from flowborne.scenes.schema_flesh import FleshTable
 from flowborne.solids.tissue import Grown, Law, Tissue, add_flesh
 
@@ -98,7 +99,7 @@ def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
         "shapes": shapes.hexdigest(),
         "thickness": table.thickness,
         "size": table.size,
-        "rules": [FIDELITY, THICKNESSES, HELD, JOINT],
+        "rules": [FIDELITY, THICKNESSES, HELD, JOINT, SAME],
     }
     if table.surface is not None:
         path = folder / table.surface

@@ -16,6 +16,7 @@ from flowborne.scenes.flesh.bones import Bones, bones_of
 from flowborne.scenes.flesh.contour import contour
 from flowborne.scenes.flesh.mesher import tetrahedra_within
 from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
+from flowborne.scenes.flesh.symmetry import chamber_of
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import with_middles
 
@@ -55,6 +56,8 @@ def skin_mesh(
 ) -> FleshMesh:
     """Flesh as far as `thickness` m outside the union of some bodies.
 
+    It has the mirror planes that exchange some of them.
+
     bones   names of the bodies
     size    length of edges, m; shorter where the surface bends too much for it
     raises  ValueError for an unknown body, for one without a geom, when the mesher fails and for
@@ -63,7 +66,7 @@ def skin_mesh(
     chosen = bones_of(spec, bones)
     tolerance = min(FIDELITY * size, THICKNESSES * min(thickness, chosen.thinnest))
     skin = contour(chosen, thickness, min(_pitch(chosen, size), 0.5 * thickness))
-    return _fleshed(skin, chosen, size, tolerance)
+    return _fleshed(skin, None, chosen, size, tolerance)
 
 
 def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: float) -> FleshMesh:
@@ -76,7 +79,7 @@ def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: fl
     tolerance = min(FIDELITY * size, THICKNESSES * chosen.thinnest)
     surface = read_surface(path)
     check_covers(path, surface, chosen, _pitch(chosen, size), tolerance)
-    return _fleshed(surface, chosen, size, tolerance)
+    return _fleshed(surface, surface, chosen, size, tolerance)
 
 
 def _pitch(bones: Bones, size: float) -> float:
@@ -84,12 +87,17 @@ def _pitch(bones: Bones, size: float) -> float:
     return min(0.3 * size, 0.6 * bones.thinnest)
 
 
-def _fleshed(outside: Mesh, bones: Bones, size: float, tolerance: float) -> FleshMesh:
-    """Flesh between an outer surface and bones."""
+def _fleshed(
+    outside: Mesh, own: Mesh | None, bones: Bones, size: float, tolerance: float
+) -> FleshMesh:
+    """Flesh between an outer surface and bones; `own` is the surface where it is the user's."""
     inside = contour(bones, 0.0, _pitch(bones, size))
-    points, elements = tetrahedra_within([outside, inside], size, tolerance)
-    flesh = elements[bones.distance(points[elements].mean(axis=1)) > 0.0]
-    used, renumbered = np.unique(flesh, return_inverse=True)
+    chamber = chamber_of(bones, inside[0], tolerance, own)
+    surfaces = [chamber.cut(surface) for surface in (outside, inside)]
+    points, elements = tetrahedra_within(surfaces, size, tolerance)
+    flesh = bones.distance(points[elements].mean(axis=1)) > 0.0
+    points, elements = chamber.unfold(points, elements, flesh, tolerance)
+    used, renumbered = np.unique(elements, return_inverse=True)
     points = points[used]
     ends = points[with_middles(len(points), renumbered.reshape(-1, 4))[0]]
     edge = float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
