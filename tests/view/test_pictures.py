@@ -205,7 +205,7 @@ def test_nothing_to_show_is_left_out(write_run: Write) -> None:
     picture = Picture(run)
     pixels = picture.draw(3)
     assert len(picture.layout.strips) == 1
-    assert field_of(run) is None
+    assert field_of(run, run.shot) is None
     assert not like(pixels[:, :, :3].astype(int), style.FORCE).any()
 
 

@@ -62,7 +62,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = SolidModel.with_flesh(spec, [grown], gravity=(0.0, 0.0, 0.0))
     world = World.at_rest(Setup(model, Fluid(Grid((16, 12, 16), 0.05, (-0.4, -0.3, -0.4)), 1000.0)))
     folder = RunFolder.create(tmp_path_factory.mktemp("runs") / "arm")
-    folder.scene.write_text('name = "arm"\n[film]\nfield = "vorticity"\n')
+    folder.scene.write_text('name = "arm"\n[film]\nfield = "none"\n')
     write_model(folder, world.setup, controlled=["elbow"], frames_per_second=24.0, wind=[])
     History.create(folder.history, ["frame", "time_s"]).close()
     recorder = Recorder(folder)

@@ -63,7 +63,8 @@ class SeenDye:
             strength = np.clip(np.nan_to_num(state[dye]) / self._full[dye], 1e-6, 1.0)
             colour += strength[..., None] * own.astype(np.float32)
             weight += strength
-        return colour / weight[..., None], np.minimum(weight, 1.0) * state["open"]
+        density = (np.minimum(weight, 1.0) * state["open"]).astype(np.float32)
+        return (colour / weight[..., None]).astype(np.float32), density
 
 
 class SeenVortices:

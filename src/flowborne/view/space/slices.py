@@ -34,7 +34,8 @@ class Slice:
         self._quad = pv.PolyData(self._corners, faces=[4, 0, 1, 2, 3])
         self._quad.active_texture_coordinates = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
         sides = np.array([grid.shape[first], grid.shape[second]])
-        self._pixels = tuple(int(side) for side in np.ceil(PIXELS * sides / sides.max()))
+        width, height = np.ceil(PIXELS * sides / sides.max()).astype(int).tolist()
+        self._pixels = (width, height)
         self._actor = plotter.add_mesh(
             self._quad, lighting=False, texture=pv.Texture(np.zeros((2, 2, 3), np.uint8))
         )

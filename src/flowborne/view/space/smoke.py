@@ -51,7 +51,8 @@ class Smoke:
         colour, strength = self._dye.smoke(state)
         share = np.clip((strength - FAINT) / (FULL - FAINT), 0.0, 1.0)
         density = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
-        light = scattered(density / np.float32(self._depth), 1.0 - state["open"], toward)
+        solid = (1.0 - state["open"]).astype(np.float32)
+        light = scattered(density / np.float32(self._depth), solid, toward)
         filled = np.argwhere(density > 1.0 / 255.0)
         self._volume.SetVisibility(len(filled) > 0)
         if len(filled) == 0:

@@ -82,7 +82,7 @@ class Stage:
             self._fluid = Smoke(plotter, run.grid, seen)
         elif run.grid is not None and isinstance(seen, SeenVortices):
             self._fluid = Vortices(plotter, run.grid, seen)
-        elif run.grid is not None and seen is not None:
+        elif run.grid is not None and isinstance(seen, SeenSlice):
             self._fluid = Slice(plotter, run.grid, seen, camera.axes(0)[2])
 
     def image(self, number: int, state: State) -> Pixels:
