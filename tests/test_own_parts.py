@@ -41,8 +41,8 @@ height = -9.0
 [controller]
 rule = { kind = "share", part = 0.25 }
 
-[output]
-picture = "none"
+[film]
+field = "none"
 exports = [{ file = "block.track", body = "block", every = 2 }]
 """
 

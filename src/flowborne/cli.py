@@ -159,21 +159,39 @@ def check(
 @app.command()
 def film(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")],
-    bones: Annotated[
-        bool, typer.Option("--bones", help="See through flesh, to the bones in it.")
-    ] = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Change a value of [film]: camera.orbit=30"
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="film.mp4, or frames.png for frames_0000.png and so on.",
+            show_default="preview.png and preview.mp4 in DIR",
+        ),
+    ] = None,
 ) -> None:
-    """Draw the picture and the film of a run again."""
-    path = RunFolder.existing(folder).path
-    from flowborne.view.film import make_preview
+    """Draw the picture and the film of a run again, as the table [film] of its scene says."""
+    files = RunFolder.existing(folder)
+    from flowborne.scenes.film_settings import film_settings
+    from flowborne.view.film import make_preview, write_shot
+    from flowborne.view.shot import Shot
 
+    shot = Shot.of(film_settings(files, _overrides(settings or [])))
+    drawn = f"{folder / 'preview.png'}, {folder / 'preview.mp4'}"
     try:
-        make_preview(path, bones=bones)
+        if out is None:
+            make_preview(files.path, shot=shot)
+        else:
+            drawn = write_shot(files.path, out, shot=shot)
     except ValueError as error:
         raise InputError(str(error)) from error
     except OSError as error:
-        raise cannot_write(path, error) from error
-    print(f"drawn: {folder / 'preview.png'}, {folder / 'preview.mp4'}")
+        raise cannot_write(folder if out is None else out, error) from error
+    print(f"drawn: {drawn}")
 
 
 @app.command()

@@ -23,7 +23,7 @@ def write_run(
     *,
     frames: int = 6,
     fluid: bool = True,
-    picture: str = "dye",
+    field: str = "dye",
     dyes: tuple[str, ...] = ("dye",),
     objective: bool = True,
     force: tuple[float, float] = (30.0, 12.0),
@@ -32,7 +32,7 @@ def write_run(
     """Run folder with the start and `frames` frames; a block, and a fixed square on its left."""
     (folder / "states").mkdir(parents=True)
     (folder / "scene.toml").write_text(
-        f'name = "made-up-block"\ndimensions = 2\n[output]\npicture = "{picture}"\n'
+        f'name = "made-up-block"\ndimensions = 2\n[film]\nfield = "{field}"\n'
     )
     (folder / "model.json").write_text(json.dumps(_model(fluid, wind)))
     columns = ["frame", "time_s", "angle_hinge_rad", "target_hinge_rad"]

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from flowborne.view.film import make_preview, write_film
+from flowborne.view import drawing
+from flowborne.view.drawing import drawn_frames
+from flowborne.view.film import make_preview, write_film, write_shot
+from flowborne.view.map_slab import MapSlab
 from flowborne.view.pictures import Picture
 from flowborne.view.plots import ChainCost, plot_chain_cost, plot_history, straight_line
 from flowborne.view.run import Run
+from flowborne.view.shot import Shot
 
 Write = Callable[..., Path]
 
@@ -103,3 +109,115 @@ def test_the_cost_of_chains_is_plotted_with_its_line(tmp_path: Path) -> None:
     assert off == pytest.approx(0.02 / 0.28, rel=1e-6)
     with pytest.raises(ValueError, match="two different x"):
         plot_chain_cost(rows[:1], tmp_path / "one.svg")
+
+
+def shot_of(**table: object) -> Shot:
+    return Shot.of(table)
+
+
+def test_an_image_sequence_has_alpha_where_nothing_is(write_run: Write, tmp_path: Path) -> None:
+    folder = write_run(frames=2, field="vorticity")
+    shot = shot_of(background="transparent", plots=False, size=[320, 240])
+    assert "frames_0002.png" in write_shot(folder, tmp_path / "frames.png", shot=shot)
+    images = [imageio.imread(path) for path in sorted(tmp_path.glob("frames_*.png"))]
+    assert [image.shape for image in images] == 3 * [(240, 320, 4)]
+    assert images[0][..., 3].min() == 0
+    assert images[0][..., 3].max() == 255
+    with pytest.raises(ValueError, match="a film in MP4 cannot be transparent"):
+        write_shot(folder, tmp_path / "film.mp4", shot=shot)
+    assert not (tmp_path / "film.mp4").exists()
+    with pytest.raises(ValueError, match=r"film\.gif is neither a film nor an image sequence"):
+        write_shot(folder, tmp_path / "film.gif")
+
+
+@pytest.mark.parametrize("size", [[640, 480], [480, 640], [1280, 720]])
+def test_a_picture_has_the_size_that_is_asked_for(write_run: Write, size: list[int]) -> None:
+    run = Run.read(write_run(frames=1))
+    for plots in (False, True):
+        assert Picture(run, shot=shot_of(size=size, plots=plots)).draw(1).shape[1::-1] == (*size,)
+    with pytest.raises(ValueError, match="has no room for its plots"):
+        Picture(run, shot=shot_of(size=[400, 64]))
+
+
+def test_start_stop_and_rate_choose_the_frames() -> None:
+    times = np.arange(25) / 24.0
+    assert shot_of().frames(times, 24.0) == list(range(25))
+    assert shot_of(start=0.25, stop=0.5).frames(times, 24.0) == list(range(6, 13))
+    assert shot_of(frames_per_second=12.0).frames(times, 24.0) == list(range(0, 25, 2))
+    assert shot_of(frames_per_second=48.0, stop=0.1).frames(times, 24.0)[:4] == [0, 0, 1, 1]
+    with pytest.raises(ValueError, match="no frame lies between 2 and 3 s; the run goes from 0 to"):
+        shot_of(start=2.0, stop=3.0).frames(times, 24.0)
+
+
+def test_other_processes_draw_the_same_frames_in_order(
+    write_run: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run.read(write_run(frames=9))
+    numbers = [*range(10), 3]
+    with closing(drawn_frames(run, run.shot, numbers, cores=1)) as alone:
+        expected = [frame.copy() for frame in alone]
+    monkeypatch.setattr(drawing, "STARTING", 0.0)
+    started: list[list[str]] = []
+    start = subprocess.Popen
+
+    def note(command: list[str], **told: object) -> object:
+        started.append(command)
+        return start(command, **told)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(subprocess, "Popen", note)
+    with closing(drawn_frames(run, run.shot, numbers, cores=2)) as together:
+        found = [frame.copy() for frame in together]
+    assert len(started) == 2
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_a_film_that_is_given_up_leaves_no_process(
+    write_run: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run.read(write_run(frames=9))
+    monkeypatch.setattr(drawing, "STARTING", 0.0)
+    artists = []
+    start = subprocess.Popen
+
+    def note(*told: object, **more: object) -> object:
+        artists.append(start(*told, **more))  # type: ignore[call-overload]
+        return artists[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", note)
+    frames = drawn_frames(run, run.shot, range(10), cores=2)
+    for _ in range(5):
+        next(frames)
+    frames.close()
+    assert len(artists) == 2
+    assert all(artist.returncode is not None for artist in artists)
+
+
+def test_a_window_follows_a_body_of_a_slab(write_run: Write) -> None:
+    run = Run.read(write_run(frames=4))
+    whole = MapSlab(run, shot_of())
+    assert whole.views[0] == pytest.approx([-1.5, 2.5, -2.0, 2.0])
+    near = MapSlab(run, shot_of(camera={"follow": "block", "distance": 2.0, "lens": 30.0}), 0.5)
+    x0, x1, y0, y1 = near.views[2]
+    assert y1 - y0 == pytest.approx(4.0 * np.tan(np.radians(15.0)))
+    assert x1 - x0 == pytest.approx(2.0 * (y1 - y0))
+    assert [0.5 * (x0 + x1), 0.5 * (y0 + y1)] == pytest.approx([0.4, 0.3], abs=0.02)
+    for told, said in (
+        ({"follow": "tail"}, "cannot follow body 'tail'; the bodies are world, block"),
+        ({"orbit": 5.0}, "a slab is seen from straight above"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            MapSlab(run, shot_of(camera=told))
+
+
+@pytest.mark.parametrize(("field", "name"), [("speed", "speed (m/s)"), ("pressure", "pressure")])
+def test_speed_and_pressure_have_a_scale(write_run: Write, field: str, name: str) -> None:
+    run = Run.read(write_run(frames=1))
+    picture = Picture(run, shot=shot_of(field=field))
+    assert picture.map.scale is not None
+    assert name in picture.map.scale[3]
+
+
+def test_a_field_that_the_run_lacks_is_said(write_run: Write) -> None:
+    run = Run.read(write_run(frames=1, dyes=()))
+    with pytest.raises(ValueError, match="the run has no dye to show; draw another field"):
+        Picture(run)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -24,6 +25,7 @@ from flowborne.view.map_slab import MapSlab
 from flowborne.view.outlines import skin_loops
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
+from flowborne.view.shot import Shot
 
 Pixels = np.ndarray
 
@@ -61,7 +63,7 @@ def fin(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def colour_at(picture: Picture, number: int, x: float, y: float) -> list[int]:
     """The map's colour at a place in m."""
     assert isinstance(picture.map, MapSlab)
-    x0, x1, y0, y1 = picture.map.view
+    x0, x1, y0, y1 = picture.map.views[number]
     box = picture.layout.map
     row = box.top + int((y1 - y) / (y1 - y0) * box.height)
     column = box.left + int((x - x0) / (x1 - x0) * box.width)
@@ -83,7 +85,7 @@ def test_flesh_is_drawn_where_its_skin_is(fin: Path) -> None:
 
 
 def test_the_map_holds_all_of_the_flesh_of_all_frames(fin: Path) -> None:
-    x0, x1, y0, y1 = MapSlab(Run.read(fin)).view
+    x0, x1, y0, y1 = MapSlab(Run.read(fin), Shot()).views[0]
     assert x0 < -0.2
     assert x1 > 1.1
     assert y0 < -0.1 - 0.1
@@ -93,7 +95,7 @@ def test_the_map_holds_all_of_the_flesh_of_all_frames(fin: Path) -> None:
 def test_bones_are_hidden_until_they_are_asked_for(fin: Path) -> None:
     run = Run.read(fin)
     assert colour_at(Picture(run), 0, 0.3, 0.0) == pytest.approx(rgb(style.FLESH), abs=2)
-    picture = Picture(run, bones=True)
+    picture = Picture(run, shot=replace(run.shot, bones=True))
     assert colour_at(picture, 0, 0.3, 0.0) == pytest.approx(rgb(style.ACCENT), abs=2)
     share = style.SEEN_THROUGH
     dim = share * rgb(style.FLESH) + (1.0 - share) * rgb(style.WATER)
@@ -112,16 +114,19 @@ def test_a_state_whose_numbers_are_lost_shows_neither_skin_nor_bones(
 
 def test_the_command_draws_bones_when_asked_to(fin: Path) -> None:
     stills = []
-    for switch in ([], ["--bones"]):
+    for switch in ([], ["--set", "bones=true"]):
         with pytest.raises(SystemExit) as left:
             main(["film", str(fin), *switch])
         assert left.value.code == 0
         stills.append(imageio.imread(fin / "preview.png"))
         film = imageio.imread(fin / "preview.mp4", plugin="FFMPEG")
-        expected = Picture(Run.read(fin), bones=bool(switch)).draw(1)[:, :, :3].astype(int)
+        run = Run.read(fin)
+        shot = replace(run.shot, bones=bool(switch))
+        expected = Picture(run, shot=shot).draw(1)[:, :, :3].astype(int)
         assert np.abs(film[1] - expected).mean() < 4.0
     for still, bones in zip(stills, (False, True), strict=True):
-        expected = Picture(Run.read(fin), 1.5, bones=bones).draw(1)[:, :, :3]
+        run = Run.read(fin)
+        expected = Picture(run, 1.5, replace(run.shot, bones=bones)).draw(1)[:, :, :3]
         np.testing.assert_array_equal(still, expected)
 
 

@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 
 from flowborne.view import style
-from flowborne.view.fields import FieldDye, FieldVorticity, field_of, full_strength, vorticity
+from flowborne.view.fields import (
+    FieldDye,
+    FieldVorticity,
+    field_of,
+    full_strength,
+    over,
+    vorticity,
+)
 from flowborne.view.layout import Box
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
@@ -31,7 +38,7 @@ def cut_out(pixels: Pixels, box: Box) -> Pixels:
 
 def pixel_of(picture: Picture, x: float, y: float) -> tuple[int, int]:
     """(row, column) in the map of a place in m."""
-    x0, x1, y0, y1 = picture.map.view
+    x0, x1, y0, y1 = picture.map.views[0]
     box = picture.layout.map
     return int((y1 - y) / (y1 - y0) * box.height), int((x - x0) / (x1 - x0) * box.width)
 
@@ -53,10 +60,10 @@ def at_cells(picture: Picture, pixels: Pixels) -> Pixels:
 @pytest.mark.parametrize("wanted", ["dye", "vorticity"])
 def test_the_map_shows_every_cell_where_it_is(write_run: Write, wanted: str) -> None:
     """Cell by cell the field's own colour; not so upside down or mirrored."""
-    run = Run.read(write_run(picture=wanted))
-    picture, field = Picture(run), field_of(run)
+    run = Run.read(write_run(field=wanted))
+    picture, field = Picture(run), field_of(run, run.shot)
     assert isinstance(field, FieldDye if wanted == "dye" else FieldVorticity)
-    expected = field.image(run.state(6)).astype(int)
+    expected = over(field.image(run.state(6)), style.WATER).astype(int)
     found = at_cells(picture, cut_out(picture.draw(6), picture.layout.map))
     free = np.ones(found.shape[:2], bool)
     free[35:75, 20:70] = False  # the bodies and the arrow
@@ -198,7 +205,7 @@ def test_nothing_to_show_is_left_out(write_run: Write) -> None:
     picture = Picture(run)
     pixels = picture.draw(3)
     assert len(picture.layout.strips) == 1
-    assert field_of(run) is None
+    assert field_of(run, run.shot) is None
     assert not like(pixels[:, :, :3].astype(int), style.FORCE).any()
 
 
@@ -214,7 +221,7 @@ def test_a_state_with_numbers_lost_is_still_drawn(write_run: Write) -> None:
     np.savez(path, **arrays)
     for wanted in ("dye", "vorticity"):
         scene = folder / "scene.toml"
-        scene.write_text(f'name = "lost"\n[output]\npicture = "{wanted}"\n')
+        scene.write_text(f'name = "lost"\n[film]\nfield = "{wanted}"\n')
         picture = Picture(Run.read(folder))
         assert not like(cut_out(picture.draw(6), picture.layout.map), style.FORCE).any()
 

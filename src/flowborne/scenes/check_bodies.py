@@ -97,6 +97,8 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
         named += unknown_body(draft, model, body, "solids", "densities")
     for body in scene.output.bodies:
         named += unknown_body(draft, model, body, "output", "bodies")
+    if scene.film.camera.follow not in ("bodies", "nothing"):
+        named += unknown_body(draft, model, scene.film.camera.follow, "film", "camera", "follow")
     for index, wind in enumerate(scene.wind):
         for body in wind.bodies or ():
             named += unknown_body(draft, model, body, "wind", index)

@@ -80,6 +80,11 @@ def check_fluid(draft: Draft) -> Iterator[str]:
             yield from _check_outlet(draft, scene.boundaries, scene.domain)
         yield from _check_bands(draft, scene.boundaries, scene.domain)
     yield from _check_boxes(draft, scene.domain)
+    if scene.film.field == "dye" and not scene.scalars() and draft.sound("film", "dye", "mouths"):
+        yield (
+            f"{draft.at('film', 'field')}: there is no dye to show. Add [[dye]], or show "
+            "vorticity, speed or pressure."
+        )
 
 
 def _half_periodic(low: str, high: str) -> bool:

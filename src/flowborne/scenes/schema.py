@@ -12,6 +12,7 @@ from flowborne.io.exporters import EXPORTERS, can_write, endings
 from flowborne.io.run_folder import FIXED_NAMES
 from flowborne.scenes.fields import Count, Number, Positive, Table, Text, Vector, filled
 from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
+from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.schema_flesh import FleshTable
 from flowborne.scenes.schema_fluid import (
     BoundariesTable,
@@ -80,14 +81,12 @@ class OutputTable(Table):
     """[output]: what a run leaves behind.
 
     checkpoint_every  frames between checkpoints
-    picture           what the fluid shows in pictures and films
     bodies            whose centre of mass, velocity, and force and torque of the fluid the history
                       holds
     exports           files for other programs, written at the end: names, or tables with file
     """
 
     checkpoint_every: Count = 24
-    picture: Literal["dye", "vorticity", "none"] = "vorticity"
     bodies: tuple[Text, ...] = ()
     exports: tuple[Annotated[ExportTable, BeforeValidator(_named_file)], ...] = ()
 
@@ -130,6 +129,7 @@ class Scene(Table):
     objectives: tuple[AnyObjective, ...] = ()
     controller: ControllerTable = ControllerTable()
     output: OutputTable = OutputTable()
+    film: FilmTable = FilmTable()
 
     _folder: Path = PrivateAttr(default=Path())
 

@@ -1,8 +1,9 @@
-"""What is seen of the fluid: dye or vorticity as a small image, a pixel per cell."""
+"""What is seen of the fluid of a slab as a small image, a pixel per cell."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -11,16 +12,20 @@ from numpy.typing import NDArray
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.run import Run, State
+from flowborne.view.shot import Shot
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
+Scale = tuple[Array, float, float, str]
 
 SAMPLES = 24
 """Frames from which the scale of a film is taken."""
 
 ROBUST = 98.5
-"""Percentile of the vorticity's size at which its colours are strongest."""
+"""Percentile of a quantity's size at which its colours are strongest."""
 
+HIGHEST = 99.8
+"""The same of speed and pressure, which are high in small places."""
 
 STRONG = 75.0
 """Percentile of a dye's values above half the largest at which it has its full colour."""
@@ -34,21 +39,32 @@ class Field(Protocol):
     """
 
     legend: Sequence[tuple[str, str]]
-    scale: tuple[Array, float, float, str] | None
+    scale: Scale | None
 
     def image(self, state: State) -> Pixels:
-        """(ny, nx, 3) colours of the cells, lowest row first."""
+        """(ny, nx, 4) colours and opacities of the cells, lowest row first."""
         ...
 
 
-def field_of(run: Run) -> Field | None:
-    """What the scene of `run` wants to see of its fluid; None without fluid."""
+def field_of(run: Run, shot: Shot) -> Field | None:
+    """What `shot` shows of the fluid of `run`; None without fluid.
+
+    raises  ValueError when it shows dye and there is none
+    """
     if run.grid is None:
         return None
-    dyes = [name for name in run.state(0) if name.startswith("scalar_")]
-    if run.picture == "dye" and dyes:
+    dyes = dyes_of(run)
+    shot.pictured(dyes)
+    if shot.field == "dye":
         return FieldDye(run, dyes)
-    return FieldStill() if run.picture == "none" else FieldVorticity(run)
+    if shot.field == "vorticity":
+        return FieldVorticity(run, shot.colour)
+    return FieldStill() if shot.field == "none" else FieldNumber(run, NUMBERS[shot.field])
+
+
+def dyes_of(run: Run) -> list[str]:
+    """Arrays of a state that hold dye."""
+    return [name for name in run.state(0) if name.startswith("scalar_")]
 
 
 class FieldStill:
@@ -56,10 +72,10 @@ class FieldStill:
 
     def __init__(self) -> None:
         self.legend: Sequence[tuple[str, str]] = ()
-        self.scale: tuple[Array, float, float, str] | None = None
+        self.scale: Scale | None = None
 
     def image(self, state: State) -> Pixels:
-        return _pixels(np.broadcast_to(style.rgb(style.WATER), (1, 1, 3)))
+        return np.zeros((1, 1, 4), np.uint8)
 
 
 class FieldDye:
@@ -72,7 +88,7 @@ class FieldDye:
         self.colours = [style.DYES[n % len(style.DYES)] for n in range(len(self.dyes))]
         names = [dye.removeprefix("scalar_") for dye in self.dyes]
         self.legend: Sequence[tuple[str, str]] = list(zip(names, self.colours, strict=True))
-        self.scale: tuple[Array, float, float, str] | None = None
+        self.scale: Scale | None = None
 
     def image(self, state: State) -> Pixels:
         open_cells = state["open"][:, :, 0]
@@ -87,7 +103,7 @@ class FieldDye:
             weight += strength
             clear *= 1.0 - strength
         mixed = colour / np.maximum(weight, 1e-12)
-        return _pixels(style.rgb(style.WATER) * clear + mixed * (1.0 - clear))
+        return pixels(np.concatenate([mixed, 1.0 - clear], axis=-1))
 
 
 class FieldVorticity:
@@ -96,25 +112,113 @@ class FieldVorticity:
     limit  1/s, where the colours are strongest
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, background: str) -> None:
+        """`background`: what is seen where nothing turns, "#rrggbb"."""
         if run.grid is None:
             raise ValueError("a run without fluid has no vorticity")
         self.grid = run.grid
         sizes = [np.abs(vorticity(state, run.grid)).ravel() for state in run.sampled(SAMPLES)]
-        self.limit = max(float(np.percentile(np.concatenate(sizes), ROBUST)), 1e-12)
-        self.table = _diverging(255)
+        self.limit = robust(sizes)
+        self.table = _fading(255)
         self.legend: Sequence[tuple[str, str]] = ()
-        self.scale: tuple[Array, float, float, str] | None = (
-            self.table / 255.0,
+        self.scale: Scale | None = (
+            over(self.table, background) / 255.0,
             -self.limit,
             self.limit,
             "vorticity (1/s)",
         )
 
     def image(self, state: State) -> Pixels:
-        share = vorticity(state, self.grid).T / self.limit
-        levels = np.rint(127.0 + 127.0 * np.clip(share, -1.0, 1.0)).astype(np.intp)
-        return self.table[levels]
+        return self.table[levels(vorticity(state, self.grid).T / self.limit, len(self.table))]
+
+
+class FieldNumber:
+    """Speed or pressure, on one scale for all frames.
+
+    limit  in the quantity's unit, where the colours end
+    """
+
+    def __init__(self, run: Run, shown: Shown) -> None:
+        self._shown, self.values = shown, shown.values
+        seen = [np.abs(shown.values(state))[_fluid(state)] for state in run.sampled(SAMPLES)]
+        self.limit = robust(seen, HIGHEST)
+        self.table = shown.table(255)
+        low = -self.limit if shown.signed else 0.0
+        self.legend: Sequence[tuple[str, str]] = ()
+        self.scale: Scale | None = (self.table / 255.0, low, self.limit, shown.name)
+
+    def image(self, state: State) -> Pixels:
+        values = filled(self.values(state)[:, :, 0], state["open"][:, :, 0])
+        return opaque(self.colours(values.T))
+
+    def colours(self, values: Array) -> Pixels:
+        """(..., 3) colours of values in the quantity's unit."""
+        share = values / self.limit
+        return self.table[levels(share if self._shown.signed else 2.0 * share - 1.0, 255)]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A number of each cell that can be shown.
+
+    name    with its unit, for the scale
+    values  state -> (nx, ny, nz)
+    signed  whether it goes both ways about 0; else it is never less
+    table   count -> (count, 3) colours from lowest to highest
+    """
+
+    name: str
+    values: Callable[[State], Array]
+    signed: bool
+    table: Callable[[int], Pixels]
+
+
+def speed(state: State) -> Array:
+    """(nx, ny, nz) size of the velocity in the cells, m/s."""
+    parts = [
+        0.5 * (np.delete(faces, 0, axis) + np.delete(faces, -1, axis))
+        for axis, faces in enumerate(state.get(f"velocity_{name}") for name in "xyz")
+        if faces is not None
+    ]
+    return np.asarray(np.sqrt(sum(part.astype(float) ** 2 for part in parts)))
+
+
+def pressure(state: State) -> Array:
+    """(nx, ny, nz) pressure in the cells about its mean in the fluid, Pa."""
+    values = state["pressure"].astype(float)
+    known = values[_fluid(state)]
+    return np.asarray(values - (known[np.isfinite(known)].mean() if known.size else 0.0))
+
+
+def _fluid(state: State) -> NDArray[np.bool_]:
+    """(nx, ny, nz) cells that are mostly open."""
+    return np.asarray(state["open"] > 0.5)
+
+
+def robust(values: Sequence[Array], percentile: float = ROBUST) -> float:
+    """Size at which colours are strongest: that of all but the largest of the values' sizes."""
+    sizes = np.abs(np.concatenate([one.ravel() for one in values]))
+    sizes = sizes[np.isfinite(sizes)]
+    return max(float(np.percentile(sizes, percentile)), 1e-12) if sizes.size else 1.0
+
+
+def levels(share: Array, count: int) -> NDArray[np.intp]:
+    """Rows of a table of `count` colours for shares of the limit from -1 to 1."""
+    half = 0.5 * (count - 1)
+    return np.rint(half + half * np.clip(np.nan_to_num(share), -1.0, 1.0)).astype(np.intp)
+
+
+def opaque(colours: Pixels) -> Pixels:
+    """(..., 4) colours (..., 3) that hide what is behind."""
+    return np.concatenate([colours, np.full((*colours.shape[:-1], 1), 255, np.uint8)], axis=-1)
+
+
+def over(image: Pixels, background: str) -> Pixels:
+    """(..., 3) an image (..., 4) before a background, "#rrggbb"."""
+    share = image[..., 3:] / 255.0
+    return np.rint(image[..., :3] * share + 255.0 * style.rgb(background) * (1.0 - share)).astype(
+        np.uint8
+    )
 
 
 def full_strength(frames: Sequence[NDArray[np.floating]]) -> float:
@@ -160,17 +264,43 @@ def _around(values: Array) -> Array:
     return np.asarray(padded[2:, 1:-1] + padded[:-2, 1:-1] + padded[1:-1, 2:] + padded[1:-1, :-2])
 
 
-def _diverging(count: int) -> Pixels:
-    """(count, 3) colours from strong clockwise through plain water to strong counter-clockwise."""
-    strong, middle, weak = ([style.rgb(c) for c in pair] for pair in zip(
-        style.SPIN_RIGHT, style.SPIN_LEFT, strict=True))  # fmt: skip
-    knots = [strong[0], middle[0], weak[0], style.rgb(style.WATER), weak[1], middle[1], strong[1]]
-    places = [-1.0, -0.55, -0.2, 0.0, 0.2, 0.55, 1.0]
+def _fading(count: int) -> Pixels:
+    """(count, 4) colours from strong clockwise through nothing to strong counter-clockwise."""
+    (right, left), clear = (_knots(style.SPIN_RIGHT), _knots(style.SPIN_LEFT)), np.zeros(1)
+    colours = np.stack([*right, right[-1], left[-1], *left[::-1]])
+    places = [-1.0, -0.55, -0.2, -1e-9, 1e-9, 0.2, 0.55, 1.0]
+    faint = np.concatenate([np.ones(3), clear, clear, np.ones(3)])
+    return pixels(_ramp(places, np.column_stack([colours, faint]), count))
+
+
+def _rising(count: int) -> Pixels:
+    """(count, 3) colours from rest to the highest speed."""
+    return pixels(_ramp(np.linspace(-1.0, 1.0, len(style.SPEED)), _knots(style.SPEED), count))
+
+
+def _balanced(count: int) -> Pixels:
+    """(count, 3) colours from the lowest pressure to the highest."""
+    knots = _knots((*style.SUCTION, style.LEVEL, *style.PUSH[::-1]))
+    return pixels(_ramp(np.linspace(-1.0, 1.0, len(knots)), knots, count))
+
+
+def _knots(colours: Sequence[str]) -> Array:
+    return np.stack([style.rgb(colour) for colour in colours])
+
+
+def _ramp(places: Sequence[float] | Array, knots: Array, count: int) -> Array:
+    """(count, k) `knots` (n, k) at places from -1 to 1, joined by straight lines."""
     share = np.linspace(-1.0, 1.0, count)
-    return _pixels(
-        np.stack([np.interp(share, places, [knot[c] for knot in knots]) for c in range(3)], axis=1)
-    )
+    return np.stack([np.interp(share, places, knot) for knot in knots.T], axis=1)
 
 
-def _pixels(colours: NDArray[np.floating]) -> Pixels:
+def pixels(colours: NDArray[np.floating]) -> Pixels:
+    """Colours from 0 to 1 as bytes."""
     return np.rint(255.0 * colours).astype(np.uint8)
+
+
+NUMBERS = {
+    "speed": Shown("speed (m/s)", speed, False, _rising),
+    "pressure": Shown("pressure about its mean (Pa)", pressure, True, _balanced),
+}
+"""Fields that are one number of each cell."""

@@ -1,18 +1,25 @@
-"""preview.png and preview.mp4 of a run folder."""
+"""Picture, film and image sequence of a run folder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import imageio.v3 as imageio
 import imageio_ffmpeg  # type: ignore[import-untyped]
+import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.io.atomic import partial_name, write_atomically
 from flowborne.io.run_folder import RunFolder
+from flowborne.view.drawing import drawn_frames
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
+from flowborne.view.shot import Shot
+
+Progress = Callable[[int, int], None]
+Pixels = NDArray[np.uint8]
 
 PICTURE_SCALE = 1.5
 """Size of preview.png relative to that of the film."""
@@ -20,57 +27,120 @@ PICTURE_SCALE = 1.5
 CODING = ("-preset", "veryfast", "-crf", "19", "-movflags", "+faststart", "-f", "mp4")
 """How the film is coded: small, sharp, and playing before it is loaded whole."""
 
+ENDINGS = (".mp4", ".png")
 
-def make_preview(
-    folder: Path, progress: Callable[[int, int], None] | None = None, *, bones: bool = False
-) -> None:
+
+def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | None = None) -> None:
     """Draw preview.png (the last frame) and preview.mp4 (all frames) of a run.
 
     folder    of the run; nothing else is read
     progress  called with (frames drawn, frames in all)
-    bones     see through flesh, to the bones in it
+    shot      what they show, that of the run's scene when None
     raises    ValueError when there is no frame, when there is only one (the picture is then drawn
-              and the film is not), or when it has three dimensions and nothing can draw them here;
-              OSError when the disc refuses
+              and the film is not), when the shot does not suit the run, or when it has three
+              dimensions and nothing can draw them here; OSError when the disc refuses
     """
     files = RunFolder(folder)
     run = Run.read(folder)
-    with closing(Picture(run, PICTURE_SCALE, bones=bones)) as picture:
-        last = picture.draw(len(run) - 1)[:, :, :3]
-    write_atomically(files.picture, lambda file: imageio.imwrite(file, last, extension=".png"))
-    if len(run) < 2:
+    shot = run.shot if shot is None else shot
+    numbers = shot.frames(run.times, run.frames_per_second)
+    # a picture of a size that was asked for has that size
+    with closing(Picture(run, PICTURE_SCALE if shot.size is None else 1.0, shot)) as picture:
+        _write_image(files.picture, picture.draw(numbers[-1]), shot)
+    if len(numbers) < 2:
         raise ValueError(
             f"{folder} has one frame, which makes a picture and no film; "
             "let the run go on with --resume"
         )
-    write_film(run, files.film, progress, bones=bones)
+    write_film(run, files.film, progress, shot)
+
+
+def write_shot(
+    folder: Path, path: Path, progress: Progress | None = None, shot: Shot | None = None
+) -> str:
+    """Draw a run into a file of one's own; what was written, for people.
+
+    path    film.mp4, or frames.png for an image sequence frames_0000.png, frames_0001.png, ...
+    raises  as `make_preview`; ValueError when the name ends in something else, too
+    """
+    if path.suffix.lower() not in ENDINGS:
+        raise ValueError(
+            f"{path} is neither a film nor an image sequence; end it with {' or '.join(ENDINGS)}"
+        )
+    run = Run.read(folder)
+    if path.suffix.lower() == ".mp4":
+        write_film(run, path, progress, shot)
+        return str(path)
+    return write_sequence(run, path, progress, shot)
 
 
 def write_film(
-    run: Run,
-    path: Path,
-    progress: Callable[[int, int], None] | None = None,
-    *,
-    bones: bool = False,
+    run: Run, path: Path, progress: Progress | None = None, shot: Shot | None = None
 ) -> None:
-    """Draw all frames of `run` into an MP4 file (H.264, plays everywhere).
+    """Draw frames of `run` into an MP4 file (H.264, plays everywhere).
 
-    bones   see through flesh, to the bones in it
-    raises  OSError when the file cannot be written; what was there is then still there
+    shot    what they show, that of the run's scene when None
+    raises  ValueError when the shot does not suit the run, or is transparent; OSError when the file
+            cannot be written; what was there is then still there
     """
-    with closing(Picture(run, bones=bones)) as picture:
-        _write(picture, path, progress)
+    shot = run.shot if shot is None else shot
+    if shot.transparent:
+        raise ValueError(
+            "a film in MP4 cannot be transparent; write an image sequence with --out frames.png, "
+            "or name a colour with --set background"
+        )
+    numbers = shot.frames(run.times, run.frames_per_second)
+    rate = shot.frames_per_second or run.frames_per_second
+    with closing(drawn_frames(run, shot, numbers)) as frames:
+        first = next(frames)
+        with _film(path, (first.shape[1], first.shape[0]), rate) as send:
+            for done, frame in enumerate(_and_then(first, frames), start=1):
+                send(frame)
+                if progress is not None:
+                    progress(done, len(numbers))
 
 
-def _write(picture: Picture, path: Path, progress: Callable[[int, int], None] | None) -> None:
-    """Code one picture after the other into a file beside `path`, which then takes its place."""
-    run = picture.run
+def write_sequence(
+    run: Run, path: Path, progress: Progress | None = None, shot: Shot | None = None
+) -> str:
+    """Draw frames of `run` into numbered files beside `path`; from which to which, for people.
+
+    raises  ValueError when the shot does not suit the run; OSError when the disc refuses
+    """
+    shot = run.shot if shot is None else shot
+    numbers = shot.frames(run.times, run.frames_per_second)
+    names = [path.with_name(f"{path.stem}_{n:04d}{path.suffix}") for n in range(len(numbers))]
+    with closing(drawn_frames(run, shot, numbers)) as frames:
+        for done, (name, frame) in enumerate(zip(names, frames, strict=True), start=1):
+            _write_image(name, frame, shot)
+            if progress is not None:
+                progress(done, len(numbers))
+    return str(names[0]) if len(names) == 1 else f"{names[0]} to {names[-1].name}"
+
+
+def _write_image(path: Path, frame: Pixels, shot: Shot) -> None:
+    kept = frame if shot.transparent else frame[:, :, :3]
+    write_atomically(path, lambda file: imageio.imwrite(file, kept, extension=".png"))
+
+
+def _and_then(first: Pixels, rest: Iterator[Pixels]) -> Iterator[Pixels]:
+    yield first
+    yield from rest
+
+
+@contextmanager
+def _film(path: Path, size: tuple[int, int], rate: float) -> Iterator[Callable[[Pixels], object]]:
+    """What takes one frame after the other into a file beside `path`, which then takes its place.
+
+    size  width and height of the frames
+    rate  of the film, 1/s
+    """
     partial = path.with_name(partial_name(path.name))
     writer = imageio_ffmpeg.write_frames(
         str(partial),
-        (picture.layout.width, picture.layout.height),
+        size,
         pix_fmt_in="rgba",
-        fps=run.frames_per_second,
+        fps=rate,
         codec="libx264",
         pix_fmt_out="yuv420p",
         macro_block_size=2,
@@ -79,10 +149,7 @@ def _write(picture: Picture, path: Path, progress: Callable[[int, int], None] | 
     )
     try:
         writer.send(None)
-        for number in range(len(run)):
-            writer.send(picture.draw(number))
-            if progress is not None:
-                progress(number + 1, len(run))
+        yield writer.send
         writer.close()
         partial.replace(path)
     finally:

@@ -39,6 +39,13 @@ class Outlines:
         ]
 
 
+def flesh_loops(run: Run, state: State) -> list[Array]:
+    """Outlines (k, 2) of the flesh of a state, m; none when its numbers are lost."""
+    if run.flesh is None or not np.isfinite(state["flesh_vertices"]).all():
+        return []
+    return skin_loops(state["flesh_vertices"].astype(float), run.flesh.triangles)
+
+
 def _loop(cut: Section) -> Array:
     """(k, 3) corners of a cross-section one after the other; of several loops the longest."""
     segments = cut.outline(ARC)

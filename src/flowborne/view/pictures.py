@@ -14,14 +14,16 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from flowborne.view import style
 from flowborne.view.arrows import arrow, round_number
 from flowborne.view.forces import SHAFT, Forces
-from flowborne.view.layout import MARGIN, Layout
+from flowborne.view.layout import MARGIN, Box, Layout
 from flowborne.view.map_slab import MapSlab
 from flowborne.view.run import Run, State
+from flowborne.view.shot import Shot
 from flowborne.view.space.map_space import MapSpace
 from flowborne.view.strips import Strip, joint_curves, strip_curves
 
@@ -72,23 +74,34 @@ class Picture:
     map     what the picture shows of the run itself
     """
 
-    def __init__(self, run: Run, scale: float = 1.0, *, bones: bool = False) -> None:
-        """`bones`: see through flesh, to the bones in it."""
+    def __init__(self, run: Run, scale: float = 1.0, shot: Shot | None = None) -> None:
+        """`shot`: what is shown, that of the run's own scene when None."""
         self.run = run
-        self.map: Map = MapSlab(run, bones) if run.slab else MapSpace(run, bones)
-        curves = strip_curves(run)
-        self.layout = Layout.of(self.map.aspect, len(curves))
+        self.shot = shot = run.shot if shot is None else shot
+        curves = strip_curves(run) if shot.plots else []
+        kind = MapSlab if run.slab else MapSpace
+        if shot.size is not None:
+            self.layout = Layout.sized(shot.size, len(curves), bare=not shot.plots)
+            box = self.layout.map
+            self.map: Map = kind(run, shot, box.height / box.width)
+        else:
+            self.map = kind(run, shot)
+            aspect = self.map.aspect
+            self.layout = Layout.of(aspect, len(curves)) if shot.plots else Layout.bare(aspect)
         self._metres = self.map.width / self.layout.map.width
 
         figure = self.layout.figure(scale)
-        figure.patch.set_facecolor(style.PAPER)
+        figure.patch.set_facecolor("none" if shot.transparent else style.PAPER)
         self._canvas = FigureCanvasAgg(figure)
         axes = self.layout.axes(figure, self.layout.map)
-        axes.set(xticks=[], yticks=[], facecolor=style.WATER)
+        axes.set(xticks=[], yticks=[], facecolor="none" if shot.transparent else shot.colour)
         axes.spines[:].set_visible(False)
         self._moving = list(self.map.draw_on(axes, self.layout.map.width))
-        self._draw_legend(self.layout.axes(figure, self.layout.legend))
-        self._draw_header()
+        self._clock: Text | None = None
+        if self.layout.legend is not None:
+            self._draw_legend(self.layout.axes(figure, self.layout.legend), self.layout.legend)
+            self._clock = self._draw_header()
+            self._moving.append(self._clock)
         self._strips: list[Strip] = []
         for box, (title, named) in zip(self.layout.strips, curves, strict=True):
             strip = Strip(self.layout.axes(figure, box), title, run.history["time_s"], named)
@@ -106,7 +119,8 @@ class Picture:
         row = self.run.row(number)
         time = float(state["time"])
         self.map.show(number, state)
-        self._clock.set_text(self._words(time, row))
+        if self._clock is not None:
+            self._clock.set_text(self._words(time, row))
         for strip in self._strips:
             strip.show(time, row)
         self._canvas.restore_region(self._still)
@@ -118,7 +132,8 @@ class Picture:
         """Let go of what the map holds."""
         self.map.close()
 
-    def _draw_header(self) -> None:
+    def _draw_header(self) -> Text:
+        """Write the name of the run; what tells the time, to be drawn anew in every frame."""
         figure, height = self._canvas.figure, self.layout.height
         left, right = MARGIN / self.layout.width, 1.0 - MARGIN / self.layout.width
         middle = 1.0 - 0.5 * self.layout.map.top / height
@@ -131,7 +146,7 @@ class Picture:
             weight="bold",
             va="center_baseline",
         )
-        self._clock = figure.text(
+        return figure.text(
             right,
             middle,
             "",
@@ -141,11 +156,10 @@ class Picture:
             va="center_baseline",
             animated=True,
         )
-        self._moving.append(self._clock)
 
-    def _draw_legend(self, axes: Axes) -> None:
+    def _draw_legend(self, axes: Axes, box: Box) -> None:
         """Scales of length, force and colour in a row below the map."""
-        width, height = self.layout.legend.width, self.layout.legend.height
+        width, height = box.width, box.height
         axes.set(xlim=(0, width), ylim=(0, height))
         axes.axis("off")
         middle = 0.5 * height

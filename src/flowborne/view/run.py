@@ -6,7 +6,7 @@ import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from flowborne.io.history import history_columns, history_rows
 from flowborne.io.run_folder import STATE_NAME, RunFolder
 from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.shape import Shape
+from flowborne.view.shot import Shot
 
 Array = NDArray[np.float64]
 State = dict[str, NDArray[Any]]
@@ -67,7 +68,7 @@ class Run:
     geoms              what is drawn of the bodies, in the order of geom_position
     frames_per_second  of the film
     wind               (n, 3) streams to draw where there is no fluid
-    picture            what the scene wants to see of the fluid
+    shot               what its scene wants to see, and from where
     history            column -> values, a number per frame of the run from the first on
     states             files of states/, in order
     flesh              what is drawn of flesh; None without
@@ -83,7 +84,7 @@ class Run:
     geoms: tuple[Geom, ...]
     frames_per_second: float
     wind: Array
-    picture: Literal["dye", "vorticity", "none"]
+    shot: Shot
     history: dict[str, Array]
     states: tuple[Path, ...]
     flesh: Flesh | None = None
@@ -112,7 +113,7 @@ class Run:
             geoms=tuple(_geom(entry) for entry in model["geoms"]),
             frames_per_second=float(model["frames_per_second"]),
             wind=np.asarray(model["wind"], float).reshape(-1, 3),
-            picture=scene.get("output", {}).get("picture", "vorticity"),
+            shot=Shot.of(scene.get("film", {})),
             history=_history(folder.history),
             states=states,
             flesh=_flesh(model.get("flesh")),
@@ -138,6 +139,11 @@ class Run:
             with np.load(path) as file:
                 values.append(file[name])
         return np.asarray(values, float)
+
+    @property
+    def times(self) -> Array:
+        """(n,) s, of all states."""
+        return self.every("time")
 
     def row(self, number: int) -> int | None:
         """Row of the history that goes with the `number`-th state; None for the initial one."""

@@ -33,6 +33,16 @@ SPIN_LEFT = ("#ffe3d8", "#ff5648", "#7e2231")
 SPIN_RIGHT = ("#d9f0ff", "#2f9dff", "#15457f")
 """The same for clockwise."""
 
+SPEED = ("#0b1420", "#233a7a", "#6d3fa5", "#c94f7c", "#f7a14a", "#fff3b0")
+"""Colours of speed from rest to the highest."""
+
+SUCTION, LEVEL, PUSH = (
+    ("#8ff0e4", "#1c8f96", "#123f54"),
+    "#101c2a",
+    ("#ffd9a0", "#cf7a2c", "#573423"),
+)
+"""Colours of pressure: the lowest first, the mean, the highest first."""
+
 
 def rgb(colour: str) -> NDArray[np.float64]:
     """(3,) red, green and blue from 0 to 1 of "#rrggbb"."""

@@ -12,6 +12,7 @@ import flowborne
 from flowborne.fluid.grid import Grid
 from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom, Run
+from flowborne.view.shot import Shot
 
 MODEL = """
 <mujoco>
@@ -130,7 +131,7 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
             ),
             "frames_per_second": 24.0,
             "wind": np.zeros((0, 3)),
-            "picture": "none",
+            "shot": Shot(field="none"),
             "history": {"frame": np.arange(1.0, frames), "time_s": np.arange(1.0, frames) / 24.0},
             "states": tuple(paths),
         }

@@ -29,14 +29,14 @@ from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.view import style
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Flesh, Geom, Run
-from flowborne.view.space.camera import FILLED, UP, camera_of
+from flowborne.view.space.camera import FILLED, camera_of
 from flowborne.view.space.flesh import FleshSurface, creased, normals, way_out
 from flowborne.view.space.ground import stands
+from flowborne.view.space.lighting import KEY
 from flowborne.view.space.map_space import MapSpace
 from flowborne.view.space.opengl import off_screen
 from flowborne.view.space.shapes import mesh_of
 from flowborne.view.space.skin import Skin
-from flowborne.view.space.stage import KEY
 
 Make = Callable[..., Run]
 Pixels = np.ndarray
@@ -62,7 +62,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = SolidModel.with_flesh(spec, [grown], gravity=(0.0, 0.0, 0.0))
     world = World.at_rest(Setup(model, Fluid(Grid((16, 12, 16), 0.05, (-0.4, -0.3, -0.4)), 1000.0)))
     folder = RunFolder.create(tmp_path_factory.mktemp("runs") / "arm")
-    folder.scene.write_text('name = "arm"\n[output]\npicture = "vorticity"\n')
+    folder.scene.write_text('name = "arm"\n[film]\nfield = "none"\n')
     write_model(folder, world.setup, controlled=["elbow"], frames_per_second=24.0, wind=[])
     History.create(folder.history, ["frame", "time_s"]).close()
     recorder = Recorder(folder)
@@ -107,6 +107,12 @@ def drawn(picture: Picture, number: int) -> Pixels:
     return pixels[:, :, :3].astype(int)
 
 
+def up_of(picture: Picture) -> np.ndarray:
+    """(3,) upwards on the map."""
+    assert isinstance(picture.map, MapSpace)
+    return picture.map.camera.axes(0)[1]
+
+
 def pixel_of(picture: Picture, number: int, place: np.ndarray) -> tuple[int, int]:
     """(row, column) in the map of a place in m."""
     assert isinstance(picture.map, MapSpace)
@@ -138,7 +144,7 @@ def test_the_skin_stands_where_its_vertices_are(ball_of_flesh: Make) -> None:
             row, column = np.argwhere(seen).mean(axis=0)
             expected = pixel_of(picture, number, middle)
             assert (row, column) == pytest.approx(expected, abs=5.0)
-            radius = expected[0] - pixel_of(picture, number, middle + 0.3 * UP)[0]
+            radius = expected[0] - pixel_of(picture, number, middle + 0.3 * up_of(picture))[0]
             assert seen.sum() == pytest.approx(np.pi * radius**2, rel=0.05)
 
 
@@ -149,7 +155,7 @@ def test_the_skin_is_shaded_smoothly(ball_of_flesh: Make) -> None:
     with closing(Picture(run)) as picture:
         pixels = drawn(picture, 0)
         row, column = pixel_of(picture, 0, np.zeros(3))
-        radius = row - pixel_of(picture, 0, 0.3 * UP)[0]
+        radius = row - pixel_of(picture, 0, 0.3 * up_of(picture))[0]
     down = pixels[row - int(0.9 * radius) : row + int(0.9 * radius), column].astype(float)
     assert hue(down[len(down) // 4]) == pytest.approx(hue_of(style.FLESH), abs=0.02)
     light = down.sum(axis=1)
@@ -196,7 +202,10 @@ def test_bones_are_hidden_until_they_are_asked_for(arm: Path) -> None:
     lower = run.state(2)["geom_position"][1].astype(float)
     loose = run.state(2)["flesh_vertices"].astype(float)
     assert [geom.covered for geom in run.geoms] == [True, True]
-    with closing(Picture(run)) as picture, closing(Picture(run, bones=True)) as inside:
+    with (
+        closing(Picture(run)) as picture,
+        closing(Picture(run, shot=replace(run.shot, bones=True))) as inside,
+    ):
         at = pixel_of(picture, 2, lower)
         skin, bone = drawn(picture, 2)[at], drawn(inside, 2)[at]
         assert hue(skin) == pytest.approx(hue_of(style.FLESH), abs=0.02)
@@ -222,7 +231,7 @@ def test_the_camera_sees_all_of_the_skin(ball_of_flesh: Make) -> None:
     places, triangles = ball(0.2)
     growing = np.array([places * [1.0, 1.0, 1.0 + 0.5 * n] for n in range(6)])
     run = ball_of_flesh(growing, triangles)
-    camera = camera_of(run)
+    camera = camera_of(run, run.shot)
     seen = np.stack([camera.project(n, points) for n, points in enumerate(growing)])
     low, high = 0.5 - 0.5 * FILLED, 0.5 + 0.5 * FILLED
     assert low - 0.01 < seen.min() < low + 0.02

@@ -18,7 +18,7 @@ from flowborne.view import style
 from flowborne.view.film import make_preview
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
-from flowborne.view.space.camera import UP
+from flowborne.view.shot import CameraShot, Shot
 from flowborne.view.space.ground import stands
 from flowborne.view.space.map_space import MapSpace
 
@@ -78,7 +78,10 @@ def test_the_accented_body_stands_where_its_projection_says(run_of: Make) -> Non
             centre = moving()[number, 1]
             expected = pixel_of(picture, number, centre)
             assert (row, column) == pytest.approx(expected, abs=5.0)
-            radius = expected[0] - pixel_of(picture, number, centre + 0.15 * UP)[0]
+            radius = (
+                expected[0]
+                - pixel_of(picture, number, centre + 0.15 * picture.map.camera.axes(0)[1])[0]
+            )
             assert amber.sum() == pytest.approx(np.pi * radius**2, rel=0.08)
 
 
@@ -145,7 +148,12 @@ def test_what_stands_on_the_ground_casts_a_shadow_on_it(run_of: Make) -> None:
 
 def test_dye_glows_where_it_is(run_of: Make, box_of_fluid: Grid) -> None:
     ball = ("sphere", (0.4, 0.0, 0.0))
-    run = run_of([ball], np.zeros((2, 1, 3)), grid=box_of_fluid, picture="dye")
+    run = run_of(
+        [ball],
+        np.zeros((2, 1, 3)),
+        grid=box_of_fluid,
+        shot=Shot("dye", camera=CameraShot(distance=8.0)),
+    )
     dye = np.zeros(box_of_fluid.shape, np.float32)
     dye[8:11, 3:7, 4:7] = 1.0
     for path in run.states:

@@ -12,8 +12,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from flowborne.view import style
 from flowborne.view.arrows import round_number
+from flowborne.view.following import swept
 from flowborne.view.run import Run
-from flowborne.view.space.camera import swept
 
 Array = NDArray[np.float64]
 
@@ -50,9 +50,14 @@ class Ground:
 
     height  m, of what is seen
     light   (3,) direction in which light travels, down
+    colour  "#rrggbb" of what the floor fades into; None where that is nothing, and of the ground
+            the shadow alone is seen
     """
 
-    def __init__(self, plotter: pv.Plotter, height: float, light: Array) -> None:
+    def __init__(
+        self, plotter: pv.Plotter, height: float, light: Array, colour: str | None
+    ) -> None:
+        self._colour = colour
         self._slope = light[:2] / light[2]
         self._extent = 1.5 * height
         self._lift = 2e-3 * height
@@ -64,6 +69,7 @@ class Ground:
         self._squares = _squares(self._side, int(np.ceil(self._seen / self._side)))
         self._shade(self._squares, style.SQUARES, np.zeros(2))
         self._lines = _add(plotter, self._squares, line_width=1.5)
+        self._floor.visibility = self._lines.visibility = colour is not None
         self._shadow = plotter.add_mesh(
             pv.Plane(i_size=self._extent, j_size=self._extent, i_resolution=1, j_resolution=1),
             lighting=False,
@@ -105,7 +111,7 @@ class Ground:
         """Give a mesh a colour that fades into the background away from a centre."""
         away = np.linalg.norm(mesh.points[:, :2] - centre, axis=1, keepdims=True)
         share = np.clip(1.0 - away / self._seen, 0.0, 1.0) ** 1.5
-        mix = style.rgb(style.WATER) * (1.0 - share) + style.rgb(colour) * share
+        mix = style.rgb(self._colour or style.WATER) * (1.0 - share) + style.rgb(colour) * share
         mesh.point_data["colour"] = np.rint(255.0 * mix).astype(np.uint8)
 
 

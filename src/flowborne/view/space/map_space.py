@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from flowborne.view.fields import Scale
 from flowborne.view.forces import Forces
 from flowborne.view.map_image import MapImage
 from flowborne.view.run import Run, State
+from flowborne.view.shot import Shot
 from flowborne.view.space.camera import camera_of
-from flowborne.view.space.clouds import cloud_of
 from flowborne.view.space.opengl import off_screen
+from flowborne.view.space.seen import seen_of
 
 if TYPE_CHECKING:
     from flowborne.view.space.stage import Stage
-
-Array = NDArray[np.float64]
 
 
 class MapSpace:
@@ -29,16 +27,16 @@ class MapSpace:
     camera  from which it is seen
     """
 
-    def __init__(self, run: Run, bones: bool = False) -> None:
-        """`bones`: see through flesh, to the bones in it."""
+    def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
+        """`aspect`: height over width that the map must have, if any."""
         self.run = run
-        self._bones = bones
-        self.camera = camera_of(run)
+        self._shot = shot
+        self.camera = camera_of(run, shot, aspect)
         self.width, self.aspect = self.camera.width, self.camera.aspect
         self.forces = Forces(run, min(self.camera.width, self.camera.height))
-        self._cloud = cloud_of(run)
-        self.legend: Sequence[tuple[str, str]] = () if self._cloud is None else self._cloud.legend
-        self.scale: tuple[Array, float, float, str] | None = None
+        self._seen = seen_of(run, shot)
+        self.legend: Sequence[tuple[str, str]] = () if self._seen is None else self._seen.legend
+        self.scale: Scale | None = None if self._seen is None else self._seen.scale
         self._stage: Stage | None = None
 
     def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
@@ -53,7 +51,7 @@ class MapSpace:
 
         pixel = self.width / pixels
         self._stage = Stage(
-            plotter, self.run, self.camera, self.forces, self._cloud, pixel, self._bones
+            plotter, self.run, self.camera, self.forces, self._seen, pixel, self._shot
         )
         return [self._image]
 

@@ -10,28 +10,22 @@ from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.forces import SHAFT, Forces
 from flowborne.view.run import Geom, Run, State
+from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows
-from flowborne.view.space.camera import OPENING, TOWARD, UP, Camera
-from flowborne.view.space.clouds import Cloud
+from flowborne.view.space.camera import Camera
 from flowborne.view.space.flesh import FleshSurface
 from flowborne.view.space.ground import Ground, stands
+from flowborne.view.space.lighting import KEY, LIGHTS
+from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
 from flowborne.view.space.shapes import LIT, mesh_of
 from flowborne.view.space.skin import Skin
+from flowborne.view.space.slices import Slice
 from flowborne.view.space.smoke import Smoke
+from flowborne.view.space.vortices import Vortices
 from flowborne.view.space.wind import WindArrows
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
-
-KEY = (0.1, 0.75, -1.25)
-"""Direction in which the strongest light travels, and shadows fall."""
-
-LIGHTS = (
-    (KEY, 0.8, "#fff6e8"),
-    ((-0.85, 0.45, -0.3), 0.42, "#cfe2ff"),
-    ((0.5, -0.85, -0.7), 0.4, "#8fc2ff"),
-)
-"""Direction, strength and colour of the lights: from above the camera, its right, and behind."""
 
 SMOOTH = 8
 """Samples of a pixel on the edges of what is drawn."""
@@ -43,8 +37,9 @@ UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
 class Stage:
     """Scene of a run in a plotter, which it takes over.
 
+    seen   what is seen of the fluid, if anything
     pixel  m, size of a pixel of the film
-    bones  whether flesh is seen through, to the bones in it
+    shot   background, and whether flesh is seen through, to the bones in it
     """
 
     def __init__(
@@ -53,11 +48,11 @@ class Stage:
         run: Run,
         camera: Camera,
         forces: Forces,
-        cloud: Cloud | None,
+        seen: SeenDye | SeenVortices | SeenSlice | None,
         pixel: float,
-        bones: bool,
+        shot: Shot,
     ) -> None:
-        self._plotter, self._camera, self._forces, self._cloud = plotter, camera, forces, cloud
+        self._plotter, self._camera, self._forces, self._shot = plotter, camera, forces, shot
         self._pixel = pixel
         _light(plotter)
         meshes = [mesh_of(geom) for geom in run.geoms]
@@ -66,26 +61,33 @@ class Stage:
             _add_body(plotter, mesh, geom, run.accented)
             for mesh, geom in zip(meshes, run.geoms, strict=True)
         ]
-        self._hidden = [geom.covered and not bones for geom in run.geoms]
+        self._hidden = [geom.covered and not shot.bones for geom in run.geoms]
         self._flesh = None
         if run.flesh is not None:
             first = run.state(0)["flesh_vertices"]
-            self._flesh = FleshSurface(plotter, run.flesh, first, seen_through=bones)
+            self._flesh = FleshSurface(plotter, run.flesh, first, seen_through=shot.bones)
         self._skin = Skin(run.geoms, meshes, run.flesh)
         self._arrows = Arrows(plotter, max(len(run.bodies), 1), style.FORCE, 0.35)
-        self._ground = self._wind = self._smoke = None
+        self._ground = self._wind = None
         if stands(run):
-            self._ground = Ground(plotter, camera.height, np.array(KEY))
+            behind = None if shot.transparent else shot.colour
+            self._ground = Ground(plotter, camera.height, np.array(KEY), behind)
+        self._edges: list[tuple[Array, pv.Actor]] = []
         if run.grid is not None:
-            plotter.add_mesh(_edges(run.grid), color=style.LINE, line_width=1.2, lighting=False)
+            self._edges = _edges(plotter, run.grid)
         elif run.wind.any():
             self._wind = WindArrows(plotter, run, camera, 0.0 if self._ground else -np.inf)
-        if cloud is not None and run.grid is not None:
-            self._smoke = Smoke(plotter, run.grid)
+        self._fluid: Smoke | Vortices | Slice | None = None
+        if run.grid is not None and isinstance(seen, SeenDye):
+            self._fluid = Smoke(plotter, run.grid, seen)
+        elif run.grid is not None and isinstance(seen, SeenVortices):
+            self._fluid = Vortices(plotter, run.grid, seen)
+        elif run.grid is not None and isinstance(seen, SeenSlice):
+            self._fluid = Slice(plotter, run.grid, seen, camera.axes(0)[2])
 
     def image(self, number: int, state: State) -> Pixels:
-        """(height, width, 3) picture of the `number`-th state, lowest row first."""
-        focus = self._camera.focus[number]
+        """(height, width, 3 or 4) picture of the `number`-th state, lowest row first."""
+        focus, toward = self._camera.focus[number], self._camera.axes(number)[2]
         centres, turns = state["geom_position"].astype(float), state["geom_rotation"].astype(float)
         for actor, hidden, *pose in zip(self._bodies, self._hidden, centres, turns, strict=True):
             _place(actor, *pose, hidden=hidden)
@@ -98,24 +100,41 @@ class Stage:
             self._ground.show(focus, self._placed(centres, turns), corners)
         if self._wind is not None:
             self._wind.show(number, float(state["time"]))
-        if self._smoke is not None and self._cloud is not None:
-            self._smoke.show(self._cloud.voxels(state))
+        if isinstance(self._fluid, Slice):
+            self._fluid.show(state, focus)
+        elif self._fluid is not None:
+            self._fluid.show(state, toward)
+        for facing, edge in self._edges:
+            edge.visibility = bool((facing @ toward < 0.0).any())
         self._arrows.show(*self._pushes(state), SHAFT * self._pixel)
-        return self._render(focus)
+        self._look(number)
+        return self._cut_out() if self._shot.transparent else self._render(self._shot.colour)
 
     def close(self) -> None:
         self._plotter.close()
 
-    def _render(self, focus: Array) -> Pixels:
-        view = self._plotter.camera
+    def _look(self, number: int) -> None:
+        """Put the camera where it is in a frame."""
+        view, focus = self._plotter.camera, self._camera.focus[number]
         view.focal_point = focus
-        view.position = focus + self._camera.distance * TOWARD
-        view.up = UP
-        view.view_angle = np.degrees(OPENING)
+        view.position = focus + self._camera.away[number]
+        view.up = self._camera.axes(number)[1]
+        view.view_angle = np.degrees(self._camera.lens)
         self._plotter.renderer.ResetCameraClippingRange()
+
+    def _render(self, background: str) -> Pixels:
+        """(height, width, 3) what is seen before a background, lowest row first."""
+        self._plotter.set_background(background)
         # a screenshot renders the first time alone
         self._plotter.render()
         return np.asarray(self._plotter.screenshot(return_img=True))[::-1]
+
+    def _cut_out(self) -> Pixels:
+        """(height, width, 4) what is seen, and how much of what is behind is not."""
+        black, white = (self._render(colour).astype(float) for colour in ("#000000", "#ffffff"))
+        opacity = 1.0 - np.clip((white - black).mean(axis=-1, keepdims=True) / 255.0, 0.0, 1.0)
+        colour = np.clip(black / np.maximum(opacity, 1.0 / 255.0), 0.0, 255.0)
+        return np.rint(np.concatenate([colour, 255.0 * opacity], axis=-1)).astype(np.uint8)
 
     def _pushes(self, state: State) -> tuple[Array, Array]:
         """Tails, on the bodies' surfaces, and vectors (n, 3) of the arrows of forces, m."""
@@ -137,7 +156,6 @@ class Stage:
 
 
 def _light(plotter: pv.Plotter) -> None:
-    plotter.set_background(style.WATER)
     plotter.enable_anti_aliasing("msaa", multi_samples=SMOOTH)
     for direction, strength, colour in LIGHTS:
         light = pv.Light(color=colour, intensity=strength, light_type="scene light")
@@ -168,11 +186,19 @@ def _place(actor: pv.Actor, centre: Array, turn: Array, *, hidden: bool) -> None
         actor.user_matrix = matrix
 
 
-def _edges(grid: Grid) -> pv.PolyData:
-    """The edges of the fluid's domain but those before it, which meet in the corner nearest by."""
-    limits = np.array([grid.origin, grid.upper])
-    near = np.where(TOWARD > 0.0, limits[1], limits[0])
-    box = pv.Box(limits.T.ravel()).extract_all_edges()
-    ends = box.points[box.lines.reshape(-1, 3)[:, 1:]]
-    hidden = np.isclose(ends, near.astype(np.float32)).all(axis=-1).any(axis=-1)
-    return pv.line_segments_from_points(ends[~hidden].reshape(-1, 3))
+def _edges(plotter: pv.Plotter, grid: Grid) -> list[tuple[Array, pv.Actor]]:
+    """The edges of the fluid's domain, and the outward normals (2, 3) of the faces that each joins:
+    one between two faces that look at the camera is before the fluid, and is not to be seen."""
+    low, high = np.array(grid.origin), np.array(grid.upper)
+    edges = []
+    for axis in range(3):
+        for sides in np.ndindex(2, 2):
+            others = np.delete(np.arange(3), axis)
+            ends = np.stack([low, high])
+            ends[:, others] = np.where(sides, high[others], low[others])
+            facing = np.zeros((2, 3))
+            facing[[0, 1], others] = np.where(sides, 1.0, -1.0)
+            line = pv.line_segments_from_points(ends)
+            actor = plotter.add_mesh(line, color=style.LINE, line_width=1.2, lighting=False)
+            edges.append((facing, actor))
+    return edges

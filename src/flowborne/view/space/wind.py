@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from flowborne.view import style
 from flowborne.view.run import Run
 from flowborne.view.space.arrows import Arrows
-from flowborne.view.space.camera import RIGHT, TOWARD, UP, Camera
+from flowborne.view.space.camera import Camera
 
 Array = NDArray[np.float64]
 
@@ -42,15 +42,18 @@ class WindArrows:
         self._vector = LENGTH * pitch * wind / speed
         self._width = WIDTH * pitch
         self._lowest = lowest + 0.5 * pitch
-        self._set_lattice(pitch, rows=abs(wind @ RIGHT) >= abs(wind @ UP))
+        right, up, _ = camera.axes(0)
+        self._set_lattice(pitch, rows=abs(wind @ right) >= abs(wind @ up))
         self._arrows = Arrows(plotter, len(self._lattice), style.WIND, 0.3)
 
     def show(self, number: int, time: float) -> None:
         """Show the arrows of a frame, which stay in the moving air and not before the camera."""
         focus = self._camera.focus[number]
-        moved = (self._drift * time - focus) @ _MAP.T
+        axes = self._camera.axes(number)
+        on, toward = axes[:2], axes[2]
+        moved = (self._drift * time - focus) @ on.T
         on_map = self._lattice + moved % self._period
-        places = focus + on_map @ _MAP - BEHIND * self._camera.height * TOWARD
+        places = focus + on_map @ on - BEHIND * self._camera.height * toward
         tails = (places - 0.5 * self._vector)[places[:, 2] > self._lowest]
         self._arrows.show(tails, np.broadcast_to(self._vector, tails.shape), self._width)
 
@@ -67,7 +70,3 @@ class WindArrows:
         lattice = [a + 0.5 * (b % 2), b] if rows else [a, b + 0.5 * (a % 2)]
         self._lattice = pitch * np.stack(lattice, axis=1)
         self._period = pitch * np.array([1.0, 2.0] if rows else [2.0, 1.0])
-
-
-_MAP = np.stack([RIGHT, UP])
-"""(2, 3) axes of the map in the world."""

@@ -1,0 +1,87 @@
+"""Table of a scene that says what its film shows, and from where."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, Strict, model_validator
+
+from flowborne.scenes.fields import Number, Positive, Table, Text, Vector
+
+Pixels = Annotated[int, Strict(), Field(ge=64)]
+
+
+class CameraTable(Table):
+    """[film.camera]: where a run is seen from. A slab is seen from above, whatever the angles.
+
+    azimuth    degrees about z from x, of the camera as seen from what it looks at
+    elevation  degrees above the horizon
+    lens       degrees between the lower and the upper edge of the picture
+    distance   m from what it looks at; what is to be seen just fits when absent
+    position   m, a place of its own, in place of azimuth, elevation and distance
+    target     m, place looked at, in place of what is followed
+    follow     name of a body, "bodies" for all of them, or "nothing"
+    orbit      degrees per second about z, counter-clockwise from above
+    """
+
+    azimuth: Number = -58.0
+    elevation: Annotated[float, Strict(), Field(ge=-89, le=89)] = 13.0
+    lens: Annotated[float, Strict(), Field(ge=1, le=120)] = 26.0
+    distance: Positive | None = None
+    position: Vector | None = None
+    target: Vector | None = None
+    follow: Text = "bodies"
+    orbit: Number = 0.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.position is not None and self.position == self.target:
+            raise ValueError("has its position where its target is. Move one of them")
+        return self
+
+
+class FilmTable(Table):
+    """[film]: what picture and film of a run show.
+
+    field              what is seen of the fluid
+    bones              see through flesh, to the bones in it
+    plots              title, legend and curves around the map; without them it is the whole picture
+    size               (width, height) in pixels, both even; what fits when absent
+    frames_per_second  of the film, which keeps the run's time; the run's own when absent
+    start, stop        s of the run; all of it when absent
+    background         "#rrggbb", or "transparent" in image sequences; water when absent
+    camera             where it is seen from
+    """
+
+    field: Literal["dye", "vorticity", "speed", "pressure", "none"] = "vorticity"
+    bones: bool = False
+    plots: bool = True
+    size: tuple[Pixels, ...] | None = None
+    frames_per_second: Positive | None = None
+    start: Number | None = None
+    stop: Number | None = None
+    background: str | None = None
+    camera: CameraTable = CameraTable()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.size is not None and (len(self.size) != 2 or any(n % 2 for n in self.size)):
+            raise ValueError(
+                f"has the size {list(self.size)}. Give width and height, even numbers of pixels"
+            )
+        if self.start is not None and self.stop is not None and self.start >= self.stop:
+            raise ValueError(
+                f"starts at {self.start:g} s and stops at {self.stop:g} s. Let it stop after it "
+                "starts"
+            )
+        if self.background is not None and not _is_background(self.background):
+            raise ValueError(
+                f'has the background \'{self.background}\'. Give "#rrggbb" or "transparent"'
+            )
+        return self
+
+
+def _is_background(text: str) -> bool:
+    digits = text.removeprefix("#").lower()
+    hexadecimal = len(text) == 7 and len(digits) == 6 and set(digits) <= set("0123456789abcdef")
+    return text == "transparent" or hexadecimal

@@ -1,0 +1,114 @@
+"""What a film shows of a run, and from where: the table [film] of its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.view import style
+
+Place = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CameraShot:
+    """Where a run is seen from; keys, units and defaults of [film.camera]."""
+
+    azimuth: float = -58.0
+    elevation: float = 13.0
+    lens: float = 26.0
+    distance: float | None = None
+    position: Place | None = None
+    target: Place | None = None
+    follow: str = "bodies"
+    orbit: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shot:
+    """What a film shows; keys, units and defaults of [film]."""
+
+    field: Literal["dye", "vorticity", "speed", "pressure", "none"] = "vorticity"
+    bones: bool = False
+    plots: bool = True
+    size: tuple[int, int] | None = None
+    frames_per_second: float | None = None
+    start: float | None = None
+    stop: float | None = None
+    background: str | None = None
+    camera: CameraShot = CameraShot()
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> Shot:
+        """The shot that a checked table describes; what it lacks has its default."""
+        camera = table.get("camera", {})
+        given: dict[str, Any] = {
+            key: tuple(v) if isinstance(v, list) else v for key, v in camera.items()
+        }
+        size = table.get("size")
+        rest = {key: value for key, value in table.items() if key not in ("camera", "size")}
+        size = None if size is None else tuple(size)
+        return cls(**rest, size=size, camera=CameraShot(**given))
+
+    @property
+    def transparent(self) -> bool:
+        """Whether there is nothing where neither fluid nor bodies are seen."""
+        return self.background == "transparent"
+
+    @property
+    def colour(self) -> str:
+        """Of the background, "#rrggbb"; of one that is not there, that of water."""
+        return style.WATER if self.background is None or self.transparent else self.background
+
+    def frames(self, times: NDArray[np.float64], run_rate: float) -> list[int]:
+        """Numbers of the states that the frames of the film show, one after the other.
+
+        A film of another rate than the run's keeps its time: each frame shows the nearest state.
+
+        times     (n,) s, of the states
+        run_rate  frames per second of the run
+        raises    ValueError when none lies between start and stop
+        """
+        start = times[0] if self.start is None else self.start
+        stop = times[-1] if self.stop is None else self.stop
+        slack = 1e-6 / run_rate
+        inside = np.flatnonzero((times >= start - slack) & (times <= stop + slack))
+        if inside.size == 0:
+            raise ValueError(
+                f"no frame lies between {start:g} and {stop:g} s; the run goes from {times[0]:g} "
+                f"to {times[-1]:g} s"
+            )
+        if self.frames_per_second is None:
+            return [int(number) for number in inside]
+        first, last = times[inside[0]], times[inside[-1]]
+        count = int(np.floor((last - first + slack) * self.frames_per_second)) + 1
+        wanted = first + np.arange(count) / self.frames_per_second
+        # of two as near the earlier one
+        nearest = np.abs(times[inside] - (wanted[:, None] - slack)).argmin(axis=1)
+        return [int(number) for number in inside[nearest]]
+
+    def followed(self, bodies: Sequence[str]) -> int | None:
+        """Number of the one body that the camera follows; None when it follows all, or nothing.
+
+        raises  ValueError when there is no such body
+        """
+        name = self.camera.follow
+        if name in ("bodies", "nothing"):
+            return None
+        if name not in bodies:
+            raise ValueError(
+                f"the camera cannot follow body '{name}'; the bodies are {', '.join(bodies)}"
+            )
+        return list(bodies).index(name)
+
+    def pictured(self, dyes: Sequence[str]) -> None:
+        """Raise ValueError when it shows dye, and there are no dyes."""
+        if self.field == "dye" and not dyes:
+            raise ValueError(
+                "the run has no dye to show; draw another field with --set field=vorticity, speed "
+                "or pressure"
+            )

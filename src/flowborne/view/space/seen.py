@@ -1,0 +1,140 @@
+"""What is seen of a fluid in space, as numbers: dye, vortices, or a slice of speed or pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.fluid.grid import Grid
+from flowborne.view import style
+from flowborne.view.fields import NUMBERS, FieldNumber, Scale, dyes_of, full_strength
+from flowborne.view.run import Run, State
+from flowborne.view.shot import Shot
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+SAMPLES = 12
+"""Frames from which the scale of a film is taken."""
+
+VORTICES = 0.6
+"""Part of all that turns, positive Q over the fluid, that is within the surfaces of vortices."""
+
+
+def seen_of(run: Run, shot: Shot) -> SeenDye | SeenVortices | SeenSlice | None:
+    """What `shot` shows of the fluid of `run`; None when there is nothing to see.
+
+    raises  ValueError when it shows dye and there is none
+    """
+    if run.grid is None or shot.field == "none":
+        return None
+    dyes = dyes_of(run)
+    shot.pictured(dyes)
+    if shot.field == "dye":
+        return SeenDye(run, dyes)
+    if shot.field == "vorticity":
+        return SeenVortices(run)
+    return SeenSlice(FieldNumber(run, NUMBERS[shot.field]))
+
+
+class SeenDye:
+    """Carried dyes, each in a colour of its own, mixed where they meet.
+
+    legend  (name, colour) of each
+    """
+
+    scale: Scale | None = None
+
+    def __init__(self, run: Run, dyes: Sequence[str]) -> None:
+        sampled = run.sampled(SAMPLES)
+        self._full = {dye: full_strength([state[dye] for state in sampled]) for dye in dyes}
+        colours = [style.DYES[n % len(style.DYES)] for n in range(len(dyes))]
+        self._colours = dict(zip(dyes, map(style.rgb, colours), strict=True))
+        names = [dye.removeprefix("scalar_") for dye in dyes]
+        self.legend: Sequence[tuple[str, str]] = list(zip(names, colours, strict=True))
+
+    def smoke(self, state: State) -> tuple[Single, Single]:
+        """Colours (nx, ny, nz, 3) and densities (nx, ny, nz) of the cells, from 0 to 1."""
+        colour = np.zeros((*state["open"].shape, 3), np.float32)
+        weight = np.zeros(state["open"].shape, np.float32)
+        for dye, own in self._colours.items():
+            strength = np.clip(np.nan_to_num(state[dye]) / self._full[dye], 1e-6, 1.0)
+            colour += strength[..., None] * own.astype(np.float32)
+            weight += strength
+        density = (np.minimum(weight, 1.0) * state["open"]).astype(np.float32)
+        return (colour / weight[..., None]).astype(np.float32), density
+
+
+class SeenVortices:
+    """Where the fluid turns more than it is strained: the surfaces on which Q has one value.
+
+    Q is half of the square of the rotation rate less that of the strain rate (Hunt, Wray and Moin
+    1988). The surfaces are warm where the fluid turns counter-clockwise as the camera sees it.
+
+    level  1/s^2, of Q on the surfaces: VORTICES of it is within them in the middle one of frames
+    """
+
+    scale: Scale | None = None
+
+    def __init__(self, run: Run) -> None:
+        assert run.grid is not None
+        self._grid = run.grid
+        levels = [_holding(self.q(state), VORTICES) for state in run.sampled(SAMPLES)]
+        self.level = float(f"{max(float(np.median(levels)), 1e-12):.2g}")
+        self.legend: Sequence[tuple[str, str]] = (
+            (f"vortices, Q = {self.level:g} /s², counter-clockwise", style.SPIN_LEFT[1]),
+            ("clockwise", style.SPIN_RIGHT[1]),
+        )
+
+    def q(self, state: State) -> Array:
+        """(nx, ny, nz) Q in the cells, 1/s^2; 0 in bodies and where a number is lost."""
+        slopes = gradients(state, self._grid)
+        q = -0.5 * np.einsum("ij...,ji...->...", slopes, slopes)
+        return np.where(state["open"] > 0.5, np.nan_to_num(q), 0.0)
+
+    def sense(self, state: State, toward: Array) -> Array:
+        """(nx, ny, nz) from -1, clockwise as seen from `toward` (3,), to 1."""
+        spin = vorticity(state, self._grid)
+        return np.asarray(spin @ toward / np.maximum(np.linalg.norm(spin, axis=-1), 1e-12))
+
+
+class SeenSlice:
+    """Speed or pressure in a plane through what the camera looks at."""
+
+    legend: Sequence[tuple[str, str]] = ()
+
+    def __init__(self, number: FieldNumber) -> None:
+        self._number = number
+        self.scale = number.scale
+
+    def image(self, state: State, axis: int, place: float) -> NDArray[np.uint8]:
+        """(n, m, 3) colours of the layer of cells across `axis` at `place`, counted in cells."""
+        values = np.moveaxis(self._number.values(state), axis, 0)
+        layer = int(np.clip(place, 0, len(values) - 1))
+        return self._number.colours(values[layer])
+
+
+def _holding(values: Array, share: float) -> float:
+    """Level above which are values that make up a share of the sum of all positive ones; 0 where
+    there are none."""
+    above = np.sort(values[values > 0.0])[::-1]
+    if not above.size:
+        return 0.0
+    return float(above[np.searchsorted(np.cumsum(above), share * above.sum())])
+
+
+def gradients(state: State, grid: Grid) -> Array:
+    """(3, 3, nx, ny, nz) derivative of each component of the velocity along each axis, 1/s."""
+    cells = [
+        0.5 * (np.delete(faces, 0, axis) + np.delete(faces, -1, axis))
+        for axis, faces in enumerate(state[f"velocity_{name}"] for name in "xyz")
+    ]
+    return np.array([np.gradient(component, grid.spacing) for component in cells])
+
+
+def vorticity(state: State, grid: Grid) -> Array:
+    """(nx, ny, nz, 3) curl of the velocity in the cells, 1/s; 0 where a number is lost."""
+    (_, uy, uz), (vx, _, vz), (wx, wy, _) = gradients(state, grid)
+    return np.nan_to_num(np.stack([wy - vz, uz - wx, vx - uy], axis=-1))
