@@ -13,6 +13,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.kernels.jit import cores as cores_here
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
@@ -37,7 +38,7 @@ def drawn_frames(
     cores   processes at most; as many as this one may run on when None
     raises  ValueError when the shot does not suit the run, or nothing can draw it here
     """
-    cores = len(os.sched_getaffinity(0)) if cores is None else cores
+    cores = cores_here() if cores is None else cores
     with closing(Picture(run, 1.0, shot)) as picture:
         for done, number in enumerate(numbers, start=1):
             began = perf_counter()
