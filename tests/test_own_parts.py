@@ -43,6 +43,8 @@ rule = { kind = "share", part = 0.25 }
 
 [film]
 field = "none"
+
+[output]
 exports = [{ file = "block.track", body = "block", every = 2 }]
 """
 
