@@ -67,6 +67,21 @@ def dyes_of(run: Run) -> list[str]:
     return [name for name in run.state(0) if name.startswith("scalar_")]
 
 
+def dye_colours(
+    run: Run, dyes: Sequence[str], samples: int
+) -> tuple[dict[str, tuple[float, str]], Sequence[tuple[str, str]]]:
+    """Of each array that holds dye the value at which it has its full colour, and that colour; and
+    the legend, (name, colour) of each.
+
+    samples  frames that are looked at
+    """
+    sampled = run.sampled(samples)
+    colours = [style.DYES[n % len(style.DYES)] for n in range(len(dyes))]
+    full = [full_strength([state[dye] for state in sampled]) for dye in dyes]
+    legend = [(d.removeprefix("scalar_"), c) for d, c in zip(dyes, colours, strict=True)]
+    return dict(zip(dyes, zip(full, colours, strict=True), strict=True)), legend
+
+
 class FieldStill:
     """Plain water."""
 
@@ -82,12 +97,7 @@ class FieldDye:
     """Carried dyes, each in a colour of its own, mixed where they meet."""
 
     def __init__(self, run: Run, dyes: Sequence[str]) -> None:
-        self.dyes = tuple(dyes)
-        sampled = run.sampled(SAMPLES)
-        self.full = {dye: full_strength([state[dye] for state in sampled]) for dye in self.dyes}
-        self.colours = [style.DYES[n % len(style.DYES)] for n in range(len(self.dyes))]
-        names = [dye.removeprefix("scalar_") for dye in self.dyes]
-        self.legend: Sequence[tuple[str, str]] = list(zip(names, self.colours, strict=True))
+        self._dyes, self.legend = dye_colours(run, dyes, SAMPLES)
         self.scale: Scale | None = None
 
     def image(self, state: State) -> Pixels:
@@ -95,8 +105,8 @@ class FieldDye:
         colour: Array = np.zeros((*open_cells.T.shape, 3))
         weight: Array = np.zeros((*open_cells.T.shape, 1))
         clear: Array = np.ones_like(weight)
-        for dye, name in zip(self.dyes, self.colours, strict=True):
-            strength = filled(state[dye][:, :, 0] / self.full[dye], open_cells).T[..., None]
+        for dye, (full, name) in self._dyes.items():
+            strength = filled(state[dye][:, :, 0] / full, open_cells).T[..., None]
             strength = np.clip(strength, 0.0, 1.0)
             light = 0.25 * strength**3
             colour += strength * (style.rgb(name) * (1.0 - light) + light)

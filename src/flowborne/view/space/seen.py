@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
-from flowborne.view.fields import NUMBERS, FieldNumber, Scale, dyes_of, full_strength
+from flowborne.view.fields import NUMBERS, FieldNumber, Scale, dye_colours, dyes_of
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 
@@ -48,20 +48,15 @@ class SeenDye:
     scale: Scale | None = None
 
     def __init__(self, run: Run, dyes: Sequence[str]) -> None:
-        sampled = run.sampled(SAMPLES)
-        self._full = {dye: full_strength([state[dye] for state in sampled]) for dye in dyes}
-        colours = [style.DYES[n % len(style.DYES)] for n in range(len(dyes))]
-        self._colours = dict(zip(dyes, map(style.rgb, colours), strict=True))
-        names = [dye.removeprefix("scalar_") for dye in dyes]
-        self.legend: Sequence[tuple[str, str]] = list(zip(names, colours, strict=True))
+        self._dyes, self.legend = dye_colours(run, dyes, SAMPLES)
 
     def smoke(self, state: State) -> tuple[Single, Single]:
         """Colours (nx, ny, nz, 3) and densities (nx, ny, nz) of the cells, from 0 to 1."""
         colour = np.zeros((*state["open"].shape, 3), np.float32)
         weight = np.zeros(state["open"].shape, np.float32)
-        for dye, own in self._colours.items():
-            strength = np.clip(np.nan_to_num(state[dye]) / self._full[dye], 1e-6, 1.0)
-            colour += strength[..., None] * own.astype(np.float32)
+        for dye, (full, name) in self._dyes.items():
+            strength = np.clip(np.nan_to_num(state[dye]) / full, 1e-6, 1.0)
+            colour += strength[..., None] * style.rgb(name).astype(np.float32)
             weight += strength
         density = (np.minimum(weight, 1.0) * state["open"]).astype(np.float32)
         return (colour / weight[..., None]).astype(np.float32), density
