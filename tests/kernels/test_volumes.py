@@ -84,6 +84,14 @@ def test_planes_are_exact(normal: tuple[float, float, float], offset: float, fla
     assert found == pytest.approx(half_space(n, offset), abs=1e-9)
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_a_mirrored_body_leaves_mirrored_volumes(axis: int) -> None:
+    """A body that is no plane in a cell too: flow about a wing is as that about its image."""
+    distance = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 6, 6))
+    image = parts(np.ascontiguousarray(np.flip(distance, axis)))
+    np.testing.assert_allclose(np.flip(image, axis), parts(distance), atol=1e-12)
+
+
 def round_distance(cells: int, radius: float, flat: bool) -> np.ndarray:
     """Distance to a ball, or disc, in the unit cube at the nodes."""
     x = np.moveaxis(np.indices((cells + 1,) * 3), 0, -1) / cells - [0.513, 0.487, 0.496]

@@ -14,7 +14,10 @@ Array = NDArray[np.float64]
 KUHN = np.array(
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]]
 )
-"""Corners 4 x + 2 y + z of six tetrahedra that make up a cube, all with its main diagonal."""
+"""Corners 4 x + 2 y + z of six tetrahedra that make up a cube, all with one main diagonal."""
+
+TETRAHEDRA = np.concatenate([KUHN ^ flip for flip in (0, 1, 2, 4)])
+"""The same with each of the four diagonals: the mean over them knows no left and right."""
 
 
 @njit(nogil=True, cache=True)
@@ -75,7 +78,8 @@ def is_clear(distance: Array, ox: Array, oy: Array, oz: Array, i: int, j: int) -
 def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> None:
     """Open part of every cell; 0 where all its faces are closed.
 
-    In a slab that of its cross-section; else of six tetrahedra, exact for a plane.
+    In a slab that of its cross-section; else the mean of four cubes of six tetrahedra, exact for a
+    plane and the same for mirrored bodies.
 
     distance    to the bodies at the nodes
     ox, oy, oz  open parts of the faces
@@ -103,10 +107,10 @@ def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> 
                     out[i, j, k] = 1.0 - closed_fraction(phi[0], phi[4], phi[6], phi[2])
                 else:
                     closed = 0.0
-                    for n in range(6):
-                        t = KUHN[n]
+                    for n in range(len(TETRAHEDRA)):
+                        t = TETRAHEDRA[n]
                         closed += closed_tetrahedron(phi[t[0]], phi[t[1]], phi[t[2]], phi[t[3]])
-                    out[i, j, k] = 1.0 - closed / 6.0
+                    out[i, j, k] = 1.0 - closed / len(TETRAHEDRA)
 
 
 def open_parts_reference(distance: Array, ox: Array, oy: Array, oz: Array) -> Array:
@@ -121,5 +125,5 @@ def open_parts_reference(distance: Array, ox: Array, oy: Array, oz: Array) -> Ar
             [distance[x, y, z] for x in (low, high) for y in (low, high) for z in (low, high)],
             axis=-1,
         )
-        closed = closed_tetrahedron_reference(corner[..., KUHN]).mean(axis=-1)
+        closed = closed_tetrahedron_reference(corner[..., TETRAHEDRA]).mean(axis=-1)
     return np.where(faces == 0.0, 0.0, 1.0 - closed)
