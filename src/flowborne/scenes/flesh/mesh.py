@@ -93,10 +93,10 @@ def _fleshed(
     """Flesh between an outer surface and bones; `own` is the surface where it is the user's."""
     inside = contour(bones, 0.0, _pitch(bones, size))
     chamber = chamber_of(bones, inside[0], tolerance, own)
-    surfaces = [chamber.cut(surface) for surface in (outside, inside)]
-    points, elements = tetrahedra_within(surfaces, size, tolerance)
+    hollow = _hollow(outside, inside)
+    points, elements = tetrahedra_within(chamber.cut(hollow), size, tolerance)
     flesh = bones.distance(points[elements].mean(axis=1)) > 0.0
-    points, elements = chamber.unfold(points, elements, flesh, tolerance)
+    points, elements = chamber.unfold(points, elements, flesh, hollow, tolerance)
     used, renumbered = np.unique(elements, return_inverse=True)
     points = points[used]
     ends = points[with_middles(len(points), renumbered.reshape(-1, 4))[0]]
@@ -105,6 +105,16 @@ def _fleshed(
     mesh = FleshMesh(points, renumbered.reshape(-1, 4), holders)
     _check_held(mesh, bones, size)
     return mesh
+
+
+def _hollow(outside: Mesh, inside: Mesh) -> Mesh:
+    """The surface of what lies between two surfaces.
+
+    One surface has one face where a wall cuts it, a ring. Of two discs upon each other, one for
+    each surface, the mesher cut off a corner in a third of its runs.
+    """
+    inward = inside[1][:, ::-1] + len(outside[0])
+    return np.concatenate([outside[0], inside[0]]), np.concatenate([outside[1], inward])
 
 
 def _connected(cells: Indices, count: int) -> Indices:

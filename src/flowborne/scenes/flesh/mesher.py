@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,26 +19,22 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-def tetrahedra_within(
-    surfaces: Sequence[Mesh], size: float, tolerance: float
-) -> tuple[Array, Indices]:
-    """Points (n, 3) and right-handed tetrahedra (m, 4) of all that the surfaces enclose.
+def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Array, Indices]:
+    """Points (n, 3) and right-handed tetrahedra (m, 4) of all that a surface encloses.
 
-    surfaces   closed and outward; faces of tetrahedra follow each of them
-    size       length of edges, m; shorter where the surfaces bend too much for it
-    tolerance  how far from the surfaces those faces may be, m
+    surface    closed, and turned outward: that of a hollow body has parts turned into the hollow
+    size       length of edges, m; shorter where the surface bends too much for it
+    tolerance  how far from the surface faces of the tetrahedra may be, m
     raises     ValueError when the mesher fails
 
     Two runs give different meshes of the same quality, even on one thread.
     """
-    first = np.cumsum([0, *(len(points) for points, _ in surfaces)])
-    points = np.concatenate([points for points, _ in surfaces])
-    triangles = [t + start for (_, t), start in zip(surfaces, first[:-1], strict=True)]
+    points, triangles = surface
     with TemporaryDirectory(prefix="flowborne-flesh-") as folder:
         np.savez(
             Path(folder) / mesh_run.SURFACES,
             points=points,
-            triangles=np.concatenate(triangles).astype(np.int32),
+            triangles=triangles.astype(np.int32),
             size=size,
             tolerance=tolerance / np.linalg.norm(np.ptp(points, axis=0)),
             threads=numba_thread_count(),

@@ -17,7 +17,6 @@ from scipy.sparse.csgraph import connected_components
 
 from flowborne.scenes.flesh.bones import Bones
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.elements import oriented
 from flowborne.solids.flesh import surface_of
 
 Array = NDArray[np.float64]
@@ -29,8 +28,8 @@ SAME = 0.01
 PARALLEL = 1e-3
 """Unit vectors that differ by less than this are one: files give coordinates with few digits."""
 
-FACING = 0.9
-"""Cosine of the angle to a wall's normal, from which on a face near a wall lies in it."""
+MIRRORED = [2, 1, 0, 3]
+"""Corners of an element's image, right-handed again and with `elements.PARTS` mirrored too."""
 
 APART = np.array([0.55, 0.72, 0.42])
 """A direction in no mirror plane that a person would choose: the chamber around it is meshed."""
@@ -58,17 +57,23 @@ class Chamber:
         return np.asarray(left.points, dtype=np.float64), left.regular_faces.astype(np.int64)
 
     def unfold(
-        self, points: Array, elements: Indices, wanted: NDArray[np.bool_], tolerance: float
+        self,
+        points: Array,
+        elements: Indices,
+        wanted: NDArray[np.bool_],
+        surface: Mesh,
+        tolerance: float,
     ) -> tuple[Array, Indices]:
         """Points and right-handed tetrahedra of all images in turn, joined at the walls.
 
         points     (n, 3) m
         elements   (m, 4) right-handed, of all that is in the chamber
         wanted     (m,) those of them that are set down in the images
+        surface    that of all the flesh, in all images
         tolerance  how far from a wall the faces on it may be, m; their points are put onto it, and
                    elements that this makes flat are left out
         """
-        on_wall = self._on_walls(points, elements, tolerance)
+        on_wall = self._on_walls(points, elements, surface, tolerance)
         settled = points - self.centre
         for those in np.unique(on_wall, axis=1).T:
             across = np.linalg.pinv(self.walls[those]) @ self.walls[those]
@@ -78,8 +83,10 @@ class Chamber:
         images = np.einsum("gij,nj->gni", self.images, settled) + self.centre
         point = self._joined(on_wall, len(points))
         first = np.unique(point, return_index=True)[1]
-        unfolded = images.reshape(-1, 3)[first]
-        return unfolded, oriented(unfolded, point[:, elements[wanted]].reshape(-1, 4))
+        unfolded = point[:, elements[wanted]]
+        turned = np.linalg.det(self.images) < 0.0
+        unfolded[turned] = unfolded[turned][..., MIRRORED]
+        return images.reshape(-1, 3)[first], unfolded.reshape(-1, 4)
 
     def _joined(self, on_wall: NDArray[np.bool_], count: int) -> Indices:
         """(g, count) numbers of the images of points: an image has those on a wall in common with
@@ -93,17 +100,22 @@ class Chamber:
             graph = graph + coo_array((np.ones(pair[0].size), pair), shape=graph.shape)
         return np.asarray(connected_components(graph, directed=False)[1]).reshape(-1, count)
 
-    def _on_walls(self, points: Array, elements: Indices, tolerance: float) -> NDArray[np.bool_]:
-        """(k, n) of each wall, the points of faces that lie in it."""
+    def _on_walls(
+        self, points: Array, elements: Indices, surface: Mesh, tolerance: float
+    ) -> NDArray[np.bool_]:
+        """(k, n) of each wall, the points of faces that lie in it.
+
+        Those are the faces beside it whose middle is no closer to the surface: which way a small
+        one faces says nothing, as the mesher may tilt it.
+        """
         faces = surface_of(elements)
-        a, b, c = np.moveaxis(points[faces], 1, 0)
-        normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        middles = pv.PolyData(points[faces].mean(axis=1))
+        middles.compute_implicit_distance(pv.PolyData.from_regular_faces(*surface), inplace=True)
+        to_surface = np.abs(middles["implicit_distance"])
         on_wall = np.zeros((len(self.walls), len(points)), bool)
         for wall, on in zip(self.walls, on_wall, strict=True):
-            near = np.abs((points - self.centre) @ wall) <= tolerance
-            lies = near[faces].all(axis=1) & (normal @ wall < -FACING)
-            on[faces[lies]] = True
+            away = np.abs((points - self.centre) @ wall)[faces]
+            on[faces[(away <= tolerance).all(axis=1) & (away.mean(axis=1) <= to_surface)]] = True
         return on_wall
 
 
