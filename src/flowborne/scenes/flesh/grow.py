@@ -11,9 +11,11 @@ import mujoco
 import numpy as np
 
 from flowborne.scenes.flesh.mesh import (
+    ASTRAY,
     FIDELITY,
     HELD,
     JOINT,
+    JOINT_EDGES,
     THICKNESSES,
     FleshMesh,
     skin_mesh,
@@ -99,7 +101,7 @@ def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
         "shapes": shapes.hexdigest(),
         "thickness": table.thickness,
         "size": table.size,
-        "rules": [FIDELITY, THICKNESSES, HELD, JOINT, SAME],
+        "rules": [FIDELITY, THICKNESSES, HELD, JOINT, JOINT_EDGES, ASTRAY, SAME],
     }
     if table.surface is not None:
         path = folder / table.surface

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pyvista as pv
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -16,9 +17,10 @@ from flowborne.scenes.flesh.bones import Bones, bones_of
 from flowborne.scenes.flesh.contour import contour
 from flowborne.scenes.flesh.mesher import tetrahedra_within
 from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
-from flowborne.scenes.flesh.symmetry import chamber_of
+from flowborne.scenes.flesh.symmetry import Chamber, chamber_of
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import with_middles
+from flowborne.solids.flesh import outer_surface
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -32,8 +34,20 @@ THICKNESSES = 0.6
 HELD = 0.5
 """How far outside a bone it still holds points, as a part of the distance that faces may be off."""
 
-JOINT = 0.75
-"""How close to a second bone points are let go, in edges as long as most are."""
+JOINT = 1.25
+"""How close to a second bone points are let go, in half sizes of the thinnest bone."""
+
+JOINT_EDGES = 0.75
+"""The same in edges as long as most are, where those are too long for it."""
+
+ASTRAY = 1.5
+"""How far the outside of a mesh may be off its surface, in tolerances, and not be meshed again."""
+
+TIGHTER = 0.8
+"""Tolerance of the next try over that of the last one."""
+
+TRIES = 8
+"""How often flesh is meshed at most."""
 
 
 @dataclass(frozen=True)
@@ -94,17 +108,39 @@ def _fleshed(
     inside = contour(bones, 0.0, _pitch(bones, size))
     chamber = chamber_of(bones, inside[0], tolerance, own)
     hollow = _hollow(outside, inside)
-    points, elements = tetrahedra_within(chamber.cut(hollow), size, tolerance)
-    flesh = bones.distance(points[elements].mean(axis=1)) > 0.0
-    points, elements = chamber.unfold(points, elements, flesh, hollow, tolerance)
-    used, renumbered = np.unique(elements, return_inverse=True)
-    points = points[used]
-    ends = points[with_middles(len(points), renumbered.reshape(-1, 4))[0]]
+    points, elements, tolerance = _meshed(hollow, outside, bones, chamber, size, tolerance)
+    ends = points[with_middles(len(points), elements)[0]]
     edge = float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
-    holders = _holders(bones, points, HELD * tolerance, JOINT * edge)
-    mesh = FleshMesh(points, renumbered.reshape(-1, 4), holders)
+    joint = max(JOINT * bones.thinnest, JOINT_EDGES * edge)
+    mesh = FleshMesh(points, elements, _holders(bones, points, HELD * tolerance, joint))
     _check_held(mesh, bones, size)
     return mesh
+
+
+def _meshed(
+    hollow: Mesh, outside: Mesh, bones: Bones, chamber: Chamber, size: float, tolerance: float
+) -> tuple[Array, Indices, float]:
+    """Points and right-handed tetrahedra between the surfaces, and the tolerance that it took.
+
+    Where walls meet, the chamber is a wedge, and the mesher may leave out of its tip all that is
+    within the tolerance of both: a pit as deep as the flesh. It is meshed again until there is none.
+    raises  ValueError when it always is
+    """
+    skin = pv.PolyData.from_regular_faces(*outside)
+    for _ in range(TRIES):
+        points, elements = tetrahedra_within(chamber.cut(hollow), size, tolerance)
+        flesh = bones.distance(points[elements].mean(axis=1)) > 0.0
+        points, elements = chamber.unfold(points, elements, flesh, hollow, tolerance)
+        used, renumbered = np.unique(elements, return_inverse=True)
+        points, elements = points[used], renumbered.reshape(-1, 4)
+        corners = pv.PolyData(points[np.unique(outer_surface(points, elements))])
+        corners.compute_implicit_distance(skin, inplace=True)
+        if np.abs(corners["implicit_distance"]).max() <= ASTRAY * tolerance:
+            return points, elements, tolerance
+        tolerance *= TIGHTER
+    raise ValueError(
+        f"flesh that has edges of {size:g} m does not follow its surface. Make the size smaller."
+    )
 
 
 def _hollow(outside: Mesh, inside: Mesh) -> Mesh:
@@ -128,7 +164,8 @@ def _holders(bones: Bones, points: Array, tolerance: float, joint: float) -> tup
     """The bone that each point is deepest in, "" for points more than `tolerance` m outside all.
 
     Points less than `joint` m from a second bone are let go: where a joint bends, flesh that both
-    bones held would be torn.
+    bones held would be torn. How stiff the flesh about it is goes with that distance, which is
+    therefore the bones' own and no mesh's.
     """
     distances = bones.distances(points)
     nearest = distances.argmin(axis=1)
