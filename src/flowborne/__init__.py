@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 from flowborne.version import __version__
 
 if TYPE_CHECKING:
-    from flowborne.control.controller import Controller, Decision
+    from flowborne.control.controller import Controller, Decision, StrengthInPhase
     from flowborne.control.measurement import Measurement
     from flowborne.control.trial import Hypothesis, Velocities
     from flowborne.coupling.named import BodyState, JointState
@@ -79,6 +79,7 @@ __all__ = [
     "SolidModel",
     "SolidState",
     "StepReport",
+    "StrengthInPhase",
     "Tissue",
     "Velocities",
     "World",
@@ -154,6 +155,7 @@ _PLACES = {
     "SolidModel": "flowborne.solids.model",
     "SolidState": "flowborne.solids.state",
     "StepReport": "flowborne.coupling.report",
+    "StrengthInPhase": "flowborne.control.controller",
     "Tissue": "flowborne.solids.tissue",
     "Velocities": "flowborne.control.trial",
     "World": "flowborne.coupling.world",

@@ -108,8 +108,7 @@ class Measures:
         controller = self._controller
         if controller is None:
             return {}
-        strength = np.broadcast_to(controller.strength, len(controller.dofs))
-        steps = strength * controller.every * frame_time
+        steps = controller.greatest_strength() * controller.every * frame_time
         places = [place for _, place in self._targets]
         return {c: float(steps[n]) for c, n in zip(self.controlled, places, strict=True)}
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flowborne.control.controller import Controller
+from flowborne.control.controller import Controller, StrengthInPhase
 from flowborne.control.executors import Serial
 from flowborne.control.gradients import GradientCentral, GradientOneSided
 from flowborne.control.measurement import Measurement
@@ -85,6 +85,22 @@ def test_K6_frames_to_the_optimum(
     assert np.diff(path[: arrived + 1]) == pytest.approx(stride, abs=1e-12)
     assert np.all(off[arrived:] <= stride * (1.0 + 1e-9))
     assert abs(np.mean(path[-20:]) - optimum) <= 0.5 * stride
+
+
+def test_a_joint_is_weaker_while_a_phase_is_on(make_world: MakeWorld, step: Step) -> None:
+    """Frames 4 to 7 go half as far, for the dof that is named; the last entry that is on counts."""
+    slow = PhaseIntervals(((4.0 * FRAME, 8.0 * FRAME),))
+    first = StrengthInPhase((0, 1), 5.0, PhaseIntervals(((6.0 * FRAME, 8.0 * FRAME),)))
+    weak = StrengthInPhase((0,), 1.0, slow)
+    controller = controller_of((0.7, 0.7), 2.0, 1.0, in_phases=(first, weak))
+    world = make_world()
+    world.solid.q[:2] = -0.9
+    assert controller.strength_at(world.time).tolist() == [2.0, 2.0]
+    assert controller.greatest_strength().tolist() == [5.0, 5.0]
+    pace = np.diff(advance(controller, world, step, 8), axis=0) / FRAME
+    assert pace[:4] == pytest.approx(2.0)
+    assert pace[4:6] == pytest.approx(np.array([[1.0, 1.0]] * 2))
+    assert controller.strength_at(7.0 * FRAME).tolist() == [1.0, 5.0]
 
 
 def test_target_is_reached_exactly_at_the_end_of_the_frame(

@@ -338,6 +338,8 @@ def test_the_controller_is_that_of_the_scene(write: Write) -> None:
             {
                 "control.0.joints": '["wrist", "rail"]',
                 "control.0.torque_limit": "4.0",
+                "control.0.in_phases": "[{ strength = 10.0, phases = { kind = 'motion', "
+                "joint = 'shoulder', side = 'above' } }]",
                 "controller.gradient": "one-sided",
                 "controller.rule": '{ kind = "golden-section", reach = 30.0 }',
                 "controller.servo": '{ kind = "pd", frequency = 2.0 }',
@@ -351,6 +353,11 @@ def test_the_controller_is_that_of_the_scene(write: Write) -> None:
     assert controller is not None
     assert_allclose(controller.dofs, [*model.dofs_of("wrist"), *model.dofs_of("rail")])
     assert_allclose(controller.strength, [math.radians(20.0), 20.0])
+    (other,) = controller.in_phases
+    assert other.places == (0, 1)
+    assert_allclose(other.strength, [math.radians(10.0), 10.0])
+    rises = made.world.setup.motions[0].velocity(0.1)[0] >= 0.0
+    assert other.phases.active(0.1) == rises
     assert isinstance(controller.gradient, GradientOneSided)
     assert_allclose(controller.gradient.displacement, [math.radians(5.0), 5.0])
     assert isinstance(controller.rule, GoldenSection)

@@ -152,6 +152,14 @@ ONE_FAULT = {
         "scene swim.toml, [[objectives]] 1, phases has the interval [2, 1] s. "
         "Put the smaller time first.",
     ),
+    "a strength in a phase that follows nothing": (
+        {
+            "strength = 20.0": "strength = 20.0\nin_phases = "
+            '[{ strength = 1.0, phases = { kind = "motion", joint = "rail" } }]'
+        },
+        "scene swim.toml, [[control]] 1, in_phases 1, phases: joint 'rail' has no [[motion]] to "
+        "follow.",
+    ),
     "a phase that follows nothing": (
         {'kind = "effort"': 'kind = "effort"\nphases = { kind = "motion", joint = "rail" }'},
         "scene swim.toml, [[objectives]] 1, phases: joint 'rail' has no [[motion]] to follow.",

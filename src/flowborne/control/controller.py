@@ -19,6 +19,7 @@ from flowborne.control.executors import Mapper, Threads
 from flowborne.control.gradients import Gradient, GradientCentral
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
+from flowborne.control.phases import Phases
 from flowborne.control.rules import FixedStep, Rule
 from flowborne.control.trial import Hypothesis, Step, Trials
 from flowborne.coupling.motion import JointCommand
@@ -55,6 +56,20 @@ class Decision:
     seconds: float
 
 
+@dataclass(frozen=True)
+class StrengthInPhase:
+    """Strength that some dofs have in place of their usual one while its phases are on.
+
+    places    (m,) which of the controlled dofs, counted from 0
+    strength  rad/s or m/s; one for all of them or one each
+    phases    when
+    """
+
+    places: tuple[int, ...]
+    strength: float | tuple[float, ...]
+    phases: Phases
+
+
 @dataclass(frozen=True, eq=False)
 class Controller:
     """Gradient descent on an objective over the controlled joints, within the creature's strength.
@@ -76,6 +91,7 @@ class Controller:
                 steps away
     servo       how the drives approach the target
     executor    where the trials run
+    in_phases   strength at times; where several are on, the last one counts
     raises      ValueError for controlled dofs that are none, negative or repeated, a strength that
                 is not positive and finite or not one per dof, every < 1 or iterations < 1
     """
@@ -90,6 +106,7 @@ class Controller:
     iterations: int = 1
     servo: Servo = field(default_factory=ServoExact)
     executor: Mapper = field(default_factory=Threads)
+    in_phases: tuple[StrengthInPhase, ...] = ()
 
     def __post_init__(self) -> None:
         dofs = np.asarray(self.dofs)
@@ -105,11 +122,12 @@ class Controller:
                     f"{name} has {values.size} values for {dofs.size} controlled dofs: "
                     "give one for all or one each"
                 )
-        strength = np.asarray(self.strength, dtype=np.float64)
-        if not (np.all(strength > 0.0) and np.all(np.isfinite(strength))):
-            raise ValueError(
-                f"strength is {self.strength}: give positive finite numbers in rad/s or m/s"
-            )
+        for strength in (self.strength, *(other.strength for other in self.in_phases)):
+            values = np.asarray(strength, dtype=np.float64)
+            if not (np.all(values > 0.0) and np.all(np.isfinite(values))):
+                raise ValueError(
+                    f"strength is {strength}: give positive finite numbers in rad/s or m/s"
+                )
         if self.every < 1 or self.iterations < 1:
             raise ValueError(
                 f"every is {self.every} frames and iterations {self.iterations}: "
@@ -137,6 +155,22 @@ class Controller:
         memory["objective"] = np.array([value])
         memory["schedule"] = np.array([self.every - 1.0, frame_time])
         return self._decision(world, True, evaluations, started)
+
+    def strength_at(self, time: float) -> Array:
+        """(n,) the fastest that each controlled dof moves at `time` (s), rad/s or m/s."""
+        strength = np.array(np.broadcast_to(self.strength, self.dofs.shape), dtype=np.float64)
+        for other in self.in_phases:
+            if other.phases.active(time):
+                strength[list(other.places)] = other.strength
+        return strength
+
+    def greatest_strength(self) -> Array:
+        """(n,) as `strength_at`, the most of all times."""
+        greatest = np.array(np.broadcast_to(self.strength, self.dofs.shape), dtype=np.float64)
+        for other in self.in_phases:
+            places = list(other.places)
+            greatest[places] = np.maximum(greatest[places], other.strength)
+        return greatest
 
     def command(self, world: World, frame_end_time: float, dt: float) -> JointCommand:
         """Command to the controlled dofs for the next step; without a decision yet, to hold still.
@@ -215,7 +249,7 @@ class Controller:
         model, state = creature.parts(world)
         pose, value, gradient, evaluations = state.q.copy(), 0.0, np.zeros(n), 0
         pace, slope = world.memory.get("pace", np.array([np.ones(n), np.zeros(n)])).copy()
-        limit = np.broadcast_to(np.asarray(self.strength), (n,)) * (self.every * frame_time)
+        limit = self.strength_at(world.time) * (self.every * frame_time)
         groups = [
             (places, wanted)
             for places, wanted in self.objective.shared_out(self.dofs)

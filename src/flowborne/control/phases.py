@@ -1,4 +1,4 @@
-"""When an objective counts: always, in intervals of time, or while a track rises or falls."""
+"""When an objective counts, or a strength: always, at times, or while a track rises or falls."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.control.controller import Controller
+from flowborne.control.controller import Controller, StrengthInPhase
 from flowborne.control.executors import Mapper
 from flowborne.control.gradients import (
     GRADIENTS,
@@ -57,14 +57,25 @@ def controller_of(
     strength: list[float] = []
     probe: list[float] = []
     limit: list[float] = []
+    in_phases: list[StrengthInPhase] = []
     for table in scene.control:
+        first, units = len(dofs), list[float]()
         for joint in table.joints:
             unit = joint_unit(model, joint)
             for dof in _free_dofs(model, joint):
                 dofs.append(dof)
+                units.append(unit)
                 strength.append(unit * table.strength)
                 probe.append(unit * table.probe)
                 limit.append(math.inf if table.torque_limit is None else table.torque_limit)
+        in_phases += [
+            StrengthInPhase(
+                tuple(range(first, len(dofs))),
+                tuple(unit * other.strength for unit in units),
+                _phases(other.phases, scene, model, motions),
+            )
+            for other in table.in_phases
+        ]
     how = scene.controller
     return Controller(
         np.array(dofs, dtype=np.int64),
@@ -82,6 +93,7 @@ def controller_of(
         iterations=how.iterations,
         servo=servo_of(how.servo, tuple(limit)),
         executor=executor,
+        in_phases=tuple(in_phases),
     )
 
 

@@ -18,6 +18,7 @@ from flowborne.scenes.schema_control import (
     ObjectivePythonTable,
     ObjectiveVelocityTable,
     ObjectiveWindDragTable,
+    PhaseIntervalsTable,
     PhaseMotionTable,
 )
 from flowborne.scenes.wording import suggestion
@@ -72,6 +73,8 @@ def _check_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
     seen: set[str] = set()
     for index, table in enumerate(scene.control):
         where = draft.at("control", index)
+        for number, other in enumerate(table.in_phases, start=1):
+            yield from _check_phases(draft, f"{where}, in_phases {number}", other.phases)
         for joint in table.joints:
             unknown = unknown_joint(draft, model, joint, "control", index)
             yield from unknown
@@ -150,11 +153,20 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
             with_parameters(table.function, table.parameters)
         except SceneError as error:
             yield f"{where}: {error}"
-    phases = table.phases
-    if isinstance(phases, PhaseMotionTable) and draft.sound("motion"):
-        followed = {motion.joint for motion in scene.motion}
-        if phases.joint not in followed:
-            yield (
-                f"{where}, phases: joint '{phases.joint}' has no [[motion]] to follow. "
-                "Add one, or give phases as intervals."
-            )
+    yield from _check_phases(draft, where, table.phases)
+
+
+def _check_phases(
+    draft: Draft, where: str, phases: PhaseIntervalsTable | PhaseMotionTable | None
+) -> Iterator[str]:
+    """A motion that phases follow is there."""
+    followed = {motion.joint for motion in draft.scene.motion}
+    if (
+        isinstance(phases, PhaseMotionTable)
+        and draft.sound("motion")
+        and phases.joint not in followed
+    ):
+        yield (
+            f"{where}, phases: joint '{phases.joint}' has no [[motion]] to follow. "
+            "Add one, or give phases as intervals."
+        )

@@ -20,7 +20,7 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
         return
     time = scene.controller.every * scene.frame_time
     for number, table in enumerate(scene.control, start=1):
-        step = table.strength * time
+        step = min([table.strength, *(other.strength for other in table.in_phases)]) * time
         if table.probe > step:
             unit = "m" if joint_kind(model, table.joints[0]) == SLIDE else "degrees"
             yield (

@@ -32,21 +32,6 @@ from flowborne.scenes.fields import (
 from flowborne.scenes.schema_drives import EXACT, ServoTable
 
 
-class ControlTable(Table):
-    """[[control]]: joints that the controller moves.
-
-    joints        their names
-    strength      fastest rate: degrees/s (hinge, ball) or m/s (slide)
-    probe         displacement d of a hypothetical motion: degrees or m
-    torque_limit  largest torque (N m) or force (N) of the drive; unlimited unless given
-    """
-
-    joints: Annotated[tuple[Text, ...], Field(min_length=1)]
-    strength: Positive
-    probe: Positive = 5.0
-    torque_limit: Positive | None = None
-
-
 class PhaseIntervalsTable(Table):
     """On during the intervals [start, stop) in s, which repeat with `period` when it is given."""
 
@@ -86,6 +71,34 @@ class PhaseMotionTable(Table):
 
 
 PhaseTable = Annotated[PhaseIntervalsTable | PhaseMotionTable, *ByKind]
+
+
+class StrengthInPhaseTable(Table):
+    """An entry of in_phases of [[control]]: { strength = 75.0, phases = { ... } }.
+
+    strength  as that of the table
+    phases    when it counts, as of an objective
+    """
+
+    strength: Positive
+    phases: PhaseTable
+
+
+class ControlTable(Table):
+    """[[control]]: joints that the controller moves.
+
+    joints        their names
+    strength      fastest rate: degrees/s (hinge, ball) or m/s (slide)
+    probe         displacement d of a hypothetical motion: degrees or m
+    torque_limit  largest torque (N m) or force (N) of the drive; unlimited unless given
+    in_phases     strengths in place of that one at times; where several are on, the last one counts
+    """
+
+    joints: Annotated[tuple[Text, ...], Field(min_length=1)]
+    strength: Positive
+    probe: Positive = 5.0
+    torque_limit: Positive | None = None
+    in_phases: tuple[StrengthInPhaseTable, ...] = ()
 
 
 class ObjectiveTable(Table):
