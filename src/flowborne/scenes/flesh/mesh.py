@@ -123,7 +123,7 @@ def _meshed(
     """Points and right-handed tetrahedra between the surfaces, and the tolerance that it took.
 
     Where walls meet, the chamber is a wedge, and the mesher may leave out of its tip all that is
-    within the tolerance of both: a pit as deep as the flesh. It is meshed again until there is none.
+    within the tolerance of both: a pit as deep as the flesh. It meshes again until there is none.
     raises  ValueError when it always is
     """
     skin = pv.PolyData.from_regular_faces(*outside)
