@@ -41,6 +41,16 @@ def test_a_run_tells_what_it_found(command, small_scene, tmp_path):
     assert "hinge 47.5°" in err
 
 
+def test_a_film_tells_how_far_it_is(command, small_scene):
+    options = ("--frames", 2, "--workers", 1, "--out", "run")
+    _, _, err = command("run", small_scene, *options)
+    assert "drawing the film …  frame 3/3" in err
+    code, out, err = command("film", "run", "--set", "size=[160, 96]", "--out", "shot.mp4")
+    assert code == 0
+    assert "drawing the film …  frame 3/3" in err
+    assert "drawn: shot.mp4" in out
+
+
 def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp_path):
     settings = ("--set", "solids.density=50", "--set", "initial.positions.hinge = 30")
     code, _, err = command("run", small_scene, "--no-film", "--frames", 1, *settings)

@@ -384,7 +384,7 @@ def test_a_blow_up_keeps_everything_before_it(small_scene, tmp_path, monkeypatch
     drawn = []
     with monkeypatch.context() as patch:
         patch.setattr(stepping, "step", blow_up)
-        patch.setattr("flowborne.view.film.make_preview", drawn.append)
+        patch.setattr("flowborne.view.film.make_preview", lambda folder, _: drawn.append(folder))
         result = run(small_scene, tmp_path / "run", film=True)
     assert result.outcome is RunOutcome.BLEW_UP
     assert "blew up in frame 9, step 2: a joint's position or velocity is not" in result.message

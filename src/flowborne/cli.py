@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -176,17 +177,24 @@ def film(
 ) -> None:
     """Draw the picture and the film of a run again, as the table [film] of its scene says."""
     files = RunFolder.existing(folder)
+    from flowborne.progress import ProgressDisplay, RunProgress
     from flowborne.scenes.film_settings import film_settings
     from flowborne.view.film import make_preview, write_shot
     from flowborne.view.shot import Shot
 
     shot = Shot.of(film_settings(files, _overrides(settings or [])))
     drawn = f"{folder / 'preview.png'}, {folder / 'preview.mp4'}"
+    began = perf_counter()
     try:
-        if out is None:
-            make_preview(files.path, shot=shot)
-        else:
-            drawn = write_shot(files.path, out, shot=shot)
+        with ProgressDisplay() as display:
+
+            def tell(done: int, frames: int) -> None:
+                display(RunProgress("film", done, frames, perf_counter() - began))
+
+            if out is None:
+                make_preview(files.path, tell, shot)
+            else:
+                drawn = write_shot(files.path, out, tell, shot)
     except ValueError as error:
         raise InputError(str(error)) from error
     except OSError as error:

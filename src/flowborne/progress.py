@@ -25,7 +25,8 @@ class RunProgress:
     """News of a run.
 
     stage      "start" (once), "compiling" (at every kernel), "frame" (after every frame), "film"
-    frame      frames done
+               (once, and after every frame drawn)
+    frame      frames done, or drawn
     frames     frames wanted
     seconds    since the run began
     kernels    number of kernels compiled so far
@@ -62,7 +63,7 @@ class ProgressDisplay:
                 TimeRemainingColumn(),
                 console=Console(file=self._stream),
             )
-            self._task = self._bar.add_task("building the scene …", total=None)
+            self._task = self._bar.add_task("starting …", total=None)
             self._bar.start()
         return self
 
@@ -91,13 +92,11 @@ class ProgressDisplay:
                 total=None if news.stage in ("start", "compiling") else news.frames,
                 completed=news.frame,
             )
-        elif news.stage == "frame":
+        elif news.stage in ("frame", "film"):
             last = news.frame == news.frames
             if monotonic() >= self._line_due or last:
                 self._line_due = monotonic() + LINE_SECONDS
                 self.say(self.line(news))
-        elif news.stage == "film":
-            self.say(self.line(news))
 
     def line(self, news: RunProgress) -> str:
         """The news in one line."""
@@ -106,7 +105,7 @@ class ProgressDisplay:
         if news.stage == "compiling":
             return f"{COMPILING} {news.kernels} kernels, {news.seconds:.0f} s"
         if news.stage == "film":
-            return "drawing the film …"
+            return f"drawing the film …  frame {news.frame}/{news.frames}"
         words = [f"frame {news.frame}/{news.frames}"]
         if not math.isnan(news.objective):
             words.append(f"objective {news.objective:.4g}")

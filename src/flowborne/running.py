@@ -109,6 +109,7 @@ def run(
     wanted = load_scene(scene) if isinstance(scene, str | Path) else scene
     folder = RunFolder.existing(Path(out)) if resume else RunFolder(Path(out))
     if resume:
+        folder.check_writable()
         wanted = scene_to_resume(folder, wanted)
     else:
         folder.check_new(replace=replace)
@@ -251,9 +252,8 @@ class _Run:
         """Draw the picture and the film; what to tell when there is nothing to draw."""
         from flowborne.view.film import make_preview
 
-        self._tell("film")
         try:
-            make_preview(self.folder.path)
+            make_preview(self.folder.path, self._tell_drawn)
         except ValueError as error:
             return f"; no film: {error}"
         return ""
@@ -371,6 +371,11 @@ class _Run:
         """How to go on."""
         path = self.folder.path
         return f"go on with: flowborne run {self.folder.scene} --out {path} --resume"
+
+    def _tell_drawn(self, drawn: int, frames: int) -> None:
+        if self._progress is not None:
+            seconds = perf_counter() - self._started
+            self._progress(RunProgress("film", drawn, frames, seconds))
 
     def _tell(
         self,

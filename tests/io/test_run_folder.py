@@ -84,6 +84,14 @@ def test_a_place_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
             RunFolder.create(place)
 
 
+def test_a_run_that_cannot_be_written_can_be_read(tmp_path, monkeypatch):
+    finished_run(tmp_path / "run")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    folder = RunFolder.existing(tmp_path / "run")
+    with pytest.raises(RunFolderError, match="run cannot be written; give yourself the right"):
+        folder.check_writable()
+
+
 def test_later_states_are_dropped(tmp_path):
     folder = finished_run(tmp_path / "run")
     (folder.states / ".000009.npz.partial").write_text("torn")

@@ -85,9 +85,14 @@ class RunFolder:
             raise RunFolderError(f"there is no folder {path}; give the folder of an earlier run")
         if not folder.is_run():
             raise RunFolderError(f"{path} is not the folder of a run; give one that a run has made")
-        if not os.access(path, os.W_OK):
-            raise RunFolderError(f"{path} cannot be written; give yourself the right to write it")
         return folder
+
+    def check_writable(self) -> None:
+        """Raise RunFolderError unless a run that is there can go on."""
+        if not os.access(self.path, os.W_OK):
+            raise RunFolderError(
+                f"{self.path} cannot be written; give yourself the right to write it"
+            )
 
     def check_new(self, *, replace: bool) -> None:
         """Raise RunFolderError unless a new run may be written here; touches nothing."""
