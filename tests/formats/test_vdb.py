@@ -10,8 +10,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import flowborne as fb
-from flowborne.formats.vdb import cell_velocity
 from flowborne.formats.vdb_file import VdbGrid, vdb_bytes
+from flowborne.io.cell_fields import cell_velocity
 
 tinyvdb = pytest.importorskip("tinyvdb")
 

@@ -15,8 +15,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import flowborne as fb
 from flowborne.formats.creature import Creature
-from flowborne.formats.vdb import cell_velocity
-from flowborne.formats.vtkhdf_file import vorticity
+from flowborne.io.cell_fields import cell_velocity, vorticity
 from flowborne.io.open_run import OpenRun
 
 pytest.importorskip("h5py")
@@ -87,8 +86,8 @@ def test_fields_are_exact(opened: Opened) -> None:
         block, state = read.blocks(number)["fluid"], run.state(number)
         assert_allclose(block.GetBounds()[::2], grid.origin)
         assert_allclose(block.GetBounds()[1::2], grid.upper)
-        velocity = cell_velocity(grid, state)
-        wanted = {"velocity": velocity, "vorticity": vorticity(grid, velocity).astype(np.float32)}
+        wanted = {"velocity": cell_velocity(grid, state)}
+        wanted |= {"vorticity": vorticity(grid, state).astype(np.float32)}
         wanted |= {name: state[name] for name in ("pressure", "open")}
         wanted |= {dye: state[f"scalar_{dye}"] for dye in run.dyes}
         assert block.GetCellData().GetNumberOfArrays() == len(wanted)
@@ -157,11 +156,3 @@ def test_vtk_knows_the_nodes_of_the_elements(opened: Opened) -> None:
     for edge in range(cell.GetNumberOfEdges()):
         ends = [np.array(cell.GetEdge(edge).GetPoints().GetPoint(n)) for n in range(3)]
         assert_allclose(ends[2], 0.5 * (ends[0] + ends[1]), atol=1e-6)
-
-
-def test_vorticity_of_a_turn_is_twice_its_rate() -> None:
-    grid = fb.Grid((4, 5, 6), 0.5)
-    x, y, z = np.meshgrid(*grid.cell_coordinates(), indexing="ij")
-    rate = np.array([0.3, -0.2, 0.5])
-    velocity = np.cross(rate, np.stack([x, y, z], axis=-1)).astype(np.float32)
-    assert_allclose(vorticity(grid, velocity), np.broadcast_to(2.0 * rate, (4, 5, 6, 3)), atol=1e-5)

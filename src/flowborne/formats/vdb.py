@@ -12,6 +12,7 @@ from flowborne.errors import SceneError
 from flowborne.fluid.grid import Grid
 from flowborne.formats.vdb_file import VdbGrid, vdb_bytes
 from flowborne.io.atomic import write_atomically
+from flowborne.io.cell_fields import cell_velocity
 from flowborne.io.exporters import Written, provided
 from flowborne.io.open_run import OpenRun
 
@@ -57,15 +58,6 @@ def numbered(path: Path, frame: int) -> Path:
 def dye_grid(grid: Grid, dye: str, values: NDArray[np.float32]) -> VdbGrid:
     """A dye where there is some."""
     return _grid(grid, dye, "fog volume", values, values != 0.0)
-
-
-def cell_velocity(grid: Grid, state: dict[str, NDArray[np.float32]]) -> NDArray[np.float32]:
-    """(nx, ny, nz, 3) m/s in the middle of cells; no z in a slab."""
-    found = np.zeros((*grid.shape, 3), np.float32)
-    for axis in grid.axes:
-        faces = np.moveaxis(state[f"velocity_{'xyz'[axis]}"], axis, 0)
-        found[..., axis] = np.moveaxis(0.5 * (faces[1:] + faces[:-1]), 0, axis)
-    return found
 
 
 def _grid(

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.grid import Grid
 from flowborne.formats.creature import Creature, has_bodies
 from flowborne.formats.stress import cauchy_stress, deformation_gradients, von_mises
-from flowborne.formats.vdb import cell_velocity
+from flowborne.io.cell_fields import cell_velocity, vorticity
 from flowborne.io.open_run import OpenRun
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
@@ -63,21 +63,6 @@ def write_vtkhdf(run: OpenRun, path: Path) -> None:
             tree[name] = h5py.SoftLink(f"/VTKHDF/{name}")
 
 
-def vorticity(grid: Grid, velocity: NDArray[np.float32]) -> Array:
-    """(nx, ny, nz, 3) curl of cell velocities (nx, ny, nz, 3) by central differences, 1/s."""
-    slope = np.zeros((3, *velocity.shape))
-    for axis in grid.axes:
-        if grid.shape[axis] > 1:
-            slope[axis] = np.gradient(velocity.astype(float), grid.spacing, axis=axis)
-    return np.stack(
-        [
-            slope[(i + 1) % 3][..., (i + 2) % 3] - slope[(i + 2) % 3][..., (i + 1) % 3]
-            for i in range(3)
-        ],
-        axis=-1,
-    )
-
-
 def _fluid(group: h5py.Group, run: OpenRun, grid: Grid) -> None:
     """The fields of the cells, a slice of each array a step."""
     _kind(group, "ImageData")
@@ -92,7 +77,7 @@ def _fluid(group: h5py.Group, run: OpenRun, grid: Grid) -> None:
         state = run.state(number)
         velocity = cell_velocity(grid, state)
         values: dict[str, NDArray[Any]] = {"velocity": velocity}
-        values["vorticity"] = vorticity(grid, velocity)
+        values["vorticity"] = vorticity(grid, state)
         values |= {name: state[name] for name in ("pressure", "open")}
         values |= {dye: state[f"scalar_{dye}"] for dye in run.dyes}
         for name, field in values.items():

@@ -10,7 +10,7 @@ import pytest
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.shot import Shot
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices, seen_of, vorticity
+from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices, seen_of
 
 State = dict[str, np.ndarray]
 
@@ -31,13 +31,6 @@ def turning(grid: Grid, spin: np.ndarray, strain: float = 0.0) -> State:
 def shown(grid: Grid, *states: State) -> SimpleNamespace:
     """As much of a run as is read."""
     return SimpleNamespace(grid=grid, state=lambda n: states[n], sampled=lambda most: states)
-
-
-def test_vorticity_of_a_rigid_rotation_is_twice_its_rate(box_of_fluid: Grid) -> None:
-    spin = np.array([0.4, -1.1, 2.3])
-    curl = vorticity(turning(box_of_fluid, spin), box_of_fluid)
-    assert curl.shape == (12, 10, 8, 3)
-    np.testing.assert_allclose(curl, np.broadcast_to(2.0 * spin, curl.shape), rtol=1e-4)
 
 
 @pytest.mark.parametrize(("rate", "strain"), [(3.0, 0.0), (0.0, 2.0), (2.0, 2.0), (2.0, 1.0)])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.grid import Grid
+from flowborne.io.cell_fields import velocity_gradients, vorticity
 from flowborne.view import style
 from flowborne.view.fields import NUMBERS, FieldNumber, Scale, dye_colours, dyes_of
 from flowborne.view.run import Run, State
@@ -85,13 +85,13 @@ class SeenVortices:
 
     def q(self, state: State) -> Array:
         """(nx, ny, nz) Q in the cells, 1/s^2; 0 in bodies and where a number is lost."""
-        slopes = gradients(state, self._grid)
+        slopes = velocity_gradients(self._grid, state)
         q = -0.5 * np.einsum("ij...,ji...->...", slopes, slopes)
         return np.where(state["open"] > 0.5, np.nan_to_num(q), 0.0)
 
     def sense(self, state: State, toward: Array) -> Array:
         """(nx, ny, nz) from -1, clockwise as seen from `toward` (3,), to 1."""
-        spin = vorticity(state, self._grid)
+        spin = np.nan_to_num(vorticity(self._grid, state))
         return np.asarray(spin @ toward / np.maximum(np.linalg.norm(spin, axis=-1), 1e-12))
 
 
@@ -118,18 +118,3 @@ def _holding(values: Array, share: float) -> float:
     if not above.size:
         return 0.0
     return float(above[np.searchsorted(np.cumsum(above), share * above.sum())])
-
-
-def gradients(state: State, grid: Grid) -> Array:
-    """(3, 3, nx, ny, nz) derivative of each component of the velocity along each axis, 1/s."""
-    cells = [
-        0.5 * (np.delete(faces, 0, axis) + np.delete(faces, -1, axis))
-        for axis, faces in enumerate(state[f"velocity_{name}"] for name in "xyz")
-    ]
-    return np.array([np.gradient(component, grid.spacing) for component in cells])
-
-
-def vorticity(state: State, grid: Grid) -> Array:
-    """(nx, ny, nz, 3) curl of the velocity in the cells, 1/s; 0 where a number is lost."""
-    (_, uy, uz), (vx, _, vz), (wx, wy, _) = gradients(state, grid)
-    return np.nan_to_num(np.stack([wy - vz, uz - wx, vx - uy], axis=-1))
