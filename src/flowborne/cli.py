@@ -170,7 +170,7 @@ def film(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="film.mp4, or frames.png for frames_0000.png and so on.",
+            help="film.mp4, film.webp, or frames.png for frames_0000.png and so on.",
             show_default="preview.png and preview.mp4 in DIR",
         ),
     ] = None,

@@ -11,6 +11,7 @@ from pathlib import Path
 import imageio.v3 as imageio
 import numpy as np
 import pytest
+from PIL import Image
 
 from flowborne.view import drawing
 from flowborne.view.drawing import drawn_frames
@@ -128,6 +129,21 @@ def test_an_image_sequence_has_alpha_where_nothing_is(write_run: Write, tmp_path
     assert not (tmp_path / "film.mp4").exists()
     with pytest.raises(ValueError, match=r"film\.gif is neither a film nor an image sequence"):
         write_shot(folder, tmp_path / "film.gif")
+
+
+def test_an_image_that_moves_has_every_frame(write_run: Write, tmp_path: Path) -> None:
+    folder = write_run(frames=3, field="vorticity")
+    shot = shot_of(background="transparent", plots=False, size=[320, 240])
+    write_shot(folder, tmp_path / "film.webp", shot=shot)
+    with Image.open(tmp_path / "film.webp") as image:
+        assert (image.n_frames, image.size, image.info["loop"]) == (4, (320, 240), 0)
+        for number in range(4):
+            image.seek(number)
+            drawn = Picture(Run.read(folder), shot=shot).draw(number).astype(int)
+            shown = np.asarray(image.convert("RGBA")).astype(int)
+            covered = drawn[..., 3:] / 255  # the colour of what is transparent means nothing
+            assert np.abs(shown - drawn)[..., 3].mean() < 4.0
+            assert (np.abs(shown - drawn) * covered)[..., :3].mean() < 4.0
 
 
 @pytest.mark.parametrize("size", [[640, 480], [480, 640], [1280, 720]])

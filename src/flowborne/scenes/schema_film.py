@@ -49,7 +49,7 @@ class FilmTable(Table):
     size               (width, height) in pixels, both even; what fits when absent
     frames_per_second  of the film, which keeps the run's time; the run's own when absent
     start, stop        s of the run; all of it when absent
-    background         "#rrggbb", or "transparent" in image sequences; water when absent
+    background         "#rrggbb", or "transparent" in image sequences and WebP; water when absent
     camera             where it is seen from
     """
 

@@ -24,10 +24,18 @@ Pixels = NDArray[np.uint8]
 PICTURE_SCALE = 1.5
 """Size of preview.png relative to that of the film."""
 
-CODING = ("-preset", "veryfast", "-crf", "19", "-movflags", "+faststart", "-f", "mp4")
-"""How the film is coded: small, sharp, and playing before it is loaded whole."""
+CODING = {
+    ".mp4": (
+        "libx264",
+        "yuv420p",
+        ("-preset", "veryfast", "-crf", "19", "-movflags", "+faststart", "-f", "mp4"),
+    ),
+    ".webp": ("libwebp_anim", "yuva420p", ("-loop", "0", "-quality", "75", "-f", "webp")),
+}
+"""Ending -> codec, pixels and options: small, sharp, and playing before it is loaded whole; a page
+shows the second one as an image, over and over."""
 
-ENDINGS = (".mp4", ".png")
+ENDINGS = (*CODING, ".png")
 
 
 def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | None = None) -> None:
@@ -60,15 +68,17 @@ def write_shot(
 ) -> str:
     """Draw a run into a file of one's own; what was written, for people.
 
-    path    film.mp4, or frames.png for an image sequence frames_0000.png, frames_0001.png, ...
+    path    film.mp4, film.webp, an image that moves, or frames.png for an image sequence
+            frames_0000.png, frames_0001.png, ...
     raises  as `make_preview`; ValueError when the name ends in something else, too
     """
     if path.suffix.lower() not in ENDINGS:
         raise ValueError(
-            f"{path} is neither a film nor an image sequence; end it with {' or '.join(ENDINGS)}"
+            f"{path} is neither a film nor an image sequence; end it with one of "
+            f"{', '.join(ENDINGS)}"
         )
     run = Run.read(folder)
-    if path.suffix.lower() == ".mp4":
+    if path.suffix.lower() in CODING:
         write_film(run, path, progress, shot)
         return str(path)
     return write_sequence(run, path, progress, shot)
@@ -77,17 +87,17 @@ def write_shot(
 def write_film(
     run: Run, path: Path, progress: Progress | None = None, shot: Shot | None = None
 ) -> None:
-    """Draw frames of `run` into an MP4 file (H.264, plays everywhere).
+    """Draw frames of `run` into an MP4 file (H.264, plays everywhere) or an animated WebP.
 
     shot    what they show, that of the run's scene when None
-    raises  ValueError when the shot does not suit the run, or is transparent; OSError when the file
-            cannot be written; what was there is then still there
+    raises  ValueError when the shot does not suit the run, or is transparent in MP4; OSError when
+            the file cannot be written; what was there is then still there
     """
     shot = run.shot if shot is None else shot
-    if shot.transparent:
+    if shot.transparent and path.suffix.lower() == ".mp4":
         raise ValueError(
             "a film in MP4 cannot be transparent; write an image sequence with --out frames.png, "
-            "or name a colour with --set background"
+            "an image that moves with --out film.webp, or name a colour with --set background"
         )
     numbers = shot.frames(run.times, run.frames_per_second)
     rate = shot.frames_per_second or run.frames_per_second
@@ -136,16 +146,17 @@ def _film(path: Path, size: tuple[int, int], rate: float) -> Iterator[Callable[[
     rate  of the film, 1/s
     """
     partial = path.with_name(partial_name(path.name))
+    codec, pixels, options = CODING[path.suffix.lower()]
     writer = imageio_ffmpeg.write_frames(
         str(partial),
         size,
         pix_fmt_in="rgba",
         fps=rate,
-        codec="libx264",
-        pix_fmt_out="yuv420p",
+        codec=codec,
+        pix_fmt_out=pixels,
         macro_block_size=2,
         quality=None,
-        output_params=list(CODING),
+        output_params=list(options),
     )
     try:
         writer.send(None)
