@@ -1,7 +1,8 @@
 """What a step in three dimensions costs, and how a frame grows with the number of cells.
 
-Of the largest part, the pressure's iterations, what they move through memory is set against what
-p = z + s p moves in the same run (after the triad of McCalpin 1995).
+The largest scene is run on all cores, too. Of the largest part, the pressure's iterations, what
+they move through memory is set against what p = z + s p moves in the same run (after the triad of
+McCalpin 1995), on one core and on all: where one takes most of what there is, others gain little.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.memory import held
 from flowborne.bench.result import Result, timed
-from flowborne.machine import PARTS, kernel_threads, memory_bandwidth
+from flowborne.machine import PARTS, cores, kernel_threads, memory_bandwidth
 from flowborne.operators import PressureSystem, faces_of
 
 NAME = "size"
@@ -53,6 +54,12 @@ def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
             f"{memory.most / 1e6:.0f} MB ({memory.most / cells[-1]:.0f} bytes a cell); "
             f"{unit * seconds[-1]:.0f} ns a cell and step: {shares}"
         )
+    if cores() > 1:
+        _, _, spread = parts_of(scenes[-1], frames, cores())
+        total = sum(spread.values())
+        lines.append(
+            f"on {cores()} threads {total:.3g} s a frame, {seconds[-1] / total:.2f} times as fast"
+        )
     lines.append(iterations_against_memory(shape))
     power = float(np.polyfit(np.log(cells), np.log(seconds), 1)[0]) if len(cells) > 1 else np.nan
     return Result(
@@ -65,9 +72,11 @@ def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     )
 
 
-def parts_of(scene: Scene, frames: int) -> tuple[tuple[int, int, int], int, dict[str, float]]:
-    """Cells along each axis, steps and median seconds of each part of a frame on one thread."""
-    with Simulation(scene, 1, "serial") as simulation, kernel_threads(1):
+def parts_of(
+    scene: Scene, frames: int, threads: int = 1
+) -> tuple[tuple[int, int, int], int, dict[str, float]]:
+    """Cells along each axis, steps and median seconds of each part of a frame."""
+    with Simulation(scene, 1, "serial") as simulation, kernel_threads(threads):
         simulation.advance_frame()
         reports = [simulation.advance_frame() for _ in range(frames)]
         shape = simulation.world.flow()[0].grid.shape
@@ -85,8 +94,11 @@ def iterations_against_memory(shape: tuple[int, int, int]) -> str:
         system = PressureSystem(faces_of(ones))
         solution, took = timed(lambda: system.solve(rhs), 3)
         most = memory_bandwidth()
+    with kernel_threads():
+        of_all = memory_bandwidth()
     each = 1e9 * took / solution.iterations / rhs.size
     return (
         f"pressure: {each:.1f} ns a cell and iteration, {MOVED / each:.0f} GB/s if nothing stays "
-        f"in cache; p = z + s p moves {1e-9 * most:.0f} GB/s"
+        f"in cache; p = z + s p moves {1e-9 * most:.0f} GB/s, on {cores()} threads "
+        f"{1e-9 * of_all:.0f} GB/s"
     )
