@@ -142,7 +142,7 @@ def check(
         typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the scene."),
     ] = None,
 ) -> None:
-    """Say everything that is wrong with a scene, and how thick the fluid sees its bodies."""
+    """Say everything that is wrong with a scene, and how the fluid sees its bodies."""
     from flowborne.coupling.seen import seen_bodies
     from flowborne.scenes.build import build
     from flowborne.scenes.load import load_scene

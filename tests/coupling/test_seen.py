@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from flowborne import Grid, load_scene
-from flowborne.coupling.seen import seen_bodies
+from flowborne.coupling.seen import Seen, seen_bodies
 from flowborne.scenes.build import build
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
 
 CUBE = Grid((20, 20, 20), 0.05, (-0.5, -0.5, -0.5))
+FINE = Grid((64, 64, 64), 1.0 / 64.0, (-0.5, -0.5, -0.5))
 TILE = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (-0.01, 0.01)])
 
 
@@ -61,9 +62,64 @@ def test_a_thin_mesh_as_a_thin_box():
     assert tile.sentence() == "tile: 0.02 m thick, seen as 0.0875 m, 1.7 cells: fewer than 3"
 
 
+def mesh_seen_in(grid: Grid, corners: np.ndarray) -> Seen:
+    """The convex hull of corners (k, 3), as the mesh of a body."""
+    vertices = " ".join(f"{x:g}" for x in corners.ravel())
+    model = (
+        f'<mujoco><asset><mesh name="fin" vertex="{vertices}"/></asset><worldbody>'
+        '<body name="fin"><joint type="slide"/><geom type="mesh" mesh="fin" contype="0" '
+        'conaffinity="0"/></body></worldbody></mujoco>'
+    )
+    (fin,) = seen_bodies(make_world(model, grid, solid_density=1000.0).setup)
+    return fin
+
+
+def wedge(high: float) -> np.ndarray:
+    """Corners of a wedge 0.6 m long whose back is `high` m high."""
+    ends = ((-0.3, 0.0), (0.3, -0.5 * high), (0.3, 0.5 * high))
+    return np.array([(x, y, z) for z in (-0.3, 0.3) for x, y in ends])
+
+
+@pytest.mark.parametrize("grid", [FINE, Grid.slab(64, 64, 1.0 / 64.0, (-0.5, -0.5))])
+def test_of_a_wedge_the_edge_is_lost_as_far_as_a_cell_fits_not_in(grid: Grid):
+    """Half a cell over half its angle's tangent of 1/6 is 3 cells."""
+    fin = mesh_seen_in(grid, wedge(0.2))
+    assert fin.tip_cells == pytest.approx(3.0, abs=0.4)
+    assert fin.tips == pytest.approx(fin.tip_cells / 64.0)
+    assert fin.sentence().endswith(
+        f"; {fin.tips:.3g} m of a tip, {fin.tip_cells:.2g} cells, are thinner than a cell and seen "
+        "rounded off. Blunt it or refine the grid"
+    )
+
+
+def test_a_blunt_wedge_and_a_plate_have_no_tips_to_tell_of():
+    for corners in (wedge(0.9), TILE):
+        fin = mesh_seen_in(CUBE, corners)
+        assert fin.tip_cells < 1.0
+        assert "tip" not in fin.sentence()
+
+
+def test_the_rim_of_a_flat_ellipsoid_is_lost_and_told_of_beside_its_thickness():
+    """It is seen as 1.75 cells thick; a cell fits in where half of that is half a cell."""
+    (fin,) = seen_in(CUBE, '<geom type="ellipsoid" size="0.4 0.4 0.01"/>')
+    assert fin.tip_cells == pytest.approx(8.0 * (1.0 - np.sqrt(1.0 - 0.25 / 0.875**2)), abs=0.4)
+    said = "fin: 0.02 m thick, seen as 0.0875 m, 1.7 cells: fewer than 3; "
+    assert fin.sentence().startswith(said + f"{fin.tips:.3g} m of a tip")
+
+
+def test_of_several_parts_the_longest_tip_counts():
+    flat, rod = (
+        '<geom type="ellipsoid" size="0.45 0.45 0.045"/>',
+        '<geom type="capsule" size="0.0445 0.1"/>',
+    )
+    (alone,), (both,) = seen_in(CUBE, flat), seen_in(CUBE, flat, rod)
+    assert both.thickness == pytest.approx(0.089)
+    assert both.tips == alone.tips > 0.05
+
+
 def test_flesh_hides_the_bones_in_it():
     seen = {one.name: one for one in seen_bodies(build(load_scene("swimmer-jet-only")).world.setup)}
-    assert all(one.tight for one in seen.values())
+    assert all(one.tight and one.tip_cells < 1.0 for one in seen.values())
     assert len(seen) == 1
 
 

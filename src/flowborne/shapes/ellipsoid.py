@@ -9,6 +9,7 @@ from flowborne.shapes.lines import in_unit_ball
 from flowborne.shapes.round import ARC, capsule_profile, revolved, swept_triangles
 from flowborne.shapes.section import Section, chord, upright_axis
 from flowborne.shapes.shape import DIRECTIONS, ENDLESS, Array, Mesh, Primitive, Shape
+from flowborne.shapes.thickness import thin_parts
 
 
 class ShapeEllipsoid(Primitive):
@@ -50,6 +51,10 @@ class ShapeEllipsoid(Primitive):
 
     def landmarks(self) -> Array:
         return np.asarray(DIRECTIONS * self.size)
+
+    def tips(self, width: float) -> float:
+        """Its rim or its ends may be sharp."""
+        return thin_parts(*self.triangles(), width)
 
     def endless(self, rotation: Array, height: float) -> Shape:
         size = self.size.copy()

@@ -112,6 +112,10 @@ class ShapeOwn(ShapeMesh):
         frame = self._centre, self._rotation
         return ShapeOwn(self.geometry, *frame, self.vertices, self.faces, self.offset + offset)
 
+    def tips(self, width: float) -> float:
+        """A ball fits into it where a smaller one, by its offset, fits within its triangles."""
+        return super().tips(width - 2.0 * self.offset)
+
 
 def named(geometry: OwnGeometry) -> str:
     """The geometry, for messages."""

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.shapes.thickness import thin_parts
+
 Array = NDArray[np.float64]
+TIP_ARC = 64
+"""Sides of what is round, to look for its tips."""
+
 ALIGNED = 1e-6
 """Largest sine of the angle by which a local axis may be off the z axis."""
 
@@ -77,6 +82,14 @@ class Section:
             points = self._corners(arc)
             plane = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
         return np.asarray(self.centre + plane @ self.axes)
+
+    def tips(self, width: float) -> float:
+        """How far it reaches along its outline beyond where a disc `width` m across fits in, m."""
+        start, end = np.moveaxis(self.outline(TIP_ARC), 1, 0)
+        rise, first = 0.5 * width * np.cross(*self.axes), np.arange(len(start))
+        a, b, c, d = (first + k * len(start) for k in range(4))
+        sides = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        return thin_parts(np.concatenate([start, end, end + rise, start + rise]), sides, width)
 
     def _corners(self, arc: int) -> Array:
         a, b = self.half

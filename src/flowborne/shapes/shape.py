@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.distance import distances
 from flowborne.shapes.section import Section
+from flowborne.shapes.thickness import thin_parts
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -124,6 +125,10 @@ class Shape(ABC):
     def thickened(self, half: float) -> Shape:
         """The same, at least 2 `half` m thick everywhere; no longer and no wider."""
 
+    def tips(self, width: float) -> float:
+        """How far it reaches along its surface beyond where a ball `width` m across fits in, m."""
+        return thin_parts(*self.triangles(), width)
+
     @abstractmethod
     def endless(self, rotation: Array, height: float) -> Shape:
         """What a slab holds of it, placed as for `section`: the same along the world's z."""
@@ -161,6 +166,10 @@ class Primitive(Shape):
 
     def thickened(self, half: float) -> Shape:
         return type(self)(np.maximum(self.size, half))
+
+    def tips(self, width: float) -> float:
+        """None: it is round, or its angles are right ones."""
+        return 0.0
 
     def endless(self, rotation: Array, height: float) -> Shape:
         return self

@@ -1,17 +1,28 @@
-"""How thick a body of triangles is."""
+"""How thick a body of triangles is, and how far its tips reach."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from flowborne.kernels.thickness import way_inward
+from flowborne.kernels.skin import skin_weights
+from flowborne.kernels.thickness import MOST_CELLS, way_inward
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 RIMS = 0.05
 """Part of a skin's area that may be thinner: around rims, where both sides meet."""
+
+FITTING = 0.95
+"""Part of its radius that a ball has to be off a skin to fit beneath it, for facets are flat."""
+
+BALLS = 1.0, 0.05
+"""Balls that have to fit, in widths: the centre of the large one may lie beyond a thin part."""
+
+MOST_FACETS = 1e5
+"""Pieces that a skin is cut into to look for its tips, about."""
 
 
 def thinnest(vertices: Array, triangles: Indices, slab: bool) -> float:
@@ -20,11 +31,10 @@ def thinnest(vertices: Array, triangles: Indices, slab: bool) -> float:
     vertices, triangles  (n, 3) m; (k, 3) outward
     slab                 whether its faces across z are cuts, not skin
     """
-    corners = vertices[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = outward(vertices[triangles])
     area = np.linalg.norm(normal, axis=1)
     if slab:
-        area[np.abs(normal[:, 2]) > 0.5 * area] = 0.0
+        area[across(normal)] = 0.0
     longest = float(np.ptp(vertices, axis=0).max())
     for halvings in range(5, -2, -1):
         way = way_inward(vertices, triangles, longest / 2.0**halvings)
@@ -33,3 +43,73 @@ def thinnest(vertices: Array, triangles: Indices, slab: bool) -> float:
     order = np.argsort(way)
     part = np.cumsum(area[order]) / area.sum()
     return float(way[order][np.searchsorted(part, RIMS)])
+
+
+def thin_parts(vertices: Array, triangles: Indices, width: float) -> float:
+    """How far a body reaches along its skin beyond where a ball `width` m across fits in, m.
+
+    Up to the edge of a wedge of angle a that is half the width over tan(a / 2). It is found to a
+    third of the width; of a body that would take more than `MOST_FACETS` less finely, and rather
+    too short. It is 0 where the ball fits nowhere: such a body is thin, and has no tips.
+
+    vertices, triangles  (n, 3) m; (k, 3) outward. Of a prism the sides, without its ends
+    """
+    if width <= 0.0:
+        return 0.0
+    corners = vertices[triangles]
+    area = 0.5 * float(np.linalg.norm(outward(corners), axis=1).sum())
+    edge = max(0.5 * width, 2.0 * np.sqrt(area / MOST_FACETS))
+    facets = divided(corners, edge)
+    fits = np.all([ball_fits(facets, vertices, triangles, part * width) for part in BALLS], axis=0)
+    if not fits.any():
+        return 0.0
+    touched = cKDTree(facets[fits].mean(axis=1))
+    beyond = touched.query(facets[~fits].reshape(-1, 3))[0].max(initial=0.0)
+    return max(0.0, float(beyond) - 0.5 * edge)
+
+
+def ball_fits(
+    facets: Array, vertices: Array, triangles: Indices, width: float
+) -> NDArray[np.bool_]:
+    """(k,) whether a ball `width` m across that lies beneath the middle of a facet is off the skin.
+
+    facets               (k, 3, 3) corners of pieces of its triangles, m
+    vertices, triangles  (n, 3) m; (k, 3) outward
+    """
+    normal = outward(facets)
+    length = np.linalg.norm(normal, axis=1)[:, None]
+    centre = facets.mean(axis=1) - 0.5 * width * normal / np.maximum(length, np.finfo(float).tiny)
+    cell = max(0.5 * width, np.ptp(vertices, axis=0).max() / MOST_CELLS)
+    corner, weight = skin_weights(centre, vertices, triangles, cell)
+    nearest = np.einsum("kc,kcd->kd", weight, vertices[corner])
+    return np.asarray(np.linalg.norm(centre - nearest, axis=1) > 0.5 * width * FITTING)
+
+
+def divided(facets: Array, longest: float) -> Array:
+    """(n, 3, 3) triangles (k, 3, 3), their longest sides halved until none is above `longest` m."""
+    done = []
+    while len(facets):
+        side = np.linalg.norm(np.roll(facets, -1, axis=1) - facets, axis=2)
+        long = side.max(axis=1) > longest
+        done.append(facets[~long])
+        first = side[long].argmax(axis=1)[:, None] + np.arange(3)
+        a, b, c = np.moveaxis(np.take_along_axis(facets[long], first[:, :, None] % 3, 1), 1, 0)
+        middle = 0.5 * (a + b)
+        halves = np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
+        facets = np.concatenate(halves)
+    return np.concatenate(done)
+
+
+def sides(vertices: Array, triangles: Indices) -> Indices:
+    """(m, 3) triangles of the skin of a slab's body, without those across z, its cuts."""
+    return triangles[~across(outward(vertices[triangles]))]
+
+
+def across(normal: Array) -> NDArray[np.bool_]:
+    """(k,) whether triangles of normals (k, 3) lie across z."""
+    return np.asarray(np.abs(normal[:, 2]) > 0.5 * np.linalg.norm(normal, axis=1))
+
+
+def outward(facets: Array) -> Array:
+    """(k, 3) normals of triangles (k, 3, 3), twice as long as their areas, m^2."""
+    return np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])

@@ -133,9 +133,12 @@ class Flesh:
     @cached_property
     def thickness(self) -> tuple[float, ...]:
         """Of each flesh at rest but for its rims, m."""
-        every = range(len(self.names))
-        skins = [self.surface[self.of_surface == f] for f in every]
-        return tuple(thinnest(self.rest, skin, self.model.slab) for skin in skins)
+        return tuple(thinnest(self.rest, skin, self.model.slab) for skin in self.skins)
+
+    @property
+    def skins(self) -> list[Indices]:
+        """(m, 3) triangles of each flesh, outward."""
+        return [self.surface[self.of_surface == f] for f in range(len(self.names))]
 
     @cached_property
     def volumes(self) -> Array:
