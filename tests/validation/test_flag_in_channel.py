@@ -62,3 +62,14 @@ def test_D3_figures_of_a_known_flutter() -> None:
     assert seen.frequency == pytest.approx(2.0, rel=1e-3)
     np.testing.assert_allclose(seen.means, [235.0, 5.0, 0.0, 0.0], rtol=1e-3, atol=1e-3)
     np.testing.assert_allclose(seen.amplitudes, [35.0, 230.0, 0.0, 0.08], rtol=2e-3)
+
+
+def test_a_flow_that_does_not_swing_is_told_as_at_rest() -> None:
+    """And is no lost run: on coarse grids vortices may not be shed."""
+    time = 0.01 * np.arange(400)
+    rows = np.stack([5.0 + np.exp(-time), 2.0 - np.exp(-time), 0.0 * time, 0.0 * time], axis=1)
+    seen = flags.flutter(rows, 0.01)
+    assert seen.frequency == 0.0
+    assert seen.means[:2] == pytest.approx([5.0, 2.0], abs=0.03)
+    assert seen.amplitudes[:2] == pytest.approx(0.0, abs=0.01)
+    assert "at rest" in seen.line

@@ -227,11 +227,11 @@ PERIODS = 4
 
 @dataclass(frozen=True)
 class Flutter:
-    """Figures of a motion that repeats itself.
+    """Figures of a motion that repeats itself, or has come to rest.
 
     means, amplitudes  (4,) middle and half of what lies between the extremes of drag (N/m), lift
                        (N/m) and the two coordinates of A (m), over whole periods
-    frequency          Hz, of a rigid flag's lift, or of A across the channel
+    frequency          Hz, of a rigid flag's lift, or of A across the channel; 0 at rest
     line               how far it is from repeating itself
     """
 
@@ -244,11 +244,15 @@ class Flutter:
 def flutter(rows: Array, dt: float) -> Flutter:
     """Figures of the last PERIODS periods of drag, lift and place of A (steps, 4).
 
-    Raises ArithmeticError when there are not so many.
+    Where there are not so many, of the LAST part of the rows.
     """
     drag, lift, _, up = rows.T
     clock = up if up.any() else lift
     seen = Shedding(dt, drag, clock, np.zeros(0))
+    if seen.rises().size <= PERIODS:
+        last = rows[-round(LAST * len(rows)) :]
+        middle, swing = 0.5 * (last.max(axis=0) + last.min(axis=0)), 0.5 * np.ptp(last, axis=0)
+        return Flutter(middle, swing, 0.0, f"at rest; lift still changes by {2.0 * swing[1]:.2g}")
     steps, period = seen.last(PERIODS)
     last = rows[steps]
     middle = [0.5 * (crest(v)[0] - crest(-v)[0]) for v in last.T]
