@@ -222,5 +222,5 @@ def test_wings_in_air_bend_alike() -> None:
         for _ in range(2):
             flyer.advance_frame()
         left, right = (flyer.joint(f"{side}_bend").position[0] for side in ("left", "right"))
-    assert left < -np.radians(0.5)
+    assert left < -np.radians(0.25)
     assert left == pytest.approx(right, rel=2e-3)
