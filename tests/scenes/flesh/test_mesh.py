@@ -204,20 +204,3 @@ def test_other_files_are_no_mesh_of_flesh(tmp_path: Path) -> None:
     pv.ImageData(dimensions=(2, 2, 2)).to_tetrahedra().save(tmp_path / "other.vtu")
     with pytest.raises(ValueError, match=r"other\.vtu cannot be read as a mesh of flesh"):
         read_mesh(tmp_path / "other.vtu")
-
-
-def test_the_tip_of_a_wedge_between_walls_is_kept() -> None:
-    """Of five legs a tenth is meshed: a sharp wedge, of which the mesher likes to lose the tip."""
-    legs = "".join(
-        f'<body name="{n}" euler="0 0 {72 * n}"><geom type="capsule" size=".25" '
-        'fromto=".6 0 -.5 1.5 0 -1.4"/></body>'
-        for n in range(5)
-    )
-    spec = mujoco.MjSpec.from_string(
-        f'<mujoco><worldbody><body name="head"><geom size=".9"/>{legs}</body></worldbody></mujoco>'
-    )
-    star = skin_mesh(spec, ("head", *"01234"), thickness=0.2, size=1.0)
-    surface = np.unique(outer_surface(star.points, star.elements))
-    on_axis = star.points[surface][np.hypot(*star.points[surface, :2].T) < 0.05, 2]
-    assert on_axis.max() > 1.0
-    assert on_axis.min() < -1.0

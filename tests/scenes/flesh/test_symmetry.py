@@ -168,20 +168,39 @@ def test_without_such_a_plane_all_is_meshed_at_once(tmp_path: Path) -> None:
     assert len(chamber(two_armed(), surface=lopsided).walls) == 0
 
 
-def test_five_legs_make_ten_images_of_half_a_leg() -> None:
+HEAD_AND_LEGS = ("head", *"01234")
+
+
+def five_legged(head: float, leg: float, fromto: str) -> mujoco.MjSpec:
+    """Five legs under a head, of these radii in m; `fromto` is that of the first leg."""
     legs = "".join(
-        f'<body name="{n}" euler="0 0 {72 * n}"><geom type="capsule" size=".1" '
-        'fromto=".6 0 0 1.5 0 -1"/></body>'
+        f'<body name="{n}" euler="0 0 {72 * n}"><geom type="capsule" size="{leg}" '
+        f'fromto="{fromto}"/></body>'
         for n in range(5)
     )
-    spec = mujoco.MjSpec.from_string(
-        f'<mujoco><worldbody><body name="head"><geom size=".6"/>{legs}</body></worldbody></mujoco>'
+    return mujoco.MjSpec.from_string(
+        f'<mujoco><worldbody><body name="head"><geom size="{head}"/>{legs}</body></worldbody>'
+        "</mujoco>"
     )
-    star = chamber(spec, ("head", *"01234"))
+
+
+def test_five_legs_make_ten_images_of_half_a_leg() -> None:
+    spec = five_legged(0.6, 0.1, ".6 0 0 1.5 0 -1")
+    star = chamber(spec, HEAD_AND_LEGS)
     assert len(star.walls) == 2
     assert -star.walls[0] @ star.walls[1] == pytest.approx(np.cos(np.pi / 5.0), abs=1e-9)
     assert len(star.images) == 10
     assert np.abs(np.linalg.det(star.images)) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_tip_of_a_wedge_between_walls_is_kept() -> None:
+    """Of five legs a tenth is meshed: a sharp wedge, of which the mesher likes to lose the tip."""
+    spec = five_legged(0.9, 0.25, ".6 0 -.5 1.5 0 -1.4")
+    star = skin_mesh(spec, HEAD_AND_LEGS, thickness=0.2, size=1.0)
+    surface = np.unique(outer_surface(star.points, star.elements))
+    on_axis = star.points[surface][np.hypot(*star.points[surface, :2].T) < 0.05, 2]
+    assert on_axis.max() > 1.0
+    assert on_axis.min() < -1.0
 
 
 @pytest.mark.parametrize(
