@@ -25,7 +25,7 @@ class RunProgress:
     """News of a run.
 
     stage      "start" (once), "compiling" (at every kernel), "frame" (after every frame), "film"
-               (once, and after every frame drawn)
+               (after every frame drawn)
     frame      frames done, or drawn
     frames     frames wanted
     seconds    since the run began

@@ -49,29 +49,23 @@ def test_of_several_parts_the_thinnest_counts_and_a_slab_has_no_thickness_across
     assert fin.thickness == fin.seen == pytest.approx(0.18)
 
 
-def test_a_thin_mesh_as_a_thin_box():
-    vertices = " ".join(f"{x:g}" for x in TILE.ravel())
-    model = (
-        f'<mujoco><asset><mesh name="tile" vertex="{vertices}"/></asset><worldbody>'
-        '<body name="tile"><joint type="slide"/><geom type="mesh" mesh="tile" contype="0" '
-        'conaffinity="0"/></body></worldbody></mujoco>'
-    )
-    (tile,) = seen_bodies(make_world(model, CUBE, solid_density=1000.0).setup)
-    assert tile.thickness == pytest.approx(0.02)
-    assert tile.tight
-    assert tile.sentence() == "tile: 0.02 m thick, seen as 0.0875 m, 1.7 cells: fewer than 3"
-
-
-def mesh_seen_in(grid: Grid, corners: np.ndarray) -> Seen:
+def mesh_seen_in(grid: Grid, corners: np.ndarray, name: str = "fin") -> Seen:
     """The convex hull of corners (k, 3), as the mesh of a body."""
     vertices = " ".join(f"{x:g}" for x in corners.ravel())
     model = (
-        f'<mujoco><asset><mesh name="fin" vertex="{vertices}"/></asset><worldbody>'
-        '<body name="fin"><joint type="slide"/><geom type="mesh" mesh="fin" contype="0" '
+        f'<mujoco><asset><mesh name="{name}" vertex="{vertices}"/></asset><worldbody>'
+        f'<body name="{name}"><joint type="slide"/><geom type="mesh" mesh="{name}" contype="0" '
         'conaffinity="0"/></body></worldbody></mujoco>'
     )
-    (fin,) = seen_bodies(make_world(model, grid, solid_density=1000.0).setup)
-    return fin
+    (body,) = seen_bodies(make_world(model, grid, solid_density=1000.0).setup)
+    return body
+
+
+def test_a_thin_mesh_as_a_thin_box():
+    tile = mesh_seen_in(CUBE, TILE, "tile")
+    assert tile.thickness == pytest.approx(0.02)
+    assert tile.tight
+    assert tile.sentence() == "tile: 0.02 m thick, seen as 0.0875 m, 1.7 cells: fewer than 3"
 
 
 def wedge(high: float) -> np.ndarray:

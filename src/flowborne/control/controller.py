@@ -158,7 +158,7 @@ class Controller:
 
     def strength_at(self, time: float) -> Array:
         """(n,) the fastest that each controlled dof moves at `time` (s), rad/s or m/s."""
-        strength = np.array(np.broadcast_to(self.strength, self.dofs.shape), dtype=np.float64)
+        strength = self._strengths()
         for other in self.in_phases:
             if other.phases.active(time):
                 strength[list(other.places)] = other.strength
@@ -166,11 +166,15 @@ class Controller:
 
     def greatest_strength(self) -> Array:
         """(n,) as `strength_at`, the most of all times."""
-        greatest = np.array(np.broadcast_to(self.strength, self.dofs.shape), dtype=np.float64)
+        greatest = self._strengths()
         for other in self.in_phases:
             places = list(other.places)
             greatest[places] = np.maximum(greatest[places], other.strength)
         return greatest
+
+    def _strengths(self) -> Array:
+        """(n,) a copy of `strength`, one for each dof."""
+        return np.array(np.broadcast_to(self.strength, self.dofs.shape), dtype=np.float64)
 
     def command(self, world: World, frame_end_time: float, dt: float) -> JointCommand:
         """Command to the controlled dofs for the next step; without a decision yet, to hold still.

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 
+from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.scenes.wording import suggestion
 from flowborne.shapes.mesh import ShapeMesh
-from flowborne.shapes.shape import Shape
+from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.mjcf import (
     displacing_geoms,
     element_name,
@@ -43,15 +43,14 @@ class Part:
     low: Array
     high: Array
     thinnest: float
-    surface: pv.PolyData | None
+    surface: Mesh | None
 
     def distance(self, points: Array) -> Array:
         """(n,) signed distances of points (n, 3), negative inside, m."""
         local = np.ascontiguousarray((points - self.position) @ self.rotation)
         if self.surface is None:
             return self.shape.distance(local)
-        cloud = pv.PolyData(local).compute_implicit_distance(self.surface)
-        return np.asarray(cloud["implicit_distance"], dtype=np.float64)
+        return signed_distance(local, self.surface)
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,5 @@ def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: A
         centre - reach,
         centre + reach,
         float(half.min()),
-        pv.PolyData.from_regular_faces(*shape.triangles())
-        if isinstance(shape, ShapeMesh)
-        else None,
+        shape.triangles() if isinstance(shape, ShapeMesh) else None,
     )

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from flowborne.scenes.flesh.bones import Bones, bones_of
 from flowborne.scenes.flesh.contour import contour
+from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.scenes.flesh.mesher import tetrahedra_within
 from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
 from flowborne.scenes.flesh.symmetry import Chamber, chamber_of
@@ -126,16 +126,15 @@ def _meshed(
     within the tolerance of both: a pit as deep as the flesh. It meshes again until there is none.
     raises  ValueError when it always is
     """
-    skin = pv.PolyData.from_regular_faces(*outside)
+    part = chamber.cut(hollow)
     for _ in range(TRIES):
-        points, elements = tetrahedra_within(chamber.cut(hollow), size, tolerance)
+        points, elements = tetrahedra_within(part, size, tolerance)
         flesh = bones.distance(points[elements].mean(axis=1)) > 0.0
         points, elements = chamber.unfold(points, elements, flesh, hollow, tolerance)
         used, renumbered = np.unique(elements, return_inverse=True)
         points, elements = points[used], renumbered.reshape(-1, 4)
-        corners = pv.PolyData(points[np.unique(outer_surface(points, elements))])
-        corners.compute_implicit_distance(skin, inplace=True)
-        if np.abs(corners["implicit_distance"]).max() <= ASTRAY * tolerance:
+        corners = points[np.unique(outer_surface(points, elements))]
+        if np.abs(signed_distance(corners, outside)).max() <= ASTRAY * tolerance:
             return points, elements, tolerance
         tolerance *= TIGHTER
     raise ValueError(

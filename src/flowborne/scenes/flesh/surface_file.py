@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flowborne.scenes.flesh.bones import Bones
 from flowborne.scenes.flesh.contour import contour
+from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.shapes.shape import Mesh
 
 Array = NDArray[np.float64]
@@ -58,8 +59,7 @@ def check_covers(path: Path, surface: Mesh, bones: Bones, pitch: float, toleranc
     pitch  of the lattice on which the bones' surfaces are looked for, m
     """
     points = contour(bones, 0.0, pitch)[0]
-    cloud = pv.PolyData(points).compute_implicit_distance(pv.PolyData.from_regular_faces(*surface))
-    outside = np.asarray(cloud["implicit_distance"])
+    outside = signed_distance(points, surface)
     worst = int(outside.argmax())
     if outside[worst] > tolerance:
         bone = bones.names[int(bones.distances(points[worst : worst + 1]).argmin())]

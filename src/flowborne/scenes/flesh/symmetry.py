@@ -16,6 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from flowborne.scenes.flesh.bones import Bones
+from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.flesh import surface_of
 
@@ -109,9 +110,7 @@ class Chamber:
         one faces says nothing, as the mesher may tilt it.
         """
         faces = surface_of(elements)
-        middles = pv.PolyData(points[faces].mean(axis=1))
-        middles.compute_implicit_distance(pv.PolyData.from_regular_faces(*surface), inplace=True)
-        to_surface = np.abs(middles["implicit_distance"])
+        to_surface = np.abs(signed_distance(points[faces].mean(axis=1), surface))
         on_wall = np.zeros((len(self.walls), len(points)), bool)
         for wall, on in zip(self.walls, on_wall, strict=True):
             away = np.abs((points - self.centre) @ wall)[faces]
@@ -170,9 +169,7 @@ def _is_mirror(
         return False
     if surface is None:
         return True
-    cloud = pv.PolyData(image(surface[0]))
-    cloud.compute_implicit_distance(pv.PolyData.from_regular_faces(*surface), inplace=True)
-    return bool(np.abs(cloud["implicit_distance"]).max() <= same)
+    return bool(np.abs(signed_distance(image(surface[0]), surface)).max() <= same)
 
 
 def _next_to(normal: Array, inward: Array) -> bool:
