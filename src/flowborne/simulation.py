@@ -112,17 +112,17 @@ class Simulation:
             built.world.setup, self.controller, self.scene.stream(), self.scene.output.bodies
         )
         self._moment = _Moment(built.world, 0, None)
-        self._at_rest = built.world.fluid is not None
+        self._started = False
         self._step: Step = step
 
     @property
     def world(self) -> World:
         """The state after `frame` frames; each frame puts a new World in its place.
 
-        raises  SceneError when the fluid cannot be set going with the bodies, the first time
+        raises  SceneError when the bodies and the fluid cannot be set going, the first time
         """
-        if self._at_rest:
-            self._set_going()
+        if not self._started:
+            self._start()
         return self._moment.world
 
     @property
@@ -147,7 +147,7 @@ class Simulation:
 
     def restore(self, world: World, frame: int) -> None:
         """Go on from `world`, which is the state after `frame` frames of the same scene."""
-        self._moment, self._at_rest = _Moment(world, frame, None), False
+        self._moment, self._started = _Moment(world, frame, None), True
 
     def advance_frame(self) -> FrameReport:
         """Decide, then take the steps of one frame, on all cores unless a context allows less.
@@ -195,22 +195,27 @@ class Simulation:
     def __exit__(self, *raised: object) -> None:
         self.close()
 
-    def _set_going(self) -> None:
-        """Let the fluid flow around bodies that move from the start."""
-        from flowborne.coupling.start import set_going
+    def _start(self) -> None:
+        """Set bodies and fluid going; controlled joints keep their velocity until a decision."""
+        from flowborne.coupling.motion import JointCommand
+        from flowborne.coupling.start import start
 
         world, scene = self._moment.world, self.scene
         free = free_joint_dofs(world.setup.solid)
         given = np.ones(free.size, bool) if scene.initial.impulse == "given" else ~free
+        held = JointCommand.none(free.size)
+        if self.controller is not None:
+            dofs = np.asarray(self.controller.dofs)
+            held.set(dofs, world.solid.v[dofs], world.solid.v[dofs])
         try:
             with _one_blas_thread(), kernel_threads():
-                set_going(world, given)
+                start(world, self.frame_time / self.steps_per_frame, given, held)
         except (ArithmeticError, ValueError) as error:
             raise SceneError(
                 f"scene {scene.name}, [initial]: {error}. Look for bodies that are in each other "
                 "or in a side of the domain, and for velocities that are too large."
             ) from error
-        self._at_rest = False
+        self._started = True
 
     def _advance(self, world: World, frame: int) -> FrameReport:
         """Take `world` through a frame."""

@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 from flowborne.coupling import flow
 from flowborne.coupling.motion import JointCommand, Trajectory
 from flowborne.coupling.report import Outcome, StepReport
-from flowborne.coupling.start import set_going
+from flowborne.coupling.start import set_going, start
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.stream import Sampled
 from flowborne.coupling.world import Fluid, Setup, World
@@ -33,6 +33,7 @@ __all__ = [
     "make_world",
     "set_going",
     "set_velocity",
+    "start",
     "start_from",
     "velocity_at",
 ]

@@ -2,18 +2,54 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome
-from flowborne.coupling.step import step
+from flowborne.coupling.step import joint_command, step
 from flowborne.coupling.world import World
 
 INSTANT = 1e-9
 """s of the step in which only impulses act."""
+
+
+def start(
+    world: World,
+    dt: float,
+    given: NDArray[np.bool_] | None = None,
+    command: JointCommand | None = None,
+) -> None:
+    """Take the velocities of the start to the middle of the first step, in place.
+
+    A step of leapfrog moves bodies with the velocity of its middle. Were that of the start taken
+    for it, times would be half a step off, and a creature whose joints begin to move would keep
+    the impulse that half a step of their drives gives it. So the fluid is set going with the bodies
+    (`set_going`) where they were half a step before, and half a step under all forces brings them
+    here.
+
+    dt       s, of the steps to come
+    given    as in `set_going`
+    command  to joints without a trajectory
+    raises   ValueError when the flow cannot be solved for, or the half step fails
+    """
+    setup, time, half = world.setup, world.time, 0.5 * dt
+    if world.fluid is not None:
+        set_going(world, given)
+    if world.solid.v.any():
+        world.solid.q[:] = setup.solid.integrate(world.solid.q, world.solid.v, -half)
+        if world.fluid is not None:
+            set_going(world)
+    world.time, world.ahead = time - half, half
+    command = joint_command(world, half, command)
+    world.time, world.setup = time, setup.but(motions=())
+    scalars = {} if world.fluid is None else world.fluid.scalars
+    report = step(world, half, command)
+    if report.outcome is not Outcome.DONE:
+        raise ValueError(f"the first half of a step failed: {report.outcome.value}")
+    if world.fluid is not None:
+        world.fluid.scalars = scalars
+    world.setup, world.time, world.steps, world.ahead = setup, time, 0, half
 
 
 def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
@@ -31,7 +67,7 @@ def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
     if fluid.one_way:
         return
     there = World(
-        replace(world.setup, motions=(), winds=()),
+        world.setup.but(motions=(), winds=()),
         world.solid.copy(),
         state.copy(),
         world.time,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -75,9 +76,14 @@ class Setup:
         if self.fluid is None:
             return replace(self, trial=True)
         tolerance = max(self.fluid.tolerance, HYPOTHETICAL)
-        looser = replace(self, fluid=replace(self.fluid, tolerance=tolerance), trial=True)
-        vars(looser)["shapes"] = self.shapes  # the same bodies on the same grid, sampled once
-        return looser
+        return self.but(fluid=replace(self.fluid, tolerance=tolerance), trial=True)
+
+    def but(self, **parts: Any) -> Setup:
+        """The same with other `parts`, but the same bodies on the same grid: sampled once."""
+        other = replace(self, **parts)
+        if self.fluid is not None:
+            vars(other)["shapes"] = self.shapes
+        return other
 
     @cached_property
     def shapes(self) -> Shapes:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.motion import Trajectory, velocity_after
+from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
 from flowborne.scenes.build_drives import driven, servo_of
 from flowborne.scenes.build_shapes import placed_shapes
@@ -176,10 +176,9 @@ def initial_state(scene: Scene, model: SolidModel) -> SolidState:
     state = posed(scene, model)
     motions = trajectories_of(scene, model, state.q.copy())
     pose_controlled(scene, model, state.q)
-    dt = scene.frame_time / scene.time.steps_per_frame
     for motion in motions:
         state.q[model.indices_of(motion.dofs)] = motion.position(0.0)
-        state.v[motion.dofs] = velocity_after(model, state.q, motion, 0.0, dt)
+        state.v[motion.dofs] = motion.velocity(0.0)
     state.q = posed_flesh(model, state.q)
     state.v = follow(model, state.q, state.v)
     return state

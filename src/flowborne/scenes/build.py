@@ -54,7 +54,6 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     setup = Setup(model, fluid, motions, winds_of(scene), mouths_of(scene, model))
     world = World.at_rest(setup)
     world.solid = initial_state(scene, model)
-    world.ahead = 0.5 * scene.frame_time / scene.time.steps_per_frame
     if world.fluid is not None:
         _set_velocity(world.fluid, scene)
     controller = None

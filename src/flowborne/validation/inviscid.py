@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne import Array, Grid, World
+from flowborne import Array, Grid
 from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
 from flowborne.validation.fluid_cases import Uniform, all_inflow
@@ -15,7 +15,7 @@ from flowborne.validation.pendulums import passages
 from flowborne.validation.reference import reference, table
 from flowborne.validation.worlds import PERIODIC, RING, Vector, mjcf, start_at_once
 from flowborne.winds import WindForce
-from flowborne.worlds import advance, kinetic_energy, make_world, set_velocity
+from flowborne.worlds import advance, kinetic_energy, make_world, set_velocity, start
 
 G = 9.81
 
@@ -190,19 +190,6 @@ def small_period(ratio: float, added: float) -> float:
     return float(2.0 * np.pi * np.sqrt(inertia / (abs(ratio - 1.0) * G * ROD)))
 
 
-def start_midway(world: World, dt: float) -> None:
-    """Give bodies and fluid the velocity of the middle of the first step from rest."""
-    ahead = world.copy()
-    advance(ahead, dt)
-    world.solid.v[:] = 0.5 * ahead.solid.v
-    _, state = world.flow()
-    _, later = ahead.flow()
-    for axis in range(3):
-        state.velocity[axis][:] = 0.5 * later.velocity[axis]
-        state.advecting_velocity[axis][:] = 0.5 * later.advecting_velocity[axis]
-        state.acceleration[axis][:] = later.acceleration[axis]
-
-
 def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: float) -> float:
     """Period in s of the bob, let go at an angle from where it rests.
 
@@ -218,7 +205,7 @@ def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: fl
     world.solid.q[0] = np.radians(degrees)
     fastest = 2.0 * np.pi / period * ROD * np.radians(degrees)
     dt = min(0.01 * period, 0.5 * grid.spacing / fastest)
-    start_midway(world, dt)
+    start(world, dt)
     angles = [float(world.solid.q[0])]
     for _ in range(int(1.35 * period / dt)):
         advance(world, dt)
