@@ -160,12 +160,14 @@ def test_forces_are_the_runs(name: str, stages: Stages) -> None:
 
 @pytest.mark.parametrize("name", RUNS)
 def test_paths_go_through_the_bones_and_the_camera_sees_them(name: str, stages: Stages) -> None:
+    """Through a lens of 50 mm: USD counts it in tenths of the unit of length."""
     creature, stage = stages[name]
     paths = UsdGeom.BasisCurves.Get(stage, "/Run/Paths")
     shape = (len(creature.skeleton.names), len(creature.run), 3)
     points = np.reshape(paths.GetPointsAttr().Get(), shape)
     assert_allclose(points, np.swapaxes(creature.skeleton.position, 0, 1), atol=1e-6)
     camera = UsdGeom.Camera.Get(stage, "/Run/Camera").GetCamera(0.0)
+    assert camera.focalLength * UsdGeom.GetStageMetersPerUnit(stage) == pytest.approx(0.5)
     low, high = creature.bounds
     corners = np.where(np.indices((2, 2, 2)).reshape(3, -1).T, low, high)
     assert all(camera.frustum.Intersects(Gf.Vec3d(*corner)) for corner in corners)

@@ -47,6 +47,9 @@ ROUGH = 0.8
 LENS, FILM, ASPECT = 50.0, 36.0, 16.0 / 9.0
 """Focal length and width of the picture, both in mm, and its width over its height."""
 
+MM = 0.01
+"""What USD has lenses and films in where lengths are metres: tenths of the unit."""
+
 TOWARD = np.array([-0.45, 0.85, -0.3])
 """Direction in which the camera looks in a room."""
 
@@ -201,9 +204,9 @@ def _camera(stage: Usd.Stage, creature: Creature) -> None:
         camera.CreateHorizontalApertureAttr(10.0 * ASPECT * height)
         camera.CreateVerticalApertureAttr(10.0 * height)
     else:
-        camera.CreateHorizontalApertureAttr(FILM)
-        camera.CreateVerticalApertureAttr(FILM / ASPECT)
-    camera.CreateFocalLengthAttr(LENS)
+        camera.CreateHorizontalApertureAttr(FILM * MM)
+        camera.CreateVerticalApertureAttr(FILM / ASPECT * MM)
+    camera.CreateFocalLengthAttr(LENS * MM)
     camera.CreateClippingRangeAttr(Gf.Vec2f(0.01 * distance, 100.0 * distance))
     right = np.cross(toward, up) / np.linalg.norm(np.cross(toward, up))
     axes = np.stack([right, np.cross(right, toward), -toward], axis=1)

@@ -32,6 +32,10 @@ QUANTITIES = (
 )
 
 
+HEADING = 4
+"""Number of the heading among them."""
+
+
 @dataclass(frozen=True)
 class SwimPath:
     """Where the robot is at TIMES.
@@ -67,11 +71,11 @@ def resampled(values: Array, last: float) -> Array:
     return np.asarray(spline(within) + (TIMES - within)[:, None] * spline(within, 1))
 
 
-def motor_angles(amplitude: int) -> Array:
-    """(241, 5) degrees of the joints at TIMES, as the motors turned them."""
+def motor_angles(amplitude: int, last: int = -2) -> Array:
+    """(241, 5) degrees of the joints at TIMES, as the motors turned them; `last` as `measured`."""
     log = table(f"motor_angles_{amplitude}deg")
     angles = np.stack([log[f"actual_{n}"] for n in range(1, 6)], axis=1)
-    return resampled(angles, log["time_s"][-2])
+    return resampled(angles, log["time_s"][last])
 
 
 def mass_centre(head: Array, joints: Array) -> Array:
@@ -87,14 +91,18 @@ def mass_centre(head: Array, joints: Array) -> Array:
     return np.asarray(np.average(middles, axis=1, weights=MASS))
 
 
-def measured(amplitude: int) -> list[SwimPath]:
-    """All runs at an amplitude of the gait in degrees, 20 or 40."""
-    log, joints = table(f"hardware_{amplitude}deg"), motor_angles(amplitude)
+def measured(amplitude: int, last: int = -2) -> list[SwimPath]:
+    """All runs at an amplitude of the gait in degrees, 20 or 40.
+
+    last  the sample whose time the last one is given: the last but one as published, -1 by the
+          logs' own times, which are later by 17 ms in the mean
+    """
+    log, joints = table(f"hardware_{amplitude}deg"), motor_angles(amplitude, last)
     runs = []
     for run in np.unique(log["run"]):
         mine = log["run"] == run
         sampled = np.stack([log["x_cm"], log["y_cm"], -log["yaw_deg"]], axis=1)[mine]
-        head = resampled(sampled, log["time_s"][mine][-2])
+        head = resampled(sampled, log["time_s"][mine][last])
         runs.append(SwimPath(mass_centre(head, joints), head))
     return runs
 
@@ -108,3 +116,16 @@ def rmse(changes: Array, runs: list[SwimPath]) -> Array:
 def scatter(runs: list[SwimPath]) -> Array:
     """(5,) rmse of the mean of all runs, the least that one trajectory can have."""
     return rmse(np.mean([run.changes() for run in runs], axis=0), runs)
+
+
+def lag(changes: Array, runs: list[SwimPath]) -> tuple[float, float]:
+    """By how much (s, to 5 ms) a trajectory's heading comes late, and its rmse without that."""
+    heading = CubicSpline(TIMES, changes[:, HEADING])
+    lags = 0.005 * np.arange(25)
+    errors = []
+    for late in lags:
+        earlier = changes.copy()
+        earlier[:, HEADING] = heading(np.minimum(TIMES + late, TIMES[-1])) - heading(late)
+        errors.append(float(rmse(earlier, runs)[HEADING]))
+    best = int(np.argmin(errors))
+    return float(lags[best]), errors[best]

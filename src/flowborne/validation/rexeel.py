@@ -19,9 +19,11 @@ from flowborne import Array, BlowUpError, Simulation, load_scene
 from flowborne.bodies import kinematics
 from flowborne.validation.case import Case, Finding
 from flowborne.validation.eel_runs import (
+    HEADING,
     QUANTITIES,
     TIMES,
     SwimPath,
+    lag,
     measured,
     rmse,
     scatter,
@@ -110,6 +112,8 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
             f"{count:>6} cells across the tank: {error:.3f}, 4 s in {one.seconds:.0f} s"
             for count, error, one in zip(cells, errors[:, n], swims, strict=True)
         ]
+        if n == HEADING:
+            lines += lateness(swims[-1].path.changes(), amplitude, runs)
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
         findings.append(
             Finding(
@@ -122,6 +126,16 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
             )
         )
     return findings
+
+
+def lateness(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[str]:
+    """What of a heading's error is lateness, in words."""
+    late, left = lag(changes, runs)
+    own = float(rmse(changes, measured(amplitude, last=-1))[HEADING])
+    return [
+        f"late by {1e3 * late:.0f} ms: {left:.3f} without that",
+        f"by the times in the logs, to which the published comparison does not keep: {own:.3f}",
+    ]
 
 
 def robot(quick: bool) -> list[Finding]:

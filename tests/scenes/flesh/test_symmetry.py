@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.flesh.bones import bones_of
 from flowborne.scenes.flesh.contour import contour
-from flowborne.scenes.flesh.mesh import FleshMesh, skin_mesh
+from flowborne.scenes.flesh.mesh import ASTRAY, FIDELITY, FleshMesh, skin_mesh
 from flowborne.scenes.flesh.symmetry import Chamber, chamber_of, reflection
 from flowborne.scenes.load import load_scene
 from flowborne.shapes.shape import Mesh
@@ -194,13 +194,17 @@ def test_five_legs_make_ten_images_of_half_a_leg() -> None:
 
 
 def test_the_tip_of_a_wedge_between_walls_is_kept() -> None:
-    """Of five legs a tenth is meshed: a sharp wedge, of which the mesher likes to lose the tip."""
+    """Of five legs a tenth is meshed: a sharp wedge, of which the mesher likes to lose the tip.
+
+    The skin is 1.1 m from the middle, and lost it would be 0.9; between them is what is accepted.
+    """
     spec = five_legged(0.9, 0.25, ".6 0 -.5 1.5 0 -1.4")
     star = skin_mesh(spec, HEAD_AND_LEGS, thickness=0.2, size=1.0)
     surface = np.unique(outer_surface(star.points, star.elements))
     on_axis = star.points[surface][np.hypot(*star.points[surface, :2].T) < 0.05, 2]
-    assert on_axis.max() > 1.0
-    assert on_axis.min() < -1.0
+    accepted = 1.1 - ASTRAY * FIDELITY
+    assert on_axis.max() > accepted
+    assert on_axis.min() < -accepted
 
 
 @pytest.mark.parametrize(
