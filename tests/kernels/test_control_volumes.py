@@ -181,8 +181,10 @@ def test_small_ones_mix_with_their_neighbours_and_keep_the_sum(
     if case.last is not None:
         field[case.last] = np.take(field, [0], component)
     mixed = field.copy()
-    level(mixed, case.volumes, listed, 0.05, 0.2, 0.003, 0.01, case.shape, case.wraps)
-    expected = level_reference(field, case.volumes, listed, 0.05, 0.2, 0.003, 0.01, case.wraps)
+    limits = 0.05, 0.2, 0.003, 0.01
+    before = case.volumes * np.random.default_rng(4).uniform(0.0, 3.0, case.volumes.shape)
+    level(mixed, before, case.volumes, listed, *limits, case.shape, case.wraps)
+    expected = level_reference(field, before, case.volumes, listed, *limits, case.wraps)
     assert (mixed != field).any()
     np.testing.assert_allclose(mixed, expected, atol=1e-14)
     weights = case.volumes.copy()

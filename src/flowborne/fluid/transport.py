@@ -321,7 +321,7 @@ class Flow:
             join_small(later, merged, self.small, self.targets, self.shares, self.nothing)
         if self.listed.size:
             limits = TINY * self.limit, SMALL * self.limit, self.held, self.nothing
-            level(later, merged, self.listed, *limits, self.shape, self.wraps)
+            level(later, self.low, merged, self.listed, *limits, self.shape, self.wraps)
             follow_targets(later, self.whole, self.whole_targets)
             fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)
         self.join(later)

@@ -289,6 +289,7 @@ def fill_empty_reference(
 @njit(nogil=True, cache=True)
 def level(
     field: Array,
+    before: Array,
     volumes: Array,
     listed: Integers,
     tiny: float,
@@ -302,9 +303,14 @@ def level(
 
     The exchange V_i V_t/(V_i + V_t) (u_t - u_i) levels both out and keeps their sum (Hu et al.
     2006): all of it below the volume `tiny`, none above `small`, linear between; and less where
-    friction holds them, by what that slows them down in a step, 1 + held / V_i^2.
+    friction holds them, by what that slows them down in a step, 1 + held / V_i^2. One that vanishes
+    in the step keeps no greater part of what it had than is left of its volume, or that, over what
+    is left, could be any velocity.
+
+    before   volumes at the start of the step
+    volumes  at its end
     """
-    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    flat, volume, earlier = field.reshape(-1), volumes.reshape(-1), before.reshape(-1)
     for n in range(listed.size):
         f = listed[n]
         own = volume[f]
@@ -317,7 +323,8 @@ def level(
                 best, most = to, volume[to]
         if best < 0:
             continue
-        share = min((small - own) / (small - tiny), 1.0) / (1.0 + held / own**2)
+        kept = min(held / (held + own**2), own / max(own, earlier[f]))
+        share = min((small - own) / (small - tiny), 1.0) * (1.0 - kept)
         exchange = share * (flat[best] - flat[f]) / (own + most)
         flat[f] += most * exchange
         flat[best] -= own * exchange
@@ -325,6 +332,7 @@ def level(
 
 def level_reference(
     field: Array,
+    before: Array,
     volumes: Array,
     listed: Integers,
     tiny: float,
@@ -340,8 +348,9 @@ def level_reference(
         around = beside[:, f][beside[:, f] >= 0]
         to = around[np.argmax(volume[around])]
         if volume[to] > volume[f]:
+            left = volume[f] / max(volume[f], before.ravel()[f])
             share = np.clip((small - volume[f]) / (small - tiny), 0.0, 1.0)
-            share /= 1.0 + held / volume[f] ** 2
+            share *= 1.0 - min(held / (held + volume[f] ** 2), left)
             mean = np.average(levelled[[f, to]], weights=volume[[f, to]])
             levelled[[f, to]] += share * (mean - levelled[[f, to]])
     return levelled.reshape(field.shape)
