@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 from flowborne.version import __version__
 
 if TYPE_CHECKING:
+    from flowborne.characters.folder import Imported, import_character
     from flowborne.control.controller import Controller, Decision, StrengthInPhase
     from flowborne.control.measurement import Measurement
     from flowborne.control.trial import Hypothesis, Velocities
@@ -63,6 +64,7 @@ __all__ = [
     "FrameReport",
     "Grid",
     "Hypothesis",
+    "Imported",
     "JointState",
     "Measurement",
     "Momentum",
@@ -92,6 +94,7 @@ __all__ = [
     "exporters",
     "flesh",
     "gradients",
+    "import_character",
     "load_scene",
     "machine",
     "make_world",
@@ -139,6 +142,7 @@ _PLACES = {
     "FrameReport": "flowborne.frame_report",
     "Grid": "flowborne.fluid.grid",
     "Hypothesis": "flowborne.control.trial",
+    "Imported": "flowborne.characters.folder",
     "JointState": "flowborne.coupling.named",
     "Measurement": "flowborne.control.measurement",
     "Momentum": "flowborne.coupling.report",
@@ -161,6 +165,7 @@ _PLACES = {
     "World": "flowborne.coupling.world",
     "advance": "flowborne.worlds",
     "export": "flowborne.exporting",
+    "import_character": "flowborne.characters.folder",
     "load_scene": "flowborne.scenes.load",
     "make_world": "flowborne.worlds",
     "open_run": "flowborne.io.open_run",

@@ -228,6 +228,37 @@ def export(
         print(f"  {written.note}")
 
 
+@app.command("import")
+def import_(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Rigged character: .glb, .gltf, .usd.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.")],
+    clip: Annotated[
+        str | None, typer.Option(help="Name of the clip.", show_default="the only one")
+    ] = None,
+    animations: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="File that has the clip.", show_default="that of the character"
+        ),
+    ] = None,
+    density: Annotated[float, typer.Option(help="Of the body, kg/m^3.")] = 1000.0,
+) -> None:
+    """Make a scene of a rigged character and its clip; docs/import.md says what becomes of it."""
+    if not density > 0.0:
+        raise InputError(f"--density is {density:g}; give kg/m^3 above 0")
+    from flowborne.characters.folder import import_character
+
+    try:
+        made = import_character(file, out, clip=clip, animations=animations, density=density)
+    except OSError as error:
+        raise cannot_write(out, error) from error
+    print(f"written: {made.scene}")
+    for note in made.notes:
+        print(f"  {note}")
+
+
 @app.command()
 def validate(
     case: Annotated[

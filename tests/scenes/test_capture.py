@@ -228,6 +228,17 @@ ARM = """
 """
 
 
+def test_any_creature_follows_joints_of_its_own_names(write: Write) -> None:
+    path = write('[solids]\nmodel = "arm.xml"\n', {"[human]\n": ""})
+    path.with_name("arm.xml").write_text(ARM)
+    (problem,) = check_scene(path)
+    assert "[clip]: the model has no joint with the name of one of the clip's" in problem
+    assert problem.endswith("Say in clip.mapping which of them each follows.")
+    path.with_name("arm.xml").write_text(ARM.replace('"swing"', '"left_shoulder"'))
+    (motion,) = built(path).world.setup.motions
+    assert motion.columns.names == ("left_shoulder",)
+
+
 def test_any_creature_follows_by_a_mapping_of_its_own(write: Write) -> None:
     path = write(
         '[solids]\nmodel = "arm.xml"\n[clip.mapping]\nswing = "left_shoulder"\n',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -232,3 +233,31 @@ def test_integrate_keeps_unit_quaternions_and_goes_back(v: list[float], dt: floa
     assert np.linalg.norm(moved[7:]) == pytest.approx(1.0, abs=1e-12)
     np.testing.assert_allclose(model.integrate(moved, -np.array(v), dt), start, atol=1e-12)
     np.testing.assert_array_equal(start, model.rest().q)
+
+
+ROBOT = """
+<robot name="fish"><link name="base"><inertial><mass value="2"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+<link name="tail"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.1 0.1 0.3"/></geometry></collision></link>
+<joint name="bend" type="revolute"><parent link="base"/><child link="tail"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>
+"""
+
+
+def test_root_of_a_urdf_floats_when_it_is_told_to(tmp_path: Path) -> None:
+    path = tmp_path / "fish.urdf"
+    path.write_text(ROBOT)
+    held = SolidModel.from_file(path)
+    assert held.body_names == ("world", "tail"), "MuJoCo makes the root part of the world"
+    free = SolidModel.from_file(path, floating=("base",))
+    assert free.body_names == ("world", "base", "tail")
+    assert free.joint_names == ("base", "bend")
+    assert free.nv == 7
+    assert free.body_mass.tolist() == [0.0, 2.0, 1.0]
+    with pytest.raises(
+        ValueError, match=r"no body 'tail' that hangs .* can be floating, are: base"
+    ):
+        SolidModel.from_file(path, floating=("tail",))

@@ -18,6 +18,7 @@ from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import scene_of_run
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import BALL, HINGE, SolidModel
+from flowborne.solids.skins import skins_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -102,8 +103,26 @@ class Skin:
     weights: Array
 
 
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A surface that several bones carry: a <skin> of the model.
+
+    name      of the skin
+    vertices  (k, 3) m in the model's own pose
+    faces     (m, 3) of them, outward
+    weights   (k, n) share of each bone in carrying a vertex, together 1
+    rgba      (4,) colour
+    """
+
+    name: str
+    vertices: Array
+    faces: Integers
+    weights: Array
+    rgba: Array
+
+
 class Creature:
-    """What of a run is bodies: `skeleton`, `surfaces` and `skins`.
+    """What of a run is bodies: `skeleton`, `surfaces`, `bound` and `skins`.
 
     raises  SceneError when the run has no bodies, or its model cannot be read
     """
@@ -153,6 +172,22 @@ class Creature:
                 )
             )
         return tuple(found)
+
+    @cached_property
+    def bound(self) -> tuple[Bound, ...]:
+        """The model's skins, which follow the bodies and have no part in the flow."""
+        return tuple(
+            Bound(skin.name, skin.vertices, skin.faces, skin.weights[:, self._numbers], skin.rgba)
+            for skin in skins_of(self.model.mj)
+        )
+
+    @cached_property
+    def seen(self) -> tuple[Surface, ...]:
+        """The surfaces of bones that carry no skin of the model, which stands for theirs, and are
+        not rigid with one that does."""
+        rigid = self.model.mj.body_weldid[self._numbers]
+        clad = {group for skin in self.bound for group in rigid[skin.weights.any(axis=0)]}
+        return tuple(s for s in self.surfaces if s.bone < 0 or rigid[s.bone] not in clad)
 
     @cached_property
     def skins(self) -> tuple[Skin, ...]:

@@ -12,9 +12,6 @@ from flowborne.io.exporters import Written, provided
 from flowborne.io.open_run import OpenRun
 from flowborne.io.optional import optional
 
-INFLUENCES = 4
-"""Bones that carry a vertex of flesh: as many as every reader of glTF takes."""
-
 NEAR = 1e-6
 """Distance from the run at which flesh has enough morph targets, in sizes of the creature."""
 
@@ -35,7 +32,7 @@ class ExporterGlb:
 
     def write(self, run: OpenRun, path: Path) -> Written:
         optional("pygltflib", "pygltflib", "gltf", f"'{path.suffix}' files")
-        from flowborne.formats.glb_file import write_glb
+        from flowborne.formats.glb_file import INFLUENCES, write_glb
 
         creature = Creature(run)
         near = NEAR * creature.size

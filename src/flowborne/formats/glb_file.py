@@ -11,13 +11,16 @@ import pygltflib as gl
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flowborne.formats.creature import SKIN_COLOUR, Array, Creature, Integers, Skin, Surface
-from flowborne.formats.morphs import MorphedSkin
+from flowborne.formats.creature import SKIN_COLOUR, Array, Bound, Creature, Integers, Skin, Surface
+from flowborne.formats.morphs import MorphedSkin, strongest
 from flowborne.quaternions import continuous
 from flowborne.version import __version__
 
 Y_UP = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
 """Quaternion (x, y, z, w) from z up to y up."""
+
+INFLUENCES = 4
+"""Bones that carry a vertex: as many as every reader of glTF takes."""
 
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 """Numbers in an element -> glTF's word."""
@@ -29,8 +32,10 @@ def write_glb(creature: Creature, skins: Mapping[str, MorphedSkin], path: Path) 
     """Write the creature to `path`; `skins` are those of its flesh by name."""
     file = _File(creature.run.name, creature.run.frames_per_second)
     joints = file.add_skeleton(creature)
-    for surface in creature.surfaces:
+    for surface in creature.seen:
         file.add_surface(surface, skinned=joints)
+    for bound in creature.bound:
+        file.add_bound(bound, skinned=joints)
     for skin in creature.skins:
         file.add_flesh(skin, skins[skin.name])
     file.save(path)
@@ -96,6 +101,12 @@ class _File:
         bones, shares = np.full((count, 1), surface.bone), np.ones((count, 1))
         self._carry(attributes, bones, shares)
         self._mesh(surface.name, attributes, surface.faces, surface.rgba, skinned)
+
+    def add_bound(self, bound: Bound, skinned: int) -> None:
+        """A surface on several bones."""
+        attributes = gl.Attributes(POSITION=self._points(bound.vertices))
+        self._carry(attributes, *strongest(bound, INFLUENCES))
+        self._mesh(bound.name, attributes, bound.faces, bound.rgba, skinned)
 
     def add_flesh(self, skin: Skin, morphed: MorphedSkin) -> None:
         """A flesh on its bones, with its morph targets and what is left of error."""

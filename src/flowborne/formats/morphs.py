@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.formats.creature import Array, Creature, Integers, Skeleton, Skin
+from flowborne.formats.creature import Array, Bound, Creature, Integers, Skeleton, Skin
 
 FLAT = 1e-2
 """Singular value of a vertex's blended rotation below which no target reaches along it."""
@@ -72,7 +72,7 @@ def _to_and_fro(column: Array, mode: Array) -> tuple[Array, Array]:
     return targets.reshape(-1, *mode.shape), weights.reshape(-1, len(column))
 
 
-def strongest(skin: Skin, most: int) -> tuple[Integers, Array]:
+def strongest(skin: Skin | Bound, most: int) -> tuple[Integers, Array]:
     """Bones (k, m) and their shares (k, m), together 1, that carry most of each vertex."""
     count = min(most, int((skin.weights > 0.0).sum(axis=1).max()))
     bones = np.argsort(-skin.weights, axis=1, kind="stable")[:, :count]

@@ -109,10 +109,15 @@ def _creature(stage: Usd.Stage, creature: Creature) -> None:
     low, high = creature.bounds
     root.CreateExtentAttr(_vectors(np.stack([low, high])))
     names = Names()
-    for surface in creature.surfaces:
+    for surface in creature.seen:
         if surface.bone >= 0:
             mesh = _surface(stage, above.AppendChild(names.of(surface.name)), surface)
             _bind(mesh, np.array([[surface.bone]]), np.ones((1, 1)), rigid=True)
+    for bound in creature.bound:
+        path = above.AppendChild(names.of(bound.name))
+        mesh = _mesh(stage, path, bound.name, bound.faces, bound.rgba)
+        _set_points(mesh, bound.vertices)
+        _bind(mesh, *strongest(bound, INFLUENCES), rigid=False)
     for skin in creature.skins:
         UsdGeom.Scope.Define(stage, above.AppendChild("Bound"))
         path = above.AppendChild("Bound").AppendChild(names.of(skin.name))

@@ -74,6 +74,7 @@ def load_model(scene: Scene) -> SolidModel:
             density=scene.solids.density,
             densities=scene.solids.densities,
             shapes=placed_shapes(scene),
+            floating=scene.solids.floating,
         )
     except ValueError as error:
         raise SceneError(_sentence(str(error))) from None
@@ -85,7 +86,7 @@ def bones_of(scene: Scene) -> mujoco.MjSpec:
     assert scene.solids is not None
     assert scene.model_path is not None
     solids = scene.solids
-    given = solids.density, solids.densities, placed_shapes(scene)
+    given = solids.density, solids.densities, placed_shapes(scene), solids.floating
     spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given)
     return spec
 

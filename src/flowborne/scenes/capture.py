@@ -74,17 +74,15 @@ def _walk(height: float) -> Capture:
 
 
 def _named(clip: Clip, table: Mapping[str, str]) -> Mapping[str, str]:
-    """The mapping for a creature whose joints' names say nothing: it is the table itself."""
+    """The mapping for any creature: the table itself, or joints of the same names without one."""
     problems = [
         f"the clip has no joint '{bone}' for '{joint}'{suggestion(bone, clip.names, 'It has')}"
         for joint, bone in table.items()
         if bone not in clip.names
     ]
-    if not table:
-        problems.append("mapping is missing. Say which joint of the clip each joint follows.")
     if problems:
         raise SceneError(problems)
-    return table
+    return table or {name: name for name in clip.names}
 
 
 def human_of(scene: Scene) -> str:
@@ -106,7 +104,8 @@ def human_of(scene: Scene) -> str:
 def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, ...]:
     """Joints of the model that follow the clip, in the model's order."""
     assert scene.clip is not None
-    taken = {*scene.controlled_joints(), *(table.joint for table in scene.motion)}
+    taken = {*scene.controlled_joints(), *scene.clip.free}
+    taken |= {table.joint for table in scene.motion}
     chosen = capture.mapping if scene.clip.joints is None else scene.clip.joints
     return tuple(
         joint
@@ -147,15 +146,16 @@ def clip_motion(
 
 
 def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:
-    """Put the controlled joints that the clip has where it begins, in place, but those in initial.
+    """Put the controlled and free joints that the clip has where it begins, in place, but those in
+    initial.
 
     q       (nq,) pose from which a blend leads into the clip
     raises  SceneError as `clip_motion` does
     """
     capture = capture_of(scene)
-    if capture is None:
+    if capture is None or scene.clip is None:
         return
-    own = set(scene.controlled_joints()) - set(scene.initial.positions)
+    own = {*scene.controlled_joints(), *scene.clip.free} - set(scene.initial.positions)
     joints = tuple(joint for joint in model.joint_names if joint in own & set(capture.mapping))
     motion = clip_motion(scene, model, q, joints)
     if motion is not None:

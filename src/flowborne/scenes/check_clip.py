@@ -42,8 +42,9 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
     assert capture is not None
     others = {joint: "controlled" for joint in scene.controlled_joints()}
     others |= {table.joint: "moved by a [[motion]]" for table in scene.motion}
+    others |= dict.fromkeys(scene.clip.free, "free")
     found = False
-    for joint in (*scene.clip.mapping, *(scene.clip.joints or ())):
+    for joint in (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free):
         unknown = unknown_joint(draft, model, joint, "clip")
         yield from unknown
         found |= bool(unknown)
@@ -59,6 +60,12 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
                 f"whose joints are {', '.join(capture.clip.names)}. Add it to clip.mapping."
             )
             found = True
+    if not set(capture.mapping) & set(model.joint_names):
+        yield (
+            f"{draft.at('clip')}: the model has no joint with the name of one of the clip's, which "
+            f"are {', '.join(capture.clip.names)}. Say in clip.mapping which of them each follows."
+        )
+        found = True
     if found:
         return
     try:

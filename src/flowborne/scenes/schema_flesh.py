@@ -19,8 +19,8 @@ class FleshTable(Table):
     name       the flesh's own
     bones      bodies of the model that lie inside and hold it
     thickness  m: it is a skin as thick as this around the bones
-    surface    instead of a thickness: file of a closed surface (.obj, .stl, .ply) in the axes of
-               the model at rest; the flesh fills it
+    surface    instead of a thickness: file of a closed surface (.obj, .stl, .ply, .off, .glb, and
+               whatever else trimesh reads) in the axes of the model at rest; the flesh fills it
     size       m: length of the elements' edges. One element through its thickness is enough for
                flesh to bend as it should
     mesh       file (.vtu) of elements that were made of all this before: made anew where it was

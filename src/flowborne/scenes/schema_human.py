@@ -52,7 +52,9 @@ class ClipTable(Table):
     offset       m by which it is then moved
     mapping      joint of the model -> joint of the clip, where their names do not tell
     joints       joints of the model that follow; unless given all that the clip has and that are
-                 not controlled
+                 not controlled, moved by a [[motion]] or free
+    free         joints that the clip has and that start as it does, but then go where forces take
+                 them: a root that is free floats
     """
 
     file: Text | None = None
@@ -68,6 +70,7 @@ class ClipTable(Table):
     offset: Vector = (0.0, 0.0, 0.0)
     mapping: dict[str, Text] = Field(default_factory=dict)
     joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+    free: tuple[Text, ...] = ()
 
     @model_validator(mode="after")
     def _check(self) -> Self:

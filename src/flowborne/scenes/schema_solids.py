@@ -34,11 +34,14 @@ class SolidsTable(Table):
     model      MJCF file, found from the folder of the scene file
     density    kg/m^3 of every body, in place of the model's densities
     densities  body -> kg/m^3 of that body, in place of the model's density and of `density`
+    floating   bodies that hang on the world without a joint, such as the root of a URDF: each gets
+               a free joint of its own name
     """
 
     model: Text
     density: Positive | None = None
     densities: dict[str, Positive] = Field(default_factory=dict)
+    floating: tuple[Text, ...] = ()
 
 
 class ShapeTable(Table, OwnTable):

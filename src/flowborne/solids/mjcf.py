@@ -47,13 +47,14 @@ def compiled(
     density: float | None,
     densities: Mapping[str, float],
     shapes: Sequence[PlacedShape] = (),
+    floating: Sequence[str] = (),
 ) -> mujoco.MjModel:
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    return bones_of(source, slab, gravity, density, densities, shapes)[1]
+    return bones_of(source, slab, gravity, density, densities, shapes, floating)[1]
 
 
 def bones_of(
@@ -63,8 +64,12 @@ def bones_of(
     density: float | None,
     densities: Mapping[str, float],
     shapes: Sequence[PlacedShape] = (),
+    floating: Sequence[str] = (),
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    """An MJCF file or text, as `compiled`, before flesh grows on it."""
+    """An MJCF file or text, as `compiled`, before flesh grows on it.
+
+    floating  bodies on the world without a joint, which get a free one of their name
+    """
     where = _named(source)
     try:
         if isinstance(source, Path):
@@ -75,6 +80,8 @@ def bones_of(
         raise _unreadable(where, error) from error
     _set_options(spec, gravity)
     add_shapes(spec, shapes)
+    for name in floating:
+        _set_floating(spec, name, where)
     for geom in spec.geoms:
         given = densities.get(geom.parent.name, density)
         if given is not None:
@@ -91,6 +98,17 @@ def bones_of(
         except ValueError as error:
             raise ValueError(f"{where} cannot be made a slab: {error}.") from error
     return spec, mj
+
+
+def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
+    held = {body.name: body for body in spec.worldbody.bodies if not body.joints}
+    if name not in held:
+        listed = ", ".join(held) or "none"
+        raise ValueError(
+            f"{where} has no body '{name}' that hangs on the world without a joint. Such bodies, "
+            f"which can be floating, are: {listed}."
+        )
+    held[name].add_freejoint(name=name)
 
 
 def _unreadable(where: str, error: ValueError) -> ValueError:

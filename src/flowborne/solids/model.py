@@ -109,17 +109,19 @@ class SolidModel:
         density: float | None = None,
         densities: Mapping[str, float] = MappingProxyType({}),
         shapes: Sequence[PlacedShape] = (),
+        floating: Sequence[str] = (),
     ) -> SolidModel:
-        """Model of an MJCF file.
+        """Model of an MJCF or URDF file.
 
         slab     take the cross-sections at z = 0, per unit depth
         gravity  (3,) m/s^2, in place of the file's own
         density  kg/m^3, in place of every geom's own density or mass
         densities  body -> kg/m^3 of its geoms, in place of `density`
         shapes   geometries of one's own, besides those of the file
+        floating  bodies on the world without a joint, which get a free one of their name
         raises   ValueError when the model is bad
         """
-        mj = mjcf.compiled(Path(path), slab, gravity, density, densities, shapes)
+        mj = mjcf.compiled(Path(path), slab, gravity, density, densities, shapes, floating)
         return cls(mj, slab, shapes=shapes)
 
     @classmethod

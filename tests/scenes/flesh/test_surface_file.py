@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
+import trimesh
 
 from flowborne.scenes.flesh.surface_file import read_surface
 from flowborne.solids.mjcf import is_closed
@@ -27,6 +28,15 @@ def test_surface_is_read_closed_and_outward(suffix: str, tmp_path: Path) -> None
     assert np.linalg.norm(points, axis=1) == pytest.approx(0.3, abs=1e-6)
 
 
+@pytest.mark.parametrize("suffix", ["glb", "off"])
+def test_whatever_trimesh_reads_is_a_surface(suffix: str, tmp_path: Path) -> None:
+    whole = trimesh.Trimesh(sphere().points, sphere().regular_faces)
+    whole.export(tmp_path / f"body.{suffix}")
+    points, triangles = read_surface(tmp_path / f"body.{suffix}")
+    assert is_closed((points, triangles))
+    assert len(points) == sphere().n_points
+
+
 def test_quadrangles_are_split(tmp_path: Path) -> None:
     pv.Cube().clean().save(tmp_path / "cube.ply")
     assert is_closed(read_surface(tmp_path / "cube.ply"))
@@ -36,7 +46,7 @@ def test_missing_and_unreadable_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"there is no flesh file .*none\.stl"):
         read_surface(tmp_path / "none.stl")
     for name, said in (
-        ("body.txt", r"body\.txt is none of \.obj, \.ply, \.stl"),
+        ("body.txt", r"body\.txt is none of .*\.glb, .*\.obj, \.off, \.ply, \.stl"),
         ("body.ply", r"body\.ply cannot be read: Not a ply file\. "),
         ("body.stl", r"body\.stl has no triangles"),
     ):

@@ -8,6 +8,7 @@ import numpy as np
 import pyvista as pv
 import trimesh
 from numpy.typing import NDArray
+from trimesh.exchange.load import mesh_formats
 
 from flowborne.scenes.flesh.bones import Bones
 from flowborne.scenes.flesh.contour import contour
@@ -15,8 +16,6 @@ from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.shapes.shape import Mesh
 
 Array = NDArray[np.float64]
-
-FORMATS = (".obj", ".ply", ".stl")
 
 SAME = 1e-7
 """Points this close, relative to the size of the surface, are one: STL repeats its corners."""
@@ -30,9 +29,9 @@ def read_surface(path: Path) -> Mesh:
     """
     if not path.is_file():
         raise ValueError(f"there is no flesh file {path}. Correct its name.")
-    if path.suffix.lower() not in FORMATS:
+    if path.suffix.lower() not in formats():
         raise ValueError(
-            f"flesh file {path} is none of {', '.join(FORMATS)}. Save the surface as one of them."
+            f"flesh file {path} is none of {', '.join(formats())}. Save the surface as one of them."
         )
     surface = _triangles(path)
     many = _edges(surface, non_manifold_edges=True)
@@ -51,6 +50,11 @@ def read_surface(path: Path) -> Mesh:
         auto_orient_normals=True, split_vertices=False, point_normals=False
     )
     return np.asarray(surface.points, dtype=np.float64), surface.regular_faces.astype(np.int64)
+
+
+def formats() -> tuple[str, ...]:
+    """Endings of the files whose triangles trimesh reads here: more with its own extras."""
+    return tuple(sorted(f".{kind}" for kind in mesh_formats() if "_" not in kind))
 
 
 def check_covers(path: Path, surface: Mesh, bones: Bones, pitch: float, tolerance: float) -> None:

@@ -1,0 +1,200 @@
+"""A character as a folder that `flowborne run` takes: scene, model, meshes, clip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from flowborne.characters.division import Division, divided
+from flowborne.characters.model import model_files
+from flowborne.characters.pose import as_cycle, clip_of, posed
+from flowborne.characters.rig import Action, Array, Rig, Surface
+from flowborne.characters.source import clip_number, read_source
+from flowborne.errors import SceneError
+from flowborne.io.bvh import write_clip
+from flowborne.io.clip import Clip
+
+ROOM = 0.35
+"""Water on every side of all that the clip reaches, in sizes of the character."""
+
+CELLS = 64
+"""Cells along the longest side of the domain."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What an import has made.
+
+    scene  file of the scene
+    notes  what became of joints, surface and clip, a sentence each
+    """
+
+    scene: Path
+    notes: tuple[str, ...]
+
+
+def import_character(
+    file: str | Path,
+    out: str | Path,
+    *,
+    clip: str | None = None,
+    animations: str | Path | None = None,
+    density: float = 1000.0,
+) -> Imported:
+    """Make a scene of a rigged character, in a folder of its own.
+
+    The character floats in a room of water, and its joints follow the clip; the folder's scene is
+    there to be edited.
+
+    file        .glb, .gltf or USD with a skeleton and a surface bound to it
+    out         folder, which is made when it is missing
+    clip        name of the clip; the only one by default
+    animations  file that has the clip, on joints of the same names; `file` by default
+    density     kg/m^3
+    raises      SceneError when a file cannot be used, a library is missing, or the scene is there
+                already; OSError when the folder cannot be written
+    """
+    path = Path(file)
+    name = _plain(path.stem)
+    scene = Path(out) / f"{name}.toml"
+    if scene.exists():
+        raise SceneError(
+            f"there is {scene} already, which may have been edited. Name another folder, or remove "
+            "it first."
+        )
+    source = read_source(path)
+    surface = source.surface
+    if surface is None:
+        raise SceneError(
+            f"{path.name} has no skin: no mesh is bound to its joints. Export the mesh with its "
+            "armature modifier and weights, and not applied."
+        )
+    moves = path if animations is None else Path(animations)
+    moving = source if animations is None else read_source(moves)
+    number = clip_number(moving, clip, moves.name)
+    rig = source.rig
+    shared = set(rig.names) & set(moving.rig.names)
+    if not shared:
+        raise SceneError(
+            f"{moves.name} has none of the joints of {path.name}, which are "
+            f"{', '.join(rig.names)}. Give clips of the same skeleton."
+        )
+    division = divided(rig, surface, path.name)
+    pose = posed(rig, moving.rig, moving.action(number))
+    once, strays = clip_of(rig, division, pose)
+    motion = as_cycle(once) or once
+    files = model_files(name, rig, division, surface, density)
+    files[f"{name}.bvh"] = _bvh(motion)
+    called = f"{path.name}, {moving.clips[number]}"
+    text = _scene(name, called, motion, as_cycle(once) is not None, _reach(rig, surface, pose))
+    files[f"{name}.toml"] = text.encode()
+    for made, content in files.items():
+        target = Path(out) / made
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    notes = (*_told(rig, division, density), _told_clip(motion, moving.clips[number], strays))
+    return Imported(scene, notes)
+
+
+def _plain(stem: str) -> str:
+    """A name for files and models."""
+    return "".join(c if c.isalnum() or c in "-_" else "-" for c in stem) or "character"
+
+
+def _bvh(clip: Clip) -> bytes:
+    with TemporaryDirectory(prefix="flowborne-clip-") as folder:
+        write_clip(Path(folder) / "clip.bvh", clip)
+        return (Path(folder) / "clip.bvh").read_bytes()
+
+
+def _reach(rig: Rig, surface: Surface, pose: Action) -> tuple[Array, Array]:
+    """(3,) lower and upper corner of the surface at rest and in every frame, m."""
+    turn = pose.rotation @ np.swapaxes(rig.rotation, 1, 2)
+    shift = pose.position - np.einsum("fnij,nj->fni", turn, rig.position)
+    corners = [surface.vertices]
+    for turned, shifted in zip(turn, shift, strict=True):
+        moved = np.einsum("kn,nij->kij", surface.weights, turned)
+        corners.append(np.einsum("kij,kj->ki", moved, surface.vertices) + surface.weights @ shifted)
+    every = np.concatenate(corners)
+    return every.min(axis=0), every.max(axis=0)
+
+
+def _scene(name: str, called: str, clip: Clip, loop: bool, reach: tuple[Array, Array]) -> str:
+    """The scene file, with remarks for whoever edits it."""
+    low, high = reach
+    room = ROOM * float((high - low).max())
+    root, last = clip.names[0], clip.names[-1]
+    return f"""description = "{called}"
+dimensions = 3
+
+[time]
+frames_per_second = {1.0 / clip.frame_time:.6g}
+frames = {clip.frames - 1}
+
+# z is up, and what looks along +z in glTF looks along -y here, as in Blender
+[domain]
+lower = {_corner(low - room)}
+upper = {_corner(high + room)}
+resolution = {CELLS}
+
+[fluid]
+density = 1000.0
+
+[boundaries]
+{_sides()}
+
+[solids]
+model = "{name}.xml"
+
+# All joints follow the clip but the free ones, which go where forces take them: the root floats.
+# Joints that a [[control]] moves are left out by themselves.
+[clip]
+file = "{name}.bvh"
+loop = {str(loop).lower()}
+free = ["{root}"]
+
+# it starts in the clip's first pose, at the speed at which it and the water have no impulse
+[initial]
+impulse = "none"
+
+# [[control]]
+# joints = ["{last}"]
+# strength = 60.0
+#
+# [[objectives]]
+# kind = "effort"
+
+[output]
+exports = ["{name}.glb"]
+"""
+
+
+def _sides() -> str:
+    return "\n".join(f'{axis}_{end} = "open"' for axis in "xyz" for end in ("min", "max"))
+
+
+def _corner(point: Array) -> list[float]:
+    return [float(f"{x:.4g}") for x in point]
+
+
+def _told(rig: Rig, division: Division, density: float) -> Sequence[str]:
+    """Joints, bodies and mass in sentences."""
+    rigid = [name for n, name in enumerate(rig.names) if division.owners[n] != n]
+    lines = [
+        f"{len(division.bodies)} bodies of {len(rig.names)} joints, {division.volume:.4g} m^3, "
+        f"{density * division.volume:.4g} kg"
+    ]
+    if rigid:
+        lines.append(f"rigid with the joint above them: {', '.join(rigid)}")
+    return lines
+
+
+def _told_clip(clip: Clip, name: str, strays: float) -> str:
+    return (
+        f"clip '{name}': {clip.frames} frames in {clip.duration:.4g} s; its joints are at most "
+        f"{strays:.2g} m from where the file has them"
+    )

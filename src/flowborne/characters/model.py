@@ -1,0 +1,110 @@
+"""The bodies of a character as MJCF, with its surface as a skin for viewers and exporters."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flowborne.characters.division import Division
+from flowborne.characters.rig import Array, Rig, Surface
+from flowborne.shapes.shape import Mesh
+
+INFLUENCES = 8
+"""Joints that carry a vertex of the skin at most: as many as exporters write."""
+
+Element = ElementTree.Element
+
+
+def model_files(
+    name: str, rig: Rig, division: Division, surface: Surface, density: float
+) -> dict[str, bytes]:
+    """A model whose bodies have the rig's names and frames: file -> content.
+
+    Every joint of the rig is a body, in whose frame it rests. Those that move have a ball joint of
+    the same name, the topmost a free joint; the others are rigid with the body above them.
+
+    density  kg/m^3 of all pieces
+    """
+    files = {}
+    root = ElementTree.Element("mujoco", model=name)
+    default = ElementTree.SubElement(root, "default")
+    values = {"type": "mesh", "contype": "0", "conaffinity": "0", "density": f"{density:g}"}
+    ElementTree.SubElement(default, "geom", values)
+    assets = ElementTree.SubElement(root, "asset")
+    ElementTree.SubElement(root, "include", file=f"{name}-skin.xml")
+    bodies: dict[int, Element] = {-1: ElementTree.SubElement(root, "worldbody")}
+    for joint, parent in enumerate(rig.parents.tolist()):
+        own = rig.names[joint]
+        body = ElementTree.SubElement(bodies[parent], "body", {"name": own} | _place(rig, joint))
+        bodies[joint] = body
+        if joint not in division.pieces:
+            continue
+        if parent < 0:
+            ElementTree.SubElement(body, "freejoint", name=own)
+        else:
+            ElementTree.SubElement(body, "joint", name=own, type="ball")
+        vertices, faces = division.pieces[joint]
+        if len(faces):
+            file = f"{name}-meshes/{joint}.obj"
+            local = (vertices - rig.position[joint]) @ rig.rotation[joint]
+            files[file] = _obj((local, faces))
+            ElementTree.SubElement(assets, "mesh", name=own, file=file, inertia="exact")
+            ElementTree.SubElement(body, "geom", name=own, mesh=own)
+    files[f"{name}.xml"] = _text(root)
+    files[f"{name}-skin.xml"] = _text(_skin(name, rig, surface))
+    return files
+
+
+def _place(rig: Rig, joint: int) -> dict[str, str]:
+    """Where a joint is in the frame of the one above it."""
+    position, rotation, parent = rig.position[joint], rig.rotation[joint], int(rig.parents[joint])
+    if parent >= 0:
+        above = rig.rotation[parent].T
+        position, rotation = above @ (position - rig.position[parent]), above @ rotation
+    turn = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
+    return {"pos": _numbers(position), "quat": _numbers(turn)}
+
+
+def _skin(name: str, rig: Rig, surface: Surface) -> Element:
+    """The whole surface, carried by the bodies."""
+    root = ElementTree.Element("mujoco")
+    skin = ElementTree.SubElement(
+        ElementTree.SubElement(root, "deformable"),
+        "skin",
+        name=name,
+        vertex=_numbers(surface.vertices),
+        face=" ".join(map(str, surface.faces.ravel().tolist())),
+    )
+    least = np.sort(surface.weights, axis=1)[:, -INFLUENCES:].min(axis=1)
+    carried = (surface.weights >= least[:, None]) & (surface.weights > 0.0)
+    turns = Rotation.from_matrix(rig.rotation).as_quat(scalar_first=True)
+    for joint in np.flatnonzero(carried.any(axis=0)):
+        vertices = np.flatnonzero(carried[:, joint])
+        ElementTree.SubElement(
+            skin,
+            "bone",
+            body=rig.names[joint],
+            bindpos=_numbers(rig.position[joint]),
+            bindquat=_numbers(turns[joint]),
+            vertid=" ".join(map(str, vertices.tolist())),
+            vertweight=_numbers(surface.weights[vertices, joint]),
+        )
+    return root
+
+
+def _obj(mesh: Mesh) -> bytes:
+    vertices, faces = mesh
+    lines = [f"v {_numbers(vertex)}" for vertex in vertices]
+    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{value:.9g}" for value in np.ravel(values))
+
+
+def _text(root: Element) -> bytes:
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8") + b"\n"

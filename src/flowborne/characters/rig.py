@@ -1,0 +1,106 @@
+"""A skeleton at rest, the surface that it carries, and how a clip moves it; metres, z up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""From axes with y up to the world's: the way back of what exporters do."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Joints in the pose in which their surface was bound to them.
+
+    names     (n) each once, the root first and parents before children
+    parents   (n,) number of the parent, -1 for the root
+    position  (n, 3) m
+    rotation  (n, 3, 3) joint's frame to the world's
+    """
+
+    names: tuple[str, ...]
+    parents: Integers
+    position: Array
+    rotation: Array
+
+    def offsets(self, position: Array, rotation: Array) -> Array:
+        """(..., n, 3) m, places (..., n, 3) in the frames (..., n, 3, 3) of the parents, the root's
+        in the world's."""
+        found = position.copy()
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                apart = position[..., joint, :] - position[..., parent, :]
+                found[..., joint, :] = np.einsum(
+                    "...ji,...j->...i", rotation[..., parent, :, :], apart
+                )
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles that joints carry by linear blend skinning, where the rig has them at rest.
+
+    vertices  (k, 3) m
+    faces     (m, 3) outward
+    weights   (k, n) share of each joint, together 1
+    """
+
+    vertices: Array
+    faces: Integers
+    weights: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Action:
+    """A clip of a file, on the file's own skeleton.
+
+    frame_time  s
+    position    (frames, n, 3) m of the joints of its rig
+    rotation    (frames, n, 3, 3) joint's frame to the world's
+    """
+
+    frame_time: float
+    position: Array
+    rotation: Array
+
+
+def own_names(names: list[str]) -> tuple[str, ...]:
+    """Names of joints, each once, also where a file has none or one twice."""
+    found = list[str]()
+    for number, name in enumerate(names):
+        base = name or f"joint_{number}"
+        again = (f"{base}_{n}" for n in count(2))
+        found.append(base if base not in found else next(n for n in again if n not in found))
+    return tuple(found)
+
+
+def one_tree(parents: list[int]) -> Integers:
+    """Parents of joints; further roots hang on the first."""
+    return np.array([-1, *(max(parent, 0) for parent in parents[1:])], np.int64)
+
+
+def rotations_in(matrices: Array) -> Array:
+    """(..., 3, 3) the rotation nearest to each matrix (..., 3, 3), which may scale and shear."""
+    left, _, right = np.linalg.svd(matrices)
+    flips = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
+    left[..., :, 2] *= flips[..., None]
+    return np.asarray(left @ right)
+
+
+def frame_times(keys: Array, densest: Array) -> Array:
+    """(frames,) s evenly from the first key to the last.
+
+    keys     s of all curves of a clip
+    densest  s of the curve that has most: its usual step is the frames'
+    """
+    first, last = float(keys.min()), float(keys.max())
+    step = float(np.median(np.diff(densest))) if len(densest) > 1 else 0.0
+    count = max(round((last - first) / step), 1) if step > 0.0 else 1
+    return np.linspace(first, last, count + 1)

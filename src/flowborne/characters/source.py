@@ -1,0 +1,90 @@
+"""A character's file, read by its ending."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from flowborne.characters.rig import Action, Rig, Surface
+from flowborne.errors import SceneError
+from flowborne.io.optional import optional
+
+GLTF, USD = (".glb", ".gltf"), (".usd", ".usda", ".usdc", ".usdz")
+
+BLENDER = (
+    'blender --background --python-expr "import bpy; bpy.ops.wm.read_factory_settings('
+    "use_empty=True); bpy.ops.import_scene.fbx(filepath='{name}'); "
+    "bpy.ops.export_scene.gltf(filepath='{stem}.glb')\""
+)
+"""What makes an .fbx file a .glb file."""
+
+
+class Source(Protocol):
+    """What a reader gives.
+
+    clips    names of the clips
+    rig      the skeleton
+    surface  None when nothing is bound to it
+    """
+
+    @property
+    def clips(self) -> tuple[str, ...]: ...
+
+    @property
+    def rig(self) -> Rig: ...
+
+    @property
+    def surface(self) -> Surface | None: ...
+
+    def action(self, clip: int) -> Action:
+        """A clip by its number in `clips`."""
+
+
+def read_source(path: Path) -> Source:
+    """The skeleton, surface and clips of a file.
+
+    raises  SceneError when it is missing, of another kind, or cannot be read
+    """
+    ending = path.suffix.lower()
+    if ending == ".fbx":
+        how = BLENDER.format(name=path.name, stem=path.stem)
+        raise SceneError(
+            f"{path.name}: .fbx is a closed format that is not read. Make a .glb of it, in "
+            f"Blender by File, Import and File, Export, or by: {how}"
+        )
+    if ending not in (*GLTF, *USD):
+        raise SceneError(
+            f"{path.name} is none of {', '.join((*GLTF, *USD))}. Export the character as one of "
+            "them."
+        )
+    if not path.is_file():
+        raise SceneError(f"there is no file {path}. Correct its name.")
+    if ending in GLTF:
+        optional("pygltflib", "pygltflib", "gltf", f"characters in '{ending}' files", verb="read")
+        from flowborne.characters.gltf import GltfSource
+
+        return GltfSource(path)
+    optional("pxr.Usd", "usd-core", "usd", f"characters in '{ending}' files", verb="read")
+    from flowborne.characters.usd import UsdSource
+
+    return UsdSource(path)
+
+
+def clip_number(source: Source, clip: str | None, name: str) -> int:
+    """Number of the clip with a name, or of the only one.
+
+    name    of the file, for messages
+    raises  SceneError when there is none, no such one, or several to choose from
+    """
+    if not source.clips:
+        raise SceneError(
+            f"{name} has no clip. Name a file that has one by --animations, whose joints have "
+            "the same names."
+        )
+    if clip is None and len(source.clips) > 1:
+        raise SceneError(
+            f"{name} has {len(source.clips)} clips. Name one by --clip: {', '.join(source.clips)}."
+        )
+    if clip is not None and clip not in source.clips:
+        raise SceneError(f"{name} has no clip '{clip}'. It has: {', '.join(source.clips)}.")
+    return 0 if clip is None else source.clips.index(clip)

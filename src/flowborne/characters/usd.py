@@ -1,0 +1,169 @@
+"""Skins, weights and animations of UsdSkel, by usd-core.
+
+source  OpenUSD, UsdSkel schemas: binding API, SkelAnimation
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Tf, Usd, UsdGeom, UsdSkel
+
+from flowborne.characters.rig import (
+    Z_UP,
+    Action,
+    Array,
+    Integers,
+    Rig,
+    Surface,
+    frame_times,
+    one_tree,
+    own_names,
+    rotations_in,
+)
+from flowborne.errors import SceneError
+
+EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+
+
+class UsdSource:
+    """A stage's skeleton, the surface bound to it, and its animations.
+
+    raises  SceneError when it cannot be read, or has no skeleton
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._name = path.name
+        try:
+            stage = Usd.Stage.Open(str(path))
+        except Tf.ErrorException as error:
+            raise SceneError(f"{path.name} cannot be read as USD. Export it anew.") from error
+        self._stage, self._cache, self._bound = stage, UsdSkel.Cache(), []
+        prims = list(Usd.PrimRange.Stage(stage, EVERYTHING))
+        for root in (prim for prim in prims if prim.IsA(UsdSkel.Root)):
+            self._cache.Populate(UsdSkel.Root(root), EVERYTHING)
+            self._bound += self._cache.ComputeSkelBindings(UsdSkel.Root(root), EVERYTHING)
+        skeletons = [binding.GetSkeleton() for binding in self._bound]
+        skeletons += [UsdSkel.Skeleton(prim) for prim in prims if prim.IsA(UsdSkel.Skeleton)]
+        if not skeletons:
+            raise SceneError(f"{path.name} has no skeleton. Export the armature as UsdSkel.")
+        self._skeleton = skeletons[0]
+        self._query = self._cache.GetSkelQuery(self._skeleton)
+        self._animations = [UsdSkel.Animation(p) for p in prims if p.IsA(UsdSkel.Animation)]
+        self._world = UsdGeom.XformCache(Usd.TimeCode.Default())
+        turn = np.eye(3) if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else Z_UP
+        self._turned = np.eye(4)
+        self._turned[:3, :3] = UsdGeom.GetStageMetersPerUnit(stage) * turn
+
+    @property
+    def clips(self) -> tuple[str, ...]:
+        """Names of the SkelAnimations."""
+        return tuple(animation.GetPrim().GetName() for animation in self._animations)
+
+    @cached_property
+    def rig(self) -> Rig:
+        """The joints where their skin is bound to them."""
+        topology = self._query.GetTopology()
+        paths = [str(joint) for joint in self._query.GetJointOrder()]
+        bind = self._to_world(self._skeleton.GetPrim()) @ _matrices(
+            self._query.GetJointWorldBindTransforms()
+        )
+        parents = [topology.GetParent(joint) for joint in range(len(paths))]
+        names = own_names([path.rpartition("/")[2] for path in paths])
+        return Rig(names, one_tree(parents), bind[:, :3, 3], rotations_in(bind[:, :3, :3]))
+
+    @property
+    def surface(self) -> Surface | None:
+        """All meshes bound to the skeleton as one; None when there is none."""
+        vertices, faces, weights, count = [], [], [], 0
+        into = self._to_world(self._skeleton.GetPrim())
+        for binding in self._bound:
+            if binding.GetSkeleton().GetPrim() != self._skeleton.GetPrim():
+                continue
+            for target in binding.GetSkinningTargets():
+                mesh = UsdGeom.Mesh(target.GetPrim())
+                if not mesh or not target.HasJointInfluences():
+                    continue
+                points = np.array(mesh.GetPointsAttr().Get(Usd.TimeCode.Default()), float)
+                if not len(points):
+                    points = np.array(mesh.GetPointsAttr().Get(Usd.TimeCode.EarliestTime()), float)
+                own = into @ _matrices([target.GetGeomBindTransform()])[0]
+                vertices.append(points @ own[:3, :3].T + own[:3, 3])
+                turned = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+                mirrored = (np.linalg.det(own[:3, :3]) < 0.0) != turned
+                faces.append(_triangles(mesh, mirrored) + count)
+                weights.append(self._weights(target, len(points)))
+                count += len(points)
+        if not vertices:
+            return None
+        return Surface(np.concatenate(vertices), np.concatenate(faces), np.concatenate(weights))
+
+    def action(self, clip: int) -> Action:
+        """The `clip`-th animation, sampled at its own rate.
+
+        raises  SceneError when it moves nothing
+        """
+        query = self._cache.GetAnimQuery(self._animations[clip])
+        codes = np.array(query.GetJointTransformTimeSamples())
+        joints = list(query.GetJointOrder())
+        order = list(self._query.GetJointOrder())
+        known = [order.index(joint) for joint in joints if joint in order]
+        if not codes.size or not known:
+            raise SceneError(f"{self._name}: clip '{self.clips[clip]}' moves no joint.")
+        rate = self._stage.GetTimeCodesPerSecond()
+        times = frame_times(codes / rate, codes / rate)
+        rest = _matrices(self._query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True))
+        local = np.tile(rest, (len(times), 1, 1, 1))
+        own = [n for n, joint in enumerate(joints) if joint in order]
+        for frame, time in enumerate(times):
+            local[frame, known] = _matrices(query.ComputeJointLocalTransforms(time * rate))[own]
+        world, into = local.copy(), self._to_world(self._skeleton.GetPrim())
+        for joint in range(len(order)):
+            parent = self._query.GetTopology().GetParent(joint)
+            above = into if parent < 0 else world[:, parent]
+            world[:, joint] = above @ local[:, joint]
+        step = float(times[-1] - times[0]) / (len(times) - 1) or 1.0
+        return Action(step, world[..., :3, 3], rotations_in(world[..., :3, :3]))
+
+    def _to_world(self, prim: Usd.Prim) -> Array:
+        """(4, 4) a prim's frame to the world's, m, z up."""
+        matrix = _matrices([self._world.GetLocalToWorldTransform(prim)])[0]
+        return np.asarray(self._turned @ matrix)
+
+    def _weights(self, target: UsdSkel.SkinningQuery, count: int) -> Array:
+        """(count, n) shares of the skeleton's joints, which need not sum to one in the file."""
+        indices, shares = target.ComputeVaryingJointInfluences(count)
+        width = target.GetNumInfluencesPerComponent()
+        order = [str(joint) for joint in self._query.GetJointOrder()]
+        own = target.GetJointOrder()
+        number = np.array([order.index(str(joint)) for joint in own] if own else range(len(order)))
+        found = np.zeros((count, len(order)))
+        rows = np.arange(count)[:, None]
+        joints = number[np.array(indices, np.int64).reshape(count, width)]
+        np.add.at(found, (rows, joints), np.array(shares, float).reshape(count, width))
+        total = found.sum(axis=1)
+        found[total <= 0.0, 0] = 1.0
+        return np.asarray(found / np.where(total > 0.0, total, 1.0)[:, None])
+
+
+def _matrices(transforms: Any) -> Array:
+    """(n, 4, 4) USD's transforms, which multiply rows, as ones that multiply columns."""
+    return np.array([np.array(transform) for transform in transforms]).swapaxes(1, 2)
+
+
+def _triangles(mesh: UsdGeom.Mesh, mirrored: bool) -> Integers:
+    """(m, 3) the faces of a mesh as fans, outward."""
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(), np.int64)
+    corners: NDArray[np.int64] = np.array(mesh.GetFaceVertexIndicesAttr().Get(), np.int64)
+    starts = np.cumsum(counts) - counts
+    fans = [
+        corners[[start, start + n, start + n + 1]]
+        for start, size in zip(starts, counts, strict=True)
+        for n in range(1, size - 1)
+    ]
+    triangles = np.array(fans, np.int64).reshape(-1, 3)
+    return triangles[:, ::-1] if mirrored else triangles

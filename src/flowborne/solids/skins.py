@@ -1,0 +1,66 @@
+"""The skins of a model: surfaces that several bodies carry, and that have no part in the flow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from flowborne.solids.mjcf import element_name, rest_poses
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelSkin:
+    """A <skin> of an MJCF model.
+
+    name      of the skin
+    vertices  (k, 3) m in the model's own pose
+    faces     (m, 3) of them, outward
+    weights   (k, bodies) share of each body in carrying a vertex, together 1
+    rgba      (4,) colour
+    """
+
+    name: str
+    vertices: Array
+    faces: Integers
+    weights: Array
+    rgba: Array
+
+
+def skins_of(mj: mujoco.MjModel) -> tuple[ModelSkin, ...]:
+    """The skins, moved by their bodies from the pose in which they were bound."""
+    position, rotation, _, _ = rest_poses(mj)
+    return tuple(_skin(mj, skin, position, rotation) for skin in range(mj.nskin))
+
+
+def _skin(mj: mujoco.MjModel, skin: int, position: Array, rotation: Array) -> ModelSkin:
+    given = mj.skin_vert[_entries(mj.skin_vertadr, mj.skin_vertnum, skin)].astype(float)
+    vertices, weights = np.zeros_like(given), np.zeros((len(given), mj.nbody))
+    first = int(mj.skin_boneadr[skin])
+    for bone in range(first, first + int(mj.skin_bonenum[skin])):
+        carried = _entries(mj.skin_bonevertadr, mj.skin_bonevertnum, bone)
+        chosen, share = mj.skin_bonevertid[carried], mj.skin_bonevertweight[carried]
+        body = int(mj.skin_bonebodyid[bone])
+        bind = Rotation.from_quat(mj.skin_bonebindquat[bone], scalar_first=True).as_matrix()
+        local = (given[chosen] - mj.skin_bonebindpos[bone]) @ bind
+        vertices[chosen] += share[:, None] * (position[body] + local @ rotation[body].T)
+        weights[chosen, body] += share
+    total = weights.sum(axis=1, keepdims=True)
+    return ModelSkin(
+        element_name(mj, mujoco.mjtObj.mjOBJ_SKIN, skin),
+        vertices / total,
+        mj.skin_face[_entries(mj.skin_faceadr, mj.skin_facenum, skin)].astype(np.int64),
+        weights / total,
+        mj.skin_rgba[skin].astype(float),
+    )
+
+
+def _entries(starts: Integers, counts: Integers, number: int) -> slice:
+    """Of one element in an array of MuJoCo's."""
+    return slice(int(starts[number]), int(starts[number] + counts[number]))

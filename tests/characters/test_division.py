@@ -1,0 +1,87 @@
+"""Closed pieces of a surface for the joints that become bodies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flowborne.characters.division import LEAST, SAME, divided
+from flowborne.characters.rig import Rig, Surface
+from flowborne.characters.source import read_source
+from flowborne.errors import SceneError
+from flowborne.shapes.mesh import ShapeMesh
+from flowborne.solids.mjcf import is_closed
+
+from . import rigged
+
+CREATURES = Path(__file__).parents[3] / "shared" / "creatures"
+
+
+def rig(parents: tuple[int, ...] = rigged.PARENTS) -> Rig:
+    count = len(parents)
+    names = tuple(f"joint_{n}" for n in range(count))
+    frames = np.tile(np.eye(3), (count, 1, 1))
+    return Rig(names, np.array(parents), np.zeros((count, 3)), frames)
+
+
+def volumes(surface: Surface, skeleton: Rig) -> dict[int, float]:
+    """Joint that moves -> volume of its piece, which is closed."""
+    division = divided(skeleton, surface, "box.glb")
+    for piece in division.pieces.values():
+        assert not len(piece[1]) or is_closed(piece)
+    return {
+        joint: ShapeMesh(*piece).volume if len(piece[1]) else 0.0
+        for joint, piece in division.pieces.items()
+    }
+
+
+def test_pieces_end_where_the_weights_are_even() -> None:
+    """The handle goes with the trunk and the tip with the tail."""
+    vertices, faces, weights = rigged.box()
+    division = divided(rig(), Surface(vertices, faces, weights / 0.8), "box.glb")
+    section = rigged.WIDTH * rigged.HEIGHT
+    assert division.owners.tolist() == [0, 0, 2, 2]
+    assert division.leader == 1
+    assert division.volume == pytest.approx(section * rigged.LENGTH, rel=1e-9)
+    found = volumes(Surface(vertices, faces, weights / 0.8), rig())
+    assert found[0] == pytest.approx(section * rigged.JOINT, rel=1e-5)
+    assert found[2] == pytest.approx(section * (rigged.LENGTH - rigged.JOINT), rel=1e-5)
+    low = division.pieces[2][0][:, 2].max()
+    assert low == pytest.approx(-rigged.JOINT, abs=1e-5)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000))
+def test_pieces_fill_the_whole_whatever_the_weights(seed: int) -> None:
+    """Many joints meet at a point, weights vanish, neighbours in the tree do not touch."""
+    random = np.random.default_rng(seed)
+    vertices, faces, _ = rigged.box()
+    parents = (-1, *(int(random.integers(0, n)) for n in range(1, 6)))
+    weights = random.random((len(vertices), 6)) ** 8 * (random.random((len(vertices), 6)) < 0.6)
+    weights[:, 0] += 1e-3
+    weights /= weights.sum(axis=1, keepdims=True)
+    found = volumes(Surface(vertices, faces, weights), rig(parents))
+    whole = rigged.WIDTH * rigged.HEIGHT * rigged.LENGTH
+    assert sum(found.values()) == pytest.approx(whole, rel=100 * SAME)
+
+
+def test_surface_with_a_hole_is_refused() -> None:
+    vertices, faces, weights = rigged.box()
+    with pytest.raises(SceneError, match=r"box\.glb: .* not watertight: 4 edges .* Fill Holes"):
+        divided(rig(), Surface(vertices, faces[2:], weights / 0.8), "box.glb")
+
+
+@pytest.mark.skipif(not CREATURES.is_dir(), reason="the creatures are beside the project")
+@pytest.mark.parametrize("name", ["fish-whale.glb", "bird-eagle.glb"])
+def test_creatures_are_divided_without_loss(name: str) -> None:
+    source = read_source(CREATURES / name)
+    assert source.surface is not None
+    division = divided(source.rig, source.surface, name)
+    parts = np.array([ShapeMesh(*piece).volume for piece in division.pieces.values()])
+    assert parts.sum() == pytest.approx(division.volume, rel=1e-6)
+    assert parts.min() > LEAST * division.volume
+    assert all(is_closed(piece) for piece in division.pieces.values())

@@ -1,0 +1,257 @@
+"""A character in, run, and out again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+import flowborne as fb
+from flowborne import cli
+from flowborne.characters.gltf import GltfSource
+from flowborne.characters.pose import as_cycle, posed
+from flowborne.characters.rig import Z_UP, Action, Rig, Surface
+from flowborne.characters.source import read_source
+from flowborne.formats.creature import Creature
+from flowborne.io.bvh import read_bvh
+from flowborne.io.clip import Clip
+from flowborne.scenes.bodies import load_model
+from flowborne.scenes.load import check_scene
+
+from . import rigged
+
+CREATURES = Path(__file__).parents[3] / "shared" / "creatures"
+needs_creatures = pytest.mark.skipif(
+    not CREATURES.is_dir(), reason="the creatures are beside the project"
+)
+
+TURNED = 1e-3
+"""Angle from the clip's file that is accepted, degrees."""
+
+FAR = 1e-5
+"""Distance that is accepted, in sizes of the character."""
+
+DRY = {"fluid.coupling": '"none"'}
+COARSE = {"domain.resolution": "16"}
+DRIVEN = {**DRY, "clip.free": "[]", "clip.loop": "false"}
+"""The root follows the clip, too, and once: what is in the file comes out again."""
+
+
+def skinned(rig: Rig, surface: Surface, action: Action) -> np.ndarray:
+    """(frames, k, 3) m the surface on its joints, by linear blend skinning."""
+    turn = action.rotation @ np.swapaxes(rig.rotation, 1, 2)
+    local = surface.vertices[None, :, None] - rig.position
+    carried = np.einsum(
+        "fnij,fknj->fkni", turn, np.broadcast_to(local, (len(turn), *local.shape[1:]))
+    )
+    return np.einsum("kn,fkni->fki", surface.weights, carried + action.position[:, None])
+
+
+def angles(found: np.ndarray, wanted: np.ndarray) -> float:
+    """Largest angle between rotations, degrees."""
+    turn = np.swapaxes(found, -1, -2) @ wanted
+    return float(np.degrees(Rotation.from_matrix(turn.reshape(-1, 3, 3)).magnitude()).max())
+
+
+@pytest.fixture(scope="module", params=["glb", "usda"])
+def box(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The scene of the rigged box, imported from either format."""
+    folder = tmp_path_factory.mktemp("box")
+    path = folder / f"box.{request.param}"
+    (rigged.write_glb if request.param == "glb" else rigged.write_usd)(path)
+    made = fb.import_character(path, folder / "scene", density=900.0)
+    assert "2 bodies of 4 joints, 0.24 m^3, 216 kg" in made.notes
+    assert "rigid with the joint above them: trunk, tail_tip" in made.notes
+    return made.scene
+
+
+def test_model_has_the_masses_of_the_pieces(box: Path) -> None:
+    solid = load_model(fb.load_scene(box))
+    assert solid.body_names == ("world", *rigged.NAMES)
+    assert solid.joint_names == ("handle", "tail")
+    section = rigged.WIDTH * rigged.HEIGHT
+    lengths = np.array([0.0, rigged.JOINT, 0.0, rigged.LENGTH - rigged.JOINT, 0.0])
+    assert_allclose(solid.body_mass[[1, 3]], 900.0 * section * lengths[[1, 3]], rtol=1e-4)
+    assert solid.body_mass.sum() == pytest.approx(900.0 * section * rigged.LENGTH, rel=1e-6)
+
+
+def test_clip_has_the_angles_of_the_file(box: Path) -> None:
+    times, turns, _ = rigged.clip()
+    clip = read_bvh(box.with_suffix(".bvh"))
+    assert clip.names == ("handle", "tail")
+    assert clip.frame_time == pytest.approx(1.0 / rigged.RATE, rel=1e-6)
+    _, world = clip.places()
+    tail, trunk = (Rotation.from_quat(world[:, joint], scalar_first=True) for joint in (1, 0))
+    still = rigged.TURNS[1].inv() * rigged.TURNS[2]
+    own = turns["tail"] * still.inv()
+    up = Rotation.from_matrix(Z_UP)
+    frame = up * rigged.TURNS[1]
+    wanted = frame * own * frame.inv()
+    assert len(times) == clip.frames
+    assert np.degrees(((trunk.inv() * tail).inv() * wanted).magnitude()).max() < TURNED
+
+
+def test_box_comes_back_as_its_file_moves_it(box: Path, tmp_path: Path) -> None:
+    """Joints of the same names at the same angles, and every vertex of the surface."""
+    frames = rigged.FRAMES - 1
+    fb.run(fb.load_scene(box, DRIVEN), tmp_path / "run", frames=frames, film=False)
+    found = GltfSource(tmp_path / "run" / "box.glb")
+    file = next(box.parent.parent.glob("box.*"))
+    given = read_source(file)
+    assert found.rig.names == given.rig.names
+    assert found.rig.parents.tolist() == given.rig.parents.tolist()
+    assert_allclose(found.rig.position, given.rig.position, atol=FAR * rigged.LENGTH)
+    ours, theirs = found.action(0), given.action(0)
+    moving = [1, 2]  # the handle goes with the trunk, and the tip keeps its angle
+    assert angles(ours.rotation[:, moving], theirs.rotation[:, moving]) < TURNED
+    assert found.surface is not None
+    assert given.surface is not None
+    assert_allclose(found.surface.weights, given.surface.weights, atol=1e-6)
+    assert_allclose(
+        skinned(found.rig, found.surface, ours),
+        skinned(given.rig, given.surface, theirs),
+        atol=FAR * rigged.LENGTH,
+    )
+
+
+def test_box_swims(box: Path, tmp_path: Path) -> None:
+    """In water on a coarse grid: the tail follows the clip, and takes the root along."""
+    fb.run(fb.load_scene(box, COARSE), tmp_path / "run", frames=3, film=False)
+    run = fb.open_run(tmp_path / "run")
+    for name in ("q", "v", "fluid_force", "pressure"):
+        assert np.isfinite(run.every(name)).all()
+    away = np.linalg.norm(
+        run.every("body_position")[:, 1] - run.every("body_position")[0, 1], axis=1
+    )
+    assert 1e-4 < away[-1] < 0.2 * rigged.LENGTH
+    (bound,) = Creature(run).bound
+    assert bound.name == "box"
+    assert not Creature(run).seen
+
+
+def test_tail_is_free_as_the_scene_offers_it(box: Path, tmp_path: Path) -> None:
+    """The lines that the scene has as a remark make the last joint seek least effort."""
+    text = box.read_text()
+    for line in ("[[control]]", "joints", "strength", "[[objectives]]", "kind"):
+        assert f"\n# {line}" in text
+        text = text.replace(f"\n# {line}", f"\n{line}")
+    path = box.with_name("free.toml")
+    path.write_text(text)
+    scene = fb.load_scene(path, {**COARSE, "clip.free": "[]"})
+    assert scene.controlled_joints() == ("tail",)
+    fb.run(scene, tmp_path / "run", frames=2, film=False)
+    run = fb.open_run(tmp_path / "run")
+    q = run.every("q")
+    assert np.isfinite(q).all()
+    assert np.abs(q[-1, 7:] - q[0, 7:]).max() > 1e-3, "the controller moves it"
+    assert np.abs(run.every("fluid_force")[-1]).max() > 0.0
+
+
+def test_mistakes_in_a_scene_of_a_character_are_told(box: Path) -> None:
+    (problem,) = check_scene(box, {"clip.free": '["hand"]'})
+    assert "joint 'hand' is not in model box.xml; did you mean 'handle'?" in problem
+    (problem,) = check_scene(box, {"clip.joints": '["handle"]'})
+    assert "[clip] joints: joint 'handle' is free as well. Take it out of one" in problem
+
+
+def test_command_says_what_it_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rigged.write_glb(tmp_path / "box.glb", clips=2)
+    words = ["import", str(tmp_path / "box.glb"), "--out", str(tmp_path / "out")]
+
+    def said(*more: str) -> tuple[object, str]:
+        with pytest.raises(SystemExit) as left:
+            cli.main([*words, *more])
+        out, err = capsys.readouterr()
+        return left.value.code, out + err
+
+    code, text = said()
+    assert (code, text.count("\n")) == (2, 1)
+    assert "box.glb has 2 clips. Name one by --clip: Swim 0, Swim 1." in text
+    code, text = said("--density", "0")
+    assert (code, text) == (2, "flowborne: --density is 0; give kg/m^3 above 0\n")
+    code, text = said("--clip", "Swim 1")
+    assert code == 0
+    assert "2 bodies of 4 joints, 0.24 m^3, 240 kg" in text
+    assert "clip 'Swim 1': 13 frames in 0.5 s; its joints are at most" in text
+    code, text = said("--clip", "Swim 1")
+    assert code == 2
+    assert "box.toml already, which may have been edited. Name another folder" in text
+
+
+def test_mistakes_in_an_import_are_told(tmp_path: Path) -> None:
+    rigged.write_glb(tmp_path / "bare.glb", skin=False)
+    with pytest.raises(fb.SceneError, match=r"bare\.glb has no skin: no mesh is bound"):
+        fb.import_character(tmp_path / "bare.glb", tmp_path / "out")
+    rigged.write_glb(tmp_path / "open.glb", closed=False)
+    with pytest.raises(fb.SceneError, match=r"open\.glb: the surface is not watertight"):
+        fb.import_character(tmp_path / "open.glb", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@needs_creatures
+@pytest.mark.parametrize(
+    ("file", "animations", "clip", "free"),
+    [
+        ("fish-whale.glb", "shark-animations.glb", "Swim Horizontal", "tail_8"),
+        ("bird-eagle.glb", "bird-animations.glb", "Flap", "tail_2"),
+    ],
+)
+def test_creature_comes_back(
+    file: str, animations: str, clip: str, free: str, tmp_path: Path
+) -> None:
+    """Driven by its own clip but for one joint, every other as the file has it."""
+    made = fb.import_character(
+        CREATURES / file, tmp_path / "scene", clip=clip, animations=CREATURES / animations
+    )
+    settings = {**DRIVEN, "clip.free": f'["{free}"]'}
+    fb.run(fb.load_scene(made.scene, settings), tmp_path / "run", frames=6, film=False)
+    given, moves = GltfSource(CREATURES / file), GltfSource(CREATURES / animations)
+    found = GltfSource(tmp_path / "run" / file)
+    assert found.rig.names == given.rig.names
+    assert given.surface is not None
+    assert found.surface is not None
+    size = float(np.ptp(given.surface.vertices, axis=0).max())
+    assert_allclose(found.rig.position, given.rig.position, atol=FAR * size)
+    assert_allclose(found.surface.vertices, given.surface.vertices, atol=FAR * size)
+    assert_allclose(found.surface.weights, given.surface.weights, atol=1e-6)
+    wanted = posed(given.rig, moves.rig, moves.action(moves.clips.index(clip)))
+    ours = found.action(0)
+    creature = Creature(fb.open_run(tmp_path / "run"))
+    jointed = {name for name in creature.model.joint_names} - {free, given.rig.names[0]}
+    chosen = [n for n, name in enumerate(given.rig.names) if name in jointed]
+    kept = sorted(set(chosen) - beyond(given.rig, free))
+    assert len(kept) > 10
+    count = len(ours.rotation)
+    assert angles(ours.rotation[:, kept], wanted.rotation[:count, kept]) < TURNED
+
+
+def test_clip_that_nearly_closes_is_a_cycle() -> None:
+    """Its first pose comes once more; one that ends elsewhere is no cycle, a closed one stays."""
+
+    def turning(degrees: list[float]) -> Clip:
+        turns = Rotation.from_euler("z", np.array(degrees)[:, None], degrees=True)
+        quaternions = turns.as_quat(scalar_first=True)[:, None]
+        still = np.zeros((len(degrees), 3))
+        return Clip(("a",), np.array([-1]), np.zeros((1, 3)), {}, 0.1, quaternions, still)
+
+    nearly = turning([0.0, 10.0, 20.0, 10.0, 2.0])
+    found = as_cycle(nearly)
+    assert found is not None
+    assert found.frames == 6
+    assert_allclose(found.rotations[:5], nearly.rotations)
+    assert_allclose(found.rotations[5], nearly.rotations[0])
+    closed = turning([0.0, 10.0, 20.0, 10.0, 0.0])
+    assert as_cycle(closed) is closed
+    assert as_cycle(turning([0.0, 10.0, 20.0, 30.0])) is None
+
+
+def beyond(rig: Rig, name: str) -> set[int]:
+    """A joint and all below it."""
+    found = {rig.names.index(name)}
+    for joint, parent in enumerate(rig.parents.tolist()):
+        if parent in found:
+            found.add(joint)
+    return found

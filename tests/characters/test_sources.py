@@ -1,0 +1,87 @@
+"""Rigged characters as they are read from glTF and USD."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from flowborne.characters.rig import Z_UP
+from flowborne.characters.source import Source, clip_number, read_source
+from flowborne.errors import SceneError
+
+from . import rigged
+
+TURNED = 1e-3
+"""Angle from the file that is accepted, degrees."""
+
+
+@pytest.fixture(scope="module", params=["glb", "usda"])
+def source(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Source:
+    path = tmp_path_factory.mktemp("rigged") / f"box.{request.param}"
+    (rigged.write_glb if request.param == "glb" else rigged.write_usd)(path)
+    return read_source(path)
+
+
+def test_joints_are_where_the_surface_is_bound_to_them(source: Source) -> None:
+    assert source.rig.names == rigged.NAMES
+    assert source.rig.parents.tolist() == list(rigged.PARENTS)
+    assert_allclose(source.rig.position, rigged.PLACES @ Z_UP.T, atol=1e-6)
+    assert_allclose(source.rig.rotation, Z_UP @ rigged.TURNS.as_matrix(), atol=1e-6)
+
+
+def test_surface_is_in_metres_and_its_weights_sum_to_one(source: Source) -> None:
+    vertices, faces, weights = rigged.box()
+    surface = source.surface
+    assert surface is not None
+    assert_allclose(surface.vertices, vertices @ Z_UP.T, atol=1e-6)
+    assert_allclose(surface.faces, faces)
+    assert_allclose(surface.weights, weights / 0.8, atol=1e-6)
+
+
+def test_clip_has_the_rotations_of_the_file(source: Source) -> None:
+    times, turns, moved = rigged.clip()
+    action = source.action(0)
+    assert action.frame_time == pytest.approx(1.0 / rigged.RATE, rel=1e-6)
+    assert len(action.position) == len(times)
+    for name, wanted in turns.items():
+        joint = rigged.NAMES.index(name)
+        above = np.swapaxes(action.rotation[:, rigged.PARENTS[joint]], 1, 2)
+        found = Rotation.from_matrix(above @ action.rotation[:, joint])
+        assert np.degrees((found.inv() * wanted).magnitude()).max() < TURNED
+    handle = action.position[:, 0]
+    assert_allclose(action.position[:, 1] - handle, moved @ Z_UP.T, atol=1e-6)
+
+
+def test_what_is_wrong_with_a_file_is_one_message(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cut.glb").write_bytes(b"glTF")
+    (tmp_path / "cut.usda").write_text("none")
+    for name, said in (
+        ("cat.fbx", r"cat\.fbx: \.fbx .* Make a \.glb of it, in Blender .*'cat\.glb'"),
+        ("cat.max", r"cat\.max is none of \.glb, \.gltf, \.usd"),
+        ("cat.glb", r"there is no file .*cat\.glb\. Correct its name"),
+        ("cut.glb", r"cut\.glb cannot be read as glTF: .*Export it anew"),
+        ("cut.usda", r"cut\.usda cannot be read as USD"),
+    ):
+        with pytest.raises(SceneError, match=said):
+            read_source(tmp_path / name)
+    rigged.write_glb(tmp_path / "box.glb", clips=2)
+    source = read_source(tmp_path / "box.glb")
+    with pytest.raises(SceneError, match=r"has no clip 'Swin'\. It has: Swim 0, Swim 1\."):
+        clip_number(source, "Swin", "box.glb")
+    with pytest.raises(SceneError, match=r"2 clips\. Name one by --clip: Swim 0, Swim 1\."):
+        clip_number(source, None, "box.glb")
+    assert clip_number(source, "Swim 1", "box.glb") == 1
+    rigged.write_glb(tmp_path / "still.glb", clips=0)
+    with pytest.raises(SceneError, match=r"has no clip\. Name a file that has one"):
+        clip_number(read_source(tmp_path / "still.glb"), None, "still.glb")
+    for module, extra, name in (("pygltflib", "gltf", "box.glb"), ("pxr.Usd", "usd", "cut.usda")):
+        monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(SceneError, match=rf"are read by .*flowborne\[{extra}\]"):
+            read_source(tmp_path / name)
