@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test imports failing clean
+.PHONY: demo test browser imports failing clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -12,6 +12,11 @@ test: $(VENV)/installed-test
 	$(BIN)/ruff format --check src tests tools
 	$(BIN)/mypy
 	$(BIN)/pytest --numprocesses auto --dist loadfile
+
+browser: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --editable '.[browser]'
+	command -v chromium || $(BIN)/playwright install --with-deps chromium
+	FLOWBORNE_SCREENSHOTS=runs/viewer $(BIN)/pytest -rs -m browser --numprocesses 0 tests/view/browser
 
 imports: $(VENV)/installed-test
 	$(BIN)/python tools/imports.py

@@ -10,6 +10,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from time import perf_counter
@@ -200,6 +201,26 @@ def film(
     except OSError as error:
         raise cannot_write(folder if out is None else out, error) from error
     print(f"drawn: {drawn}")
+
+
+@app.command()
+def view(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of a run, which may still go on.")
+    ],
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Where the page is served.")] = 8080,
+    host: Annotated[str, typer.Option(help="0.0.0.0 lets other machines look, too.")] = "127.0.0.1",
+) -> None:
+    """Look at a run in a browser; docs/viewer.md says what can be seen."""
+    from flowborne.view.browser.viewer import open_viewer, serve
+
+    try:
+        viewer = open_viewer(folder, host, port)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    print(f"viewing {folder} at http://{host}:{port}; Ctrl-C ends it", flush=True)
+    with suppress(KeyboardInterrupt):
+        serve(viewer)
 
 
 @app.command()

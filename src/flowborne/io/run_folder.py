@@ -25,6 +25,9 @@ from flowborne.version import __version__
 MARK = "flowborne"
 """Key of summary.json that tells a run folder from any other."""
 
+RUNNING = "running"
+"""Outcome in summary.json of a run that has none yet."""
+
 FIXED_NAMES = (
     "scene.toml",
     "history.csv",
@@ -127,12 +130,16 @@ class RunFolder:
         except (OSError, ValueError, TypeError):
             return False
 
+    def goes_on(self) -> bool:
+        """Whether a run is being written here, or was and has been killed."""
+        return self.is_run() and self.read_summary().get("outcome") == RUNNING
+
     def mark(self, model_files: list[str]) -> None:
         """Say in summary.json that a run is being written here.
 
         model_files  names of the files that the run copies beside scene.toml
         """
-        self.write_summary({"outcome": "running", "model_files": model_files})
+        self.write_summary({"outcome": RUNNING, "model_files": model_files})
 
     def write_summary(self, summary: dict[str, Any]) -> None:
         write_json(self.summary, {MARK: __version__, **summary})

@@ -25,7 +25,7 @@ class Arrows:
     def __init__(self, plotter: pv.Plotter, most: int, colour: str, lit: float) -> None:
         rings = 5 * SIDES
         self._mesh = pv.PolyData.from_regular_faces(
-            np.zeros((most * rings, 3)), np.concatenate([_FACES + n * rings for n in range(most)])
+            np.zeros((most * rings, 3)), np.concatenate([FACES + n * rings for n in range(most)])
         )
         self._actor = plotter.add_mesh(
             self._mesh, color=colour, ambient=1.0 - lit, diffuse=lit, interpolation="flat"
@@ -65,6 +65,14 @@ def arrows(tails: Array, vectors: Array, width: float) -> Array:
     return np.concatenate(rings, axis=1)
 
 
+def arrow_mesh(tails: Array, vectors: Array, width: float) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (k, 3) m and triangles (m, 3), outward, of the same arrows."""
+    corners = arrows(tails, vectors, width)
+    triangles = np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
+    first = 5 * SIDES * np.arange(len(corners))
+    return corners.reshape(-1, 3), (first[:, None, None] + triangles).reshape(-1, 3)
+
+
 _TURN = 2.0 * np.pi * np.arange(SIDES) / SIDES
 _CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
@@ -77,4 +85,5 @@ def _faces() -> NDArray[np.int64]:
     return np.concatenate([band + n * SIDES for n in range(4)])
 
 
-_FACES = _faces()
+FACES = _faces()
+"""(m, 4) corners of the faces of one arrow."""

@@ -8,6 +8,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
+from flowborne.view.forces import Forces
 from flowborne.view.run import Flesh, Geom, State
 from flowborne.view.space.flesh import way_out
 
@@ -45,6 +46,20 @@ class Skin:
             if (room > 0.0).all():
                 farthest = max(farthest, float((room[slope > 0.0] / slope[slope > 0.0]).min()))
         return farthest
+
+
+def pushes(forces: Forces, skin: Skin, state: State, pixel: float) -> tuple[Array, Array]:
+    """Tails, on the bodies' surfaces, and vectors (n, 3) of the arrows of forces, m.
+
+    pixel  size of a pixel, m
+    """
+    arrows = forces.arrows(state, pixel)
+    tails = [
+        tail + skin.reach(body, tail, vector, state) * vector / np.linalg.norm(vector)
+        for body, tail, vector in arrows
+    ]
+    vectors = [vector for *_, vector in arrows]
+    return np.reshape(tails, (-1, 3)), np.reshape(vectors, (-1, 3))
 
 
 def _planes(mesh: pv.PolyData) -> tuple[Array, Array]:

@@ -17,8 +17,8 @@ from flowborne.view.space.flesh import FleshSurface
 from flowborne.view.space.ground import Ground, stands
 from flowborne.view.space.lighting import KEY, LIGHTS
 from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
-from flowborne.view.space.shapes import LIT, mesh_of
-from flowborne.view.space.skin import Skin
+from flowborne.view.space.shapes import LIT, colour_of, mesh_of
+from flowborne.view.space.skin import Skin, pushes
 from flowborne.view.space.slices import Slice
 from flowborne.view.space.smoke import Smoke
 from flowborne.view.space.vortices import Vortices
@@ -29,9 +29,6 @@ Pixels = NDArray[np.uint8]
 
 SMOOTH = 8
 """Samples of a pixel on the edges of what is drawn."""
-
-UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
-"""Colour of a geometry to which the model gives none."""
 
 
 class Stage:
@@ -106,7 +103,8 @@ class Stage:
             self._fluid.show(state, toward)
         for facing, edge in self._edges:
             edge.visibility = bool((facing @ toward < 0.0).any())
-        self._arrows.show(*self._pushes(state), SHAFT * self._pixel)
+        shown = pushes(self._forces, self._skin, state, self._pixel)
+        self._arrows.show(*shown, SHAFT * self._pixel)
         self._look(number)
         return self._cut_out() if self._shot.transparent else self._render(self._shot.colour)
 
@@ -136,16 +134,6 @@ class Stage:
         colour = np.clip(black / np.maximum(opacity, 1.0 / 255.0), 0.0, 255.0)
         return np.rint(np.concatenate([colour, 255.0 * opacity], axis=-1)).astype(np.uint8)
 
-    def _pushes(self, state: State) -> tuple[Array, Array]:
-        """Tails, on the bodies' surfaces, and vectors (n, 3) of the arrows of forces, m."""
-        arrows = self._forces.arrows(state, self._pixel)
-        tails = [
-            tail + self._skin.reach(body, tail, vector, state) * vector / np.linalg.norm(vector)
-            for body, tail, vector in arrows
-        ]
-        vectors = [vector for *_, vector in arrows]
-        return np.reshape(tails, (-1, 3)), np.reshape(vectors, (-1, 3))
-
     def _placed(self, centres: Array, turns: Array) -> list[Array]:
         """(n, 3) points in the world of each geometry whose place is known."""
         placed = [
@@ -166,15 +154,9 @@ def _light(plotter: pv.Plotter) -> None:
 def _add_body(
     plotter: pv.Plotter, mesh: pv.PolyData, geom: Geom, accented: frozenset[int]
 ) -> pv.Actor:
-    """Add a geometry, in the model's own colour unless it stands fixed or is accented."""
-    own = tuple(np.round(geom.rgba, 6))
-    plain = own == UNCOLOURED or geom.body == 0 or geom.body in accented
-    return plotter.add_mesh(
-        mesh,
-        color=style.body_colour(geom.body, accented) if plain else own[:3],
-        opacity=float(geom.rgba[3]),
-        **LIT,
-    )
+    """Add a geometry."""
+    colour, opacity = colour_of(geom, accented)
+    return plotter.add_mesh(mesh, color=tuple(colour), opacity=opacity, **LIT)
 
 
 def _place(actor: pv.Actor, centre: Array, turn: Array, *, hidden: bool) -> None:

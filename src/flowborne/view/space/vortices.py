@@ -19,23 +19,25 @@ FINE = 4_000_000
 """Points up to which surfaces are found on a grid twice as fine, between which Q is cubic."""
 
 
-class Vortices:
-    """The surfaces in a plotter."""
+class VortexSurfaces:
+    """The surfaces of a state as meshes.
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenVortices) -> None:
+    fine  points up to which they are found on a grid twice as fine
+    """
+
+    def __init__(self, grid: Grid, seen: SeenVortices, fine: int = FINE) -> None:
         self._seen = seen
-        self._finer = 2 if 8 * np.prod(grid.shape) <= FINE else 1
+        self._finer = 2 if 8 * np.prod(grid.shape) <= fine else 1
         h = grid.spacing / self._finer
         self._image = pv.ImageData(
             dimensions=[self._finer * n for n in grid.shape],
             spacing=(h, h, h),
             origin=[x + 0.5 * h for x in grid.origin],
         )
-        self._plotter = plotter
-        self._actor: pv.Actor | None = None
 
-    def show(self, state: State, toward: Array) -> None:
-        """Show the vortices of a state to a camera in the direction `toward` (3,)."""
+    def of(self, state: State, toward: Array) -> pv.PolyData:
+        """Triangles; their vertices have "sense" from -1, clockwise to a camera in the direction
+        `toward` (3,), to 1."""
         for name, values, order in (
             ("q", self._seen.q(state), 3),
             ("sense", self._seen.sense(state, toward), 1),
@@ -44,7 +46,20 @@ class Vortices:
             if self._finer > 1:
                 fine = zoom(fine, self._finer, order=order, grid_mode=True, mode="nearest")
             self._image.point_data[name] = fine.ravel(order="F")
-        surface = self._image.contour([self._seen.level], scalars="q")
+        return self._image.contour([self._seen.level], scalars="q")
+
+
+class Vortices:
+    """The surfaces in a plotter."""
+
+    def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenVortices) -> None:
+        self._surfaces = VortexSurfaces(grid, seen)
+        self._plotter = plotter
+        self._actor: pv.Actor | None = None
+
+    def show(self, state: State, toward: Array) -> None:
+        """Show the vortices of a state to a camera in the direction `toward` (3,)."""
+        surface = self._surfaces.of(state, toward)
         if self._actor is not None:
             self._plotter.remove_actor(self._actor, render=False)
             self._actor = None

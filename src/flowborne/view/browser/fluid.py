@@ -1,0 +1,198 @@
+"""The fluid in the scene: a cloud of dye, surfaces of vortices, and a slice."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.fluid.grid import Grid
+from flowborne.view import style
+from flowborne.view.browser.layer import Layer
+from flowborne.view.browser.nodes import show_mesh
+from flowborne.view.browser.settings import Settings
+from flowborne.view.fields import NUMBERS, Field, FieldNumber, Scale, dyes_of, field_of, over
+from flowborne.view.run import Run, State
+from flowborne.view.shot import Shot
+from flowborne.view.space.lighting import scattered
+from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
+from flowborne.view.space.vortices import VortexSurfaces
+
+if TYPE_CHECKING:
+    from viser import SceneApi
+
+Array = NDArray[np.float64]
+Legend = list[tuple[str, str]]
+
+FINE = 2_000_000
+"""Points up to which vortices are found on a grid twice as fine: what a browser takes in time."""
+
+SPLATS = 60_000
+"""Cells of dye that are sent at most; beyond, eight of them are sent as one."""
+
+FAINT = 0.08
+"""Density of dye that is not seen."""
+
+WIDE = 0.6
+"""Standard deviation of the Gaussian that a cell of dye is drawn as, in cells."""
+
+DEPTH = 1.6
+"""Cells of full dye that let through a third of the light."""
+
+
+class Fluid:
+    """What is seen of the fluid of a run, on scales that are taken from its frames when they are
+    asked for.
+
+    grid    of it
+    toward  (3,) to the camera, which says what is clockwise
+    """
+
+    def __init__(self, scene: SceneApi, run: Run, toward: Array) -> None:
+        assert run.grid is not None
+        self.grid: Grid = run.grid
+        self.toward = toward
+        self._scene, self._run = scene, run
+        self._layer = Layer(scene, run.grid)
+        self._fields: dict[str, Field | None] = {}
+
+    @property
+    def frames(self) -> int:
+        """Frames of the run from which the scales are taken."""
+        return len(self._run)
+
+    def show(self, state: State, wanted: Settings) -> None:
+        """Show of a state what is wanted."""
+        if self._run.slab:
+            self._show_slab(state, wanted)
+        else:
+            self._show_dye(state, wanted.field == "dye")
+            self._show_vortices(state, wanted.field == "vorticity")
+            self._show_slice(state, wanted)
+        axis, place = (2, 0.0) if self._run.slab else (wanted.axis, wanted.place)
+        speed = self._number("speed").limit if wanted.velocity else 1.0
+        self._layer.show_velocity(state, axis, place, speed, wanted.velocity)
+
+    def legend(self, wanted: Settings) -> tuple[Legend, list[Scale]]:
+        """(name, colour) of what is seen in a colour of its own, and the scales of colours."""
+        if self._run.slab:
+            field = self._slab_field(wanted.field)
+            scales = [] if field is None or field.scale is None else [field.scale]
+            return ([] if field is None else list(field.legend)), scales
+        names: Legend = []
+        if wanted.field == "dye":
+            names += self._dye.legend
+        if wanted.field == "vorticity":
+            names += self._vortices.legend
+        slices = () if wanted.slice == "none" else (self._number(wanted.slice).scale,)
+        return names, [scale for scale in slices if scale is not None]
+
+    def _show_slab(self, state: State, wanted: Settings) -> None:
+        field = self._slab_field(wanted.field)
+        image = np.zeros((1, 1, 4), np.uint8) if field is None else field.image(state)
+        self._layer.show_image(over(image, self._run.shot.colour), 2, 0.0)
+
+    def _show_slice(self, state: State, wanted: Settings) -> None:
+        if wanted.slice == "none":
+            self._layer.hide_image()
+            return
+        cell = (wanted.place - self.grid.origin[wanted.axis]) / self.grid.spacing
+        image = SeenSlice(self._number(wanted.slice)).image(state, wanted.axis, cell)
+        self._layer.show_image(image.swapaxes(0, 1), wanted.axis, wanted.place)
+
+    def _show_vortices(self, state: State, wanted: bool) -> None:
+        """Those that turn one way and the other are a mesh each, of their colour."""
+        points, faces, warm = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, bool)
+        if wanted:
+            surface = self._surfaces.of(state, self.toward)
+            if surface.n_points:
+                points, faces = surface.points, surface.regular_faces
+                warm = surface.point_data["sense"][faces].mean(axis=1) > 0.0
+        for name, chosen, colour in (
+            ("left", faces[warm], style.SPIN_LEFT[1]),
+            ("right", faces[~warm], style.SPIN_RIGHT[1]),
+        ):
+            show_mesh(
+                self._scene,
+                f"/run/vortices/{name}",
+                (points, chosen),
+                color=style.rgb(colour),
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+
+    def _show_dye(self, state: State, wanted: bool) -> None:
+        """A Gaussian for each cell with dye in it, lit as smoke."""
+        smoke = cloud(self.grid, self._dye, state, self.toward) if wanted else None
+        if smoke is None or not len(smoke[0]):
+            self._scene.remove_by_name("/run/dye")
+            return
+        centres, colours, opacities, size = smoke
+        self._scene.add_gaussian_splats(
+            "/run/dye",
+            centres.astype(np.float32),
+            np.broadcast_to((WIDE * size) ** 2 * np.eye(3), (len(centres), 3, 3)),
+            colours,
+            opacities[:, None],
+        )
+
+    @cached_property
+    def _dye(self) -> SeenDye:
+        return SeenDye(self._run, dyes_of(self._run))
+
+    @cached_property
+    def _vortices(self) -> SeenVortices:
+        return SeenVortices(self._run)
+
+    @cached_property
+    def _surfaces(self) -> VortexSurfaces:
+        return VortexSurfaces(self.grid, self._vortices, FINE)
+
+    @cached_property
+    def _numbers(self) -> dict[str, FieldNumber]:
+        return {}
+
+    def _number(self, name: str) -> FieldNumber:
+        if name not in self._numbers:
+            self._numbers[name] = FieldNumber(self._run, NUMBERS[name])
+        return self._numbers[name]
+
+    def _slab_field(self, name: str) -> Field | None:
+        if name not in self._fields:
+            self._fields[name] = field_of(self._run, Shot.of({"field": name}))
+        return self._fields[name]
+
+
+def cloud(
+    grid: Grid, dye: SeenDye, state: State, toward: Array
+) -> tuple[Array, NDArray[np.float32], NDArray[np.float32], float]:
+    """Centres (n, 3) m, colours (n, 3) and opacities (n,) of the cells with dye, and their size, m.
+
+    toward  (3,) to the camera, for the light that dye scatters
+    """
+    colour, density = dye.smoke(state)
+    size, solid = grid.spacing, (1.0 - state["open"]).astype(np.float32)
+    while np.count_nonzero(density > FAINT) > SPLATS:
+        colour, density, solid = _coarser(colour), _coarser(density), _coarser(solid)
+        size *= 2.0
+    light = scattered(density / np.float32(DEPTH), solid, toward)
+    chosen = np.argwhere(density > FAINT)
+    at = tuple(chosen.T)
+    centres = np.asarray(grid.origin) + size * (chosen + 0.5)
+    # Gaussians at every cell add up to 2 pi WIDE^2 times the height of one
+    opacity = (1.0 - np.exp(-density[at] / DEPTH)) / (2.0 * np.pi * WIDE**2)
+    return centres, np.clip(colour[at] * light[at], 0.0, 1.0), np.clip(opacity, 0.0, 1.0), size
+
+
+def _coarser(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means over blocks of two cells each way; what is left over at the upper ends is dropped."""
+    for axis in range(3):
+        values = np.moveaxis(values, axis, 0)
+        if len(values) > 1:
+            values = values[: len(values) // 2 * 2]
+            values = np.float32(0.5) * (values[::2] + values[1::2])
+        values = np.moveaxis(values, 0, axis)
+    return values

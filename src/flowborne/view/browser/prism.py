@@ -1,0 +1,74 @@
+"""Flat shapes raised to prisms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Mesh = tuple[Array, Integers]
+"""Vertices (n, 3) m and triangles (m, 3) of them, outward."""
+
+
+def prism(outlines: Sequence[Array], low: float, high: float) -> Mesh:
+    """What outlines enclose, raised from one z to another, m.
+
+    There is no bottom, which nobody sees. Top and sides share no vertex, so that the edge between
+    them is lit as one.
+
+    outlines  (k, 2) m of each, counter-clockwise, and clockwise around holes
+    """
+    if not outlines:
+        return nothing()
+    flat = np.concatenate(outlines)
+    sizes = [len(outline) for outline in outlines]
+    firsts = np.cumsum([0, *sizes[:-1]])
+    here = np.arange(len(flat))
+    loops = [first + np.arange(size) for first, size in zip(firsts, sizes, strict=True)]
+    there = np.concatenate([np.roll(loop, -1) for loop in loops])
+    top = np.pad(flat, ((0, 0), (0, 1)), constant_values=high)
+    bottom = np.pad(flat, ((0, 0), (0, 1)), constant_values=low)
+    upper, lower = len(flat), 2 * len(flat)
+    sides = [
+        (lower + here, lower + there, upper + there),
+        (lower + here, upper + there, upper + here),
+    ]
+    faces = [_inside(top, loops), *(np.stack(corners, axis=1) for corners in sides)]
+    return np.concatenate([top, top, bottom]), np.concatenate(faces)
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Several meshes as one."""
+    if not meshes:
+        return nothing()
+    firsts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes[:-1])])
+    faces = [first + faces for first, (_, faces) in zip(firsts, meshes, strict=True)]
+    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
+
+
+def nothing() -> Mesh:
+    """A mesh without vertices."""
+    return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+
+
+def counter_clockwise(outline: Array) -> Array:
+    """An outline (k, 2) in that direction, whichever it had."""
+    x, y = outline.T
+    area = float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return outline if area >= 0.0 else outline[::-1]
+
+
+def _inside(points: Array, loops: Sequence[Integers]) -> Integers:
+    """(m, 3) triangles of points (n, 3) in a plane that loops of them enclose."""
+    lines = [entry for loop in loops for entry in (len(loop) + 1, *loop.tolist(), int(loop[0]))]
+    outline = pv.PolyData(points, lines=lines)
+    cap = vtkContourTriangulator()
+    cap.SetInputData(outline)
+    cap.Update()
+    faces = pv.wrap(cap.GetOutput()).regular_faces
+    return np.asarray(faces, np.int64)

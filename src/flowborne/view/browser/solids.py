@@ -1,0 +1,144 @@
+"""Bodies, flesh, and the forces on them, as meshes in the scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flowborne.view import style
+from flowborne.view.arrows import arrow
+from flowborne.view.browser.nodes import show_mesh
+from flowborne.view.browser.prism import Mesh, counter_clockwise, joined, nothing, prism
+from flowborne.view.forces import SHAFT, Forces
+from flowborne.view.outlines import Outlines, flesh_loops
+from flowborne.view.run import Run, State
+from flowborne.view.space.arrows import arrow_mesh
+from flowborne.view.space.flesh import creased
+from flowborne.view.space.shapes import colour_of, mesh_of
+from flowborne.view.space.skin import Skin, pushes
+
+if TYPE_CHECKING:
+    from viser import MeshHandle, SceneApi
+
+
+THICK = 0.02
+"""Thickness of what is drawn of a slab, in smaller sides of what is seen."""
+
+PIXELS = 700.0
+"""About how many a browser shows across the smaller side of what is seen."""
+
+
+class Bodies:
+    """The geometries, each a mesh in its own frame that is placed anew for every state.
+
+    meshes  of each geometry
+    """
+
+    def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
+        """`side`: m, smaller side of what is seen."""
+        self._covered = [geom.covered for geom in run.geoms]
+        self.meshes: list[MeshHandle] = []
+        for n, (vertices, faces) in enumerate(_surfaces(run, side)):
+            colour, opacity = colour_of(run.geoms[n], run.accented)
+            self.meshes.append(
+                scene.add_mesh_simple(
+                    f"/run/bodies/{n}",
+                    vertices.astype(np.float32),
+                    faces.astype(np.uint32),
+                    color=colour,
+                    opacity=None if opacity == 1.0 else opacity,
+                )
+            )
+
+    def show(self, state: State, bones: bool) -> None:
+        """Place them; those in flesh are seen with `bones`, one whose numbers are lost is not."""
+        centres, turns = state["geom_position"].astype(float), state["geom_rotation"].astype(float)
+        for n, mesh in enumerate(self.meshes):
+            known = np.isfinite(centres[n]).all() and np.isfinite(turns[n]).all()
+            mesh.visible = bool(known) and (bones or not self._covered[n])
+            if mesh.visible:
+                mesh.position = centres[n]
+                mesh.wxyz = Rotation.from_matrix(turns[n]).as_quat(scalar_first=True)
+
+
+class FleshMesh:
+    """The skin of all flesh; of a slab its cross-section.
+
+    mesh  in the scene
+    """
+
+    def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
+        """`side`: m, smaller side of what is seen."""
+        assert run.flesh is not None
+        self._run, self._high = run, THICK * side
+        state = run.state(0)
+        first = state["flesh_vertices"].astype(float)
+        self._vertex, self._faces = creased(first, run.flesh.triangles)
+        vertices, faces = self._surface(state)
+        self.mesh: MeshHandle = scene.add_mesh_simple(
+            "/run/flesh",
+            vertices.astype(np.float32),
+            faces.astype(np.uint32),
+            color=style.rgb(style.FLESH),
+        )
+
+    def show(self, state: State, bones: bool) -> None:
+        """Show the flesh of a state, seen through with `bones`; not when its numbers are lost."""
+        self.mesh.visible = bool(np.isfinite(state["flesh_vertices"]).all())
+        self.mesh.opacity = style.SEEN_THROUGH if bones else None
+        if self.mesh.visible:
+            vertices, faces = self._surface(state)
+            self.mesh.vertices = vertices.astype(np.float32)
+            if self._run.slab:
+                self.mesh.faces = faces.astype(np.uint32)
+
+    def _surface(self, state: State) -> Mesh:
+        if self._run.slab:
+            return prism(flesh_loops(self._run, state), 0.0, self._high)
+        return state["flesh_vertices"][self._vertex], self._faces
+
+
+class Pushes:
+    """The forces of fluid and winds on the bodies, as arrows of one scale.
+
+    scale  of the arrows
+    """
+
+    def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
+        self.scale = Forces(run, side)
+        self._scene, self._slab = scene, run.slab
+        self._pixel, self._high = side / PIXELS, THICK * side
+        self._skin = None
+        if not run.slab:
+            self._skin = Skin(run.geoms, [mesh_of(geom) for geom in run.geoms], run.flesh)
+
+    def show(self, state: State, wanted: bool) -> None:
+        """Show the arrows of a state, or none."""
+        mesh = self._mesh(state) if wanted else nothing()
+        colour = style.rgb(style.FORCE)
+        show_mesh(self._scene, "/run/forces", mesh, color=colour, cast_shadow=False)
+
+    def _mesh(self, state: State) -> Mesh:
+        """All arrows of a state as one."""
+        width = SHAFT * self._pixel
+        if self._skin is None:
+            found = self.scale.arrows(state, self._pixel)
+            flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]
+            return joined([prism([one], self._high, 1.5 * self._high) for one in flat])
+        return arrow_mesh(*pushes(self.scale, self._skin, state, self._pixel), width)
+
+
+def _surfaces(run: Run, side: float) -> list[Mesh]:
+    """Vertices (k, 3) m and faces (m, 3) of each geometry in its own frame."""
+    if not run.slab:
+        meshes = [mesh_of(geom) for geom in run.geoms]
+        return [(np.asarray(m.points, float), m.regular_faces) for m in meshes]
+    state, found = run.state(0), []
+    placed = Outlines(run).placed(state)
+    poses = zip(state["geom_position"], state["geom_rotation"], placed, strict=True)
+    for centre, turn, outline in poses:
+        vertices, faces = prism([counter_clockwise(outline)], 0.0, THICK * side)
+        found.append(((vertices - centre) @ turn, faces))
+    return found

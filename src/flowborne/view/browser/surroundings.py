@@ -1,0 +1,114 @@
+"""What stands around the bodies: light, background, ground, the edges of a domain, and wind."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flowborne.fluid.grid import Grid
+from flowborne.view import style
+from flowborne.view.arrows import round_number
+from flowborne.view.browser.viewpoint import FilmView
+from flowborne.view.run import Run
+from flowborne.view.space.arrows import arrow_mesh
+from flowborne.view.space.ground import SQUARE, stands
+from flowborne.view.space.lighting import LIGHTS
+
+if TYPE_CHECKING:
+    from viser import SceneApi
+
+BRIGHT = 3.0
+"""Strength of a light in a browser over that in a film: there it is divided by pi."""
+
+AMBIENT = 0.75
+"""Light that comes from everywhere."""
+
+ABOVE = ((0.25, 0.45, -1.0), 0.75, "#ffffff")
+"""Direction, strength and colour of the light on a slab, which is seen from above."""
+
+
+def surround(scene: SceneApi, run: Run, view: FilmView) -> None:
+    """Put everything into the scene that does not change with time."""
+    scene.set_up_direction(view.up)
+    scene.set_background_image(
+        np.broadcast_to(np.rint(255.0 * style.rgb(run.shot.colour)).astype(np.uint8), (4, 4, 3)),
+        format="png",
+    )
+    scene.add_frame("/run", show_axes=False)
+    ground = not run.slab and stands(run)
+    _light(scene, run.slab, ground)
+    if ground:
+        _lay_ground(scene, view)
+    if run.grid is not None and not run.slab:
+        _draw_edges(scene, run.grid)
+    if run.grid is None and run.wind.any():
+        _blow(scene, run, view)
+
+
+def _light(scene: SceneApi, slab: bool, shadows: bool) -> None:
+    scene.configure_default_lights(False)
+    scene.configure_environment_map(None)
+    scene.add_light_ambient("/lights/ambient", intensity=AMBIENT)
+    for n, (direction, strength, colour) in enumerate([ABOVE] if slab else LIGHTS):
+        red, green, blue = np.rint(255.0 * style.rgb(colour)).astype(int).tolist()
+        x, y, z = (-10.0 * np.array(direction)).tolist()
+        scene.add_light_directional(
+            f"/lights/{n}",
+            color=(red, green, blue),
+            intensity=BRIGHT * strength,
+            cast_shadow=shadows and n == 0,
+            position=(x, y, z),
+        )
+
+
+def _lay_ground(scene: SceneApi, view: FilmView) -> None:
+    """A floor with squares of a round number of metres, fading away."""
+    square = round_number(SQUARE * view.side)
+    scene.add_grid(
+        "/run/ground",
+        infinite_grid=True,
+        cell_size=square,
+        section_size=square,
+        cell_color=style.rgb(style.SQUARES),
+        section_color=style.rgb(style.SQUARES),
+        fade_distance=8.0 * view.side,
+        fade_strength=2.0,
+        shadow_opacity=0.55,
+        plane_color=style.rgb(style.FLOOR),
+        plane_opacity=0.0,
+        position=(0.0, 0.0, -1e-3 * view.side),
+    )
+
+
+def _draw_edges(scene: SceneApi, grid: Grid) -> None:
+    """The edges of the fluid's domain."""
+    corners = np.array(list(product(*zip(grid.origin, grid.upper, strict=True))))
+    ends = [(a, b) for a, b in combinations(corners, 2) if np.count_nonzero(a != b) == 1]
+    scene.add_line_segments(
+        "/run/domain",
+        np.array(ends, np.float32),
+        style.rgb(style.LINE),
+        thickness=1.5,
+        thickness_units="screen",
+    )
+
+
+def _blow(scene: SceneApi, run: Run, view: FilmView) -> None:
+    """An arrow along the wind, upwind of what is looked at and staying there, with its speed."""
+    wind = run.wind.sum(axis=0)
+    speed = float(np.linalg.norm(wind))
+    vector = 0.17 * view.side * wind / speed
+    tail = view.first.target - 0.54 * view.side * wind / speed
+    vertices, faces = arrow_mesh(tail[None], vector[None], 0.012 * view.side)
+    scene.add_mesh_simple(
+        "/wind",
+        vertices.astype(np.float32),
+        faces.astype(np.uint32),
+        color=style.rgb(style.CURVES[1]),
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+    place = tail + 0.5 * vector + 0.04 * view.side * np.eye(3)["xyz".index(view.up[1])]
+    scene.add_label("/wind/speed", f"wind {speed:.3g} m/s", position=place)

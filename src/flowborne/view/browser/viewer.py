@@ -1,0 +1,172 @@
+"""Opens a run in a browser, and keeps what is seen of it up to date."""
+
+from __future__ import annotations
+
+import socket
+from contextlib import suppress
+from pathlib import Path
+from time import monotonic, sleep
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.errors import SceneError
+from flowborne.io.optional import optional
+from flowborne.io.run_folder import RunFolder, RunFolderError
+from flowborne.view.browser.camera_keys import CameraKeys
+from flowborne.view.browser.fluid import Fluid
+from flowborne.view.browser.growing import GrowingRun
+from flowborne.view.browser.legend import legend_html
+from flowborne.view.browser.panel import Panel
+from flowborne.view.browser.settings import Settings
+from flowborne.view.browser.solids import Bodies, FleshMesh, Pushes
+from flowborne.view.browser.surroundings import surround
+from flowborne.view.browser.timeline import Timeline
+from flowborne.view.browser.viewpoint import FilmView
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+Array = NDArray[np.float64]
+
+TICK = 1.0 / 60.0
+"""s between two looks at the controls."""
+
+LOOK = 0.5
+"""s between two looks into the folder, and two at the cameras."""
+
+
+class Viewer:
+    """A run in the scene and panel of a server; `tick` keeps them up to date.
+
+    run       as far as it has come
+    timeline  the time that is seen
+    panel     the controls
+    """
+
+    def __init__(self, server: ViserServer, run: GrowingRun, folder: str) -> None:
+        """raises  ValueError when the shot of the run's scene does not suit it"""
+        self.server, self.folder = server, folder
+        self._shown: tuple[int, bool, bool, Settings] | None = None
+        self._open(run)
+
+    def tick(self, seconds: float) -> None:
+        """Let so many seconds go by, and show what is then to be seen."""
+        self.timeline.advance(seconds)
+        self.panel.obey()
+        timeline, settings = self.timeline, self.panel.settings
+        wanted = (timeline.number, timeline.playing, timeline.newest, settings)
+        if wanted != self._shown:
+            self._show(settings)
+            self._shown = wanted
+
+    def look(self) -> None:
+        """Take new frames of the run, and the cameras of those who look."""
+        # while a run is being replaced its folder cannot be read, and what was there is seen
+        with suppress(RunFolderError):
+            new = self.run.grown()
+            if new is not None and new.continues(self.run):
+                self._extend(new)
+            elif new is not None:
+                self._open(new)
+        self._keys.show(self.server.get_clients(), self._along)
+
+    def _open(self, run: GrowingRun) -> None:
+        """Show a run from its beginning."""
+        server = self.server
+        server.scene.reset()
+        server.gui.reset()
+        self.run, self._view = run, FilmView.of(run)
+        self.timeline = Timeline(run.times)
+        first, side = self._view.first, self._view.side
+        server.initial_camera.position = tuple(first.position)
+        server.initial_camera.look_at = tuple(first.target)
+        server.initial_camera.fov = float(np.radians(first.lens))
+        surround(server.scene, run, self._view)
+        self._bodies = Bodies(server.scene, run, side)
+        self._flesh = FleshMesh(server.scene, run, side) if run.flesh is not None else None
+        self._measure()
+        self.panel = Panel(server.gui, run, self._view, self.timeline)
+        self._keys = CameraKeys(self.folder, run.slab)
+        self._along = np.zeros(3)
+        self._shown = None
+        if RunFolder(run.states[0].parent.parent).goes_on():
+            self.timeline.show_newest()
+
+    def _extend(self, run: GrowingRun) -> None:
+        """Show a run that has come farther."""
+        self.run, self._view = run, FilmView.of(run)
+        self.timeline.extend(run.times)
+        if len(run) >= 2 * self._measured:
+            self._measure()
+        self.panel.extend(run)
+        self._shown = None
+
+    def _measure(self) -> None:
+        """Take scales from the frames there are: anew whenever there are twice as many."""
+        run, view = self.run, self._view
+        self._measured = len(run)
+        self._pushes = Pushes(self.server.scene, run, view.side)
+        toward = view.first.position - view.first.target
+        self._fluid = None
+        if run.grid is not None:
+            self._fluid = Fluid(self.server.scene, run, toward / np.linalg.norm(toward))
+
+    def _show(self, wanted: Settings) -> None:
+        """Show the state of the time as it is wanted."""
+        number = self.timeline.number
+        state = self.run.state(number)
+        self._along = self._view.path[number] if wanted.follow else np.zeros(3)
+        names, scales = ([], []) if self._fluid is None else self._fluid.legend(wanted)
+        with self.server.atomic():
+            self.server.scene.add_frame("/run", show_axes=False, position=-self._along)
+            self._bodies.show(state, wanted.bones)
+            if self._flesh is not None:
+                self._flesh.show(state, wanted.bones)
+            self._pushes.show(state, wanted.forces)
+            if self._fluid is not None:
+                self._fluid.show(state, wanted)
+            self.panel.show(self.run, number)
+            shown = self._pushes.scale if wanted.forces else None
+            self.panel.legend.content = legend_html(names, scales, shown)
+
+
+def open_viewer(folder: Path, host: str, port: int) -> Viewer:
+    """A viewer of the run in `folder`, which is served from now on.
+
+    raises  RunFolderError when there is nothing to view there; SceneError when viser is missing,
+            or nothing can be served there; ValueError when the shot of the run's scene does not
+            suit it
+    """
+    viser = optional("viser", "viser", "view", "views in a browser")
+    run = GrowingRun.opened(folder)
+    _check_free(host, port)
+    server = viser.ViserServer(host=host, port=port, verbose=False)
+    return Viewer(server, run, str(folder))
+
+
+def serve(viewer: Viewer) -> None:
+    """Keep a viewer up to date until it is interrupted."""
+    before = looked = monotonic()
+    while True:
+        now = monotonic()
+        viewer.tick(now - before)
+        before = now
+        if now - looked >= LOOK:
+            viewer.look()
+            looked = now
+        sleep(max(0.0, TICK - (monotonic() - now)))
+
+
+def _check_free(host: str, port: int) -> None:
+    """Raise SceneError unless a server can listen there: viser would take the next port."""
+    with socket.socket() as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            taken.bind((host, port))
+        except OSError as error:
+            raise SceneError(
+                f"{host}, port {port} cannot be used ({error.strerror}); name another one with "
+                "--port"
+            ) from None

@@ -1,0 +1,137 @@
+"""The viewer in a real browser: `make browser`. FLOWBORNE_SCREENSHOTS names a folder for them."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import flowborne
+from flowborne.kernels.jit import cores
+from flowborne.view import style
+
+pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")
+playwright = pytest.importorskip(
+    "playwright.sync_api", reason="a browser is driven by playwright: make browser"
+)
+
+pytestmark = pytest.mark.browser
+
+SOFTWARE = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""Options with which Chromium draws WebGL without a graphics card."""
+
+SYSTEM = ("chromium", "chromium-browser", "google-chrome")
+"""Names of a browser that the machine may have of its own."""
+
+FIRST_PICTURE = 3.0
+"""s from the page's address to its first picture, where the machine has a core free for it."""
+
+DIFFERENT = 12.0
+"""Levels of 255 by which a colour is another one."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    own = next((path for name in SYSTEM if (path := shutil.which(name))), None)
+    with playwright.sync_playwright() as started:
+        try:
+            found = started.chromium.launch(executable_path=own, args=list(SOFTWARE))
+        except playwright.Error:
+            pytest.skip("there is no Chromium here: make browser")
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module", params=["human-wind-back", "ns-block-drag-max"])
+def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a walker of 150 frames in space, and of a block in a stream."""
+    frames = {"human-wind-back": 150, "ns-block-drag-max": 12}[request.param]
+    folder = tmp_path_factory.mktemp("runs") / str(request.param)
+    flowborne.run(request.param, folder, frames=frames, workers=1, film=False)
+    return folder
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    """Address of the viewer of a run, by the command."""
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    command = [sys.executable, "-m", "flowborne", "view", str(folder), "--port", str(port)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            line = next(line for line in process.stdout if line.startswith("viewing"))
+            assert str(port) in line
+            yield f"http://127.0.0.1:{port}"
+        finally:
+            process.terminate()
+
+
+def picture(page: Any) -> np.ndarray:
+    """(height, width, 3) what the page shows of the run, without the panel."""
+    image = Image.open(BytesIO(page.screenshot())).convert("RGB")
+    return np.asarray(image, float)[:, : image.width - 380]
+
+
+def drawn(image: np.ndarray) -> float:
+    """Part of an image that is not the colour of still water."""
+    water = 255.0 * style.rgb(style.WATER)
+    return float((np.abs(image - water).max(axis=-1) > DIFFERENT).mean())
+
+
+def opened(browser: Any, address: str) -> tuple[Any, float]:
+    """Page of a viewer once there is something on it, and s that it took."""
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    before = monotonic()
+    page.goto(address)
+    # viser tells of drawing without a graphics card
+    page.add_style_tag(content=".mantine-Notifications-root { display: none }")
+    while drawn(picture(page)) < 0.02:
+        assert monotonic() - before < 60.0, "nothing was drawn in a minute"
+    return page, monotonic() - before
+
+
+def seek(page: Any, time: float) -> None:
+    """Type a time beside the slider, and wait until it is shown."""
+    box = page.locator('xpath=//label[text()="time (s)"]/following::input[@type="text"][1]')
+    box.fill(str(time))
+    box.press("Enter")
+    page.get_by_text(f"t = {time:.3f} s").wait_for()
+    sleep(1.0)
+
+
+def test_first_picture_and_three_moments(browser: Any, run: Path, tmp_path: Path) -> None:
+    """Bodies move from moment to moment, and the panel says when; the first picture is in time."""
+    shots = Path(os.environ.get("FLOWBORNE_SCREENSHOTS", tmp_path))
+    shots.mkdir(parents=True, exist_ok=True)
+    times = flowborne.open_run(run).times
+    with served(run) as address:
+        page, seconds = opened(browser, address)
+        print(f"{run.name}: first picture after {seconds:.2f} s")
+        moments = []
+        for n, share in enumerate((0.25, 0.5, 1.0)):
+            seek(page, round(float(times[round(share * (len(times) - 1))]), 3))
+            moments.append(picture(page))
+            page.screenshot(path=shots / f"{run.name}-{n}.png")
+        page.get_by_text("camera", exact=True).click()
+        page.get_by_text("[film.camera]").wait_for()
+        page.close()
+    for before, after in itertools.pairwise(moments):
+        assert (np.abs(after - before).max(axis=-1) > DIFFERENT).mean() > 0.005
+    assert all(drawn(image) > 0.02 for image in moments)
+    if os.getloadavg()[0] < cores():
+        assert seconds < FIRST_PICTURE

@@ -1,0 +1,223 @@
+"""What of a run goes into the scene and the panel."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from flowborne.cli import main
+from flowborne.errors import SceneError
+from flowborne.io.cell_fields import cell_velocity
+from flowborne.io.run_folder import RunFolder, RunFolderError
+from flowborne.scenes.schema_film import FilmTable
+from flowborne.view.browser.camera_keys import camera_text
+from flowborne.view.browser.growing import GrowingRun
+from flowborne.view.browser.layer import velocity_arrows
+from flowborne.view.browser.viewer import Viewer, open_viewer
+from flowborne.view.browser.viewpoint import FilmView, Viewpoint
+from flowborne.view.outlines import Outlines
+from flowborne.view.run import Run
+from flowborne.view.shot import Shot
+from flowborne.view.window import windows
+
+pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def folder(write_run: Write) -> Path:
+    """Folder of a block in a stream, 12 frames."""
+    path = write_run(frames=12)
+    RunFolder(path).write_summary({"outcome": "done"})
+    return path
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+@pytest.fixture
+def viewer(folder: Path) -> Iterator[Viewer]:
+    opened = open_viewer(folder, "127.0.0.1", free_port())
+    opened.tick(0.0)
+    yield opened
+    opened.server.stop()
+
+
+def placed(viewer: Viewer, geom: int) -> np.ndarray:
+    """(n, 3) vertices of a geometry where the scene has them, m."""
+    mesh = viewer._bodies.meshes[geom]
+    turn = Rotation.from_quat(mesh.wxyz, scalar_first=True).as_matrix()
+    return np.asarray(mesh.vertices @ turn.T + mesh.position)
+
+
+def distance_to_block(state: dict[str, np.ndarray], points: np.ndarray) -> np.ndarray:
+    """(n,) m, of points in the plane from the outline of the block of 1 m x 0.18 m."""
+    local = (points - state["geom_position"][1]) @ state["geom_rotation"][1]
+    return np.asarray(np.maximum(np.abs(local[:, 0]) - 0.5, np.abs(local[:, 1]) - 0.09))
+
+
+def test_bodies_are_where_the_run_has_them(viewer: Viewer) -> None:
+    for number in (0, 7):
+        viewer.timeline.seek(viewer.run.times[number])
+        viewer.tick(0.0)
+        points = placed(viewer, 1)
+        assert np.abs(distance_to_block(viewer.run.state(number), points)).max() < 1e-5
+
+
+def test_slider_seeks(viewer: Viewer) -> None:
+    viewer.panel._slider.value = 0.31
+    viewer.tick(0.0)
+    assert viewer.timeline.number == 7
+    assert "frame 7 of 12" in viewer.panel._clock.content
+
+
+def test_slider_goes_along_while_it_plays(viewer: Viewer) -> None:
+    viewer.timeline.play()
+    viewer.tick(0.25)
+    assert viewer.timeline.playing
+    assert viewer.panel._slider.value == pytest.approx(0.25)
+
+
+def test_curves_follow_the_time(viewer: Viewer) -> None:
+    viewer.timeline.seek(0.25)
+    viewer.tick(0.0)
+    times, whole, past = viewer.panel.curves.plots[-1].data
+    assert np.allclose(whole, np.degrees(viewer.run.history["angle_hinge_rad"]))
+    assert np.array_equal(np.isfinite(past), times <= 0.25 + 1e-9)
+
+
+def test_new_frames_appear(viewer: Viewer, folder: Path) -> None:
+    states = folder / "states"
+    with np.load(states / "000012.npz") as last:
+        arrays = dict(last)
+    arrays["time"] = np.float64(13 / 24)
+    arrays["geom_position"] = arrays["geom_position"] + np.float32(0.125)
+    np.savez(states / "000013.npz", **arrays)
+    with (folder / "history.csv").open("a") as history:
+        history.write("13,0.541667,0.5,0.5,-0.7\n")
+    viewer.timeline.seek(viewer.run.times[-1])
+    viewer.tick(0.0)
+    before = placed(viewer, 1)
+    viewer.timeline.show_newest()
+    viewer.look()
+    viewer.tick(0.0)
+    assert len(viewer.run) == 14
+    assert viewer.timeline.number == 13
+    assert np.allclose(placed(viewer, 1) - before, 0.125, atol=1e-6)
+    assert viewer.panel.curves.plots[-1].data[0][-1] == pytest.approx(13 / 24, abs=1e-5)
+
+
+def test_run_that_starts_again_is_seen_from_its_start(viewer: Viewer, folder: Path) -> None:
+    viewer.timeline.show_newest()
+    for path in sorted((folder / "states").iterdir())[3:]:
+        path.unlink()
+    viewer.look()
+    viewer.tick(0.0)
+    assert len(viewer.run) == 3
+    assert viewer.timeline.number == 0
+
+
+def test_run_that_goes_on_is_seen_at_its_newest_frame(folder: Path) -> None:
+    RunFolder(folder).mark([])
+    viewer = open_viewer(folder, "127.0.0.1", free_port())
+    assert viewer.timeline.newest
+    viewer.server.stop()
+
+
+def test_states_are_read_once(folder: Path) -> None:
+    run = GrowingRun.opened(folder)
+    assert run.grown() is None
+    first = run.every("geom_position")
+    (folder / "states" / "000005.npz").write_bytes(b"")
+    assert np.array_equal(run.every("geom_position"), first)
+
+
+def test_fields_of_a_slab(viewer: Viewer) -> None:
+    """Every choice is shown with its legend."""
+    for field, said in (("vorticity", "vorticity (1/s)"), ("speed", "speed (m/s)"), ("dye", "dye")):
+        viewer.panel._controls["field"].value = field
+        viewer.tick(0.0)
+        assert said in viewer.panel.legend.content
+        assert viewer.server.scene.get_handle_by_name("/run/slice") is not None
+
+
+def test_velocity_arrows_point_along_the_velocity(folder: Path) -> None:
+    run = Run.read(folder)
+    assert run.grid is not None
+    state = run.state(3)
+    vertices, _faces = velocity_arrows(run.grid, state, 2, 0.0, 1.0)
+    arrow = vertices.reshape(-1, 7, 3)[0]
+    middle = 0.5 * (arrow[3] + 0.5 * (arrow[0] + arrow[6]))
+    along = arrow[3] - 0.5 * (arrow[0] + arrow[6])
+    cell = (*tuple(np.floor((middle - run.grid.origin) / run.grid.spacing).astype(int)[:2]), 0)
+    velocity = cell_velocity(run.grid, state)[cell]
+    assert np.dot(along, velocity) > 0.999 * np.linalg.norm(along) * np.linalg.norm(velocity)
+
+
+def test_camera_of_a_slab_gives_the_same_film(folder: Path) -> None:
+    run = Run.read(folder)
+    view = FilmView.of(run)
+    keys = tomllib.loads(camera_text("run", view.first, True).split("```")[1][4:])["film"]
+    shot = Shot.of(FilmTable.model_validate(keys).model_dump(exclude_none=True))
+    seen = windows(run, Outlines(run), shot, None)[0]
+    wanted = windows(run, Outlines(run), run.shot, None)[0]
+    assert seen[2:] == pytest.approx(wanted[2:], abs=0.01)
+
+
+def test_camera_keys_are_those_of_a_scene() -> None:
+    seen_from = Viewpoint(np.array([7.0, -2.5, 1.25]), np.array([0.1, 0.0, 0.9]), 26.0)
+    keys = tomllib.loads(camera_text("run", seen_from, False).split("```")[1][4:])["film"]
+    camera = Shot.of(FilmTable.model_validate(keys).model_dump(exclude_none=True)).camera
+    assert camera.position == (7.0, -2.5, 1.25)
+    assert camera.target == (0.1, 0.0, 0.9)
+    assert camera.lens == 26.0
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (shutil.rmtree, "there is no folder"),
+        (lambda path: (path / "summary.json").unlink(), "is not the folder of a run"),
+        (lambda path: shutil.rmtree(path / "states"), "has no frame yet"),
+        (lambda path: (path / "model.json").write_text("{"), "cannot be read"),
+    ],
+)
+def test_folder_with_nothing_to_view(
+    folder: Path, spoil: Callable[[Path], object], said: str
+) -> None:
+    spoil(folder)
+    with pytest.raises(RunFolderError, match=said):
+        GrowingRun.opened(folder)
+
+
+def test_port_in_use_is_said(folder: Path) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = int(other.getsockname()[1])
+        with pytest.raises(SceneError, match=f"port {port} cannot be used .* --port"):
+            open_viewer(folder, "127.0.0.1", port)
+
+
+def test_command_says_what_is_missing(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(SystemExit) as left:
+        main(["view", str(folder)])
+    assert left.value.code == 2
+    assert "pip install 'flowborne[view]'" in capsys.readouterr().err
+    assert json.loads((folder / "summary.json").read_text())["outcome"] == "done"
