@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -206,33 +208,49 @@ parameters = { speed = 3.0 }
 """
 
 
-@pytest.mark.parametrize(
-    ("body", "said"),
-    [
-        ("return speed * np.ones_like(x)", None),
-        ("return [1.0, 2.0]", "wind 'breeze:rising' gave an array of shape (2,)"),
-        ("return x.gusts", "wind 'breeze:rising' failed in breeze.py, line 3 (AttributeError"),
-    ],
-)
-def test_a_wind_takes_parameters_and_says_where_it_fails(
-    scene: Path, tmp_path: Path, body: str, said: str | None
-) -> None:
+@pytest.fixture
+def windy(scene: Path) -> Iterator[Callable[[str], Path]]:
+    """A scene file whose wind is a function with the body that is given."""
+
+    def write(body: str) -> Path:
+        forget("breeze")
+        code = f"import numpy as np\ndef rising(x, time, speed):\n    {body}\n"
+        scene.with_name("breeze.py").write_text(code)
+        file = scene.with_name("wind.toml")
+        file.write_text(WIND)
+        return file
+
+    yield write
     forget("breeze")
-    code = f"import numpy as np\ndef rising(x, time, speed):\n    {body}\n"
-    scene.with_name("breeze.py").write_text(code)
-    file = scene.with_name("wind.toml")
-    file.write_text(WIND)
-    result = fb.run(file, tmp_path / "run", film=False)
-    if said is None:
-        assert result.outcome.name == "DONE"
-        assert fb.OpenRun(tmp_path / "run").history["drag_N"][0] > 1.0
-    else:
-        assert said in result.message
+
+
+def test_a_wind_takes_parameters(windy: Callable[[str], Path], tmp_path: Path) -> None:
+    file = windy("return speed * np.ones_like(x)")
+    assert fb.run(file, tmp_path / "run", film=False).outcome.name == "DONE"
+    assert fb.OpenRun(tmp_path / "run").history["drag_N"][0] > 1.0
     file.write_text(WIND.replace("speed", "pace"))
     assert "function 'breeze:rising': got an unexpected keyword argument 'pace'" in str(
         check_scene(file)
     )
-    forget("breeze")
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("return [1.0, 2.0]", "wind 'breeze:rising' gave an array of shape (2,)"),
+        ("return x.gusts", "wind 'breeze:rising' failed in breeze.py, line 3 (AttributeError"),
+    ],
+)
+def test_a_wind_that_fails_is_told_before_the_run_or_keeps_what_was_done(
+    windy: Callable[[str], Path], tmp_path: Path, body: str, said: str
+) -> None:
+    with pytest.raises(fb.SceneError, match=re.escape(said)):
+        fb.run(windy(body), tmp_path / "run", film=False)
+    assert not (tmp_path / "run").exists()
+    file = windy(body.replace("return", "return np.zeros_like(x) if time < 0.02 else"))
+    result = fb.run(file, tmp_path / "run", film=False)
+    assert said in result.message
+    assert result.frames == 1
 
 
 def test_a_gradient_of_ones_own_gets_the_probes_of_the_scene(scene: Path) -> None:

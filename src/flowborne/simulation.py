@@ -17,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import Setup, World
-from flowborne.errors import SceneError
+from flowborne.errors import PartError, SceneError
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
@@ -210,6 +210,8 @@ class Simulation:
         try:
             with _one_blas_thread(), kernel_threads():
                 start(world, self.frame_time / self.steps_per_frame, given, held)
+        except PartError as error:
+            raise SceneError(f"scene {scene.name}: {error}") from error
         except (ArithmeticError, ValueError) as error:
             raise SceneError(
                 f"scene {scene.name}, [initial]: {error}. Look for bodies that are in each other "
