@@ -29,6 +29,7 @@ class FleshSystem:
 
     model    what it is of
     A        (nv, nv) sparse, symmetric positive definite, without the rows
+    elastic  (nv, nv) sparse, the part dt^2/2 K of A that is the flesh's
     impulse  (nv,) A v + dt b, without the rows
     dt       s
     v        (nv,) velocity before the step
@@ -38,6 +39,7 @@ class FleshSystem:
 
     model: SolidModel
     A: csr_array
+    elastic: csr_array
     impulse: Array
     dt: float
     v: Array
@@ -110,7 +112,8 @@ def assemble_flesh(
     K, elastic = _flesh(model, s)
     assert model.flesh is not None
     damping = model.flesh.damping
-    A = A + (0.5 * dt**2 + 0.5 * dt * damping) * K
+    half = 0.5 * dt**2 * K
+    A = A + half + 0.5 * dt * damping * K
     force = s.smooth + elastic - damping * (K @ state.v)
     v = state.v.copy()
     still = A @ v
@@ -123,7 +126,7 @@ def assemble_flesh(
     if s.data.nefc:
         s.forward(state.q, state.v, applied)
         rows, zones = rows_of(model, s)
-    return FleshSystem(model, csr_array(A), own, dt, v, rows, zones, centre, own)
+    return FleshSystem(model, csr_array(A), csr_array(half), own, dt, v, rows, zones, centre, own)
 
 
 def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_array, Array]:

@@ -9,6 +9,17 @@ where B = A + J^T D J holds the active constraint rows. Their number is small, s
 factorised and B_FF^-1 is found by the formula of Sherman, Morrison and Woodbury:
 
     B^-1 = A^-1 - Y (D^-1 + J Y)^-1 Y^T      Y = A^-1 J^T
+
+Flesh that turns moves along a straight line in a step, which stretches it by half the square of
+the angle. Vibrations too fast for the step take that up and keep it: undamped, a flag that swings
+through a third of its length tore after 90 steps. Of a velocity v whose frequency is w, S = A^-1 E
+keeps s = (w dt)^2 / (2 + (w dt)^2), with E = dt^2/2 K the flesh's part of A, and a step takes the
+impulse
+
+    FADING E S^(FINE - 1) v
+
+from the flesh: a share FADING s^FINE, nearly all of it from what the step cannot follow. The
+damping ratio of a vibration in n steps a period is FADING (2 pi / n)^5 / 16.
 """
 
 from __future__ import annotations
@@ -30,6 +41,9 @@ from flowborne.solvers.mobility import Mobility, factored_mobility
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+FADING, FINE = 0.25, 3
+"""What a step takes from vibrations that it cannot follow, and how sharply those are told."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +158,7 @@ class PrescribedFlesh:
 def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> PrescribedFlesh:
     """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly."""
     free, factor = _factored(system, prescribed)
+    system = _faded(system, free, factor)
     none = np.zeros(len(hold))
     rows = np.zeros((len(free), 0)), None
     return _solved(
@@ -159,6 +174,16 @@ def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> Presc
             none,
         )
     )
+
+
+def _faded(system: FleshSystem, free: NDArray[np.int64], factor: Cholesky) -> FleshSystem:
+    """With the impulse that takes from vibrations too fast for the step."""
+    v = system.v
+    for _ in range(FINE - 1):
+        kept = np.zeros_like(v)
+        kept[free] = factor.solve((system.elastic @ v)[free])
+        v = kept
+    return replace(system, impulse=system.impulse - FADING * (system.elastic @ v))
 
 
 def _factored(system: FleshSystem, prescribed: Mask) -> tuple[NDArray[np.int64], Cholesky]:
