@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 import flowborne as fb
@@ -20,6 +21,7 @@ from flowborne.io.bvh import read_bvh
 from flowborne.io.clip import Clip
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import check_scene
+from flowborne.view.run import Run
 
 from . import rigged
 
@@ -130,6 +132,22 @@ def test_box_swims(box: Path, tmp_path: Path) -> None:
     (bound,) = Creature(run).bound
     assert bound.name == "box"
     assert not Creature(run).seen
+
+
+def test_pictures_show_the_surface_in_place_of_its_pieces(box: Path, tmp_path: Path) -> None:
+    """The drawn skin is the surface of the file, where the file's clip has it."""
+    frames = rigged.FRAMES - 1
+    fb.run(fb.load_scene(box, DRIVEN), tmp_path / "run", frames=frames, film=False)
+    run = Run.read(tmp_path / "run")
+    assert all(geom.covered for geom in run.geoms)
+    (skin,) = run.skins
+    exported = GltfSource(tmp_path / "run" / "box.glb")
+    assert exported.surface is not None
+    drawn = np.array([skin.vertices(run.state(n)) for n in range(len(run))])
+    wanted = skinned(exported.rig, exported.surface, exported.action(0))
+    apart, _ = KDTree(drawn[-1]).query(wanted[-1])
+    assert apart.max() < FAR * rigged.LENGTH
+    assert np.ptp(drawn, axis=0).max() > 0.1 * rigged.LENGTH
 
 
 def test_tail_is_free_as_the_scene_offers_it(box: Path, tmp_path: Path) -> None:

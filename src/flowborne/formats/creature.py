@@ -18,7 +18,7 @@ from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import scene_of_run
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import BALL, HINGE, SolidModel
-from flowborne.solids.skins import skins_of
+from flowborne.solids.skins import clad_bodies, skins_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -185,9 +185,8 @@ class Creature:
     def seen(self) -> tuple[Surface, ...]:
         """The surfaces of bones that carry no skin of the model, which stands for theirs, and are
         not rigid with one that does."""
-        rigid = self.model.mj.body_weldid[self._numbers]
-        clad = {group for skin in self.bound for group in rigid[skin.weights.any(axis=0)]}
-        return tuple(s for s in self.surfaces if s.bone < 0 or rigid[s.bone] not in clad)
+        clad = clad_bodies(self.model.mj)[self._numbers]
+        return tuple(s for s in self.surfaces if s.bone < 0 or not clad[s.bone])
 
     @cached_property
     def skins(self) -> tuple[Skin, ...]:

@@ -14,7 +14,9 @@ from flowborne.io.run_folder import RunFolder
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
+from flowborne.solids.mjcf import rest_poses
 from flowborne.solids.model import SolidModel
+from flowborne.solids.skins import clad_bodies, skins_of
 
 Array = NDArray[np.float64]
 
@@ -159,6 +161,7 @@ def write_model(
             "grid": grid,
             "geoms": _geoms(solid),
             "flesh": None if solid.flesh is None else _flesh(solid.flesh),
+            "skins": [] if solid.slab else _skins(solid),
             "frames_per_second": frames_per_second,
             "wind": wind,
         },
@@ -168,17 +171,39 @@ def write_model(
 def _geoms(solid: SolidModel) -> list[dict[str, Any]]:
     """The geometries in the order of geom_position."""
     listed = []
+    clad = np.zeros(solid.nbody, bool) if solid.slab else clad_bodies(solid.mj)[: solid.nbody]
     for geom, shape in enumerate(solid.geom_shape):
         entry: dict[str, Any] = {
             "type": shape.kind,
             "size": solid.geom_size[geom].tolist(),
             "body": int(solid.geom_body[geom]),
             "rgba": solid.geom_rgba[geom].tolist(),
-            "covered": bool(solid.geom_covered[geom]),
+            "covered": bool(solid.geom_covered[geom] or clad[solid.geom_body[geom]]),
         }
         if isinstance(shape, ShapeMesh):
             entry |= {"vertices": shape.vertices.tolist(), "faces": shape.faces.tolist()}
         listed.append(entry)
+    return listed
+
+
+def _skins(solid: SolidModel) -> list[dict[str, Any]]:
+    """The model's skins in its own pose, and where the bodies that carry each are in it."""
+    listed = []
+    position, rotation, _, _ = rest_poses(solid.mj)
+    for skin in skins_of(solid.mj):
+        bodies = np.flatnonzero(skin.weights.any(axis=0))
+        listed.append(
+            {
+                "name": skin.name,
+                "rgba": skin.rgba.tolist(),
+                "vertices": skin.vertices.tolist(),
+                "triangles": skin.faces.tolist(),
+                "bodies": bodies.tolist(),
+                "weights": skin.weights[:, bodies].tolist(),
+                "body_position": position[bodies].tolist(),
+                "body_rotation": rotation[bodies].tolist(),
+            }
+        )
     return listed
 
 

@@ -33,6 +33,28 @@ class ModelSkin:
     rgba: Array
 
 
+def skinned(vertices: Array, weights: Array, turn: Array, shift: Array) -> Array:
+    """(k, 3) places of a surface that bodies carry, m: linear blend skinning.
+
+    vertices  (k, 3) m where the bodies do not move it
+    weights   (k, n) share of each body in carrying a vertex, together 1
+    turn, shift  (n, 3, 3) R and (n, 3) t of each body's motion x -> R x + t, m
+    """
+    blended = np.einsum("kn,nij->kij", weights, turn)
+    return np.asarray(np.einsum("kij,kj->ki", blended, vertices) + weights @ shift)
+
+
+def clad_bodies(mj: mujoco.MjModel) -> NDArray[np.bool_]:
+    """(nbody,) which bodies a skin stands for: it follows them, or what is rigid with them."""
+    carrying = np.zeros(mj.nbody, bool)
+    for skin in skins_of(mj):
+        carrying |= skin.weights.any(axis=0)
+    carrying[0] = False
+    found: NDArray[np.bool_] = np.isin(mj.body_weldid, mj.body_weldid[carrying])
+    found[0] = False
+    return found
+
+
 def skins_of(mj: mujoco.MjModel) -> tuple[ModelSkin, ...]:
     """The skins, moved by their bodies from the pose in which they were bound."""
     position, rotation, _, _ = rest_poses(mj)

@@ -6,7 +6,7 @@ import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from flowborne.io.history import history_columns, history_rows
 from flowborne.io.run_folder import STATE_NAME, RunFolder
 from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.shape import Shape
+from flowborne.solids.skins import skinned
+from flowborne.view import style
 from flowborne.view.shot import Shot
 
 Array = NDArray[np.float64]
@@ -33,13 +35,31 @@ class Geom:
     shape    in its own frame
     body     number of the body
     rgba     colour that the model gives it
-    covered  whether flesh is all around it
+    covered  whether flesh is all around it, or a skin stands for it
     """
 
     shape: Shape
     body: int
     rgba: Array
     covered: bool = False
+
+
+class Skin(Protocol):
+    """A surface that deforms from frame to frame.
+
+    triangles  (m, 3) of vertices, outward
+    rgb        (3,) colour
+    """
+
+    @property
+    def triangles(self) -> NDArray[np.int64]: ...
+
+    @property
+    def rgb(self) -> Array: ...
+
+    def vertices(self, state: State) -> Array:
+        """(k, 3) m, in a state."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -52,6 +72,41 @@ class Flesh:
 
     triangles: NDArray[np.int64]
     bodies: tuple[int, ...]
+
+    @property
+    def rgb(self) -> Array:
+        return style.rgb(style.FLESH)
+
+    def vertices(self, state: State) -> Array:
+        """(k, 3) m, in a state."""
+        return state["flesh_vertices"].astype(float)
+
+
+@dataclass(frozen=True)
+class CarriedSkin:
+    """A skin of the model, which bodies carry.
+
+    rest       (k, 3) its vertices in the model's own pose, m
+    triangles  (m, 3) of them, outward
+    bodies     (n,) numbers of those that carry it, and weights (k, n) their shares, together 1
+    position   (n, 3) m and rotation (n, 3, 3), where the bodies are in the model's own pose
+    rgb        (3,) colour
+    """
+
+    rest: Array
+    triangles: NDArray[np.int64]
+    bodies: NDArray[np.int64]
+    weights: Array
+    position: Array
+    rotation: Array
+    rgb: Array
+
+    def vertices(self, state: State) -> Array:
+        """(k, 3) m, in a state."""
+        turn = state["body_rotation"][self.bodies].astype(float) @ self.rotation.swapaxes(1, 2)
+        moved = state["body_position"][self.bodies].astype(float)
+        shift = moved - np.einsum("nij,nj->ni", turn, self.position)
+        return skinned(self.rest, self.weights, turn, shift)
 
 
 @dataclass(frozen=True)
@@ -72,6 +127,7 @@ class Run:
     history            column -> values, a number per frame of the run from the first on
     states             files of states/, in order
     flesh              what is drawn of flesh; None without
+    carried            the model's skins, in a room
     """
 
     name: str
@@ -88,6 +144,7 @@ class Run:
     history: dict[str, Array]
     states: tuple[Path, ...]
     flesh: Flesh | None = None
+    carried: tuple[CarriedSkin, ...] = ()
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -117,7 +174,13 @@ class Run:
             history=_history(folder.history),
             states=states,
             flesh=_flesh(model.get("flesh")),
+            carried=tuple(_carried(entry) for entry in model.get("skins", ())),
         )
+
+    @property
+    def skins(self) -> tuple[Skin, ...]:
+        """All that deforms."""
+        return self.carried if self.flesh is None else (self.flesh, *self.carried)
 
     def __len__(self) -> int:
         """Number of frames that can be drawn, the initial state included."""
@@ -186,6 +249,18 @@ def _flesh(entry: dict[str, Any] | None) -> Flesh | None:
     if entry is None:
         return None
     return Flesh(np.asarray(entry["triangles"], np.int64), tuple(entry["bodies"]))
+
+
+def _carried(entry: dict[str, Any]) -> CarriedSkin:
+    return CarriedSkin(
+        np.asarray(entry["vertices"], float),
+        np.asarray(entry["triangles"], np.int64),
+        np.asarray(entry["bodies"], np.int64),
+        np.asarray(entry["weights"], float),
+        np.asarray(entry["body_position"], float),
+        np.asarray(entry["body_rotation"], float),
+        np.asarray(entry["rgba"][:3], float),
+    )
 
 
 def _history(path: Path) -> dict[str, Array]:

@@ -1,61 +1,298 @@
-"""An arrow starts where the line of its force leaves the body."""
+"""Flesh in space: a smooth skin over bones that are seen through it only when asked for."""
 
 from __future__ import annotations
 
+import colorsys
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
 import numpy as np
 import pytest
+import pyvista as pv
 
-from flowborne.shapes.kinds import shape_of
-from flowborne.view.run import Geom
+from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.report import Outcome
+from flowborne.coupling.step import step
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.fluid.grid import Grid
+from flowborne.io.history import History
+from flowborne.io.recorder import Recorder, write_model
+from flowborne.io.run_folder import RunFolder
+from flowborne.shapes.box import ShapeBox
+from flowborne.solids.flesh import surface_of
+from flowborne.solids.model import SolidModel
+from flowborne.solids.tissue import Tissue, add_flesh
+from flowborne.validation.flesh_bars import bar_mesh
+from flowborne.view import style
+from flowborne.view.pictures import Picture
+from flowborne.view.run import Flesh, Geom, Run
+from flowborne.view.space.camera import FILLED, camera_of
+from flowborne.view.space.ground import stands
+from flowborne.view.space.lighting import KEY
+from flowborne.view.space.map_space import MapSpace
+from flowborne.view.space.opengl import off_screen
+from flowborne.view.space.outside import Outside
 from flowborne.view.space.shapes import mesh_of
-from flowborne.view.space.skin import Skin
+from flowborne.view.space.skin import SkinSurface, creased, normals, way_out
 
-TURN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""The geometry's x is the world's y, its y z and its z x."""
+Make = Callable[..., Run]
+Pixels = np.ndarray
 
-PLACE = np.array([3.0, 4.0, 5.0])
+BALL = ("sphere", (0.1, 0.0, 0.0))
 
-
-def geom(kind: str, size: tuple[float, float, float], body: int = 1) -> Geom:
-    return Geom(shape_of(kind, np.array(size), None), body, np.ones(4))
-
-
-def skin_of(*geoms: Geom) -> Skin:
-    return Skin(geoms, [mesh_of(geom) for geom in geoms])
+ARM = """<mujoco><worldbody><body name="upper" pos="-.2 0 0"><joint name="shoulder" axis="0 1 0"/>
+<geom type="capsule" fromto=".05 0 0 .15 0 0" size=".025"/><body name="lower" pos=".2 0 0">
+<joint name="elbow" axis="0 1 0"/><geom type="capsule" fromto=".05 0 0 .15 0 0" size=".025"/>
+</body></body></worldbody></mujoco>"""
 
 
-@pytest.mark.parametrize(
-    ("kind", "size", "vector", "reach"),
-    [
-        ("box", (0.1, 0.2, 0.3), (5.0, 0.0, 0.0), 0.3),
-        ("box", (0.1, 0.2, 0.3), (0.0, -2.0, 0.0), 0.1),
-        ("box", (0.1, 0.2, 0.3), (0.0, 1.0, 1.0), 0.1 * np.sqrt(2.0)),
-        ("sphere", (0.4, 0.0, 0.0), (1.0, -2.0, 3.0), 0.4),
-        ("capsule", (0.1, 0.5, 0.0), (0.1, 0.0, 0.0), 0.6),
-        ("cylinder", (0.1, 0.5, 0.0), (0.0, 0.0, 9.0), 0.1),
-        ("ellipsoid", (0.1, 0.2, 0.3), (0.0, 0.0, 1.0), 0.2),
-    ],
-)
-def test_the_line_leaves_the_body_at_its_surface(
-    kind: str, size: tuple[float, float, float], vector: tuple[float, ...], reach: float
-) -> None:
-    state = {"geom_position": PLACE[None], "geom_rotation": TURN[None]}
-    found = skin_of(geom(kind, size)).reach(1, PLACE, np.array(vector), state)
-    assert found == pytest.approx(reach, rel=0.01)
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run of two bones in flesh that bend in a fluid; two frames of one step each."""
+    spec = mujoco.MjSpec.from_string(ARM)
+    points, elements = bar_mesh((8, 2, 2), (0.4, 0.1, 0.1))
+    points[:, 0] -= 0.2
+    held = (np.hypot(*points[:, 1:].T) < 0.01) & (np.abs(points[:, 0]) > 0.04)
+    bones = [("upper", "lower")[int(x > 0.0)] for x in points[:, 0]]
+    holders = [bone if h else "" for bone, h in zip(bones, held, strict=True)]
+    grown = add_flesh(spec, "arm", points, elements, Tissue(3e4, 0.3, 1000.0, 0.01), holders)
+    model = SolidModel.with_flesh(spec, [grown], gravity=(0.0, 0.0, 0.0))
+    world = World.at_rest(Setup(model, Fluid(Grid((16, 12, 16), 0.05, (-0.4, -0.3, -0.4)), 1000.0)))
+    folder = RunFolder.create(tmp_path_factory.mktemp("runs") / "arm")
+    folder.scene.write_text('name = "arm"\n[film]\nfield = "none"\n')
+    write_model(folder, world.setup, controlled=["elbow"], frames_per_second=24.0, wind=[])
+    History.create(folder.history, ["frame", "time_s"]).close()
+    recorder = Recorder(folder)
+    recorder.write(0, world, None)
+    command = JointCommand.none(model.nv)
+    for joint, speed in (("shoulder", 1.0), ("elbow", -3.0)):
+        command.set(model.dofs_of(joint), speed, speed)
+    for frame in (1, 2):
+        report = step(world, 0.02, command)
+        assert report.outcome is Outcome.DONE
+        recorder.write(frame, world, report)
+    return folder.path
 
 
-def test_of_several_parts_the_farthest_that_holds_the_place_counts() -> None:
-    skin = skin_of(
-        geom("sphere", (0.1, 0.0, 0.0)),
-        geom("sphere", (0.3, 0.0, 0.0)),
-        geom("sphere", (0.3, 0.0, 0.0)),
-        geom("sphere", (9.0, 0.0, 0.0), body=2),
-    )
-    places = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.8, 0, 0], [0, 0, 0]])
+@pytest.fixture
+def ball_of_flesh(run_of: Make) -> Callable[..., Run]:
+    """Makes a run of a ball that lies on the ground and of flesh, wherever that is."""
+
+    def make(vertices: np.ndarray, triangles: np.ndarray, **told: object) -> Run:
+        """`vertices` (frames, k, 3) of flesh."""
+        run = run_of([BALL], np.full((len(vertices), 1, 3), [0.0, 0.0, 0.1]), **told)
+        for path, places in zip(run.states, vertices, strict=True):
+            with np.load(path) as file:
+                arrays = dict(file)
+            np.savez(path, **arrays, flesh_vertices=places.astype(np.float32))
+        geoms = tuple(replace(geom, covered=True) for geom in run.geoms)
+        return replace(run, geoms=geoms, flesh=Flesh(triangles, (1,)))
+
+    return make
+
+
+def ball(radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles of a ball about the origin."""
+    mesh = pv.Icosphere(radius=radius, nsub=4)
+    return np.asarray(mesh.points, float), mesh.regular_faces.astype(np.int64)
+
+
+def drawn(picture: Picture, number: int) -> Pixels:
+    """(h, w, 3) the map of a frame."""
+    box = picture.layout.map
+    pixels = picture.draw(number)[box.top : box.top + box.height, box.left : box.left + box.width]
+    return pixels[:, :, :3].astype(int)
+
+
+def up_of(picture: Picture) -> np.ndarray:
+    """(3,) upwards on the map."""
+    assert isinstance(picture.map, MapSpace)
+    return picture.map.camera.axes(0)[1]
+
+
+def pixel_of(picture: Picture, number: int, place: np.ndarray) -> tuple[int, int]:
+    """(row, column) in the map of a place in m."""
+    assert isinstance(picture.map, MapSpace)
+    x, y = picture.map.camera.project(number, np.asarray(place, float)[None])[0]
+    box = picture.layout.map
+    return int((1.0 - y) * box.height), int(x * box.width)
+
+
+def hue(colour: Pixels) -> float:
+    return colorsys.rgb_to_hsv(*(colour / 255.0))[0]
+
+
+def lit(pixels: Pixels) -> Pixels:
+    """Where there is something other than water."""
+    return np.abs(pixels - np.rint(255.0 * style.rgb(style.WATER))).max(axis=-1) > 6
+
+
+def hue_of(colour: str) -> float:
+    return hue(255.0 * style.rgb(colour))
+
+
+def test_the_skin_stands_where_its_vertices_are(ball_of_flesh: Make) -> None:
+    places, triangles = ball(0.3)
+    middles = np.array([[0.0, 0.0, 0.0], [0.4, 0.3, 0.5]])
+    run = ball_of_flesh(middles[:, None] + places, triangles)
+    with closing(Picture(run)) as picture:
+        for number, middle in enumerate(middles):
+            seen = lit(drawn(picture, number))
+            row, column = np.argwhere(seen).mean(axis=0)
+            expected = pixel_of(picture, number, middle)
+            assert (row, column) == pytest.approx(expected, abs=5.0)
+            radius = expected[0] - pixel_of(picture, number, middle + 0.3 * up_of(picture))[0]
+            assert seen.sum() == pytest.approx(np.pi * radius**2, rel=0.05)
+
+
+def test_the_skin_is_shaded_smoothly(ball_of_flesh: Make) -> None:
+    """Of its own colour; on a line across its middle it darkens without steps from face to face."""
+    places, triangles = ball(0.3)
+    run = ball_of_flesh(np.broadcast_to(places, (2, *places.shape)), triangles)
+    with closing(Picture(run)) as picture:
+        pixels = drawn(picture, 0)
+        row, column = pixel_of(picture, 0, np.zeros(3))
+        radius = row - pixel_of(picture, 0, 0.3 * up_of(picture))[0]
+    down = pixels[row - int(0.9 * radius) : row + int(0.9 * radius), column].astype(float)
+    assert hue(down[len(down) // 4]) == pytest.approx(hue_of(style.FLESH), abs=0.02)
+    light = down.sum(axis=1)
+    assert light.max() > 2.5 * light.min()
+    assert np.abs(np.diff(light)).max() < 0.03 * np.ptp(light)
+
+
+def test_a_state_whose_numbers_are_lost_shows_no_skin(ball_of_flesh: Make) -> None:
+    places, triangles = ball(0.3)
+    vertices = np.array([places, places])
+    vertices[1, 5] = np.nan
+    with closing(Picture(ball_of_flesh(vertices, triangles))) as picture:
+        assert lit(drawn(picture, 0)).any()
+        assert not lit(drawn(picture, 1)).any()
+
+
+def test_flesh_casts_its_shadow_on_the_ground(ball_of_flesh: Make) -> None:
+    """A ring lets light through its hole."""
+    ring = pv.ParametricTorus(ringradius=0.5, crosssectionradius=0.1).triangulate()
+    places = np.array([0.0, 0.0, 1.0]) + np.asarray(ring.points, float)
+    triangles = ring.regular_faces.astype(np.int64)
+    down = np.array([0.0, 0.0, -9.81])
+    run = ball_of_flesh(np.array([places, places]), triangles, gravity=down)
+    fallen = np.array(KEY)[:2] / -KEY[2]
+    with closing(Picture(run)) as picture:
+        pixels = drawn(picture, 0)
+        hole, shade = (
+            pixels[pixel_of(picture, 0, np.append(fallen + aside, 0.0))].sum()
+            for aside in ([0.0, 0.0], [0.5, 0.0])
+        )
+    assert hole > shade + 40
+
+
+def test_flesh_alone_may_stand_on_the_ground(ball_of_flesh: Make) -> None:
+    places, triangles = ball(0.3)
+    for height, expected in ((0.3, True), (1.0, False), (0.0, False)):
+        lifted = np.array([places, places]) + np.array([0.0, 0.0, height])
+        run = ball_of_flesh(lifted, triangles, gravity=np.array([0.0, 0.0, -9.81]))
+        assert stands(replace(run, geoms=())) == expected
+
+
+def test_bones_are_hidden_until_they_are_asked_for(arm: Path) -> None:
+    run = Run.read(arm)
+    lower = run.state(2)["geom_position"][1].astype(float)
+    loose = run.state(2)["flesh_vertices"].astype(float)
+    assert [geom.covered for geom in run.geoms] == [True, True]
+    with (
+        closing(Picture(run)) as picture,
+        closing(Picture(run, shot=replace(run.shot, bones=True))) as inside,
+    ):
+        at = pixel_of(picture, 2, lower)
+        skin, bone = drawn(picture, 2)[at], drawn(inside, 2)[at]
+        assert hue(skin) == pytest.approx(hue_of(style.FLESH), abs=0.02)
+        assert hue(bone) == pytest.approx(hue_of(style.ACCENT), abs=0.03)
+        assert bone[0] > 150, "bright, as a body is"
+        joint = pixel_of(picture, 2, loose.mean(axis=0))
+        before, through = drawn(picture, 2)[joint], drawn(inside, 2)[joint]
+        assert through.sum() < 0.8 * before.sum(), "the water behind is seen between the bones"
+
+
+def test_arrows_of_forces_start_on_the_skin(arm: Path) -> None:
+    run = Run.read(arm)
+    assert run.flesh is not None
+    assert run.flesh.bodies == (1, 2)
+    state = run.state(2)
+    skin = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
+    for body in run.flesh.bodies:
+        middle = state["fluid_centre"][body].astype(float)
+        assert 0.045 < skin.reach(body, middle, np.array([0.0, 3.0, 0.0]), state) < 0.055
+
+
+def test_the_camera_sees_all_of_the_skin(ball_of_flesh: Make) -> None:
+    places, triangles = ball(0.2)
+    growing = np.array([places * [1.0, 1.0, 1.0 + 0.5 * n] for n in range(6)])
+    run = ball_of_flesh(growing, triangles)
+    camera = camera_of(run, run.shot)
+    seen = np.stack([camera.project(n, points) for n, points in enumerate(growing)])
+    low, high = 0.5 - 0.5 * FILLED, 0.5 + 0.5 * FILLED
+    assert low - 0.01 < seen.min() < low + 0.02
+    assert high - 0.02 < seen.max() < high + 0.01
+
+
+def test_only_creases_have_two_normals() -> None:
+    points, elements = bar_mesh((3, 3, 3), (1.0, 1.0, 1.0))
+    skin = surface_of(elements)
+    vertex, faces = creased(points, skin)
+    assert len(vertex) == 6 * 4**2
+    np.testing.assert_array_equal(vertex[faces], skin)
+    found = normals(points[vertex], faces)
+    np.testing.assert_allclose(np.abs(found).max(axis=1), 1.0)
+    middle = [0.5, 0.0, 0.0]
+    assert ((points[vertex] - middle) * found).sum(axis=1) == pytest.approx(0.5)
+    places, triangles = ball(0.3)
+    assert len(creased(places, triangles)[0]) == len(places)
+
+
+def test_normals_follow_the_skin_as_it_deforms() -> None:
+    places, triangles = ball(1.0)
+    plotter = off_screen(64, 64)
+    first = {"flesh_vertices": places}
+    surface = SkinSurface(plotter, Flesh(triangles, ()), first, seen_through=False)
+    surface.show({"flesh_vertices": places * [3.0, 1.0, 0.5]})
+    (actor,) = plotter.actors.values()
+    shown = actor.mapper.dataset
+    plotter.close()
+    expected = np.asarray(shown.points) / [9.0, 1.0, 0.25]
+    expected /= np.linalg.norm(expected, axis=1)[:, None]
+    found = shown.point_data.active_normals
+    assert np.einsum("ij,ij->i", found, expected).min() > 0.99
+
+
+def test_the_way_out_ends_where_the_line_first_leaves_the_skin() -> None:
+    ring = pv.ParametricTorus(
+        ringradius=1.0, crosssectionradius=0.3, u_res=80, v_res=40, w_res=40
+    ).triangulate()
+    corners = np.asarray(ring.points, float)[ring.regular_faces]
+    volume = np.linalg.det(corners).sum() / 6.0
+    corners = corners if volume > 0.0 else corners[:, ::-1]
+    across = np.array([1.0, 0.0, 0.0])
+    inside = np.array([-1.0, 1e-3, 2e-3])
+    assert way_out(inside, across, corners) == pytest.approx(0.3, rel=0.02)
+    assert way_out(inside, -across, corners) == pytest.approx(0.3, rel=0.02)
+    assert way_out(inside - across, across, corners) == 0.0
+    assert way_out(inside + across, across, corners) == 0.0
+    assert way_out(inside, across, corners[:0]) == 0.0
+
+
+def test_a_part_of_a_body_outside_flesh_still_counts() -> None:
+    places, triangles = ball(0.2)
+    box = Geom(ShapeBox(np.array([0.5, 0.1, 0.1])), 1, np.ones(4))
+    skin = Outside([box], [mesh_of(box)], [Flesh(triangles, (1,))])
     state = {
-        "geom_position": places,
-        "geom_rotation": np.broadcast_to(np.eye(3), (4, 3, 3)),
+        "geom_position": np.zeros((1, 3)),
+        "geom_rotation": np.eye(3)[None],
+        "flesh_vertices": places,
     }
-    along = np.array([2.0, 0.0, 0.0])
-    assert skin.reach(1, np.zeros(3), along, state) == pytest.approx(0.4, rel=0.01)
-    assert skin.reach(1, np.array([5.0, 0.0, 0.0]), along, state) == 0.0
+    tilted = np.array([1e-4, 2e-4, 3e-4])
+    assert skin.reach(1, tilted, np.array([1.0, 0.0, 0.0]), state) == pytest.approx(0.5, rel=1e-3)
+    assert skin.reach(1, tilted, np.array([0.0, 0.0, 1.0]), state) == pytest.approx(0.2, rel=0.02)
+    assert skin.reach(7, tilted, np.array([0.0, 0.0, 1.0]), state) == pytest.approx(0.2, rel=0.02)

@@ -119,7 +119,7 @@ class Panel:
                 self._add_slice(gui, run, view)
             controls["velocity"] = gui.add_checkbox("velocity arrows", False)
         controls["forces"] = gui.add_checkbox("forces", True)
-        if run.flesh is not None or any(geom.covered for geom in run.geoms):
+        if run.skins or any(geom.covered for geom in run.geoms):
             controls["bones"] = gui.add_checkbox("bones", shot.bones)
         if np.ptp(view.path, axis=0).max() > 0.0:
             controls["follow"] = gui.add_checkbox("follow", True)

@@ -13,11 +13,11 @@ from flowborne.view.browser.nodes import show_mesh
 from flowborne.view.browser.prism import Mesh, counter_clockwise, joined, nothing, prism
 from flowborne.view.forces import SHAFT, Forces
 from flowborne.view.outlines import Outlines, flesh_loops
-from flowborne.view.run import Run, State
+from flowborne.view.run import Run, Skin, State
 from flowborne.view.space.arrows import arrow_mesh
-from flowborne.view.space.flesh import creased
+from flowborne.view.space.outside import Outside, pushes
 from flowborne.view.space.shapes import colour_of, mesh_of
-from flowborne.view.space.skin import Skin, pushes
+from flowborne.view.space.skin import creased
 
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
@@ -63,30 +63,28 @@ class Bodies:
                 mesh.wxyz = Rotation.from_matrix(turns[n]).as_quat(scalar_first=True)
 
 
-class FleshMesh:
-    """The skin of all flesh; of a slab its cross-section.
+class SkinMesh:
+    """A skin; of the flesh of a slab its cross-section.
 
     mesh  in the scene
     """
 
-    def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
+    def __init__(self, scene: SceneApi, run: Run, skin: Skin, name: str, side: float) -> None:
         """`side`: m, smaller side of what is seen."""
-        assert run.flesh is not None
-        self._run, self._high = run, THICK * side
+        self._run, self._skin, self._high = run, skin, THICK * side
         state = run.state(0)
-        first = state["flesh_vertices"].astype(float)
-        self._vertex, self._faces = creased(first, run.flesh.triangles)
+        self._vertex, self._faces = creased(skin.vertices(state), skin.triangles)
         vertices, faces = self._surface(state)
         self.mesh: MeshHandle = scene.add_mesh_simple(
-            "/run/flesh",
+            f"/run/skins/{name}",
             vertices.astype(np.float32),
             faces.astype(np.uint32),
-            color=style.rgb(style.FLESH),
+            color=skin.rgb,
         )
 
     def show(self, state: State, bones: bool) -> None:
-        """Show the flesh of a state, seen through with `bones`; not when its numbers are lost."""
-        self.mesh.visible = bool(np.isfinite(state["flesh_vertices"]).all())
+        """Show the skin in a state, seen through with `bones`; not when its numbers are lost."""
+        self.mesh.visible = bool(np.isfinite(self._skin.vertices(state)).all())
         self.mesh.opacity = style.SEEN_THROUGH if bones else None
         if self.mesh.visible:
             vertices, faces = self._surface(state)
@@ -97,7 +95,7 @@ class FleshMesh:
     def _surface(self, state: State) -> Mesh:
         if self._run.slab:
             return prism(flesh_loops(self._run, state), 0.0, self._high)
-        return state["flesh_vertices"][self._vertex], self._faces
+        return self._skin.vertices(state)[self._vertex], self._faces
 
 
 class Pushes:
@@ -110,9 +108,9 @@ class Pushes:
         self.scale = Forces(run, side)
         self._scene, self._slab = scene, run.slab
         self._pixel, self._high = side / PIXELS, THICK * side
-        self._skin = None
+        self._outside = None
         if not run.slab:
-            self._skin = Skin(run.geoms, [mesh_of(geom) for geom in run.geoms], run.flesh)
+            self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
 
     def show(self, state: State, wanted: bool) -> None:
         """Show the arrows of a state, or none."""
@@ -123,11 +121,11 @@ class Pushes:
     def _mesh(self, state: State) -> Mesh:
         """All arrows of a state as one."""
         width = SHAFT * self._pixel
-        if self._skin is None:
+        if self._outside is None:
             found = self.scale.arrows(state, self._pixel)
             flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]
             return joined([prism([one], self._high, 1.5 * self._high) for one in flat])
-        return arrow_mesh(*pushes(self.scale, self._skin, state, self._pixel), width)
+        return arrow_mesh(*pushes(self.scale, self._outside, state, self._pixel), width)
 
 
 def _surfaces(run: Run, side: float) -> list[Mesh]:

@@ -20,7 +20,7 @@ from flowborne.view.browser.growing import GrowingRun
 from flowborne.view.browser.legend import legend_html
 from flowborne.view.browser.panel import Panel
 from flowborne.view.browser.settings import Settings
-from flowborne.view.browser.solids import Bodies, FleshMesh, Pushes
+from flowborne.view.browser.solids import Bodies, Pushes, SkinMesh
 from flowborne.view.browser.surroundings import surround
 from flowborne.view.browser.timeline import Timeline
 from flowborne.view.browser.viewpoint import FilmView
@@ -85,7 +85,9 @@ class Viewer:
         server.initial_camera.fov = float(np.radians(first.lens))
         surround(server.scene, run, self._view)
         self._bodies = Bodies(server.scene, run, side)
-        self._flesh = FleshMesh(server.scene, run, side) if run.flesh is not None else None
+        self._skins = [
+            SkinMesh(server.scene, run, skin, str(n), side) for n, skin in enumerate(run.skins)
+        ]
         self._measure()
         self.panel = Panel(server.gui, run, self._view, self.timeline)
         self._keys = CameraKeys(self.folder, run.slab)
@@ -122,8 +124,8 @@ class Viewer:
         with self.server.atomic():
             self.server.scene.add_frame("/run", show_axes=False, position=-self._along)
             self._bodies.show(state, wanted.bones)
-            if self._flesh is not None:
-                self._flesh.show(state, wanted.bones)
+            for skin in self._skins:
+                skin.show(state, wanted.bones)
             self._pushes.show(state, wanted.forces)
             if self._fluid is not None:
                 self._fluid.show(state, wanted)

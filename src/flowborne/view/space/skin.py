@@ -1,69 +1,112 @@
-"""Where a line from within a body leaves it, so that the arrow of a force starts at the skin."""
+"""Skins, of flesh or of the model, as smooth surfaces that deform from frame to frame."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from flowborne.view.forces import Forces
-from flowborne.view.run import Flesh, Geom, State
-from flowborne.view.space.flesh import way_out
+from flowborne.view import style
+from flowborne.view.run import Skin, State
+from flowborne.view.space.shapes import LIT
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+CREASE = 60.0
+"""Angle between two triangles at first from which on their edge is seen, degrees."""
 
 
-class Skin:
-    """The bodies as convex parts bounded by planes, and the flesh around them.
-
-    meshes  of the geometries, in their own frames
-    """
+class SkinSurface:
+    """A skin in a plotter."""
 
     def __init__(
-        self, geoms: Sequence[Geom], meshes: Sequence[pv.PolyData], flesh: Flesh | None = None
+        self, plotter: pv.Plotter, skin: Skin, first: State, *, seen_through: bool
     ) -> None:
-        self._flesh = flesh
-        self._planes = [_planes(mesh) for mesh in meshes]
-        self._parts: dict[int, list[int]] = {}
-        for n, geom in enumerate(geoms):
-            self._parts.setdefault(geom.body, []).append(n)
+        """`first`: the state that says where there are edges to be seen."""
+        self._skin, vertices = skin, skin.vertices(first)
+        self._vertex, self._faces = creased(vertices, skin.triangles)
+        points = vertices[self._vertex]
+        self._mesh = pv.PolyData.from_regular_faces(points, self._faces)
+        self._mesh.point_data.active_normals = normals(points, self._faces)
+        self._actor = plotter.add_mesh(
+            self._mesh,
+            color=skin.rgb,
+            opacity=style.SEEN_THROUGH if seen_through else 1.0,
+            culling="back" if seen_through else None,
+            **LIT,
+        )
 
-    def reach(self, body: int, place: Array, vector: Array, state: State) -> float:
-        """m along `vector` (3,) from `place` (3,) to the surface of a body or of the flesh around
-        the place; 0 from outside both."""
-        along = vector / np.linalg.norm(vector)
-        farthest = 0.0
-        if self._flesh is not None:
-            corners = state["flesh_vertices"].astype(float)[self._flesh.triangles]
-            farthest = way_out(place, along, corners)
-        for part in self._parts.get(body, ()):
-            turn, centre = state["geom_rotation"][part], state["geom_position"][part]
-            normals, heights = self._planes[part]
-            room = heights - normals @ ((place - centre) @ turn)
-            slope = normals @ (along @ turn)
-            if (room > 0.0).all():
-                farthest = max(farthest, float((room[slope > 0.0] / slope[slope > 0.0]).min()))
-        return farthest
+    def show(self, state: State) -> Array:
+        """Show the skin; one whose numbers are lost is not seen. (m, 3, 3) m, the corners of its
+        triangles."""
+        vertices = self._skin.vertices(state)
+        self._actor.visibility = bool(np.isfinite(vertices).all())
+        if self._actor.visibility:
+            points = vertices[self._vertex]
+            self._mesh.points = points
+            self._mesh.point_data.active_normals[:] = normals(points, self._faces)
+            self._mesh.Modified()
+        return np.asarray(vertices[self._skin.triangles])
 
 
-def pushes(forces: Forces, skin: Skin, state: State, pixel: float) -> tuple[Array, Array]:
-    """Tails, on the bodies' surfaces, and vectors (n, 3) of the arrows of forces, m.
+def creased(vertices: Array, triangles: Indices) -> tuple[Indices, Indices]:
+    """The vertex (n,) of each point of a surface, and its triangles (m, 3) of points.
 
-    pixel  size of a pixel, m
+    A vertex on a crease has a point, and so a normal, on each side of it.
+
+    vertices   (k, 3) m;  triangles  (m, 3) of them
     """
-    arrows = forces.arrows(state, pixel)
-    tails = [
-        tail + skin.reach(body, tail, vector, state) * vector / np.linalg.norm(vector)
-        for body, tail, vector in arrows
-    ]
-    vectors = [vector for *_, vector in arrows]
-    return np.reshape(tails, (-1, 3)), np.reshape(vectors, (-1, 3))
+    faces = np.arange(triangles.size).reshape(-1, 3)
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    corners = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+    order = np.lexsort(np.sort(edges, axis=1).T)
+    here, there = order[:-1], order[1:]
+    facing = _unit(_across(vertices[triangles]))
+    joined = (edges[here] == edges[there][:, ::-1]).all(axis=1)
+    joined &= (facing[here // 3] * facing[there // 3]).sum(axis=1) > np.cos(np.radians(CREASE))
+    here, there = here[joined], there[joined]
+    # the two triangles of an edge go along it in opposite directions
+    pairs = np.concatenate([corners[here], corners[there][:, ::-1]], axis=1)
+    first, second = pairs[:, :2].ravel(), pairs[:, 2:].ravel()
+    graph = coo_array((np.ones(first.size), (first, second)), shape=2 * (triangles.size,))
+    count, point = connected_components(graph, directed=False)
+    vertex = np.empty(count, np.int64)
+    vertex[point] = triangles.ravel()
+    return vertex, point.reshape(-1, 3).astype(np.int64)
 
 
-def _planes(mesh: pv.PolyData) -> tuple[Array, Array]:
-    """Outward normals (m, 3) of a mesh's faces, and their heights (m,) over the origin, m."""
-    normals = np.asarray(mesh.face_normals, float)
-    middles = np.asarray(mesh.cell_centers().points, float)
-    return normals, np.einsum("ij,ij->i", normals, middles)
+def normals(points: Array, triangles: Indices) -> Array:
+    """(n, 3) mean normal of the triangles (m, 3) around each point, weighted by their areas."""
+    total = np.zeros((len(points), 3))
+    np.add.at(total, triangles, _across(points[triangles])[:, None])
+    return _unit(total)
+
+
+def _across(corners: Array) -> Array:
+    """(m, 3) normals of triangles with corners (m, 3, 3), as long as twice their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+
+
+def way_out(place: Array, along: Array, corners: Array) -> float:
+    """m along the unit vector `along` (3,) from `place` (3,) to where it leaves a closed skin of
+    triangles with corners (m, 3, 3) m; 0 from outside it (Moeller and Trumbore 1997)."""
+    known = corners[np.isfinite(corners).all(axis=(1, 2))]
+    slope = _across(known) @ along
+    crossed, slope = known[slope != 0.0], slope[slope != 0.0]
+    first = crossed[:, 0] - place
+    one, other = crossed[:, 1] - crossed[:, 0], crossed[:, 2] - crossed[:, 0]
+    turn = np.cross(first, along)
+    u, v = (turn * other).sum(axis=1) / slope, -(turn * one).sum(axis=1) / slope
+    distance = (first * _across(crossed)).sum(axis=1) / slope
+    met = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0)
+    if not met.any():
+        return 0.0
+    nearest = np.flatnonzero(met)[np.argmin(distance[met])]
+    return float(distance[nearest]) if slope[nearest] > 0.0 else 0.0

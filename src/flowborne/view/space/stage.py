@@ -13,12 +13,12 @@ from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows
 from flowborne.view.space.camera import Camera
-from flowborne.view.space.flesh import FleshSurface
 from flowborne.view.space.ground import Ground, stands
 from flowborne.view.space.lighting import KEY, LIGHTS
+from flowborne.view.space.outside import Outside, pushes
 from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
 from flowborne.view.space.shapes import LIT, colour_of, mesh_of
-from flowborne.view.space.skin import Skin, pushes
+from flowborne.view.space.skin import SkinSurface
 from flowborne.view.space.slices import Slice
 from flowborne.view.space.smoke import Smoke
 from flowborne.view.space.vortices import Vortices
@@ -59,11 +59,11 @@ class Stage:
             for mesh, geom in zip(meshes, run.geoms, strict=True)
         ]
         self._hidden = [geom.covered and not shot.bones for geom in run.geoms]
-        self._flesh = None
-        if run.flesh is not None:
-            first = run.state(0)["flesh_vertices"]
-            self._flesh = FleshSurface(plotter, run.flesh, first, seen_through=shot.bones)
-        self._skin = Skin(run.geoms, meshes, run.flesh)
+        first = run.state(0)
+        self._skins = [
+            SkinSurface(plotter, skin, first, seen_through=shot.bones) for skin in run.skins
+        ]
+        self._outside = Outside(run.geoms, meshes, run.skins)
         self._arrows = Arrows(plotter, max(len(run.bodies), 1), style.FORCE, 0.35)
         self._ground = self._wind = None
         if stands(run):
@@ -88,11 +88,9 @@ class Stage:
         centres, turns = state["geom_position"].astype(float), state["geom_rotation"].astype(float)
         for actor, hidden, *pose in zip(self._bodies, self._hidden, centres, turns, strict=True):
             _place(actor, *pose, hidden=hidden)
-        corners = np.zeros((0, 3, 3))
-        if self._flesh is not None:
-            vertices = state["flesh_vertices"].astype(float)
-            self._flesh.show(vertices)
-            corners = vertices[self._flesh.triangles]
+        corners = np.concatenate(
+            [np.zeros((0, 3, 3)), *(surface.show(state) for surface in self._skins)]
+        )
         if self._ground is not None:
             self._ground.show(focus, self._placed(centres, turns), corners)
         if self._wind is not None:
@@ -103,7 +101,7 @@ class Stage:
             self._fluid.show(state, toward)
         for facing, edge in self._edges:
             edge.visibility = bool((facing @ toward < 0.0).any())
-        shown = pushes(self._forces, self._skin, state, self._pixel)
+        shown = pushes(self._forces, self._outside, state, self._pixel)
         self._arrows.show(*shown, SHAFT * self._pixel)
         self._look(number)
         return self._cut_out() if self._shot.transparent else self._render(self._shot.colour)
