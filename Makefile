@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test browser imports failing clean
+.PHONY: demo test browser imports failing exporters clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -23,6 +23,9 @@ imports: $(VENV)/installed-test
 
 failing: $(VENV)/installed-test
 	$(BIN)/python tools/failing.py
+
+exporters: $(VENV)/installed-test
+	$(BIN)/python tools/exporters.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -11,8 +11,10 @@ from scipy.spatial.transform import Rotation
 
 import flowborne as fb
 from flowborne.formats.creature import Creature
-from flowborne.io.bvh import TO_WORLD, read_bvh
-from flowborne.io.bvh_file import BvhFile, load_bvh
+from flowborne.io.bvh import read_bvh
+from flowborne.io.bvh_file import load_bvh
+
+read_back = pytest.importorskip("read_back", exc_type=ImportError)
 
 CRANE = """
 <mujoco>
@@ -70,30 +72,6 @@ def crane(runs: Path) -> Path:
     return runs / "crane"
 
 
-def placed(bvh: BvhFile, unit: float) -> tuple[np.ndarray, np.ndarray]:
-    """(frames, n, 3) m and (frames, n, 3, 3) of the joints, in the world's axes, by the file alone:
-    position channels replace OFFSET, rotations are multiplied in the file's order."""
-    frames, count = len(bvh.values), len(bvh.joints)
-    places, turns = np.zeros((frames, count, 3)), np.zeros((frames, count, 3, 3))
-    for n, joint in enumerate(bvh.joints):
-        local = np.tile(joint.offset, (frames, 1))
-        turn = np.tile(np.eye(3), (frames, 1, 1))
-        for column, (axis, turning) in enumerate(joint.channels, start=joint.first):
-            if turning:
-                angles = bvh.values[:, [column]]
-                turn = turn @ Rotation.from_euler("xyz"[axis], angles, degrees=True).as_matrix()
-            else:
-                local[:, axis] = bvh.values[:, column]
-        if joint.parent < 0:
-            places[:, n], turns[:, n] = local, turn
-        else:
-            above = turns[:, joint.parent]
-            places[:, n] = places[:, joint.parent] + np.einsum("fij,fj->fi", above, local)
-            turns[:, n] = above @ turn
-    world = TO_WORLD["y"]
-    return unit * places @ world.T, world @ turns @ world.T
-
-
 @pytest.mark.parametrize("name", ["chain", "fish", "crane"])
 def test_joints_are_where_the_run_has_them(
     name: str, request: pytest.FixtureRequest, tmp_path: Path
@@ -105,7 +83,9 @@ def test_joints_are_where_the_run_has_them(
     assert [joint.parent for joint in bvh.joints] == skeleton.parents.tolist()
     assert len(bvh.values) == len(fb.open_run(folder))
     assert bvh.frame_time == pytest.approx(1.0 / fb.open_run(folder).frames_per_second)
-    places, turns = placed(bvh, 0.01)
+    read = read_back.Bvh(tmp_path / "out.bvh")
+    joints = np.array([list(read.joints(frame).values()) for frame in range(len(bvh.values))])
+    places, turns = joints[..., :3, 3], joints[..., :3, :3]
     assert_allclose(places, skeleton.position, atol=1e-5 * Creature(fb.open_run(folder)).size)
     rest = skeleton.rest[1]
     away = Rotation.from_matrix(

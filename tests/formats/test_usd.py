@@ -15,6 +15,8 @@ from flowborne.formats.creature import Creature
 pytest.importorskip("pxr")
 from pxr import Gf, Usd, UsdGeom, UsdShade, UsdSkel, UsdValidation, UsdVol
 
+read_back = pytest.importorskip("read_back", exc_type=ImportError)
+
 FAR = 1e-5
 """Distance from the run that is accepted, in sizes of the creature."""
 
@@ -66,50 +68,39 @@ def test_the_stage_has_rate_frames_unit_axis_and_names(name: str, stages: Stages
 @pytest.mark.parametrize("name", RUNS)
 def test_joints_are_where_the_run_has_them(name: str, stages: Stages) -> None:
     """By UsdSkel's own query, frame by frame, in the skeleton's space."""
-    creature, stage = stages[name]
-    skeleton = creature.skeleton
-    prim = UsdSkel.Skeleton.Get(stage, "/Run/Creature/Skeleton")
-    assert list(prim.GetJointNamesAttr().Get()) == list(skeleton.names)
-    cache = UsdSkel.Cache()
-    query = cache.GetSkelQuery(prim)
+    creature, read = stages[name][0], read_back.Stage(stages[name][1])
+    skeleton, query = creature.skeleton, read.query
     assert len(query.GetAnimQuery().GetJointTransformTimeSamples()) == len(creature.run)
     assert UsdSkel.Topology(query.GetJointOrder()).GetParentIndices() == skeleton.parents.tolist()
     for frame in range(len(creature.run)):
-        found = np.array(query.ComputeJointSkelTransforms(frame))
-        assert_allclose(found[:, 3, :3], skeleton.position[frame], atol=FAR * creature.size)
-        away = np.einsum(
-            "nji,njk->nik", np.swapaxes(found[:, :3, :3], 1, 2), skeleton.rotation[frame]
-        )
+        joints = read.joints(frame)
+        assert list(joints) == list(skeleton.names)
+        found = np.array(list(joints.values()))
+        assert_allclose(found[:, :3, 3], skeleton.position[frame], atol=FAR * creature.size)
+        away = np.einsum("nji,njk->nik", found[:, :3, :3], skeleton.rotation[frame])
         assert np.degrees(Rotation.from_matrix(away).magnitude()).max() < TURNED
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_surfaces_go_with_their_bodies(name: str, stages: Stages) -> None:
     """Skinned by UsdSkel, each vertex is where the run's pose of its geometry puts it."""
-    creature, stage = stages[name]
+    creature, read = stages[name][0], read_back.Stage(stages[name][1])
     model, run = creature.model, creature.run
-    root = UsdSkel.Root.Get(stage, "/Run/Creature")
-    cache = UsdSkel.Cache()
-    cache.Populate(root, Usd.PrimDefaultPredicate)
-    skeleton = UsdSkel.Skeleton.Get(stage, "/Run/Creature/Skeleton")
-    query, skinned = cache.GetSkelQuery(skeleton), 0
-    for binding in cache.ComputeSkelBinding(
-        root, skeleton, Usd.PrimDefaultPredicate
-    ).GetSkinningTargets():
-        mesh = UsdGeom.Mesh(binding.GetPrim())
-        if mesh.GetPurposeAttr().Get() == "guide":
-            continue
-        geom = model.geom_names.index(mesh.GetPrim().GetDisplayName())
-        own, faces = model.geom_shape[geom].triangles()
-        assert_array_equal(mesh.GetFaceVertexIndicesAttr().Get(), np.ravel(faces))
-        for frame in range(len(run)):
-            state = run.state(frame)
-            where = own @ state["geom_rotation"][geom].T + state["geom_position"][geom]
-            place = binding.ComputeSkinnedTransform(query.ComputeSkinningTransforms(frame), frame)
-            points = [place.Transform(Gf.Vec3d(p)) for p in mesh.GetPointsAttr().Get()]
-            assert_allclose(points, where, atol=FAR * creature.size)
-        skinned += 1
-    assert skinned == sum(surface.bone >= 0 for surface in creature.surfaces)
+    flesh = {skin.name for skin in creature.skins}
+    for frame in range(len(run)):
+        state = run.state(frame)
+        for part, points in read.meshes(frame).items():
+            if part not in flesh:
+                geom = model.geom_names.index(part)
+                own, _ = model.geom_shape[geom].triangles()
+                where = own @ state["geom_rotation"][geom].T + state["geom_position"][geom]
+                assert_allclose(points, where, atol=FAR * creature.size)
+    for prim in read.stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh) and prim.GetDisplayName() in model.geom_names:
+            faces = model.geom_shape[model.geom_names.index(prim.GetDisplayName())].triangles()[1]
+            indices = UsdGeom.Mesh(prim).GetFaceVertexIndicesAttr().Get()
+            assert_array_equal(indices, np.ravel(faces))
+    assert len(read.bound) == sum(s.bone >= 0 for s in creature.surfaces) + len(creature.skins)
 
 
 @pytest.mark.parametrize("name", RUNS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,22 +13,7 @@ from flowborne.formats.vdb_file import VdbGrid, vdb_bytes
 from flowborne.io.cell_fields import cell_velocity
 
 tinyvdb = pytest.importorskip("tinyvdb")
-
-
-def voxels_of(grid: Any, active: np.ndarray, components: int = 1) -> np.ndarray:
-    """The field of a grid whose leaves are those that hold `active` voxels, in the file's order:
-    by node of 4096^3 voxels, by node of 128^3, by leaf of 8^3. (tinyvdb's own lists end after 64
-    leaves.)"""
-    nodes = [grid.tree.node(number) for number in range(grid.tree.num_nodes)]
-    leaves = [node for node in nodes if node.type == "leaf"]
-    assert sum(leaf.active_voxel_count for leaf in leaves) == active.sum()
-    corners = {tuple(corner) for corner in (np.argwhere(active) // 8).tolist()}
-    order = sorted(corners, key=lambda c: ([n // 512 for n in c], [n // 16 for n in c], c))
-    found = np.zeros([8 * -(-n // 8) for n in active.shape] + [components], np.float32)
-    for (i, j, k), leaf in zip(order, leaves, strict=True):
-        part = np.frombuffer(leaf.data, np.float32).reshape(8, 8, 8, components)
-        found[8 * i : 8 * i + 8, 8 * j : 8 * j + 8, 8 * k : 8 * k + 8] = part
-    return found[tuple(slice(0, n) for n in active.shape)].squeeze()
+read_back = pytest.importorskip("read_back", exc_type=ImportError)
 
 
 @pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke")])
@@ -47,9 +31,9 @@ def test_volumes_are_exact(
             assert set(grids) == {dye, "velocity"}
             state = run.state(number)
             wanted = state[f"scalar_{dye}"]
-            assert_array_equal(voxels_of(grids[dye], wanted != 0.0), wanted.squeeze())
+            assert_array_equal(read_back.voxels_of(grids[dye], wanted != 0.0), wanted.squeeze())
             everywhere = np.ones(run.grid.shape, bool)
-            velocity = voxels_of(grids["velocity"], everywhere, 3)
+            velocity = read_back.voxels_of(grids["velocity"], everywhere, 3)
             assert_array_equal(velocity, cell_velocity(run.grid, state).squeeze())
             for grid in grids.values():
                 assert_allclose(grid.transform["voxel_size"], run.grid.spacing)
@@ -68,7 +52,7 @@ def test_fields_of_many_nodes_are_exact(tmp_path: Path) -> None:
     (tmp_path / "noise.vdb").write_bytes(vdb_bytes([grid]))
     with tinyvdb.open(str(tmp_path / "noise.vdb")) as file:
         file.read_grids()
-        assert_array_equal(voxels_of(file.grid(0), active), kept)
+        assert_array_equal(read_back.voxels_of(file.grid(0), active), kept)
 
 
 def test_a_run_without_fluid_is_refused(walk: Path, tmp_path: Path) -> None:

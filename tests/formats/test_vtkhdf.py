@@ -7,62 +7,29 @@ from typing import Any
 
 import numpy as np
 import pytest
-import vtkmodules.vtkCommonDataModel
 from numpy.testing import assert_allclose, assert_array_equal
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import flowborne as fb
 from flowborne.formats.creature import Creature
 from flowborne.io.cell_fields import cell_velocity, vorticity
 from flowborne.io.open_run import OpenRun
 
-pytest.importorskip("h5py")
+read_back = pytest.importorskip("read_back", exc_type=ImportError)
 
 FAR = 1e-5
 """Distance from the run that is accepted, in sizes of the creature."""
 
 
-class Read:
-    """A file as VTK reads it."""
-
-    def __init__(self, path: Path) -> None:
-        self._reader = vtkHDFReader()
-        self._reader.SetFileName(str(path))
-        self._reader.UpdateInformation()
-        about, steps = self._reader.GetOutputInformation(0), vtkStreamingDemandDrivenPipeline
-        count = about.Length(steps.TIME_STEPS())
-        self.times = [about.Get(steps.TIME_STEPS(), n) for n in range(count)]
-
-    def blocks(self, number: int) -> dict[str, Any]:
-        """Name -> block of a step."""
-        self._reader.UpdateTimeStep(self.times[number])
-        whole = self._reader.GetOutputDataObject(0)
-        name = vtkmodules.vtkCommonDataModel.vtkCompositeDataSet.NAME()
-        return {
-            whole.GetMetaData(n).Get(name): whole.GetBlock(n)
-            for n in range(whole.GetNumberOfBlocks())
-        }
-
-
-def cells(block: Any, name: str) -> np.ndarray:
-    return vtk_to_numpy(block.GetCellData().GetArray(name))
-
-
-def points(block: Any) -> np.ndarray:
-    return vtk_to_numpy(block.GetPoints().GetData())
-
-
 @pytest.fixture
-def opened(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[OpenRun, Read]:
+def opened(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[OpenRun, Any]:
     """The run of the parameter, and its file."""
     folder = request.getfixturevalue(request.param)
     fb.export(folder, tmp_path / "run.vtkhdf")
-    return fb.open_run(folder), Read(tmp_path / "run.vtkhdf")
+    return fb.open_run(folder), read_back.VtkHdf(tmp_path / "run.vtkhdf")
 
 
-Opened = tuple[OpenRun, Read]
+Opened = tuple[OpenRun, Any]
 every = pytest.mark.parametrize("opened", ["chain", "fish", "walk"], indirect=True)
 wet = pytest.mark.parametrize("opened", ["chain", "fish"], indirect=True)
 
@@ -97,7 +64,7 @@ def test_fields_are_exact(opened: Opened) -> None:
                 .transpose(2, 1, 0, 3)
                 .reshape(-1, field[0, 0, 0].size)
             )
-            assert_array_equal(cells(block, name).reshape(flat.shape), flat)
+            assert_array_equal(read_back.cells_of(block, name).reshape(flat.shape), flat)
 
 
 @every
@@ -111,9 +78,11 @@ def test_bodies_are_where_the_run_has_them(opened: Opened) -> None:
             shape.triangles()[0] @ state["geom_rotation"][n].T + state["geom_position"][n]
             for n, shape in enumerate(model.geom_shape)
         ]
-        assert_allclose(points(block), np.concatenate(wanted), atol=FAR * creature.size)
-        geometry = cells(block, "geometry")
-        assert_array_equal(cells(block, "body"), model.geom_body[geometry])
+        assert_allclose(
+            read_back.points_of(block), np.concatenate(wanted), atol=FAR * creature.size
+        )
+        geometry = read_back.cells_of(block, "geometry")
+        assert_array_equal(read_back.cells_of(block, "body"), model.geom_body[geometry])
         assert block.GetNumberOfPolys() == sum(len(s.triangles()[1]) for s in model.geom_shape)
 
 
@@ -124,7 +93,7 @@ def test_forces_are_the_runs(opened: Opened) -> None:
         block, state = read.blocks(number)["forces"], run.state(number)
         force = vtk_to_numpy(block.GetPointData().GetArray("force"))
         assert_array_equal(force, state["fluid_force"][1:])
-        assert_array_equal(points(block), state["fluid_centre"][1:])
+        assert_array_equal(read_back.points_of(block), state["fluid_centre"][1:])
 
 
 @pytest.mark.parametrize("opened", ["fish"], indirect=True)
@@ -135,15 +104,15 @@ def test_flesh_is_where_the_run_has_it_with_its_stresses(opened: Opened) -> None
     assert flesh is not None
     for number in range(len(run)):
         block, state = read.blocks(number)["flesh"], run.state(number)
-        found = points(block)
+        found = read_back.points_of(block)
         skin = found[np.unique(flesh.surface)]
         assert_allclose(skin, state["flesh_vertices"], atol=FAR * creature.size)
         assert block.GetNumberOfCells() == len(flesh.elements)
-        stress = cells(block, "stress").reshape(-1, 3, 3)
+        stress = read_back.cells_of(block, "stress").reshape(-1, 3, 3)
         assert_allclose(stress, np.swapaxes(stress, 1, 2), atol=1e-5 * np.abs(stress).max() + 1e-6)
         least = run.history["flesh_least_detF"][number - 1] if number else 1.0
-        assert cells(block, "volume_ratio").min() == pytest.approx(least, abs=1e-5)
-        pull = cells(block, "von_mises")
+        assert read_back.cells_of(block, "volume_ratio").min() == pytest.approx(least, abs=1e-5)
+        pull = read_back.cells_of(block, "von_mises")
         assert pull.max() < 1.0 if number == 0 else pull.max() > 100.0
 
 
