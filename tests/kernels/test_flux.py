@@ -11,6 +11,8 @@ from flowborne.kernels.flux import (
     CUT,
     GHOSTS,
     UPSTREAM,
+    fade,
+    fade_reference,
     largest_crossing,
     largest_crossing_reference,
     pad_field,
@@ -136,3 +138,14 @@ def test_largest_crossing(cells: Shape) -> None:
     q = fluxes(cells, np.random.default_rng(4))
     assert largest_crossing.parallel(*q) == largest_crossing(*q)
     assert largest_crossing(*q) == pytest.approx(largest_crossing_reference(q), rel=1e-14)
+
+
+@pytest.mark.parametrize("cells", [(5, 7, 6), (9, 8, 1)])
+def test_what_is_given_fades_where_the_flow_is_fast(cells: Shape) -> None:
+    q = fluxes(cells, np.random.default_rng(4))
+    most = largest_crossing(*q)
+    found = np.empty(cells)
+    fade(found, *q, 0.3 * most, 0.9 * most)
+    np.testing.assert_allclose(found, fade_reference(q, 0.3 * most, 0.9 * most), rtol=1e-12)
+    assert found.min() == 0.0
+    assert found.max() == 1.0

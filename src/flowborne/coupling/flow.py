@@ -31,7 +31,7 @@ from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides, pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import accelerated
-from flowborne.fluid.transport import Transport, carry_component
+from flowborne.fluid.transport import Transport, beside_faces, carry_component
 from flowborne.kernels.faces import (
     fill_empty_faces,
     gained,
@@ -173,10 +173,13 @@ def carry_in_flux_form(
     grid, sides, dt = fluid.grid, fluid.boundaries, transport.dt
     arrived, crossed, gained = grid.zeros_faces(), np.zeros(3), np.zeros(3)
     drunk = [np.zeros(3) for _ in jets]
+    lasting = transport.lasting(grid)
     for axis in grid.axes:
         inlets = inlets_across(axis, jets, sources, grid, sides)
         along = np.empty_like(arrived[axis])
         still_to_come(along, state.acceleration[axis], velocity[axis], state.velocity[axis], dt)
+        if lasting is not None:
+            along *= beside_faces(lasting, axis, sides)
         carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
         arrived[axis][:] = carried.velocity
         crossed[axis] = fluid.density * carried.crossed

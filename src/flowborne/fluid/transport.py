@@ -25,6 +25,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import (
     NOTHING,
     ControlVolumes,
+    means,
     parts,
     wrapping,
 )
@@ -45,6 +46,7 @@ from flowborne.kernels.flux import (
     CUT,
     GHOSTS,
     UPSTREAM,
+    fade,
     largest_crossing,
     pad_field,
     stage,
@@ -56,6 +58,11 @@ order lets noise grow from 0.9 on."""
 
 SUBSTEPS = 100
 """Most substeps: a flow that asks for more has broken down, and its step will say so."""
+
+LASTING = (2.0, 4.0)
+"""Cells that the flow crosses in a step, the axes added up, up to which what the last step gave it
+goes along, and from which on nothing does. Pressure and forces gave it at a place that a faster
+flow leaves behind, and it would grow from step to step: noise as fine as the grid."""
 
 SMALL, TINY = 0.2, 0.05
 """Parts of a cell below which control volumes begin to be mixed with their neighbours, and are
@@ -115,6 +122,16 @@ class Transport:
         """In how many the step is done."""
         return min(max(1, int(np.ceil(self.courant(grid) / COURANT))), SUBSTEPS)
 
+    def lasting(self, grid: Grid) -> Array | None:
+        """(nx, ny, nz) share of what the last step gave the flow that goes along with it, see
+        LASTING; None where all of it does."""
+        if self.courant(grid) <= LASTING[0]:
+            return None
+        share = np.empty(grid.shape)
+        least, most = (cells * grid.cell_volume / self.dt for cells in LASTING)
+        fade(share, *self.flux, least, most)
+        return share
+
 
 @dataclass(frozen=True)
 class Carried:
@@ -128,6 +145,16 @@ class Carried:
     velocity: Array
     crossed: float
     drained: Array
+
+
+def beside_faces(cells: Array, axis: int, sides: Boundaries) -> Array:
+    """A field of the cells on the faces across an axis: the mean of both cells, or the one there
+    is."""
+    found = means(cells, axis, sides.periodic()[axis])
+    if not sides.periodic()[axis]:
+        found[edge(axis, 0)] *= 2.0
+        found[edge(axis, -1)] *= 2.0
+    return found
 
 
 def neighbours(count: int, periodic: bool) -> tuple[Integers, Array]:

@@ -308,8 +308,31 @@ def largest_crossing(qx: Array, qy: Array, qz: Array) -> float:
 
 def largest_crossing_reference(q: Faces) -> float:
     """`largest_crossing` in NumPy."""
+    return float(_crossing(q).max())
+
+
+@kernel
+def fade(out: Array, qx: Array, qy: Array, qz: Array, least: float, most: float) -> None:
+    """In each cell 1 where what crosses it, as in `largest_crossing`, is up to `least`, 0 from
+    `most` on, and linear between them."""
+    for i in prange(out.shape[0]):
+        for j in range(out.shape[1]):
+            for k in range(out.shape[2]):
+                rate = max(abs(qx[i, j, k]), abs(qx[i + 1, j, k]))
+                rate += max(abs(qy[i, j, k]), abs(qy[i, j + 1, k]))
+                rate += max(abs(qz[i, j, k]), abs(qz[i, j, k + 1]))
+                out[i, j, k] = min(max((most - rate) / (most - least), 0.0), 1.0)
+
+
+def fade_reference(q: Faces, least: float, most: float) -> Array:
+    """`fade` in NumPy."""
+    return np.clip((most - _crossing(q)) / (most - least), 0.0, 1.0)
+
+
+def _crossing(q: Faces) -> Array:
+    """(n0, n1, n2) volume per time that crosses each cell, the axes added up, in NumPy."""
     rates = []
     for axis, flux in enumerate(q):
         size = np.moveaxis(np.abs(flux), axis, 0)
         rates.append(np.moveaxis(np.maximum(size[:-1], size[1:]), 0, axis))
-    return float(sum(rates).max())
+    return np.asarray(sum(rates))
