@@ -95,3 +95,13 @@ def test_the_last_row_can_be_taken_back(tmp_path):
     history.append({"frame": 3, "angle_hinge_rad": 1.0, "seconds_total": 0.1})
     history.drop_last(length)
     assert (path.read_bytes(), history.rows) == (whole, 2)
+
+
+def test_names_with_commas_quotes_and_line_breaks_are_columns(tmp_path):
+    columns = ("time", 'angle_a,b "left"\nor right')
+    history = History.create(tmp_path / "history.csv", columns)
+    history.append({columns[0]: 0.5, columns[1]: 2.0})
+    history.close()
+    assert history_columns(tmp_path / "history.csv") == columns
+    assert list(history_rows(tmp_path / "history.csv", columns)) == [(0.5, 2.0)]
+    History.reopen(tmp_path / "history.csv", columns, 1).close()

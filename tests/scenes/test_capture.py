@@ -252,3 +252,16 @@ def test_any_creature_follows_by_a_mapping_of_its_own(write: Write) -> None:
     for frame in (0, 30, 90):
         angle = 2.0 * np.arctan2(arm[frame, 2], arm[frame, 0])  # about the left-pointing axis
         assert motion.position(frame * clip.frame_time) == pytest.approx(angle, abs=1e-6)
+
+
+def test_a_human_or_a_start_with_a_fault_beside_a_walk_is_told(tmp_path: Path) -> None:
+    walk = "gravity = [0.0, 0.0, -9.81]\n[time]\nframes_per_second = 30.0\nframes = 2\n[clip]\n"
+    faults = {
+        "[human]\nmass = -3": "[human] mass: -3 is not greater than 0",
+        '[human]\nsex = "x"': "[human] sex: 'x' is not known",
+        "[human]\n[initial]\npositions = { left_kne = 3.0 }": "joint 'left_kne' is not in",
+    }
+    for fault, said in faults.items():
+        (tmp_path / "walk.toml").write_text(f"{walk}{fault}\n")
+        (problem,) = check_scene(tmp_path / "walk.toml")
+        assert said in problem

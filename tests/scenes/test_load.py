@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -169,3 +170,18 @@ def test_meshes_and_includes_travel_with_the_scene(write: Write, tmp_path: Path)
     again = load_scene(save_scene(copy, tmp_path / "second"))
     assert_same(again, scene)
     assert (run / "assets/0-tetra.obj").read_bytes() == files["assets/0-tetra.obj"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("frames = " + 5000 * "9", "there is a number of thousands of digits in it. Shorten it."),
+        ("a = " + 3000 * "[" + 3000 * "]", "its arrays or tables are nested hundreds deep."),
+    ],
+)
+def test_what_toml_allows_and_no_scene_needs_is_one_message(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    (tmp_path / "swim.toml").write_text(text)
+    with pytest.raises(SceneError, match=re.escape(f"scene swim.toml: {said}")):
+        load_scene(tmp_path / "swim.toml")

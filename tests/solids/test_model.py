@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -261,3 +262,40 @@ def test_root_of_a_urdf_floats_when_it_is_told_to(tmp_path: Path) -> None:
         ValueError, match=r"no body 'tail' that hangs .* can be floating, are: base"
     ):
         SolidModel.from_file(path, floating=("tail",))
+
+
+IMPOSSIBLE = {
+    'damping="nan"': "joint 'j' has damping nan. Give a number of 0 or more.",
+    'damping="-1"': "joint 'j' has damping -1. Give a number of 0 or more.",
+    'armature="-1"': "joint 'j' has armature -1. Give a number of 0 or more.",
+    'frictionloss="inf"': "joint 'j' has frictionloss inf. Give a number of 0 or more.",
+    'stiffness="-5"': "joint 'j' has stiffness -5. Give a number of 0 or more.",
+    'axis="nan 0 1"': "joint 'j' has axis nan. Give a finite number.",
+    'pos="0 inf 0"': "joint 'j' has pos inf. Give a finite number.",
+}
+
+
+@pytest.mark.parametrize("given", IMPOSSIBLE)
+@pytest.mark.filterwarnings("ignore:Inertia matrix")
+def test_numbers_that_no_body_can_have_are_refused(given: str) -> None:
+    box = '<geom type="box" size="0.1 0.2 0.1"/>'
+    text = f'<mujoco><worldbody><body name="b"><joint name="j" {given}/>{box}</body></worldbody>'
+    with pytest.raises(ValueError, match=re.escape(IMPOSSIBLE[given])):
+        SolidModel.from_string(text + "</mujoco>")
+
+
+def test_equalities_and_tendons_are_looked_at_too() -> None:
+    bodies = """<body name="a"><joint name="i"/><geom type="box" size="0.1 0.2 0.1"/></body>
+      <body name="b"><joint name="j"/><geom type="box" size="0.1 0.2 0.1"/></body>"""
+    tied = '<equality><joint name="gear" joint1="i" joint2="j" polycoef="0 nan 0 0 0"/></equality>'
+    cord = """<tendon><fixed name="cord" stiffness="-3"><joint joint="i" coef="1"/></fixed>
+      </tendon>"""
+    for more, said in ((tied, "equality 'gear' has data nan"), (cord, "tendon 'cord' has stiff")):
+        with pytest.raises(ValueError, match=re.escape(said)):
+            SolidModel.from_string(f"<mujoco><worldbody>{bodies}</worldbody>{more}</mujoco>")
+
+
+def test_what_follows_the_end_of_a_model_is_refused() -> None:
+    text = '<mujoco><worldbody><geom type="sphere" size="1"/></worldbody></mujoco>'
+    with pytest.raises(ValueError, match="cannot be read: junk after document element: line 1"):
+        SolidModel.from_string(text + text)

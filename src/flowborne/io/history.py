@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from io import StringIO
 from pathlib import Path
 
 from flowborne.io.atomic import write_text
@@ -29,7 +31,7 @@ class History:
     @classmethod
     def create(cls, path: Path, columns: Sequence[str]) -> History:
         """New history with a header and no rows, in place of what was there."""
-        write_text(path, ",".join(columns) + "\n")
+        write_text(path, _header(columns))
         return cls(path, columns, 0)
 
     @classmethod
@@ -39,7 +41,8 @@ class History:
         raises  ValueError when its columns are others, or when it has fewer rows
         """
         with open(path, "r+b") as file:
-            if file.readline().decode().rstrip("\n") != ",".join(columns):
+            header = _header(columns).encode()
+            if file.read(len(header)) != header:
                 raise ValueError(f"{path} has other columns than this version writes")
             for row in range(rows):
                 if not file.readline().endswith(b"\n"):
@@ -85,8 +88,8 @@ class History:
 
 def history_columns(path: Path) -> tuple[str, ...]:
     """Names of the columns of a history."""
-    with open(path, encoding="utf-8") as file:
-        return tuple(file.readline().rstrip("\n").split(","))
+    with open(path, encoding="utf-8", newline="") as file:
+        return tuple(next(csv.reader(file), ()))
 
 
 def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ...]]:
@@ -94,13 +97,20 @@ def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ..
 
     raises  ValueError when there is no such column
     """
-    with open(path, encoding="utf-8") as file:
-        names = file.readline().rstrip("\n").split(",")
+    with open(path, encoding="utf-8", newline="") as file:
+        names = next(csv.reader(file), [])
         places = [names.index(column) for column in columns]
         for line in file:
             if line.endswith("\n"):
                 cells = line.rstrip("\n").split(",")
                 yield tuple(float(cells[place]) for place in places)
+
+
+def _header(columns: Sequence[str]) -> str:
+    """The first row: a name that holds a comma, a quote or a line break is quoted."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerow(columns)
+    return text.getvalue()
 
 
 def _text(value: float) -> str:

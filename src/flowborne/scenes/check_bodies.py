@@ -114,7 +114,7 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
             )
     yield from named
     state = [
-        *_check_initial(draft, model),
+        *check_initial(draft, model),
         *_check_motions(draft, model),
         *check_formulas(draft),
     ]
@@ -124,7 +124,8 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
         yield from _check_places(draft, model)
 
 
-def _check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
+    """The pose and the velocities that a scene starts with against the model's joints."""
     initial = draft.scene.initial
     if initial.impulse == "none" and not any(
         joint_kind(model, joint) == FREE for joint in model.joint_names

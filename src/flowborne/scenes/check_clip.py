@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from flowborne.errors import SceneError
 from flowborne.scenes.bodies import posed
 from flowborne.scenes.capture import capture_of, clip_motion
-from flowborne.scenes.check_bodies import unknown_joint
+from flowborne.scenes.check_bodies import check_initial, unknown_joint
 from flowborne.scenes.draft import Draft
 from flowborne.solids.model import SolidModel
 
@@ -21,11 +21,12 @@ def check_clip(draft: Draft) -> Iterator[str]:
         yield f"{draft.at('human')}: a human needs 3 dimensions, and the scene has 2. Drop one."
     if scene.clip is None:
         return
-    if scene.clip.file is None and scene.human is None and draft.sound("human"):
-        yield (
-            f"{draft.at('clip')}: there is no file, and a walk without one needs a [human]. "
-            "Add clip.file or [human]."
-        )
+    if scene.clip.file is None and scene.human is None:
+        if draft.sound("human"):
+            yield (
+                f"{draft.at('clip')}: there is no file, and a walk without one needs a [human]. "
+                "Add clip.file or [human]."
+            )
         return
     try:
         capture_of(scene)
@@ -34,7 +35,8 @@ def check_clip(draft: Draft) -> Iterator[str]:
 
 
 def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
-    """Joints that follow the clip against the model, and against what else moves them."""
+    """Joints that follow the clip against the model, and against what else moves them; the clip's
+    motion where it can be entered from a pose without fault."""
     scene = draft.scene
     if scene.clip is None:
         return
@@ -66,7 +68,7 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
             f"are {', '.join(capture.clip.names)}. Say in clip.mapping which of them each follows."
         )
         found = True
-    if found:
+    if found or any(check_initial(draft, model)):
         return
     try:
         clip_motion(scene, model, posed(scene, model).q)

@@ -152,6 +152,14 @@ def _read(path: Path) -> dict[str, Any]:
             f"scene {path.name}{where}: this is not TOML ({what[:1].lower() + what[1:]}). "
             "Correct it there."
         ) from None
+    except ValueError:
+        raise SceneError(
+            f"scene {path.name}: there is a number of thousands of digits in it. Shorten it."
+        ) from None
+    except RecursionError:
+        raise SceneError(
+            f"scene {path.name}: its arrays or tables are nested hundreds deep. Flatten them."
+        ) from None
 
 
 def override(raw: dict[str, Any], key: str, text: str) -> None:
@@ -194,7 +202,7 @@ def value_of(text: str) -> Any:
     """The TOML value that a text is, or the text."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text
 
 

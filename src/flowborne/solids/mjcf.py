@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.shapes.shape import Mesh, Shape
+from flowborne.solids.model_numbers import impossible
 from flowborne.solids.own_shapes import Own, add_shapes, own_shape
 
 Array = NDArray[np.float64]
@@ -71,6 +73,7 @@ def bones_of(
     floating  bodies on the world without a joint, which get a free one of their name
     """
     where = _named(source)
+    _check_xml(source, where)
     try:
         if isinstance(source, Path):
             spec = mujoco.MjSpec.from_file(str(source))
@@ -111,7 +114,17 @@ def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
     held[name].add_freejoint(name=name)
 
 
-def _unreadable(where: str, error: ValueError) -> ValueError:
+def _check_xml(source: str | Path, where: str) -> None:
+    """MuJoCo reads over what follows the end of a model, and what copies it does not."""
+    try:
+        ElementTree.fromstring(source.read_bytes() if isinstance(source, Path) else source)
+    except ElementTree.ParseError as error:
+        raise _unreadable(where, error) from error
+    except OSError as error:
+        raise ValueError(f"{where} cannot be read: {error.strerror}. Mend that.") from error
+
+
+def _unreadable(where: str, error: Exception) -> ValueError:
     return ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.")
 
 
@@ -156,6 +169,9 @@ def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> No
 
 
 def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
+    wrong = next(impossible(mj), None)
+    if wrong is not None:
+        raise ValueError(f"{where}: {wrong}")
     if mj.nflex:
         raise ValueError(
             f"{where}: flex '{element_name(mj, mujoco.mjtObj.mjOBJ_FLEX, 0)}' is not simulated, as "
