@@ -299,3 +299,22 @@ def test_what_follows_the_end_of_a_model_is_refused() -> None:
     text = '<mujoco><worldbody><geom type="sphere" size="1"/></worldbody></mujoco>'
     with pytest.raises(ValueError, match="cannot be read: junk after document element: line 1"):
         SolidModel.from_string(text + text)
+
+
+HUGE = {
+    '<asset><hfield name="hill" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>': (
+        "<hfield> 'hill' asks for 74.5 GB, and 1 GB is the most. Make it smaller."
+    ),
+    '<size memory="2T"/>': "<size memory> asks for 2.05e+03 GB",
+    '<size nuserdata="1000000000"/>': "<size nuserdata> asks for 7.45 GB",
+    '<worldbody><replicate count="1000"><replicate count="1000"><body><joint/>'
+    '<geom size="1"/></body></replicate></replicate></worldbody>': (
+        "<replicate> makes 1e+06 copies, and 20000 are the most. Take fewer."
+    ),
+}
+
+
+@pytest.mark.parametrize("asked", HUGE)
+def test_models_that_ask_for_gigabytes_are_refused_before_they_are_made(asked: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(HUGE[asked])):
+        SolidModel.from_string(f"<mujoco>{asked}</mujoco>")

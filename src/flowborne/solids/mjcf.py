@@ -15,6 +15,7 @@ from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.model_numbers import impossible
+from flowborne.solids.model_size import too_large
 from flowborne.solids.own_shapes import Own, add_shapes, own_shape
 
 Array = NDArray[np.float64]
@@ -115,13 +116,17 @@ def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
 
 
 def _check_xml(source: str | Path, where: str) -> None:
-    """MuJoCo reads over what follows the end of a model, and what copies it does not."""
+    """MuJoCo reads over what follows the end of a model, and what copies it does not; and it makes
+    all that a model asks for."""
     try:
-        ElementTree.fromstring(source.read_bytes() if isinstance(source, Path) else source)
+        model = ElementTree.fromstring(source.read_bytes() if isinstance(source, Path) else source)
     except ElementTree.ParseError as error:
         raise _unreadable(where, error) from error
     except OSError as error:
         raise ValueError(f"{where} cannot be read: {error.strerror}. Mend that.") from error
+    large = next(too_large(model), None)
+    if large is not None:
+        raise ValueError(f"{where}: {large}")
 
 
 def _unreadable(where: str, error: Exception) -> ValueError:

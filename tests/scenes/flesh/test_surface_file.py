@@ -71,3 +71,16 @@ def test_inner_walls_are_counted_and_one_is_placed(tmp_path: Path) -> None:
     pv.PolyData.from_regular_faces(points, faces).save(tmp_path / "wall.ply")
     with pytest.raises(ValueError, match=r"wall\.ply: 1 edges .* more than two .* \(0\.26"):
         read_surface(tmp_path / "wall.ply")
+
+
+def test_a_triangle_of_a_vertex_that_is_not_there_is_told(tmp_path: Path) -> None:
+    """The mesher would read what is behind its arrays, and end the interpreter."""
+    lines = [
+        "ply\nformat ascii 1.0\nelement vertex 4",
+        *(f"property float {axis}" for axis in "xyz"),
+        "element face 4\nproperty list uchar int vertex_indices\nend_header",
+        *("0 0 0", "1 0 0", "0 1 0", "0 0 1", "3 0 1 200", "3 0 1 3", "3 0 2 3", "3 1 2 3"),
+    ]
+    (tmp_path / "bad.ply").write_text("\n".join(lines) + "\n")
+    with pytest.raises(ValueError, match=r"a triangle of vertex 200, and vertices 0 to 3\."):
+        read_surface(tmp_path / "bad.ply")

@@ -92,6 +92,11 @@ def _triangles(path: Path) -> pv.PolyData:
         raise ValueError(
             f"flesh file {path} has no triangles at finite places. Save a closed surface in it."
         )
+    if read.faces.min() < 0 or read.faces.max() >= len(read.vertices):
+        raise ValueError(
+            f"flesh file {path} has a triangle of vertex {read.faces.max()}, and vertices "
+            f"0 to {len(read.vertices) - 1}. Save the surface once more."
+        )
     surface = pv.PolyData.from_regular_faces(read.vertices, read.faces)
     return surface.clean(tolerance=SAME)
 
