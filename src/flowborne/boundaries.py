@@ -10,6 +10,7 @@ from flowborne.fluid.boundary import (
     BoundaryNoSlip,
     BoundaryOpen,
     BoundaryPeriodic,
+    Profile,
     Source,
 )
 
@@ -21,5 +22,6 @@ __all__ = [
     "BoundaryNoSlip",
     "BoundaryOpen",
     "BoundaryPeriodic",
+    "Profile",
     "Source",
 ]

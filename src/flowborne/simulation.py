@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -72,7 +72,8 @@ class Simulation:
     workers   how many trials of the controller run at once; by default as many as there are
               trials and processors. Results do not depend on it
     executor  "serial", "threads" (default), "processes", or an object with submit() or map()
-    raises    SceneError when the scene is wrong; ValueError for workers < 1
+    raises    SceneError when the scene is wrong or does not fit into memory; ValueError for
+              workers < 1
 
     scene            the Scene
     controller       the Controller, or None
@@ -103,7 +104,8 @@ class Simulation:
             len(self.scene.controlled_joints()), self.scene.has_fluid
         )
         kind = ("serial" if count == 1 else "threads") if executor is None else executor
-        built = build(self.scene, mapper(kind, count))
+        with _enough_memory(self.scene):
+            built = build(self.scene, mapper(kind, count))
         self.controller: Controller | None = built.controller
         self.frame_time = built.frame_time
         self.steps_per_frame = built.steps_per_frame
@@ -152,11 +154,15 @@ class Simulation:
     def advance_frame(self) -> FrameReport:
         """Decide, then take the steps of one frame, on all cores unless a context allows less.
 
-        raises  BlowUpError when a step fails. Whatever is raised, the frame has not begun
+        raises  BlowUpError when a step fails or a measure is not a finite number. Whatever is
+                raised, the frame has not begun
         """
         world = self.world.copy()
         with _one_blas_thread(), kernel_threads():
             report = self._advance(world, self.frame + 1)
+        lost = self.measures.lost(self.measures.values(world, report.frame, report))
+        if lost:
+            raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")
         self._moment = _Moment(world, report.frame, report)
         return report
 
@@ -208,7 +214,7 @@ class Simulation:
             dofs = np.asarray(self.controller.dofs)
             held.set(dofs, world.solid.v[dofs], world.solid.v[dofs])
         try:
-            with _one_blas_thread(), kernel_threads():
+            with _one_blas_thread(), kernel_threads(), _enough_memory(scene):
                 start(world, self.frame_time / self.steps_per_frame, given, held)
         except PartError as error:
             raise SceneError(f"scene {scene.name}: {error}") from error
@@ -262,6 +268,18 @@ class Simulation:
             decided=decided,
             seconds=seconds,
         )
+
+
+@contextmanager
+def _enough_memory(scene: Scene) -> Iterator[None]:
+    """Context in which a lack of memory is a SceneError."""
+    try:
+        yield
+    except MemoryError as error:
+        raise SceneError(
+            f"scene {scene.name} does not fit into the memory of this machine ({error}). "
+            "Make its grid coarser: lower [domain] resolution or cells."
+        ) from error
 
 
 def trouble(world: World, report: StepReport) -> str | None:

@@ -171,15 +171,18 @@ def test_phases_are_those_of_the_decision(make_world: MakeWorld, step: Step) -> 
     assert value == pytest.approx(0.4)
 
 
-def test_blown_up_trial_says_what_was_tried(make_world: MakeWorld, step: Step) -> None:
+@pytest.mark.parametrize("outcome", [Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE])
+def test_blown_up_trial_says_what_was_tried(
+    make_world: MakeWorld, step: Step, outcome: Outcome
+) -> None:
     def blow_up(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
         report = step(world, dt, command)
-        report.outcome = Outcome.NOT_FINITE
+        report.outcome = outcome
         return report
 
     trial = trial_of(make_world(), blow_up, Hypothesis(0.1), SHOULDER, [0.25])
     with pytest.raises(
-        TrialError, match=r"shoulder by 0\.25 at time 0 s, a velocity or a pressure"
+        TrialError, match=rf"shoulder by 0\.25 at time 0 s, {outcome.value}; try a smaller"
     ):
         trial.run()
     nothing = ObjectiveSum.of(ObjectiveCallable(lambda m: np.nan))

@@ -161,7 +161,7 @@ class Trial:
 
     def _advance(self, world: World, command: JointCommand) -> StepReport:
         report = self.step(world, self.hypothesis.dt, command)
-        if report.outcome is Outcome.NOT_FINITE:
+        if report.outcome in (Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE):
             raise TrialError(self._complaint(report.outcome.value))
         return report
 

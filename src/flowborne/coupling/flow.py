@@ -171,7 +171,7 @@ def carry_in_flux_form(
     """
     fluid, state = world.flow()
     grid, sides, dt = fluid.grid, fluid.boundaries, transport.dt
-    arrived, crossed, gained = grid.zeros_faces(), np.zeros(3), np.zeros(3)
+    arrived, crossed, held, gained = grid.zeros_faces(), np.zeros(3), np.zeros(3), np.zeros(3)
     drunk = [np.zeros(3) for _ in jets]
     lasting = transport.lasting(grid)
     for axis in grid.axes:
@@ -183,6 +183,7 @@ def carry_in_flux_form(
         carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
         arrived[axis][:] = carried.velocity
         crossed[axis] = fluid.density * carried.crossed
+        held[axis] = fluid.density * carried.held
         brought = dt * float(inlets.gain @ inlets.velocity)
         gained[axis] = fluid.density * (brought - float(carried.drained.sum()))
         for jet, taken in zip(jets, drunk, strict=True):
@@ -196,7 +197,7 @@ def carry_in_flux_form(
         transport.after,
         np.zeros(3),
         crossed,
-        fluid_momentum(arrived, masses, grid, sides) - reached,
+        held + fluid_momentum(arrived, masses, grid, sides) - reached,
         gained,
         tuple(after_drinking(jet, taken, dt) for jet, taken in zip(jets, drunk, strict=True)),
     )

@@ -19,6 +19,7 @@ class Outcome(Enum):
     VISCOSITY_NOT_CONVERGED = "the viscous solve did not reach its tolerance"
     NOT_SETTLED = "contacts, torque limits or Coriolis forces did not settle"
     NOT_FINITE = "a velocity or a pressure is not a finite number"
+    ADVECTION_NOT_FINITE = "a velocity of the fluid is not a finite number after advection"
 
 
 @dataclass

@@ -48,7 +48,8 @@ def step(world: World, dt: float, command: JointCommand | None = None) -> StepRe
     """Advance `world` by dt, in place (section 6).
 
     command    what the controlled dofs do; the setup's prescribed motions are added to it
-    returns  the report; its outcome is not DONE when the numbers cannot be trusted
+    returns  the report; its outcome is not DONE when the numbers cannot be trusted, and the world
+             cannot be stepped on
     """
     timer = Timer()
     if not world.setup.trial:
@@ -95,6 +96,8 @@ def step_together(world: World, dt: float, command: JointCommand, timer: Timer) 
     blown, mass = carried.jets, face_masses(carried.volumes, fluid.density)
     velocity = forced(carried.velocity, cut.open, mass, fluid, world.time + dt, dt)
     timer.lap("advection")
+    if not all(np.isfinite(u).all() for u in velocity):
+        return broken_off(world, Outcome.ADVECTION_NOT_FINITE, dt, timer)
     # forces on the bodies, and their own equations of motion
     wind = winds_on(world, pose)
     buoyancy = buoyant_push(world.setup.solid, pose, fluid.density)
@@ -310,6 +313,24 @@ def momentum_balance(
         jet=carried.expelled,
         forces=forces,
         budget_error=unknown / scale if scale > 0.0 else 0.0,
+    )
+
+
+def broken_off(world: World, outcome: Outcome, dt: float, timer: Timer) -> StepReport:
+    """What a step did that ends before its solve: nothing is known of forces."""
+    model = world.setup.solid
+    wrench, unknown = np.full((model.nbody, 6), np.nan), np.full(model.nv, np.nan)
+    return StepReport(
+        dt=dt,
+        outcome=outcome,
+        velocity=unknown,
+        actuator=unknown,
+        pressure_wrench=wrench,
+        viscous_wrench=wrench,
+        buoyancy_wrench=wrench,
+        wind_wrench=wrench,
+        jet_wrench=wrench,
+        seconds=timer.seconds,
     )
 
 

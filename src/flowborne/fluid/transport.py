@@ -10,7 +10,7 @@ Verstappen 2005). Values at the sides are of third order, held between their nei
 bodies they are the means of both, which neither gain nor lose energy. Two stages (Heun); what else
 the flow is given in a step goes along in the values, away from bodies, and not in the amounts, so
 that a steady flow stays as it is. A step of a Courant number above COURANT is done in substeps with
-one carrying field.
+one carrying field; control volumes too small for what flows through them there are `fleeting`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.boundary import Boundaries, BoundaryInflow
 from flowborne.fluid.control_volumes import (
     NOTHING,
     ControlVolumes,
@@ -30,7 +30,14 @@ from flowborne.fluid.control_volumes import (
     wrapping,
 )
 from flowborne.fluid.crossing import crossings
-from flowborne.fluid.ghosts import Scalar, edge, fill_ghosts, wrap_deep
+from flowborne.fluid.fleeting import (
+    CROSSED,
+    Fleeting,
+    beyond_sides,
+    left_or_taken_up,
+    side_rates,
+)
+from flowborne.fluid.ghosts import Scalar, edge, fill_ghosts, wall_velocity, wrap_deep
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import (
@@ -56,7 +63,7 @@ COURANT = 0.8
 """Cells that the flow may cross in a substep, the axes added up: Heun's method with values of third
 order lets noise grow from 0.9 on."""
 
-SUBSTEPS = 100
+SUBSTEPS = 300
 """Most substeps: a flow that asks for more has broken down, and its step will say so."""
 
 LASTING = (2.0, 4.0)
@@ -119,8 +126,11 @@ class Transport:
         return self.dt * self.crossing / grid.cell_volume
 
     def substeps(self, grid: Grid) -> int:
-        """In how many the step is done."""
-        return min(max(1, int(np.ceil(self.courant(grid) / COURANT))), SUBSTEPS)
+        """In how many the step is done; in one where a flux is not a finite number."""
+        courant = self.courant(grid)
+        if not np.isfinite(courant):
+            return 1
+        return min(max(1, int(np.ceil(courant / COURANT))), SUBSTEPS)
 
     def lasting(self, grid: Grid) -> Array | None:
         """(nx, ny, nz) share of what the last step gave the flow that goes along with it, see
@@ -139,11 +149,13 @@ class Carried:
 
     velocity  on its faces, m/s
     crossed   volume times velocity that came in through the sides of the domain, m^4/s
+    held      the same that inflows gave to what was carried to them on the way
     drained   (n,) the same that left at each inlet with the fluid's own velocity
     """
 
     velocity: Array
     crossed: float
+    held: float
     drained: Array
 
 
@@ -223,7 +235,7 @@ def carry_component(
         flow.join(along)
     u = transport.before.mean_velocity(velocity, component)
     flow.fill(u)
-    crossed, drained = 0.0, np.zeros(inlets.index.size)
+    crossed, held, drained = 0.0, 0.0, np.zeros(inlets.index.size)
     for s in range(count):
         time = s * dt
         flow.begin(u, s / count, (s + 1) / count)
@@ -233,9 +245,10 @@ def carry_component(
         if s < count - 1:
             u = arrived.copy()
             flow.mean(u)
+            held += flow.hold(u, time + dt)
         crossed += 0.5 * dt * (came + went)
         drained += 0.5 * dt * (left + gone)
-    return Carried(arrived, crossed, drained)
+    return Carried(arrived, crossed, held, drained)
 
 
 class Flow:
@@ -272,6 +285,21 @@ class Flow:
         self.held = 2.0 * transport.viscosity * transport.dt * grid.face_area**2
         exchanged = transport.courant(grid) / transport.substeps(grid) / COURANT
         self.limit = min(exchanged, 1.0) * grid.cell_volume
+        self.fleeting = self.find_fleeting()
+
+    def find_fleeting(self) -> Fleeting | None:
+        """Those that may let through more in a substep than they hold; None without any."""
+        transport, grid, component = self.transport, self.grid, self.component
+        if transport.courant(grid) <= CROSSED:
+            return None
+        index = left_or_taken_up(self.listed, *self.ends)
+        rate = side_rates(transport.flux, index, component, grid, self.place, self.share)
+        crossed = transport.dt * np.maximum(rate, 0.0).sum(axis=1) / grid.cell_volume
+        index, rate = index[crossed > CROSSED], rate[crossed > CROSSED]
+        if index.size == 0:
+            return None
+        beside = beyond_sides(index, self.marks, component, grid, self.sides)
+        return Fleeting(index, beside, rate, self.nothing)
 
     def fill(self, u: Array) -> None:
         """Give control volumes that hold nothing yet the velocity around them, in place."""
@@ -289,12 +317,31 @@ class Flow:
         if self.wraps[self.component] > 0:
             u[edge(self.component, -1)] = u[edge(self.component, 0)]
 
+    def hold(self, u: Array, time: float) -> float:
+        """Give the faces of inflows across the component their own velocity after a part of the
+        step, in place; gives volume times what that changes it by, m^4/s.
+
+        Their ghosts hold what they do: left alone, they would grow away from those beside them, by
+        exp(1) while the flow crosses a cell.
+        """
+        given, axis = 0.0, self.component
+        for upper, side in enumerate(self.sides.pair(axis)):
+            if isinstance(side, BoundaryInflow):
+                layer = edge(axis, slice(-1, None) if upper else slice(1))
+                clock = self.transport.time + time
+                wall = wall_velocity(side, self.grid, axis, bool(upper), axis, clock)
+                given += float((self.high[layer] * (wall - u[layer])).sum())
+                u[layer] = wall
+        return given
+
     def begin(self, u: Array, early: float, late: float) -> None:
         """Begin a part of the step, from `early` to `late` of it, at the velocity u."""
         start, end = self.ends
         self.start = u
         self.low = start if early == 0.0 else start + early * (end - start)
         self.high = end if late == 1.0 else start + late * (end - start)
+        if self.fleeting is not None:
+            self.fleeting.choose(self.low, self.high, (late - early) * self.transport.dt)
 
     def stage(
         self, u: Array, along: Array | None, time: float, dt: float, weight: float
@@ -320,6 +367,9 @@ class Flow:
             planes(self.transport.flux, grid), axis + grid.is_slab, self.place, self.share,
         )  # fmt: skip
         left = self.exchange(later, dt, weight)
+        if self.fleeting is not None:
+            inner = [slice(GHOSTS, -GHOSTS) if a in grid.axes else slice(None) for a in range(3)]
+            self.fleeting.pass_on(later, self.net, self.padded[tuple(inner)], weight)
         self.settle(later)
         came_in = sum(crossing.came_in(self.padded) for crossing in self.crossings)
         return later, came_in, left

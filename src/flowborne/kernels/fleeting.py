@@ -1,0 +1,170 @@
+"""Control volumes through which more flows than they hold, carried implicitly: upwind values at the
+end of a stage leave them, so none is too small (May and Berger 2017).
+
+Lists are of these control volumes, flat indices in ascending order; `way` is 2 axis for the lower
+and 2 axis + 1 for the upper side across an axis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from flowborne.kernels.arrays import Array, Integers
+
+SWEEPS = 1000
+"""Most times that what leaves all of them is worked out, one after the other."""
+
+SETTLED = 1e-15
+"""Change of what leaves one, relative to the largest, at which that is done."""
+
+
+@njit(nogil=True, cache=True)
+def what_leaves(
+    field: Array,
+    later: Array,
+    volumes: Array,
+    listed: Integers,
+    beside: Integers,
+    row: Integers,
+    out: Array,
+    nothing: float,
+) -> Array:
+    """(n,) the value v with which each control volume V lets out what leaves it, from
+
+        (V + sum of what leaves) v  =  amount without these sides + sum of what comes in x its v
+
+    field    value of each control volume at the start, with which those not listed let it out
+    later    after an explicit stage with the mean of both at these sides, amount where `volumes` is
+             not above `nothing`
+    volumes  after the stage
+    listed   (n,); something leaves each of them
+    beside   (n, 6) control volume beyond each side, -1 where the side is none of these
+    row      (n, 6) its place in the list, -1 if it is not there
+    out      (n, 6) volume that leaves through each side in the stage
+    """
+    values, after, volume = field.reshape(-1), later.reshape(-1), volumes.reshape(-1)
+    known, gone = np.empty(listed.size), np.empty(listed.size)
+    leaving = np.empty(listed.size)
+    for n in range(listed.size):
+        own = listed[n]
+        leaving[n] = values[own]
+        known[n] = after[own] * (volume[own] if volume[own] > nothing else 1.0)
+        gone[n] = volume[own]
+        for way in range(6):
+            to, passed = beside[n, way], out[n, way]
+            if to < 0:
+                continue
+            known[n] += passed * 0.5 * (values[own] + values[to])
+            gone[n] += max(passed, 0.0)
+            if row[n, way] < 0:
+                known[n] -= min(passed, 0.0) * values[to]
+    for sweep in range(SWEEPS):
+        change, scale = 0.0, 0.0
+        for step in range(listed.size):
+            n = step if sweep % 2 == 0 else listed.size - 1 - step
+            total = known[n]
+            for way in range(6):
+                if row[n, way] >= 0 and out[n, way] < 0.0:
+                    total -= out[n, way] * leaving[row[n, way]]
+            now = total / gone[n]
+            change = max(change, abs(now - leaving[n]))
+            scale = max(scale, abs(now))
+            leaving[n] = now
+        if change <= SETTLED * scale:
+            break
+    return leaving
+
+
+def what_leaves_reference(
+    field: Array,
+    later: Array,
+    volumes: Array,
+    listed: Integers,
+    beside: Integers,
+    row: Integers,
+    out: Array,
+    nothing: float,
+) -> Array:
+    """`what_leaves` in NumPy, as one system of equations."""
+    values, volume, n = field.ravel(), volumes.ravel()[listed], np.arange(listed.size)
+    inner, among = beside >= 0, (beside >= 0) & (row >= 0)
+    passed, came = np.where(inner, out, 0.0), np.where(inner, np.maximum(-out, 0.0), 0.0)
+    amount = later.ravel()[listed] * np.where(volume > nothing, volume, 1.0)
+    amount += (passed * 0.5 * (values[listed][:, None] + values[beside])).sum(axis=1)
+    amount += (came * values[beside] * ~among).sum(axis=1)
+    system = np.diag(volume + np.maximum(passed, 0.0).sum(axis=1))
+    np.subtract.at(system, (np.repeat(n, 6)[among.ravel()], row[among]), came[among])
+    return np.asarray(np.linalg.solve(system, amount))
+
+
+@njit(nogil=True, cache=True)
+def let_through(
+    later: Array,
+    net: Array,
+    field: Array,
+    volumes: Array,
+    listed: Integers,
+    beside: Integers,
+    row: Integers,
+    rate: Array,
+    arriving: Array,
+    leaving: Array,
+    dt: float,
+    nothing: float,
+) -> None:
+    """Let upwind values through the sides of listed control volumes in place of the mean of both
+    beside them: what one gives another takes. In place in `later` and `net`.
+
+    later     after an explicit stage of which this is `dt`, amount where `volumes` is not above
+              `nothing`
+    net       amount that leaves each control volume per time
+    field     that the stage carried
+    volumes   after it
+    rate      (n, 6) volume per time that leaves through each side
+    arriving  (n, 6) value with which it comes in from control volumes that are not listed
+    leaving   (n,) value with which it leaves those listed
+    beside, row  as in `what_leaves`
+    """
+    after, gone = later.reshape(-1), net.reshape(-1)
+    values, volume = field.reshape(-1), volumes.reshape(-1)
+    for n in range(listed.size):
+        own = listed[n]
+        for way in range(6):
+            to, through, at = beside[n, way], rate[n, way], row[n, way]
+            if to < 0:
+                continue
+            passed = leaving[n]
+            if through < 0.0:
+                passed = leaving[at] if at >= 0 else arriving[n, way]
+            more = through * (passed - 0.5 * (values[own] + values[to]))
+            gone[own] += more
+            after[own] -= dt * more / (volume[own] if volume[own] > nothing else 1.0)
+            if at < 0:
+                gone[to] -= more
+                after[to] += dt * more / (volume[to] if volume[to] > nothing else 1.0)
+
+
+def let_through_reference(
+    later: Array,
+    net: Array,
+    field: Array,
+    volumes: Array,
+    listed: Integers,
+    beside: Integers,
+    row: Integers,
+    rate: Array,
+    arriving: Array,
+    leaving: Array,
+    dt: float,
+    nothing: float,
+) -> tuple[Array, Array]:
+    """`let_through` in NumPy: `later` and `net` after it."""
+    values, change = field.ravel(), np.zeros_like(field)
+    entering = np.where(row >= 0, leaving[row], arriving)
+    passed = np.where(rate > 0.0, leaving[:, None], entering)
+    more = rate * (passed - 0.5 * (values[listed][:, None] + values[beside])) * (beside >= 0)
+    np.add.at(change.reshape(-1), listed, more.sum(axis=1))
+    apart = (beside >= 0) & (row < 0)
+    np.subtract.at(change.reshape(-1), beside[apart], more[apart])
+    return later - dt * change / np.where(volumes > nothing, volumes, 1.0), net + change

@@ -1,0 +1,125 @@
+"""Bodies that cross many cells in a step: what they sweep is as fast as they are, not faster."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne import Array, Grid, Outcome, StepReport, World, step
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen, BoundaryPeriodic
+from flowborne.motions import JointCommand
+from flowborne.validation.worlds import RING, mjcf
+from flowborne.worlds import advance, make_world, set_velocity
+
+LONG = 0.2
+"""m, half the length of the plate across its way, or all of it from its hinge."""
+
+PLATES = {
+    "slides": '<body pos="{x} 0.5 {z}"><joint type="slide" axis="1 0 0"/>'
+    '<geom type="box" size="0.06 0.2 0.12"/></body>',
+    "turns": '<body pos="{x} 0.5 {z}"><joint type="hinge" axis="0 0 1"/>'
+    '<geom type="box" size="0.06 0.2 0.12" pos="0 -0.2 0"/></body>',
+}
+ARM = {"slides": 1.0, "turns": 2.0 * LONG}
+"""m from the hinge to the tip; of what slides its own way."""
+
+AROUND = Boundaries(*(BoundaryPeriodic(),) * 6)
+
+
+def blow(x: Array, y: Array, z: Array, time: float = 0.0) -> tuple[Array, Array, Array]:
+    return 1.0 + 0.0 * x, 0.0 * x, 0.0 * x
+
+
+CHANNEL = Boundaries(x_min=BoundaryInflow(blow), x_max=BoundaryOpen())
+
+
+def slab(cells: int) -> Grid:
+    return Grid.slab(cells, cells, 1.0 / cells, (0.0, 0.0))
+
+
+def room(cells: int) -> Grid:
+    return Grid((cells,) * 3, 1.0 / cells, (0.0, 0.0, 0.0))
+
+
+def plate(way: str, grid: Grid, sides: Boundaries) -> World:
+    body = PLATES[way].format(x=0.4, z=0.0 if grid.is_slab else 0.5)
+    return make_world(mjcf(body), grid, boundaries=sides)
+
+
+def fastest(world: World) -> float:
+    return max(float(np.abs(u).max()) for u in world.flow()[1].velocity)
+
+
+def swept(world: World, dt: float, rate: float, held: bool) -> StepReport:
+    """After a step in which the joint goes at a rate, and is held still at the end or goes on."""
+    command = JointCommand.none(1)
+    command.set(np.array([0]), rate, 0.0 if held else rate)
+    report = step(world, dt, command)
+    assert report.outcome is Outcome.DONE
+    assert report.momentum.budget_error < 1e-10
+    return report
+
+
+@pytest.mark.parametrize("way", PLATES)
+@pytest.mark.parametrize(
+    ("grid", "cells"),
+    [(slab(96), 8), (slab(128), 12), (slab(160), 20), (room(48), 6)],
+    ids=["8 of 96", "12 of 128", "20 of 160", "6 of 48 in a room"],
+)
+def test_fluid_at_rest_is_no_faster_than_around_the_plate_at_first(
+    way: str, grid: Grid, cells: int
+) -> None:
+    """Its first step is the flow of an impulse, which nothing has carried."""
+    world, dt = plate(way, grid, Boundaries()), 0.02
+    tip = cells * grid.spacing / dt
+    rate = tip / ARM[way]
+    world.solid.v[0] = rate
+    swept(world, dt, rate, held=False)
+    at_first = fastest(world)
+    assert at_first < 4.0 * tip
+    for _ in range(2):
+        swept(world, dt, rate, held=False)
+        assert fastest(world) < 1.3 * at_first
+
+
+@pytest.mark.parametrize("way", PLATES)
+@pytest.mark.parametrize("dt", [0.005, 0.02, 0.08])
+@pytest.mark.parametrize(("count", "cells"), [(96, 8), (160, 20)])
+def test_a_stream_is_three_times_as_fast_as_the_plate_meets_it_at_most(
+    way: str, count: int, cells: int, dt: float
+) -> None:
+    """As in a hypothetical step: displaced, and held."""
+    grid = slab(count)
+    world = plate(way, grid, CHANNEL)
+    set_velocity(world, blow)
+    advance(world, 1e-9)
+    for values in (*world.flow()[1].acceleration, world.flow()[1].pressure):
+        values[:] = 0.0
+    tip = cells * grid.spacing / dt
+    for _ in range(2):
+        swept(world, dt, tip / ARM[way], held=True)
+        assert fastest(world) < 3.0 * (1.0 + tip)
+
+
+@pytest.mark.parametrize("grid", [slab(96), room(40)], ids=["slab", "room"])
+def test_a_stream_stays_uniform_past_a_plate_that_goes_with_it(grid: Grid) -> None:
+    """By nine cells in a step, around the ring and again."""
+    dt, speed = 0.02, 9.0 * grid.spacing / 0.02
+    world = plate("slides", grid, RING if grid.is_slab else AROUND)
+    world.solid.v[0] = speed
+    set_velocity(world, lambda x, y, z: (speed + 0.0 * x, 0.0 * x, 0.0 * x))
+    for _ in range(4):
+        swept(world, dt, speed, held=False)
+        for axis, u in enumerate(world.flow()[1].velocity):
+            assert np.abs(u - (speed if axis == 0 else 0.0)).max() < 1e-10 * speed
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_velocity_that_is_no_number_is_told_before_the_solve(wrong: float) -> None:
+    world = plate("slides", slab(16), Boundaries())
+    world.flow()[1].velocity[0][4, 4] = wrong
+    report = step(world, 0.01)
+    assert report.outcome is Outcome.ADVECTION_NOT_FINITE
+    assert report.iterations == 0
+    with pytest.raises(ArithmeticError, match="not a finite number after advection"):
+        advance(world, 0.01)
