@@ -4,29 +4,30 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flowborne.validation.report import failures, read_report, tier_of
+from flowborne.validation.case import Tier
+from flowborne.validation.report import failures, read_report, tier_of, verdicts
+from marked import with_part
 
 ROOT = Path(__file__).parents[1]
 README, REPORT = ROOT / "README.md", ROOT / "docs" / "validation"
-BEGIN, END = "<!-- failing: made by `make failing` -->\n", "<!-- end of failing -->\n"
 
 
 def section() -> str:
     """How many figures pass, and a table of those that do not."""
     data = read_report(REPORT)
-    cases = [case[tier_of(case)] for case in data.values()]
-    full = sum(tier_of(case) == "full" for case in data.values())
-    figures = sum(len(case["findings"]) for case in cases)
-    failing = failures(data)
+    tiers = [tier_of(case) for case in data.values()]
+    run = ", ".join(f"{tiers.count(tier)} in the tier {tier}" for tier in reversed(Tier))
+    counts = verdicts(data)
     said = (
-        f"[The report](docs/validation/index.html) has {len(data)} cases, {full} of them in full "
-        "and the others on the coarser grids of their quick tier: "
-        f"{figures - len(failing)} of {figures} figures pass. These do not:"
+        f"[The report](docs/validation/index.html) has {len(data)} cases, {run}: "
+        f"{counts['pass']} of {counts['pass'] + counts['fail']} figures pass, and "
+        f"{counts['unconfirmed']} more stand beside values that are not confirmed at their source. "
+        "These do not pass:"
     )
     rows = [
         f"| {name} | {tier} | {finding['quantity']} | {number(finding['value'])} | "
         f"{number(finding['reference'])} | {finding['tolerance']} |"
-        for name, tier, finding in failing
+        for name, tier, finding in failures(data)
     ]
     head = ["| case | tier | figure | flowborne | reference | accepted |", "|" + " --- |" * 6]
     return "\n".join([said, "", *head, *rows]) + "\n"
@@ -39,8 +40,7 @@ def number(value: float | str) -> str:
 
 def with_section(text: str) -> str:
     """The README with the table of today."""
-    before, rest = text.split(BEGIN)
-    return before + BEGIN + section() + END + rest.split(END)[1]
+    return with_part(text, "failing", section())
 
 
 if __name__ == "__main__":

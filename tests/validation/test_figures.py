@@ -37,4 +37,4 @@ def test_figures_are_written_and_printed(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_time_of_a_frame_is_measured() -> None:
-    assert 0.0 < figures.frame_seconds(1, 1, frames=1) < 60.0
+    assert figures.frame_seconds(1, 1, frames=1) > 0.0

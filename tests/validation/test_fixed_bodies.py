@@ -25,7 +25,7 @@ def test_B1_on_ten_cells_across_D():
 
 def test_B1_figures_of_a_known_flow():
     """A linear pressure and a velocity that changes its sign at a known place."""
-    world = channel(10, 0.3)
+    world = channel(10, Parabola(0.3))
     fluid, state = world.flow()
     x, _, _ = fluid.grid.cell_coordinates()
     state.pressure[:] = (1.0 - 3.0 * x)[:, None, None]
@@ -36,7 +36,7 @@ def test_B1_figures_of_a_known_flow():
 
 
 def test_refined_flow_is_the_coarse_one():
-    coarse, fine = channel(10, 0.3), channel(20, 0.3)
+    coarse, fine = channel(10, Parabola(0.3)), channel(20, Parabola(0.3))
     set_velocity(coarse, Parabola(0.3))
     coarse.flow()[1].pressure[:] = np.arange(220.0)[:, None, None]
     start_from(coarse, fine)

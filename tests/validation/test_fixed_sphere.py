@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flowborne.validation import case
-from flowborne.validation.fixed_sphere import quarter, recirculation, separation
+from flowborne.validation.fixed_sphere import BETWEEN, quarter, recirculation, separation
 from flowborne.worlds import set_velocity
 
 
@@ -35,6 +35,6 @@ def test_the_flow_separates_where_it_turns_round_at_the_sphere():
         return speed * aside / r, -speed * x / r * y / aside, -speed * x / r * z / aside
 
     set_velocity(world, turning)
-    assert separation(world) == pytest.approx(120.0, abs=0.6)
+    assert separation(world, BETWEEN) == pytest.approx(120.0, abs=0.6)
     set_velocity(world, lambda x, y, z: (1.0 + 0.0 * x, 0.0 * y, 0.0 * z))
-    assert separation(world) == 180.0
+    assert separation(world, BETWEEN) == 180.0

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from flowborne import load_scene
-from flowborne.validation import run_cases
+from flowborne.validation import case
 from flowborne.validation.standing import BACK, SPREAD, G, Load, human, settled, standing
 
 
 @pytest.mark.parametrize("name", ["K8", "K9", "K10"])
 def test_every_finding_passes(name: str) -> None:
-    found = run_cases([name], quick=True)
+    found = case(name).run(quick=True)
     assert found
     assert [result.title for result in found if result.verdict != "pass"] == []
 

@@ -4,14 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
 from time import perf_counter
-from typing import Any
+from traceback import extract_tb
+from typing import Any, Literal
 
 import numpy as np
 
+from flowborne import Array
 from flowborne.validation.reference import entry
 
 Value = float | str
+Verdict = Literal["pass", "fail", "unconfirmed"]
+
+THE_RUN = "the run"
+"""What a case that broke down is judged by; its figures were not measured."""
+
+
+class Tier(StrEnum):
+    """How long a validation takes on two cores; each tier takes in those before it."""
+
+    MINUTE = "minute"
+    HALF_HOUR = "half-hour"
+    ALL = "all"
+
+    def within(self, wanted: Tier) -> bool:
+        """Whether what belongs to this tier is run when `wanted` is asked for."""
+        tiers = tuple(Tier)
+        return tiers.index(self) <= tiers.index(wanted)
 
 
 @dataclass(frozen=True)
@@ -64,11 +85,45 @@ class GridSeries:
 
 
 @dataclass(frozen=True)
+class Curve:
+    """Points (x, y) of a plot; published ones stand beside those that were measured."""
+
+    label: str
+    x: Sequence[float] | Array
+    y: Sequence[float] | Array
+    published: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, to the five digits that a plot can show."""
+        return {
+            "label": self.label,
+            "x": [float(f"{value:.5g}") for value in self.x],
+            "y": [float(f"{value:.5g}") for value in self.y],
+            "published": self.published,
+        }
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves over the same axes; x and y name them with their units."""
+
+    x: str
+    y: str
+    curves: Sequence[Curve]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {"x": self.x, "y": self.y, "curves": [curve.as_dict() for curve in self.curves]}
+
+
+@dataclass(frozen=True)
 class Finding:
     """One quantity of a case, measured and judged.
 
     tolerance  how far from the reference still counts, in words or as a number
     lines      more for people
+    plot       the curve that the quantity was read from, beside the published one
+    confirmed  False where the list has the reference from memory: the finding does not count
     """
 
     quantity: str
@@ -78,6 +133,14 @@ class Finding:
     passed: bool
     series: GridSeries | None = None
     lines: tuple[str, ...] = ()
+    plot: Plot | None = None
+    confirmed: bool = True
+
+    @property
+    def verdict(self) -> Verdict:
+        if not self.confirmed:
+            return "unconfirmed"
+        return "pass" if self.passed else "fail"
 
 
 def near(
@@ -143,26 +206,29 @@ class Result:
     """A finding with the case that it belongs to.
 
     id        of the case in the reference list
+    tier      that the run belongs to
     quantity  which of its quantities
-    verdict   "pass" or "fail"
     seconds   that the whole case took
     """
 
     id: str
+    tier: Tier
     title: str
     quantity: str
     value: Value
     reference: Value
     tolerance: Value
-    verdict: str
+    verdict: Verdict
     lines: list[str]
     seconds: float
     series: GridSeries | None = None
+    plot: Plot | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON; a value that is not finite becomes its name."""
         row: dict[str, Any] = {
             "id": self.id,
+            "tier": self.tier.value,
             "title": self.title,
             "quantity": self.quantity,
             "value": _plain(self.value),
@@ -174,7 +240,23 @@ class Result:
         }
         if self.series is not None:
             row["series"] = self.series.as_dict()
+        if self.plot is not None:
+            row["plot"] = self.plot.as_dict()
         return row
+
+    @classmethod
+    def from_dict(cls, row: dict[str, Any]) -> Result:
+        """The result that `as_dict` gave."""
+        found = dict(row)
+        if "series" in found:
+            series = {
+                name: found["series"][name] for name in ("label", "cells", "values", "errors")
+            }
+            found["series"] = GridSeries(**series)
+        if "plot" in found:
+            plot = found["plot"]
+            found["plot"] = Plot(plot["x"], plot["y"], [Curve(**curve) for curve in plot["curves"]])
+        return cls(**{**found, "tier": Tier(found["tier"])})
 
 
 @dataclass(frozen=True)
@@ -183,10 +265,16 @@ class Case:
 
     id       in the list
     measure  runs the case and gives its findings; True asks for coarser grids and shorter runs
+    quick    smallest tier that has the shorter run
+    full     smallest tier that has the whole one
+    alone    whether it measures seconds, so that no other case may run beside it
     """
 
     id: str
     measure: Callable[[bool], list[Finding]]
+    quick: Tier = Tier.MINUTE
+    full: Tier = Tier.ALL
+    alone: bool = False
 
     @property
     def title(self) -> str:
@@ -196,30 +284,49 @@ class Case:
     def source(self) -> str:
         return entry(self.id).source
 
+    def tier_in(self, wanted: Tier) -> Tier | None:
+        """The largest of the case's tiers that is run in `wanted`; None where it has none there."""
+        has = (self.full, self.quick)
+        return next((tier for tier in has if tier.within(wanted)), None)
+
     def run(self, quick: bool = False) -> list[Result]:
         """Measure and judge. A run that breaks down is a failed result, with the cause."""
         started = perf_counter()
         try:
             findings = self.measure(quick)
-        except ArithmeticError as error:
-            findings = [Finding("the run", str(error), "ends", "", False)]
+        except Exception as error:  # whatever it is, the other cases go on
+            return [self.broken(quick, _said(error), perf_counter() - started)]
         seconds = perf_counter() - started
-        return [self._result(finding, seconds) for finding in findings]
+        return [self._result(finding, quick, seconds) for finding in findings]
 
-    def _result(self, finding: Finding, seconds: float) -> Result:
+    def broken(self, quick: bool, cause: str, seconds: float = 0.0) -> Result:
+        """The failed result of a run without figures."""
+        return self._result(Finding(THE_RUN, cause, "ends", "", False), quick, seconds)
+
+    def _result(self, finding: Finding, quick: bool, seconds: float) -> Result:
         lines = list(finding.series.lines()) if finding.series is not None else []
         return Result(
             self.id,
+            self.quick if quick else self.full,
             f"{self.title}: {finding.quantity}",
             finding.quantity,
             finding.value,
             finding.reference,
             finding.tolerance,
-            "pass" if finding.passed else "fail",
+            finding.verdict,
             lines + list(finding.lines),
             seconds,
             finding.series,
+            finding.plot,
         )
+
+
+def _said(error: Exception) -> str:
+    """What broke a run: of a flow that blew up its message, of all else kind and place, too."""
+    if isinstance(error, ArithmeticError):
+        return str(error)
+    last = extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(last.filename).name}, line {last.lineno})"
 
 
 def _plain(value: Value) -> Value:

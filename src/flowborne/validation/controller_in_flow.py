@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from flowborne import Array, BlowUpError, Simulation, load_scene
 from flowborne.motions import JointCommand
-from flowborne.validation.case import Case, Finding, GridSeries, near
+from flowborne.validation.case import Case, Finding, GridSeries, Tier, near
 from flowborne.validation.reference import reference
 from flowborne.worlds import advance
 
@@ -247,4 +247,4 @@ def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Find
     ]
 
 
-CASES = (Case("K5", block_in_stream), Case("K6", frames_and_strength))
+CASES = (Case("K5", block_in_stream, Tier.HALF_HOUR), Case("K6", frames_and_strength))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from flowborne import Grid, World
 from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.validation.case import Case, Finding, GridSeries, near
+from flowborne.validation.case import Case, Finding, GridSeries, Tier, near
 from flowborne.validation.fluid_cases import Uniform
 from flowborne.validation.reference import reference
-from flowborne.validation.worlds import mjcf, whole_steps
+from flowborne.validation.worlds import Vector, mjcf, whole_steps
 from flowborne.worlds import advance, make_world, set_velocity, start_from, velocity_at
 
 UPSTREAM, DOWNSTREAM, ASIDE = 6, 16, 5
@@ -27,6 +29,9 @@ CFL = 1.0
 
 STREAM = Uniform((1.0, 0.0, 0.0))
 """U = 1 m/s past a sphere of D = 1 m in a fluid of 1 kg/m^3."""
+
+BETWEEN: Vector = (0.0, np.sqrt(0.5), np.sqrt(0.5))
+"""Between y and z, away from the planes of symmetry."""
 
 
 def quarter(cells: int, reynolds: float) -> World:
@@ -74,25 +79,24 @@ def recirculation(world: World) -> float:
     return float(x[i] - fluid.grid.spacing * row[i] / (row[i] - row[i - 1]) - 0.5)
 
 
-def separation(world: World) -> float:
-    """Angle from the front at which the flow along the sphere turns round, degrees; 180 where it
-    does not.
+def separation(world: World, aside: Vector) -> float:
+    """Angle from the front at which the flow along a body of D = 1 m turns round, degrees; 180
+    where it does not.
 
-    Found at one and at two cells from the sphere and continued to its side.
+    Found at one and at two cells from the body and continued to its side.
+
+    aside  across the stream: the plane in which it is looked for
     """
     h = world.flow()[0].grid.spacing
     angles = np.radians(np.arange(95.0, 175.0, 0.25))
+    outward = np.outer(-np.cos(angles), STREAM.velocity) + np.outer(np.sin(angles), aside)
+    along = np.outer(np.sin(angles), STREAM.velocity) + np.outer(np.cos(angles), aside)
     turns = []
     for away in (h, 2.0 * h):
-        # in the plane between y and z, away from the planes of symmetry
-        out = np.sin(angles) * np.sqrt(0.5)
-        x = (0.5 + away) * np.column_stack([-np.cos(angles), out, out])
-        velocity = velocity_at(world, x)
-        aside = np.cos(angles) * np.sqrt(0.5)
-        along = velocity[:, 0] * np.sin(angles) + (velocity[:, 1] + velocity[:, 2]) * aside
-        if not (along < 0.0).any():
+        backward = (velocity_at(world, (0.5 + away) * outward) * along).sum(axis=1) < 0.0
+        if not backward.any():
             return 180.0
-        turns.append(float(np.degrees(angles[int(np.argmax(along < 0.0))])))
+        turns.append(float(np.degrees(angles[int(np.argmax(backward))])))
     return 2.0 * turns[0] - turns[1]
 
 
@@ -110,7 +114,7 @@ def sphere(quick: bool) -> list[Finding]:
             else:
                 start_from(coarser, world)
             coefficient, change = steady(world, NEXT if coarser else FIRST[quick])
-            rows.append((coefficient, recirculation(world), separation(world)))
+            rows.append((coefficient, recirculation(world), separation(world, BETWEEN)))
             lines.append(f"{n:>6g} cells across D: Cd changes by {change:.2g} in the last D/U")
             coarser = world
         drags, lengths, angles = zip(*rows, strict=True)
@@ -138,9 +142,9 @@ def bubble(
     ]
 
 
-def series_of(grids: tuple[int, ...], values: tuple[float, ...], exact: float) -> GridSeries:
+def series_of(grids: Sequence[int], values: Sequence[float], exact: float) -> GridSeries:
     """Values from grid to grid with their errors."""
     return GridSeries("cells across D", grids, values, [abs(v - exact) for v in values])
 
 
-CASES = (Case("B7", sphere),)
+CASES = (Case("B7", sphere, full=Tier.HALF_HOUR),)

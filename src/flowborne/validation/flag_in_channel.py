@@ -10,7 +10,7 @@ import numpy as np
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, StepReport, World
 from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
 from flowborne.flesh import FleshMesh, FleshTable
-from flowborne.validation.case import Case, Finding, GridSeries, near
+from flowborne.validation.case import Case, Finding, GridSeries, Tier, near
 from flowborne.validation.fixed_bodies import Parabola, begin
 from flowborne.validation.flesh import round_root
 from flowborne.validation.flesh_bars import flat_mesh, grown_from, tissue_table
@@ -323,4 +323,4 @@ def _columns(seen: Sequence[Flutter]) -> tuple[list[Array], list[Array]]:
     return [s.means for s in seen], [s.amplitudes for s in seen]
 
 
-CASES = (Case("D2", rigid_flag), Case("D3", flag_of_flesh))
+CASES = (Case("D2", rigid_flag, Tier.HALF_HOUR), Case("D3", flag_of_flesh, Tier.HALF_HOUR))

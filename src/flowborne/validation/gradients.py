@@ -14,7 +14,7 @@ from flowborne.executors import Serial
 from flowborne.gradients import GradientCentral, GradientOneSided
 from flowborne.machine import cores, kernel_threads
 from flowborne.objectives import ObjectiveCallable, ObjectiveSum, ObjectiveWindDrag
-from flowborne.validation.case import Case, Finding, GridSeries, at_most, near, order_of
+from flowborne.validation.case import Case, Finding, GridSeries, Tier, at_most, near, order_of
 from flowborne.validation.controller import AIR, HINGE, LENGTH, SPEED, WIDTH, block
 from flowborne.validation.worlds import Vector, mjcf
 from flowborne.winds import WindFaces, WindForce
@@ -199,4 +199,4 @@ def gradient_case(quick: bool) -> list[Finding]:
     return difference_error(quick) + exact_position(quick) + chain_cost(quick)
 
 
-CASES = (Case("K7", gradient_case),)
+CASES = (Case("K7", gradient_case, Tier.HALF_HOUR, alone=True),)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne import Array, Simulation, load_scene
-from flowborne.validation.case import Case, Finding, at_most
+from flowborne.validation.case import Case, Finding, Tier, at_most
 from flowborne.validation.standing import (
     BACK,
     MASS,
@@ -124,4 +124,7 @@ def torso_shift(back: Load, arm: Load) -> tuple[float, float]:
     return float(back.mass @ place[:, 0] / whole), float(-arm.mass.sum() * arm.reach[0] / whole)
 
 
-CASES = (Case("K8", back_over_hips), Case("K9", arms_hang))
+CASES = (
+    Case("K8", back_over_hips, full=Tier.HALF_HOUR),
+    Case("K9", arms_hang, full=Tier.HALF_HOUR),
+)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne import Simulation
-from flowborne.validation.case import Case, Finding, at_most, near
+from flowborne.validation.case import Case, Finding, Tier, at_most, near
 from flowborne.validation.standing import (
     BACK,
     SHOULDERS,
@@ -78,4 +78,4 @@ def in_the_wind(quick: bool) -> list[Finding]:
     return leans_into_the_wind() + arms_in_the_wind()
 
 
-CASES = (Case("K10", in_the_wind),)
+CASES = (Case("K10", in_the_wind, full=Tier.HALF_HOUR),)

@@ -9,7 +9,7 @@ import numpy as np
 
 from flowborne import Array, Grid
 from flowborne.boundaries import Boundaries, BoundaryOpen
-from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
+from flowborne.validation.case import Case, Finding, GridSeries, Tier, at_most, near
 from flowborne.validation.fluid_cases import Uniform, all_inflow
 from flowborne.validation.pendulums import passages
 from flowborne.validation.reference import reference, table
@@ -349,5 +349,5 @@ CASES = (
     Case("I6", munk_moment),
     Case("I7", pendulum),
     Case("I8", piston),
-    Case("I9", free_turn),
+    Case("I9", free_turn, full=Tier.HALF_HOUR),
 )

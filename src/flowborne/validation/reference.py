@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -14,6 +15,7 @@ class Entry:
     """A case of the list.
 
     quantities  name -> value as the list has it: a number, a formula in words, or a table
+    memory      names of those that were quoted from memory and not checked at their source
     """
 
     id: str
@@ -21,6 +23,7 @@ class Entry:
     source: str
     provenance: str
     quantities: dict[str, Any]
+    memory: Sequence[str] = ()
 
 
 @cache
@@ -42,3 +45,8 @@ def reference(case: str, quantity: str) -> Any:
 def table(case: str, quantity: str) -> dict[float, Any]:
     """A table of the list whose keys are numbers."""
     return {float(key): value for key, value in reference(case, quantity).items()}
+
+
+def confirmed(case: str, quantity: str) -> bool:
+    """Whether a quantity's value was checked at its source, or derived."""
+    return quantity not in entry(case).memory

@@ -10,7 +10,7 @@ import numpy as np
 
 from flowborne import Array, BlowUpError, Simulation, load_scene
 from flowborne.bodies import kinematics
-from flowborne.validation.case import Case, Finding
+from flowborne.validation.case import Case, Finding, Tier
 from flowborne.validation.flyer import control_is_worth_it
 
 CYCLE = 1.75
@@ -153,4 +153,4 @@ def creatures(quick: bool) -> list[Finding]:
     return control_is_worth_it(quick) + legs_are_worth_it(quick) + stroke_is_worth_it(quick)
 
 
-CASES = (Case("K11", creatures),)
+CASES = (Case("K11", creatures, Tier.HALF_HOUR),)

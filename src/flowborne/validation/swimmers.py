@@ -8,7 +8,7 @@ from flowborne import Array, Grid, World
 from flowborne.bodies import halfway_momentum, kinematics
 from flowborne.boundaries import Boundaries
 from flowborne.motions import TrajectorySinusoid
-from flowborne.validation.case import Case, Finding, GridSeries, at_most
+from flowborne.validation.case import Case, Finding, GridSeries, Tier, at_most
 from flowborne.validation.worlds import RING, mjcf
 from flowborne.worlds import advance, make_world
 
@@ -121,4 +121,4 @@ def invariants(quick: bool) -> list[Finding]:
     return [*findings, at_most(said, drifts[-1], 1e-3, series=series)]
 
 
-CASES = (Case("S5", invariants),)
+CASES = (Case("S5", invariants, full=Tier.HALF_HOUR),)

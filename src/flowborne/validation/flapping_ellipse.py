@@ -1,0 +1,144 @@
+"""An ellipse that hovers by flapping to and fro: S3."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flowborne import Array, Grid, World
+from flowborne.motions import TrajectorySinusoid
+from flowborne.validation.case import Case, Curve, Finding, GridSeries, Plot, Tier
+from flowborne.validation.reference import reference
+from flowborne.validation.worlds import mjcf, whole_steps
+from flowborne.worlds import advance, make_world
+
+SWAY, PERIOD, PITCH = 2.8, 4.0, 0.25 * np.pi
+"""m that the centre of the ellipse of 1 m goes from end to end, s, and rad that it pitches from
+upright to each side."""
+
+THICKNESS = 0.1
+"""Of the ellipse over its chord."""
+
+FASTEST = np.pi * SWAY / PERIOD
+"""m/s, of the centre."""
+
+REYNOLDS = 75.0
+
+GRIDS = {True: (10, 20), False: (20, 40)}
+"""Cells across the chord, by quick."""
+
+SIDE = {True: 10, False: 30}
+"""Chords across the closed box, by quick."""
+
+STROKES = {True: 1.0, False: 4.0}
+"""Periods that are followed from rest, by quick."""
+
+CFL = 1.0
+"""Cells that the centre crosses in a step at most; the tips are up to 1.4 times as fast."""
+
+TURNING = 0.012
+"""Of T: published drag so near to a turn of the stroke, where it jumps from one sign to the other,
+is left out."""
+
+LIFT, DRAG, MEASURED = "CL(t/T) Eldredge", "CD(t/T) Eldredge", "CL experiment Wang"
+
+
+def hover(cells: int, side: int) -> World:
+    """The ellipse upright at one end of its way, in still fluid."""
+    body = (
+        '<body name="wing"><joint name="x" type="slide" axis="1 0 0"/>'
+        '<joint name="pitch" axis="0 0 1"/>'
+        f'<geom type="ellipsoid" size="0.5 {0.5 * THICKNESS} 1"/></body>'
+    )
+    motions = (
+        TrajectorySinusoid(np.array([0]), 0.5 * SWAY, PERIOD, 0.0, 0.5 * np.pi),
+        TrajectorySinusoid(np.array([1]), PITCH, PERIOD, 0.5 * np.pi),
+    )
+    world = make_world(
+        mjcf(body),
+        Grid.slab(side * cells, side * cells, 1.0 / cells, (-0.5 * side, -0.5 * side)),
+        viscosity=FASTEST / REYNOLDS,
+        motions=motions,
+        tolerance=1e-7,
+    )
+    world.solid.q[:] = [motion.position(0.0)[0] for motion in motions]
+    return world
+
+
+def largest_quasi_steady() -> tuple[float, float]:
+    """The largest lift and drag in a stroke by 1.2 sin 2a and 1.4 - cos 2a times rho u^2 c / 2, by
+    which the published coefficients are made dimensionless, N/m."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 10_001)
+    pressure = 0.5 * (FASTEST * np.sin(angle)) ** 2
+    pitch = 0.5 * np.pi + PITCH * np.sin(angle)
+    lift = pressure * np.abs(1.2 * np.sin(2.0 * pitch))
+    drag = pressure * (1.4 - np.cos(2.0 * pitch))
+    return float(lift.max()), float(drag.max())
+
+
+def flap(cells: int, side: int, strokes: float) -> Array:
+    """(n, 3) t/T in the middle of every step, and lift and drag over the largest quasi-steady ones;
+    drag is positive against the way that the wing goes."""
+    world = hover(cells, side)
+    count, dt = whole_steps(strokes * PERIOD, CFL / cells / FASTEST)
+    lift, drag = largest_quasi_steady()
+    rows = []
+    for k in range(count):
+        report = advance(world, dt)
+        force = (report.pressure_wrench + report.viscous_wrench)[1]
+        phase = (k + 0.5) * dt / PERIOD
+        onward = -np.sign(np.sin(2.0 * np.pi * phase))
+        rows.append((phase, force[1] / lift, -onward * force[0] / drag))
+    return np.array(rows)
+
+
+def apart(times: Array, values: Array, published: Array) -> float:
+    """Root of the mean square distance from published points (n, 2)."""
+    return float(
+        np.sqrt(np.mean((np.interp(published[:, 0], times, values) - published[:, 1]) ** 2))
+    )
+
+
+def hovering(quick: bool) -> list[Finding]:
+    """S3: lift and drag from rest, beside another solver's and beside the experiment.
+
+    The list has no tolerance: the measured lift is itself away from that solver's, and so far may
+    ours be; the drag, of which nothing was measured, may be as far.
+    """
+    grids = GRIDS[quick]
+    runs = [flap(n, SIDE[quick], STROKES[quick]) for n in grids]
+    lift, drag, measured = (
+        points[points[:, 0] <= STROKES[quick]]
+        for points in (np.array(reference("S3", name)) for name in (LIFT, DRAG, MEASURED))
+    )
+    bound = apart(measured[:, 0], measured[:, 1], lift)
+    drag = drag[np.abs((drag[:, 0] + 0.25) % 0.5 - 0.25) > TURNING]
+    findings = []
+    for name, column, published in (("lift", 1, lift), ("drag", 2, drag)):
+        away = [apart(run[:, 0], run[:, column], published) for run in runs]
+        series = GridSeries("cells across the chord", grids, away, away)
+        run = runs[-1][:: max(1, len(runs[-1]) // 500)]
+        curves = [
+            Curve("Eldredge", published[:, 0], published[:, 1], True),
+            Curve("flowborne", run[:, 0], run[:, column]),
+        ]
+        if name == "lift":
+            curves.append(Curve("measured by Wang", measured[:, 0], measured[:, 1], True))
+        findings.append(
+            replace(
+                Finding(
+                    f"{name}, mean distance from Eldredge's",
+                    away[-1],
+                    bound,
+                    "at most the experiment's in lift",
+                    away[-1] <= bound,
+                    series,
+                ),
+                plot=Plot("t/T", f"{name} over the largest quasi-steady one", curves),
+            )
+        )
+    return findings
+
+
+CASES = (Case("S3", hovering, Tier.HALF_HOUR),)

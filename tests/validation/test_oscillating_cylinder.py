@@ -1,0 +1,24 @@
+"""V3 on a coarse grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.validation.oscillating_cylinder import CURVE, PERIOD, last_cycle, morison
+from flowborne.validation.reference import reference
+
+
+def test_V3_second_cycle_on_four_cells():
+    phases, forces = last_cycle(4, 2)
+    moments, published = np.array(reference("V3", CURVE)).T
+    away = np.interp(moments, phases, forces, period=1.0) - published
+    assert np.sqrt(np.mean(away**2)) < 0.1 * np.abs(published).max()
+
+
+def test_V3_the_coefficients_of_a_force_that_has_them():
+    phases = (np.arange(100) + 0.5) / 100
+    angle = 2.0 * np.pi * phases
+    v, rate = -np.cos(angle), 2.0 * np.pi / PERIOD * np.sin(angle)
+    forces = -2.0 * np.abs(v) * v - 0.5 * np.pi * 1.5 * rate
+    assert morison(phases, forces) == pytest.approx((2.0, 1.5))

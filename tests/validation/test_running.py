@@ -1,0 +1,87 @@
+"""Tiers, side by side, and not twice."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+
+from flowborne.machine import cores
+from flowborne.validation import Tier, case, case_ids
+from flowborne.validation.case import THE_RUN, Case, Finding, Result
+from flowborne.validation.page import PAGE
+from flowborne.validation.report import read_report
+from flowborne.validation.running import batches, run_cases
+
+MINUTE, HALF_HOUR, ALL = Tier
+
+
+def measured(quick: bool) -> list[Finding]:
+    """A finding that says which run it is of."""
+    return [Finding("run", "quick" if quick else "full", "", "", True)]
+
+
+def test_a_tier_takes_in_the_smaller_ones() -> None:
+    known = Case("B1", measured, quick=MINUTE, full=ALL)
+    assert [known.tier_in(tier) for tier in Tier] == [MINUTE, MINUTE, ALL]
+    known = Case("B1", measured, quick=HALF_HOUR, full=ALL)
+    assert [known.tier_in(tier) for tier in Tier] == [None, HALF_HOUR, ALL]
+
+
+def test_a_result_says_its_tier() -> None:
+    known = Case("B1", measured, quick=HALF_HOUR, full=ALL)
+    told = [(r.tier, r.value) for quick in (True, False) for r in known.run(quick)]
+    assert told == [(HALF_HOUR, "quick"), (ALL, "full")]
+
+
+def test_every_case_has_two_tiers_the_shorter_run_first() -> None:
+    for known in map(case, case_ids()):
+        assert known.quick is not known.full
+        assert known.quick.within(known.full), known.id
+
+
+def test_a_case_that_raises_is_a_failed_result_with_its_message() -> None:
+    def broken(quick: bool) -> list[Finding]:
+        raise KeyError("arm")
+
+    (result,) = Case("B1", broken).run()
+    assert (result.quantity, result.verdict) == (THE_RUN, "fail")
+    assert str(result.value).startswith("KeyError: 'arm' (test_running.py, line ")
+
+
+def test_the_longest_go_first_and_those_that_measure_seconds_alone() -> None:
+    runs = [(name, case(name).tier_in(HALF_HOUR)) for name in ("F1", "F6", "K7", "K11")]
+    together, alone = batches(runs)
+    assert [job.id for job in together] == ["K11", "F1", "F6"]
+    assert all(job.threads == max(1, cores() // 3) for job in together)
+    assert [(job.id, job.threads) for job in alone] == [("K7", cores())]
+
+
+def test_what_the_report_has_is_not_run_again(tmp_path: Path) -> None:
+    first = run_cases(["A3"], MINUTE, report=tmp_path, stream=io.StringIO())
+    told, shown = io.StringIO(), []
+    again = run_cases(["A3", "F6"], MINUTE, shown.append, tmp_path, told)
+    assert told.getvalue().splitlines()[0] == "cases: 2, 1 of them in the report already"
+    assert "A3 took" not in told.getvalue()
+    assert "2/2  F6 took" in told.getvalue()
+    assert [r.as_dict() for r in again if r.id == "A3"] == [
+        {**r.as_dict(), "seconds": round(r.seconds, 1)} for r in first
+    ]
+    assert [r.id for r in again] == sorted((r.id for r in again), key=list(case_ids()).index)
+    assert len(shown) == len(again)
+
+
+def test_an_interruption_leaves_what_is_done(tmp_path: Path) -> None:
+    def interrupt(result: Result) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_cases(["F6", "K10"], MINUTE, interrupt, tmp_path, io.StringIO())
+    assert list(read_report(tmp_path)) == ["F6"]
+    assert 'id="F6"' in (tmp_path / PAGE).read_text()
+
+
+def test_a_case_of_another_tier_is_refused() -> None:
+    with pytest.raises(ValueError, match="K11 is not in the tier minute: it has half-hour and all"):
+        run_cases(["K11"], MINUTE)
