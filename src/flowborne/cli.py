@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
@@ -74,9 +75,10 @@ def flowborne(
 @app.command()
 def scenes() -> None:
     """List the built-in scenes."""
-    from flowborne.scenes.load import load_scene, scene_names
+    from flowborne.scenes.load import find, read_scene, scene_names
 
-    rows = [(s.name, s.figure, s.description) for s in map(load_scene, scene_names())]
+    listed = [read_scene(find(name)) for name in scene_names()]
+    rows = [(scene.name, scene.figure, scene.description) for scene in listed]
     widths = [max((len(row[n]) for row in rows), default=0) for n in range(2)]
     for name, figure, description in rows:
         print(f"{name:<{widths[0]}}  {figure:<{widths[1]}}  {description}".rstrip())
@@ -142,15 +144,30 @@ def check(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the scene."),
     ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Import the Python that the scene names, as run does.")
+    ] = False,
 ) -> None:
-    """Say everything that is wrong with a scene, and how the fluid sees its bodies."""
+    """Say everything that is wrong with a scene, and how the fluid sees its bodies.
+
+    Bodies and fluid are set going, as in a run.
+    """
     from flowborne.coupling.seen import seen_bodies
-    from flowborne.scenes.build import build
+    from flowborne.progress import ProgressDisplay, RunProgress
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.notes import notes_of
 
-    loaded = load_scene(scene, _overrides(settings or []))
-    setup = build(loaded).world.setup
+    loaded = load_scene(scene, _overrides(settings or []), trust=trust)
+    began = perf_counter()
+    with ProgressDisplay() as progress:
+        from flowborne.kernels.compilation import compilation_watched
+        from flowborne.simulation import Simulation
+
+        def tell(kernels: int) -> None:
+            progress(RunProgress("compiling", 0, 0, perf_counter() - began, kernels))
+
+        with compilation_watched(tell), Simulation(loaded, workers=1) as simulation:
+            setup = simulation.world.setup
     print("nothing wrong")
     for note in notes_of(loaded, setup.solid):
         print(f"  {note}")
@@ -285,26 +302,38 @@ def validate(
     case: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="Only this case; may be repeated.")
     ] = None,
-    quick: Annotated[bool, typer.Option(help="Coarser grids, in minutes.")] = False,
+    tier: Annotated[
+        str,
+        typer.Option(metavar="TIER", help="minute, half-hour or all: how long it may take."),
+    ] = "minute",
     report: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder of a report that the cases are put into."),
+        typer.Option(
+            metavar="DIR",
+            help="Folder of a report that the cases are put into; what it has is not run again.",
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compare with analytic and published cases."""
-    from flowborne.validation import case_ids, run_cases
+    from flowborne.validation import Tier, case_ids
+    from flowborne.validation.running import run_cases
 
     ids = _known(case or [], case_ids(), "case", "--case")
+    (wanted,) = _known([tier], tuple(Tier), "tier", "--tier")
     show = None if as_json else _result_printer("id", "reference", "tolerance")
     if report is not None:
         _make_folder(report)
     try:
-        results = run_cases(ids or None, quick, on_result=show, report=report)
+        results = run_cases(ids or None, Tier(wanted), on_result=show, report=report)
     except ValueError as error:
         raise InputError(str(error)) from error
     except OSError as error:
         raise cannot_write(report or Path(), error) from error
+    except KeyboardInterrupt as stopped:
+        kept = "" if report is None else f"; {report} has what is done, the same command goes on"
+        _complain(f"interrupted{kept}")
+        raise typer.Exit(INTERRUPTED) from stopped
     _report(results, as_json)
 
 
@@ -344,10 +373,25 @@ def figures(
     print(f"written: {', '.join(str(path) for path in sorted(out.glob('figure-*')))}")
 
 
+@app.command()
+def doctor() -> None:
+    """Try what flowborne needs of this machine, and say how to mend what is missing."""
+    from flowborne.doctor import findings
+
+    missing = 0
+    for finding in findings():
+        print(finding.line(), flush=True)
+        missing += finding.missing
+    if missing:
+        raise typer.Exit(FAILED)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line, then leave with its exit code."""
     for name in BLAS_THREADS:
         os.environ[name] = "1"
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries; what is wrong is said in one message
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)
@@ -455,4 +499,6 @@ def _sentence(error: Exception) -> str:
 
 
 def _complain(message: str) -> None:
-    print(f"flowborne: {message}", file=sys.stderr)
+    """Say what is wrong in one line, whatever letters the input has put into it."""
+    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
+    print(f"flowborne: {line}", file=sys.stderr)

@@ -22,6 +22,10 @@ class SceneError(Exception):
         return type(self), (self.problems,)
 
 
+class WorkerError(ValueError):
+    """Processes that work for this one died, and again after a new start."""
+
+
 class PartError(ValueError):
     """A part of the user's own failed: an objective, a rule, a wind, an exporter.
 

@@ -27,10 +27,10 @@ def export(
                 library is missing; RunFolderError when `run` is no run; PartError when an exporter
                 of one's own fails; OSError when the file cannot be written
     """
-    from flowborne.scenes.load import scene_of_run
+    from flowborne.scenes.load import read_scene
 
     folder, path = RunFolder.existing(Path(run)), Path(out)
-    scene_of_run(folder.scene)  # brings the plugins
+    read_scene(folder.scene)  # brings the plugins
     ending = path.suffix
     if not can_write(ending):
         raise SceneError(

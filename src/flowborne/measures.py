@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 IMPULSES = ("exchanged", "advection", "boundary", "crossed", "forces")
 """Parts of the budget that are impulses of a whole frame."""
+
+LISTED = 3
+"""Most columns that a message names."""
 
 SLIDE, HINGE = 2, 3
 """Kinds of joints, by MuJoCo's numbers."""
@@ -102,6 +106,15 @@ class Measures:
         if report is not None:
             values |= self._of_frame(report)
         return values
+
+    def lost(self, values: Mapping[str, float]) -> str:
+        """Names of the first few columns of a frame without a finite number; "" when all have one.
+
+        Without a controller there is no objective, which is then nan.
+        """
+        known = set() if self._controller is not None else {"objective"}
+        names = [c for c, value in values.items() if c not in known and not np.isfinite(value)]
+        return ", ".join(names[:LISTED]) + (" and more" if len(names) > LISTED else "")
 
     def strength_steps(self, frame_time: float) -> dict[str, float]:
         """column of each controlled joint -> the farthest it moves by one decision, rad or m."""

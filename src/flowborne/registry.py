@@ -42,7 +42,7 @@ class Registry(Generic[Part]):
         self._kinds: dict[str, tuple[Callable[..., Part], type[BaseModel]]] = {}
 
     def __contains__(self, kind: object) -> bool:
-        return kind in self._kinds
+        return isinstance(kind, str) and kind in self._kinds
 
     @property
     def kinds(self) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from enum import Enum
 from math import nan, prod
@@ -14,8 +14,9 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from flowborne.coupling.seen import seen_bodies
-from flowborne.errors import PartError, SceneError
+from flowborne.errors import PartError, SceneError, WorkerError
 from flowborne.frame_report import PARTS, FrameReport
+from flowborne.io.arrays_file import check_states
 from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.io.history import History
 from flowborne.io.recorder import Recorder, write_model
@@ -94,9 +95,10 @@ def run(
     film      draw preview.png and preview.mp4 at the end
     progress  called with news of the run
     returns   the result; a run that blew up or filled the disc returns, too: see its outcome
-    raises    RunFolderError when `out` or the arguments are wrong, SceneError when the scene is or
-              does not fit into memory; nothing is then written. RunInterrupted (a
-              KeyboardInterrupt) after Ctrl-C or SIGTERM, when everything has been saved
+    raises    RunFolderError when `out` or the arguments are wrong or another run is being written
+              there, SceneError when the scene is wrong or does not fit into memory; nothing is then
+              written. RunInterrupted (a KeyboardInterrupt) after Ctrl-C or SIGTERM, when everything
+              has been saved; KeyboardInterrupt when there was nothing to save yet
     """
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.save import scene_files
@@ -114,26 +116,22 @@ def run(
     else:
         folder.check_new(replace=replace)
     wanted = with_frames(wanted, frames)
-    files = scene_files(wanted)
-    with _simulation(wanted, workers) as simulation:
-        job = _Run(simulation, folder, files, progress)
-        with job.compilation_told():
-            if resume:
-                job.resume()
-            else:
-                job.begin(replace=replace)
-            return job.finish(*job.go_on(), film=film)
-
-
-def _simulation(scene: Scene, workers: int | None) -> Simulation:
-    """The simulation of a scene. Raises SceneError when the machine has no room for it."""
-    try:
-        return Simulation(scene, workers=workers)
-    except MemoryError as error:
-        raise SceneError(
-            f"scene {scene.name} does not fit into the memory of this machine ({error}). "
-            "Make its grid coarser: lower [domain] resolution or cells."
-        ) from error
+    with folder.locked(), _Signals() as signals, ExitStack() as open_until_the_end:
+        try:
+            with signals.interruptible():
+                files = scene_files(wanted)
+                simulation = open_until_the_end.enter_context(Simulation(wanted, workers=workers))
+                job = _Run(simulation, folder, files, signals, progress)
+                open_until_the_end.enter_context(job.compilation_told())
+                if not resume:
+                    job.start()
+        except KeyboardInterrupt as stop:
+            raise KeyboardInterrupt("stopped before anything was written") from stop
+        if resume:
+            job.resume()
+        else:
+            job.begin(replace=replace)
+        return job.finish(*job.go_on(), film=film)
 
 
 class _Run:
@@ -144,6 +142,7 @@ class _Run:
         simulation: Simulation,
         folder: RunFolder,
         files: dict[str, bytes],
+        signals: _Signals,
         progress: Callable[[RunProgress], None] | None,
     ) -> None:
         self.simulation = simulation
@@ -154,8 +153,13 @@ class _Run:
         self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
+        self._signals = signals
         self._progress = progress
         self._started = perf_counter()
+
+    def start(self) -> None:
+        """Set bodies and fluid going, which may take long. Raises SceneError."""
+        _ = self.simulation.world
 
     def begin(self, *, replace: bool) -> None:
         """Make the folder ready for a new run. Raises RunFolderError; then nothing is written."""
@@ -183,6 +187,7 @@ class _Run:
                     "or start again with --replace"
                 )
             self._check_space(freed=0)
+            check_states(folder, simulation.frame)
             write_scene(folder, self.files)
             if simulation.frame == 0:
                 self._write_start()
@@ -196,31 +201,27 @@ class _Run:
 
     def go_on(self) -> tuple[RunOutcome, str]:
         """Advance and record to the last frame, or to what stops the run."""
-        simulation = self.simulation
+        simulation, signals = self.simulation, self._signals
         self._tell("start")
-        with _Signals() as signals:
-            while simulation.frame < self.frames and not signals.asked:
-                try:
-                    with signals.interruptible():
-                        report = simulation.advance_frame()
-                except (KeyboardInterrupt, SystemError) as stop:
-                    # an interrupt becomes a SystemError while a kernel hands back its result
-                    if isinstance(stop, SystemError) and not signals.asked:
-                        raise
-                    if simulation.report is None or simulation.frame == self._rows():
-                        break
-                    report = simulation.report
-                except BlowUpError as error:
-                    return RunOutcome.BLEW_UP, self._blown_up(error)
-                try:
-                    values = self._record(report)
-                except OSError as error:
-                    return RunOutcome.NOT_WRITTEN, self._not_written(error)
-                self._tell("frame", report.objective, values)
+        while simulation.frame < self.frames and not signals.asked:
             try:
-                self._save()
+                with signals.interruptible():
+                    report = simulation.advance_frame()
+            except KeyboardInterrupt:
+                if simulation.report is None or simulation.frame == self._rows():
+                    break
+                report = simulation.report
+            except BlowUpError as error:
+                return RunOutcome.BLEW_UP, self._blown_up(error)
+            try:
+                values = self._record(report)
             except OSError as error:
                 return RunOutcome.NOT_WRITTEN, self._not_written(error)
+            self._tell("frame", report.objective, values)
+        try:
+            self._save()
+        except OSError as error:
+            return RunOutcome.NOT_WRITTEN, self._not_written(error)
         if simulation.frame < self.frames:
             return RunOutcome.INTERRUPTED, f"stopped after frame {simulation.frame}; {self._how()}"
         return RunOutcome.DONE, f"{simulation.frame} frames are in {self.folder.path}"
@@ -244,18 +245,21 @@ class _Run:
             if outcome is RunOutcome.DONE:
                 outcome, message = RunOutcome.NOT_WRITTEN, self._not_written(error)
         result = RunResult(folder.path, outcome, message, self.simulation.frame, summary)
-        if outcome is RunOutcome.INTERRUPTED:
+        if outcome is RunOutcome.INTERRUPTED or self._signals.asked:
             raise RunInterrupted(result)
         return result
 
     def _draw(self) -> str:
-        """Draw the picture and the film; what to tell when there is nothing to draw."""
+        """Draw the picture and the film; what to tell when they are not, or not whole."""
         from flowborne.view.film import make_preview
 
         try:
-            make_preview(self.folder.path, self._tell_drawn)
-        except ValueError as error:
+            with self._signals.interruptible():
+                make_preview(self.folder.path, self._tell_drawn)
+        except (RunFolderError, ValueError) as error:
             return f"; no film: {error}"
+        except KeyboardInterrupt:
+            return f"; stopped while drawing; draw with: flowborne film {self.folder.path}"
         return ""
 
     def _export(self) -> tuple[list[str], str]:
@@ -267,11 +271,15 @@ class _Run:
         for table in self.simulation.scene.output.exports:
             try:
                 out = self.folder.path / table.file
-                written = export(self.folder.path, out, table.parameters)
+                with self._signals.interruptible():
+                    written = export(self.folder.path, out, table.parameters)
                 names = (str(file.relative_to(self.folder.path)) for file in written.files)
                 exported += names
             except (OSError, PartError, RunFolderError, SceneError) as error:
                 failed += f"; no {table.file}: {error}"
+            except KeyboardInterrupt:
+                how = f"flowborne export {self.folder.path} --out {out}"
+                failed += f"; stopped before {table.file} was written; write it with: {how}"
         return exported, failed
 
     def compilation_told(self) -> AbstractContextManager[None]:
@@ -313,9 +321,10 @@ class _Run:
         return values
 
     def _save(self) -> None:
-        """Write the checkpoint, after the rows that it speaks of are on the disc."""
+        """Write the checkpoint, after the rows and states that it speaks of are on the disc."""
         assert self.history is not None
         self.history.sync()
+        self.recorder.sync()
         save_checkpoint(self.folder.checkpoint, self.simulation.world, self.simulation.frame)
 
     def _check_space(self, freed: int) -> None:
@@ -352,7 +361,7 @@ class _Run:
             self._save()
         except OSError as full:
             kept += f", but its checkpoint could not be written ({full.strerror})"
-        if isinstance(error.__cause__, PartError):
+        if isinstance(error.__cause__, PartError | WorkerError):
             return f"the run stopped in {error}; {kept}; then {self._how()}"
         return f"the simulation blew up in {error}; {kept}; try more steps per frame"
 
@@ -401,7 +410,7 @@ class _Run:
 
 
 class _Signals:
-    """Ctrl-C and SIGTERM while a run is going: noted, and raised only where that is safe.
+    """Ctrl-C and SIGTERM during a run: noted, and raised only where that is safe.
 
     asked  whether one has come
     """
@@ -429,9 +438,16 @@ class _Signals:
 
     @contextmanager
     def interruptible(self) -> Iterator[None]:
-        """Context that a signal ends at once, by KeyboardInterrupt."""
+        """Context that a signal ends at once, by KeyboardInterrupt, also one that came before."""
+        if self.asked:
+            raise KeyboardInterrupt
         self._safe = True
         try:
             yield
+        except SystemError as error:
+            # an interrupt becomes a SystemError while a kernel hands back its result
+            if not self.asked:
+                raise
+            raise KeyboardInterrupt from error
         finally:
             self._safe = False

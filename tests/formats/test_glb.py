@@ -45,23 +45,17 @@ Files = dict[str, tuple[Creature, Path]]
 def test_every_mesh_is_where_the_run_has_it(name: str, files: Files) -> None:
     creature, path = files[name]
     read, model = read_back.Gltf(path), creature.model
-    skins = {skin.name: skin for skin in creature.skins}
+    skins = {skin.name for skin in creature.skins}
     for node in read.gltf.nodes:
         if node.mesh is not None and node.name not in skins:
             part = read.gltf.meshes[node.mesh].primitives[0]
             faces = model.geom_shape[model.geom_names.index(node.name)].triangles()[1]
             assert_array_equal(read.array(part.indices).ravel(), np.ravel(faces))
     for frame in range(len(creature.run)):
-        state, found = creature.run.state(frame), read.meshes(frame)
-        assert set(found) == {*model.geom_names, *skins}
-        for name, points in found.items():
-            if name in skins:
-                wanted = state["flesh_vertices"][skins[name].chosen]
-            else:
-                geom = model.geom_names.index(name)
-                own, _ = model.geom_shape[geom].triangles()
-                wanted = own @ state["geom_rotation"][geom].T + state["geom_position"][geom]
-            assert_allclose(points, wanted, atol=FAR * creature.size)
+        found, wanted = read.meshes(frame), read_back.meshes_of(creature, frame)
+        assert set(found) == set(wanted)
+        for part, points in found.items():
+            assert_allclose(points, wanted[part], atol=FAR * creature.size)
 
 
 @pytest.mark.parametrize("name", RUNS)

@@ -14,6 +14,7 @@ from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.human.gait import gait_clip
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import check_scene, load_scene
+from flowborne.scenes.notes import notes_of
 from flowborne.scenes.save import HUMAN_FILE, save_scene, scene_files
 from flowborne.simulation import Simulation
 
@@ -265,3 +266,51 @@ def test_a_human_or_a_start_with_a_fault_beside_a_walk_is_told(tmp_path: Path) -
         (tmp_path / "walk.toml").write_text(f"{walk}{fault}\n")
         (problem,) = check_scene(tmp_path / "walk.toml")
         assert said in problem
+
+
+def t_posed(path: Path) -> None:
+    """Put a frame before the first, in which both arms are held sideways."""
+    lines = path.read_text().splitlines()
+    at = next(n for n, line in enumerate(lines) if line.startswith("Frames"))
+    count = int(lines[at].split()[-1])
+    numbers = np.array(lines[at + 2].split(), float)
+    joints = [line.split()[-1] for line in lines if line.split()[:1] in (["ROOT"], ["JOINT"])]
+    for joint, turn in (("left_shoulder", 80.0), ("right_shoulder", -80.0)):
+        numbers[3 + 3 * joints.index(joint)] += turn
+    lines[at] = f"Frames: {count + 1}"
+    lines.insert(at + 2, " ".join(map(str, numbers)))
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_a_t_pose_before_the_clip_is_named_with_its_cure(write: Write, tmp_path: Path) -> None:
+    path = write()
+    assert check_scene(path) == []
+    t_posed(tmp_path / "walk.bvh")
+    (problem,) = check_scene(path)
+    assert "[clip]: from the first frame that is used of walk.bvh to the second" in problem
+    assert "_shoulder' turns by 80 degrees" in problem
+    assert problem.endswith("Drop it by skip = 1.")
+    assert check_scene(path, {"clip.skip": "1"}) == []
+    assert check_scene(path, {"clip.smooth": "6.0"}) == []
+
+
+def test_a_clip_shorter_than_the_run_says_where_it_stands_still(write: Write) -> None:
+    path = write()
+    for settings, told in (
+        ({"time.frames": "240"}, True),
+        ({"time.frames": "240", "clip.loop": "true", "clip.blend": "0.2"}, False),
+        ({"time.frames": "4"}, False),
+        ({"time.frames": "20", "clip.start": "0.5"}, True),
+    ):
+        scene = load_scene(path, settings)
+        notes = list(notes_of(scene, build(scene).world.setup.solid))
+        assert len(notes) == told, settings
+    assert "walk.bvh goes on for 0.55 s of the run's 0.833 s, and stands still" in notes[0]
+
+
+def test_a_clip_with_the_wrong_axis_up_is_told_the_other(write: Write) -> None:
+    (problem,) = check_scene(write(), {"clip.up": "z"})
+    assert problem == (
+        "scene stroll.toml, [clip]: with up = 'z' its legs do not point down when no joint is "
+        "turned. Set up = 'y', or correct the mapping."
+    )

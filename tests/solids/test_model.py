@@ -318,3 +318,23 @@ HUGE = {
 def test_models_that_ask_for_gigabytes_are_refused_before_they_are_made(asked: str) -> None:
     with pytest.raises(ValueError, match=re.escape(HUGE[asked])):
         SolidModel.from_string(f"<mujoco>{asked}</mujoco>")
+
+
+@pytest.mark.parametrize(
+    ("joint", "geom", "told"),
+    [
+        (
+            'range="90 -90"',
+            "",
+            "joint 'j' has a range from 90 to -90. Put the smaller number first",
+        ),
+        ("", 'density="nan"', "geom 'g' has density nan. Give a number of 0 or more"),
+        ("", 'density="-3"', "geom 'g' has density -3. Give a number of 0 or more"),
+        ("", 'mass="-1"', "geom 'g' has mass -1. Give a number of 0 or more"),
+    ],
+)
+def test_numbers_that_a_density_from_elsewhere_hides_are_refused(joint, geom, told):
+    text = f"""<mujoco><worldbody><body name="b"><joint name="j" {joint}/>
+    <geom name="g" size="0.1" {geom}/></body></worldbody></mujoco>"""
+    with pytest.raises(ValueError, match=told):
+        SolidModel.from_string(text, density=500.0)

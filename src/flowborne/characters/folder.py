@@ -17,6 +17,7 @@ from flowborne.characters.source import clip_number, read_source
 from flowborne.errors import SceneError
 from flowborne.io.bvh import write_clip
 from flowborne.io.clip import Clip
+from flowborne.solids.skins import skinned
 
 ROOM = 0.35
 """Water on every side of all that the clip reaches, in sizes of the character."""
@@ -115,11 +116,11 @@ def _reach(rig: Rig, surface: Surface, pose: Action) -> tuple[Array, Array]:
     """(3,) lower and upper corner of the surface at rest and in every frame, m."""
     turn = pose.rotation @ np.swapaxes(rig.rotation, 1, 2)
     shift = pose.position - np.einsum("fnij,nj->fni", turn, rig.position)
-    corners = [surface.vertices]
-    for turned, shifted in zip(turn, shift, strict=True):
-        moved = np.einsum("kn,nij->kij", surface.weights, turned)
-        corners.append(np.einsum("kij,kj->ki", moved, surface.vertices) + surface.weights @ shifted)
-    every = np.concatenate(corners)
+    places = (
+        skinned(surface.vertices, surface.weights, turned, shifted)
+        for turned, shifted in zip(turn, shift, strict=True)
+    )
+    every = np.concatenate([surface.vertices, *places])
     return every.min(axis=0), every.max(axis=0)
 
 

@@ -14,9 +14,11 @@ import multiprocessing
 import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from itertools import chain
 from typing import Any, Protocol, TypeVar
 
+from flowborne.errors import WorkerError
 from flowborne.kernels.jit import allowed_threads, cores, kernel_threads
 
 Task = TypeVar("Task")
@@ -119,7 +121,7 @@ class Processes(Pool):
     The shared object goes to each worker once, when the workers start; tasks that refer to it
     carry a mark in its place. Each worker gets its part of the tasks in one parcel, so that what
     they have in common travels once. The main script must guard its start by
-    `__name__ == "__main__"`.
+    `__name__ == "__main__"`. When a worker dies, all start anew, once.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -128,6 +130,23 @@ class Processes(Pool):
 
     def map(
         self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
+    ) -> list[Answer]:
+        try:
+            return self._map(function, tasks, shared)
+        except BrokenProcessPool:
+            self.close()
+        try:
+            return self._map(function, tasks, shared)
+        except BrokenProcessPool as error:
+            self.close()
+            raise WorkerError(
+                f"of {self.workers} worker processes one died, and again after a new start: give "
+                "fewer workers if memory is short, and guard the start of a script by "
+                'if __name__ == "__main__"'
+            ) from error
+
+    def _map(
+        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object
     ) -> list[Answer]:
         if self._executor is not None and shared is not self._shared:
             self.close()

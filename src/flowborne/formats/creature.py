@@ -15,7 +15,7 @@ from flowborne.errors import SceneError
 from flowborne.io.open_run import OpenRun
 from flowborne.io.recorder import on_skin
 from flowborne.scenes.bodies import load_model
-from flowborne.scenes.load import scene_of_run
+from flowborne.scenes.load import read_scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import BALL, HINGE, SolidModel
 from flowborne.solids.skins import clad_bodies, skins_of
@@ -130,7 +130,7 @@ class Creature:
     def __init__(self, run: OpenRun) -> None:
         if not has_bodies(run):
             raise SceneError(f"{run.folder} has no bodies. Add [solids] or [human] to its scene.")
-        self.run, self.model = run, load_model(scene_of_run(run.folder / "scene.toml"))
+        self.run, self.model = run, load_model(read_scene(run.folder / "scene.toml"))
         self._numbers = _bones(self.model)
 
     @cached_property

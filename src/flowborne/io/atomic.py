@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -63,6 +63,15 @@ def write_text(path: Path, text: str) -> None:
 def write_json(path: Path, value: Any) -> None:
     """Write `value` as JSON, whole or not at all; raises ValueError when it holds a NaN."""
     write_text(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def sync_files(paths: Sequence[Path]) -> None:
+    """Wait until files of one folder, and their names, are on the disc."""
+    for path in paths:
+        with open(path, "rb+") as file:
+            os.fsync(file.fileno())
+    if paths:
+        sync_folder(paths[0].parent)
 
 
 def sync_folder(path: Path) -> None:

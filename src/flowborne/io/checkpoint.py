@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from flowborne.coupling.world import Setup, World
+from flowborne.io.arrays_file import read_arrays
 from flowborne.io.atomic import write_atomically
 
 
@@ -27,11 +27,10 @@ def load_checkpoint(path: Path, setup: Setup) -> tuple[World, int]:
     raises  ValueError when the file is not a checkpoint, or is one of another setup
     """
     try:
-        with np.load(path) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = read_arrays(path)
         frame = int(arrays.pop("frame"))
         world = World.from_arrays(setup, arrays)
-    except (KeyError, OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
+    except (KeyError, OSError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is not a checkpoint of this scene ({error})") from error
     return world, frame
 

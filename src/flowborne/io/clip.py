@@ -44,6 +44,11 @@ class Clip:
         """s from the first frame to the last."""
         return (self.frames - 1) * self.frame_time
 
+    def turns(self) -> Array:
+        """(frames - 1, n) rad by which each joint turns from a frame to the next."""
+        same = np.abs(np.einsum("fnk,fnk->fn", self.rotations[1:], self.rotations[:-1]))
+        return 2.0 * np.arccos(np.minimum(same, 1.0))
+
     def placed(self, offset: tuple[float, ...], heading: float) -> Clip:
         """The clip elsewhere: turned by `heading` (rad) about the vertical through where the root
         begins, to the left, then moved by `offset` (3,) m."""

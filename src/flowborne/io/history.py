@@ -87,9 +87,12 @@ class History:
 
 
 def history_columns(path: Path) -> tuple[str, ...]:
-    """Names of the columns of a history."""
+    """Names of the columns of a history. Raises ValueError when it has no header."""
     with open(path, encoding="utf-8", newline="") as file:
-        return tuple(next(csv.reader(file), ()))
+        columns = tuple(next(csv.reader(file), ()))
+    if not columns:
+        raise ValueError(f"{path.name} is empty")
+    return columns
 
 
 def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ...]]:

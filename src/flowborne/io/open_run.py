@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -14,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
+from flowborne.io.arrays_file import read_state
 from flowborne.io.history import history_columns, history_rows
 from flowborne.io.optional import optional
-from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError
+from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
 from flowborne.io.state_arrays import DYE, StateArray, quantity
 
 if TYPE_CHECKING:
@@ -44,22 +44,18 @@ class OpenRun:
         files = RunFolder.existing(Path(folder))
         self.folder = files.path
         self._files = files
-        try:
-            self.scene: dict[str, Any] = tomllib.loads(files.scene.read_text(encoding="utf-8"))
+        self.scene = files.read_scene()
+        with reading(self.folder):
             self._model = json.loads(files.model.read_text(encoding="utf-8"))
             names = sorted(p.name for p in files.states.iterdir() if STATE_NAME.fullmatch(p.name))
-        except (OSError, ValueError) as error:
-            raise RunFolderError(
-                f"{folder} cannot be read ({error}); start the run again with --replace"
-            ) from error
+            self.name = str(self.scene.get("name", files.path.name))
+            self.bodies: tuple[str, ...] = tuple(self._model["bodies"])
+            self.joints: tuple[str, ...] = tuple(self._model["joints"])
+            self.frames_per_second = float(self._model["frames_per_second"])
         if not names:
             raise RunFolderError(f"{folder} has no frame yet; let the run go on with --resume")
         self._states = tuple(files.states / name for name in names)
-        self.name = str(self.scene.get("name", files.path.name))
-        self.bodies: tuple[str, ...] = tuple(self._model["bodies"])
-        self.joints: tuple[str, ...] = tuple(self._model["joints"])
         self.frames = tuple(int(path.stem) for path in self._states)
-        self.frames_per_second = float(self._model["frames_per_second"])
 
     def __len__(self) -> int:
         """Number of states: that of the frames, and the start."""
@@ -94,9 +90,10 @@ class OpenRun:
     @cached_property
     def history(self) -> dict[str, Array]:
         """column -> (frames,) numbers, as history.csv has them; the unit ends the name."""
-        columns = list(history_columns(self._files.history))
-        rows = np.array(list(history_rows(self._files.history, columns)), float)
-        return dict(zip(columns, rows.reshape(-1, len(columns)).T, strict=True))
+        with reading(self.folder):
+            columns = list(history_columns(self._files.history))
+            rows = np.array(list(history_rows(self._files.history, columns)), float)
+            return dict(zip(columns, rows.reshape(-1, len(columns)).T, strict=True))
 
     @cached_property
     def times(self) -> Array:
@@ -106,8 +103,7 @@ class OpenRun:
     @cached_property
     def arrays(self) -> Mapping[str, StateArray]:
         """Name -> array of all states, lazily; see state_arrays.QUANTITIES for shapes and units."""
-        with np.load(self._states[0]) as file:
-            names = tuple(file.files)
+        names = read_state(self._states[0])
         return MappingProxyType(
             {name: StateArray(self._states, name, quantity(name)) for name in names}
         )
@@ -119,8 +115,7 @@ class OpenRun:
         fluid_force (nb, 3), flesh_vertices (k, 3); of the fluid velocity_x, velocity_y, velocity_z
         on the faces, pressure, scalar_<dye>, and open, the part of each cell that no body takes up.
         """
-        with np.load(self._states[number]) as file:
-            return {name: file[name] for name in file.files}
+        return read_state(self._states[number])
 
     def every(self, name: str) -> Array:
         """(n, ...) one array of all states, such as "body_position".

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
-from flowborne.io.atomic import write_atomically, write_json
+from flowborne.io.atomic import sync_files, write_atomically, write_json
 from flowborne.io.run_folder import RunFolder
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
@@ -41,12 +42,13 @@ class Recorder:
       scalar_<name>                              in the cells
       open                                       part of each cell that no body takes up
 
-    A file is there whole or not at all when the process is killed. Files are not forced to the
-    disc one by one, which would cost more than writing them.
+    A file is there whole or not at all when the process is killed. `sync` forces all of them to
+    the disc: one by one that would cost more than writing them.
     """
 
     def __init__(self, folder: RunFolder) -> None:
         self.folder = folder
+        self._written: list[Path] = []
 
     def write(self, frame: int, world: World, report: StepReport | None) -> None:
         """Write the state after `frame` frames; `report` is of the last step, None at the start.
@@ -56,6 +58,12 @@ class Recorder:
         arrays = self.arrays(world, report)
         path = self.folder.state(frame)
         write_atomically(path, lambda file: np.savez(file, **arrays), durable=False)  # type: ignore[arg-type]
+        self._written.append(path)
+
+    def sync(self) -> None:
+        """Wait until every state that was written is on the disc."""
+        sync_files(self._written)
+        self._written.clear()
 
     def bytes_per_frame(self, world: World) -> int:
         """About the size of a state file."""

@@ -8,6 +8,7 @@ checkpoint.npz   the whole state of the last saved frame
 model.json       the bodies' geometry and the skin of flesh, to draw them
 preview.png      the last frame
 preview.mp4      the film
+.lock            empty; whoever writes the run has it locked
 """
 
 from __future__ import annotations
@@ -16,9 +17,15 @@ import json
 import os
 import re
 import shutil
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
+from flowborne.errors import SceneError
 from flowborne.io.atomic import partial_name, write_json
 from flowborne.version import __version__
 
@@ -39,8 +46,17 @@ FIXED_NAMES = (
 )
 """Files of every run; the mark comes last, so that a folder half removed is still a run's."""
 
+LOCK_NAME = ".lock"
+
+OWN_NAMES = (*FIXED_NAMES, LOCK_NAME, "states")
+"""Names in a run folder that nothing else can have."""
+
 STATE_NAME = re.compile(r"\d{6,}\.npz")
 PARTIAL_STATE_NAME = re.compile(r"\.\d{6,}\.npz\.partial")
+
+
+UNREADABLE = (AttributeError, LookupError, OSError, SceneError, TypeError, ValueError)
+"""What reading a file raises that is not as a run has written it."""
 
 
 class RunFolderError(Exception):
@@ -89,6 +105,32 @@ class RunFolder:
         if not folder.is_run():
             raise RunFolderError(f"{path} is not the folder of a run; give one that a run has made")
         return folder
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Context in which no other process writes a run here; a folder that is missing is made.
+
+        A folder that has nothing in it at the end is removed. The lock ends with the process.
+        raises  RunFolderError when a run is being written here, or the folder cannot be made
+        """
+        lock = FileLock(self.path / LOCK_NAME, blocking=False)
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            lock.acquire()
+        except Timeout:
+            raise RunFolderError(
+                f"another run is being written into {self.path}; wait for its end, or name "
+                "another folder with --out"
+            ) from None
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
+        try:
+            yield
+        finally:
+            if self.path.is_dir() and all(e.name == LOCK_NAME for e in self.path.iterdir()):
+                (self.path / LOCK_NAME).unlink(missing_ok=True)
+                self.path.rmdir()
+            lock.release()
 
     def check_writable(self) -> None:
         """Raise RunFolderError unless a run that is there can go on."""
@@ -148,6 +190,11 @@ class RunFolder:
         summary: dict[str, Any] = json.loads(self.summary.read_text(encoding="utf-8"))
         return summary
 
+    def read_scene(self) -> dict[str, Any]:
+        """scene.toml as nested dictionaries; raises RunFolderError when it cannot be read."""
+        with reading(self.path):
+            return tomllib.loads(self.scene.read_text(encoding="utf-8"))
+
     def model_files(self) -> list[str]:
         """Names of the files that this run has copied beside its scene, none outside the folder."""
         copied = self.read_summary().get("model_files", []) if self.is_run() else []
@@ -168,7 +215,7 @@ class RunFolder:
 
     def drop_states_after(self, frame: int) -> None:
         """Remove the states of later frames, and what was half-written."""
-        for path in self._state_files():
+        for path in self.state_files():
             if int(path.stem) > frame:
                 path.unlink()
         self._remove_partial()
@@ -177,7 +224,7 @@ class RunFolder:
         """Bytes of the files here that a run wrote."""
         if not self.is_run():
             return 0
-        paths = [*self._named_files(), *self._state_files()]
+        paths = [*self._named_files(), *self.state_files()]
         return sum(path.stat().st_size for path in paths)
 
     def _names(self) -> list[str]:
@@ -188,7 +235,8 @@ class RunFolder:
         """Those of them that are there."""
         return [self.path / name for name in self._names() if (self.path / name).is_file()]
 
-    def _state_files(self) -> list[Path]:
+    def state_files(self) -> list[Path]:
+        """Files of the states that are there, in no order."""
         if not self.states.is_dir():
             return []
         return [path for path in self.states.iterdir() if STATE_NAME.fullmatch(path.name)]
@@ -197,12 +245,12 @@ class RunFolder:
         """Whether nothing is here but what a run leaves that was killed before it began."""
         return all(
             (entry == self.states and entry.is_dir() and not any(entry.iterdir()))
-            or entry.name == partial_name(self.summary.name)
+            or entry.name in (LOCK_NAME, partial_name(self.summary.name))
             for entry in self.path.iterdir()
         )
 
     def _remove_run(self) -> None:
-        paths = [*self._state_files(), *self._named_files()]
+        paths = [*self.state_files(), *self._named_files()]
         for path in paths:
             path.unlink()
         for folder in {path.parent for path in paths} - {self.path, self.states}:
@@ -214,9 +262,22 @@ class RunFolder:
         for name in self._names():
             path = self.path / name
             path.with_name(partial_name(path.name)).unlink(missing_ok=True)
-        for path in list(self.states.iterdir()):
+        for path in list(self.states.iterdir()) if self.states.is_dir() else []:
             if PARTIAL_STATE_NAME.fullmatch(path.name):
                 path.unlink()
+
+
+@contextmanager
+def reading(folder: Path) -> Iterator[None]:
+    """Context in which whatever the files of a run lack, or have wrong, is a RunFolderError."""
+    try:
+        yield
+    except UNREADABLE as error:
+        first = error.problems[0] if isinstance(error, SceneError) else str(error)
+        said = f"it lacks {first}" if isinstance(error, KeyError) else first.rstrip(".")
+        raise RunFolderError(
+            f"the files of run {folder} cannot be read ({said}); start the run again with --replace"
+        ) from error
 
 
 def cannot_write(path: Path, error: OSError) -> RunFolderError:

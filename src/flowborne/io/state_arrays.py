@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.io.arrays_file import read_state
+
 
 class Quantity(NamedTuple):
     """What an array of the states is.
@@ -78,8 +80,7 @@ class StateArray:
         return self[:].astype(self.dtype if dtype is None else dtype, copy=False)
 
     def _read(self, number: int) -> NDArray[Any]:
-        with np.load(self._states[number]) as file:
-            return np.asarray(file[self._name])
+        return read_state(self._states[number], (self._name,))[self._name]
 
 
 def quantity(name: str) -> Quantity:

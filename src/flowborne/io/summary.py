@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import sys
 from collections import deque
@@ -94,6 +95,14 @@ def versions() -> dict[str, str]:
         **{name: version(name) for name in ("numpy", "scipy", "numba", "mujoco-core")},
         "system": platform.platform(),
     }
+
+
+def machine_memory() -> int | None:
+    """Memory of this machine, bytes; None where the system does not tell."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def peak_memory() -> int | None:

@@ -15,7 +15,7 @@ from flowborne.io.bvh import read_bvh
 from flowborne.io.clip import Clip
 from flowborne.scenes.clip_following import Passage, trajectory_of_clip
 from flowborne.scenes.clip_motion import TrajectoryClip
-from flowborne.scenes.clip_scale import check_scale, leg_length
+from flowborne.scenes.clip_scale import check_scale, check_upright, leg_length
 from flowborne.scenes.human.body import ELBOWS, human_mjcf
 from flowborne.scenes.human.clip_skeleton import skeleton_of
 from flowborne.scenes.human.gait import gait_clip
@@ -62,6 +62,7 @@ def capture_of(scene: Scene) -> Capture | None:
         return Capture(clip, _named(clip, table.mapping), None)
     mapping = mapping_of(clip, table.mapping)
     check_scale(leg_length(clip, mapping), table.unit)
+    check_upright(clip, mapping, table.up)
     return Capture(clip, mapping, skeleton_of(clip, mapping))
 
 

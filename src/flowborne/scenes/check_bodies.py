@@ -61,7 +61,9 @@ def check_without_bodies(draft: Draft) -> Iterator[str]:
 
 def unknown_joint(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> list[str]:
     """The problem when `joint` is not in the model."""
-    return _unknown(draft, joint, model.joint_names, "joint", "Its joints are", keys)
+    carried = zip(model.joint_names, model.mj.jnt_bodyid, strict=True)
+    bones = [name for name, body in carried if body < model.nbody]  # the others are of flesh
+    return _unknown(draft, joint, bones, "joint", "Its joints are", keys)
 
 
 def unknown_body(draft: Draft, model: SolidModel, body: str, *keys: Key) -> list[str]:
@@ -102,7 +104,7 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     for index, wind in enumerate(scene.wind):
         for body in wind.bodies or ():
             named += unknown_body(draft, model, body, "wind", index)
-        if isinstance(wind, WindPythonTable):
+        if isinstance(wind, WindPythonTable) and draft.sound("plugins"):
             try:
                 with_parameters(wind.function, wind.parameters)
             except SceneError as error:

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from flowborne.errors import SceneError
+from flowborne.io.clip import Clip
 from flowborne.scenes.bodies import posed
 from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.check_bodies import check_initial, unknown_joint
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.schema_human import ClipTable
 from flowborne.solids.model import SolidModel
+
+JUMP = np.radians(15.0)
+"""Least turn of a joint from the first frame to the second that is looked at."""
+
+JUMPS = 3.0
+"""How much more all joints then turn than between any two later frames, if it is a T-pose."""
+
+MANY = 10
+"""Frames of a clip from which on that can be told."""
 
 
 def check_clip(draft: Draft) -> Iterator[str]:
@@ -29,9 +42,29 @@ def check_clip(draft: Draft) -> Iterator[str]:
             )
         return
     try:
-        capture_of(scene)
+        capture = capture_of(scene)
     except SceneError as error:
         yield from (f"{draft.at('clip')}: {problem}" for problem in error.problems)
+        return
+    if capture is not None and scene.clip.file is not None:
+        yield from _check_first_pose(draft, capture.clip, scene.clip)
+
+
+def _check_first_pose(draft: Draft, clip: Clip, table: ClipTable) -> Iterator[str]:
+    """A clip that begins with a T-pose, which a recording jumps out of, cannot be followed."""
+    begun = table.start > 0.5 * clip.frame_time or table.smooth is not None
+    if begun or clip.frames < MANY:
+        return
+    turns = clip.turns()
+    first, later = turns[0], turns[1:]
+    if first.max() > JUMP and first.sum() > JUMPS * later.sum(axis=1).max():
+        joint = clip.names[int(first.argmax())]
+        yield (
+            f"{draft.at('clip')}: from the first frame that is used of {table.file} to the second "
+            f"'{joint}' turns by {np.degrees(first.max()):.3g} degrees, and no joint by more than "
+            f"{np.degrees(later.max()):.3g} between any two after that: the first is a T-pose or "
+            f"the like. Drop it by skip = {table.skip + 1}."
+        )
 
 
 def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:

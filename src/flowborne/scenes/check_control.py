@@ -148,7 +148,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
             )
     if isinstance(table, ObjectiveVelocityTable) and table.body is not None:
         yield from unknown_body(draft, model, table.body, "objectives", index)
-    if isinstance(table, ObjectivePythonTable):
+    if isinstance(table, ObjectivePythonTable) and draft.sound("plugins"):
         try:
             with_parameters(table.function, table.parameters)
         except SceneError as error:

@@ -143,6 +143,10 @@ def _joined(
     return stride
 
 
+SLOWEST = 0.1
+"""Least part of a period of the low-pass that a clip is long."""
+
+
 def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
     """Rows after a low-pass of zero lag; `cut_off` (Hz) is that of both passes together."""
     one_pass = cut_off / (np.sqrt(2.0) - 1.0) ** 0.25
@@ -151,6 +155,11 @@ def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
         raise SceneError(
             f"smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the most for a clip "
             f"of {1.0 / frame_time:.4g} frames a second. Leave it out or lower it."
+        )
+    if cut_off * len(rows) * frame_time < SLOWEST:
+        raise SceneError(
+            f"smooth {cut_off:g} Hz keeps nothing of a clip of {len(rows) * frame_time:.3g} s. "
+            "Leave it out or raise it."
         )
     from scipy.signal import butter, sosfiltfilt  # a fifth of a second that most scenes save
 

@@ -1,4 +1,4 @@
-"""Whether a clip's unit makes a person of its skeleton."""
+"""Whether a clip's unit and axes make a person of its skeleton."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from flowborne.io.clip import Clip
 
 SHORTEST, LONGEST, USUAL = 0.2, 2.0, 0.85
 """m from hip to ankle: of a small child, of a giant, of a grown person."""
+
+UPRIGHT = 0.5
+"""Least part of its length by which a leg points down."""
 
 UNITS = {
     0.001: "mm",
@@ -35,6 +38,26 @@ def leg_length(clip: Clip, mapping: Mapping[str, str]) -> float:
             joint = int(clip.parents[joint])
         lengths.append(length)
     return sum(lengths) / 2.0
+
+
+def check_upright(clip: Clip, mapping: Mapping[str, str], up: str) -> None:
+    """Raise SceneError unless the legs point down when no joint is turned, as a person's do.
+
+    up  axis of the file that is taken to point up
+    """
+    down, length = 0.0, leg_length(clip, mapping)
+    for side in ("left", "right"):
+        hip = clip.names.index(mapping[f"{side}_hip"])
+        joint = clip.names.index(mapping[f"{side}_ankle"])
+        while joint != hip and joint > 0:
+            down -= 0.5 * float(clip.offsets[joint, 2])
+            joint = int(clip.parents[joint])
+    if down < UPRIGHT * length:
+        other = "z" if up == "y" else "y"
+        raise SceneError(
+            f"with up = '{up}' its legs do not point down when no joint is turned. "
+            f"Set up = '{other}', or correct the mapping."
+        )
 
 
 def check_scale(length: float, unit: float) -> None:

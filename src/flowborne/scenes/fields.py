@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -46,6 +47,15 @@ def _two_or_three(values: tuple[float, ...]) -> tuple[float, ...]:
 def _three(values: tuple[float, ...]) -> tuple[float, ...]:
     return _two_or_three(values) + (0.0,) * (3 - len(values))
 
+
+def _possible_name(value: str) -> str:
+    if "\0" in value or any(len(part.encode()) > 255 for part in Path(value).parts):
+        raise ValueError("is no name that a file can have. Shorten it, without letters of no width")
+    return value
+
+
+FileName = Annotated[Text, AfterValidator(_possible_name)]
+"""A file, found from the folder of the scene file."""
 
 Corner = Annotated[tuple[Number, ...], AfterValidator(_two_or_three)]
 """A place: (x, y) or (x, y, z) in m."""

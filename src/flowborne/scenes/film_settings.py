@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
 
 from flowborne.errors import SceneError
-from flowborne.io.run_folder import RunFolder, RunFolderError
+from flowborne.io.run_folder import RunFolder
 from flowborne.scenes.load import override
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.wording import explain
@@ -19,12 +18,10 @@ def film_settings(folder: RunFolder, overrides: Mapping[str, str]) -> dict[str, 
     """The table [film] of a run with every default filled in.
 
     overrides  dotted key -> TOML text of its new value: {"camera.orbit": "30"}
-    raises     SceneError with every problem there is; RunFolderError when there is no scene
+    raises     SceneError with every problem there is; RunFolderError when the scene is missing or
+               cut
     """
-    try:
-        scene = tomllib.loads(folder.scene.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RunFolderError(f"{folder.scene} cannot be read: {error.strerror}") from error
+    scene = folder.read_scene()
     raw = {"film": scene.get("film", {})}
     for key, text in overrides.items():
         override(raw["film"], key, text)

@@ -56,6 +56,8 @@ def read_columns(path: Path, column: str, where: str) -> tuple[list[float], list
         raise SceneError(f"{where}: {path} cannot be read ({error}). Give a CSV file.") from None
     header = rows[0] if rows else []
     places = []
+    if "time" not in header:  # of a file that is something else nothing is repeated
+        raise SceneError(f"{where}: {path.name} has no column 'time'. Name it in the first row.")
     for name in ("time", column):
         if name not in header:
             end = suggestion(name, [h for h in header if h != "time"], "Its first row has")

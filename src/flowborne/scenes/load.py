@@ -6,6 +6,7 @@ import copy
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from flowborne.errors import SceneError
+from flowborne.io.run_folder import reading
 from flowborne.scenes.check import cross_check
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.elbows import join_elbows
@@ -63,37 +65,42 @@ def scene_names() -> tuple[str, ...]:
     return BUILT_IN
 
 
-def load_scene(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> Scene:
+def load_scene(
+    name_or_path: str | Path, overrides: Mapping[str, str] | None = None, *, trust: bool = True
+) -> Scene:
     """The scene of a built-in name or of a TOML file, checked whole.
 
     overrides  dotted key -> TOML text of its new value; list entries count from 0:
                {"domain.resolution": "64", "control.0.strength": "30"}
+    trust      import the Python that the scene names, as has to be done to run it; a scene that
+               names some is refused without it, before any is imported
     raises     SceneError with every problem there is
     """
-    scene, problems = _examine(name_or_path, overrides)
+    scene, problems = _examine(name_or_path, overrides, trust)
     if scene is None or problems:
         raise SceneError(problems)
     return scene
 
 
-def scene_of_run(path: Path) -> Scene:
-    """The scene of a run folder, which was checked whole before it was run: read, and no more.
+def read_scene(path: Path) -> Scene:
+    """The scene of a file that has been checked whole before, as that of a run: read, and no more.
 
-    raises  SceneError with what its file alone has wrong
+    raises  RunFolderError when its file alone has anything wrong
     """
-    draft, problems = _understood(_read(path), path)
-    if draft is None or problems:
-        raise SceneError(problems)
-    return draft.scene
+    with reading(path.parent):
+        draft, problems = _understood(_read(path), path)
+        if draft is None or problems:
+            raise SceneError(problems)
+        return draft.scene
 
 
 def check_scene(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> list[str]:
     """Everything that is wrong with a scene; an empty list when it is fine."""
-    return _examine(name_or_path, overrides)[1]
+    return _examine(name_or_path, overrides, trust=True)[1]
 
 
 def _examine(
-    name_or_path: str | Path, overrides: Mapping[str, str] | None
+    name_or_path: str | Path, overrides: Mapping[str, str] | None, trust: bool
 ) -> tuple[Scene | None, list[str]]:
     try:
         path = find(name_or_path)
@@ -102,6 +109,11 @@ def _examine(
             override(raw, key, text)
     except SceneError as error:
         return None, error.problems
+    if not trust and (named := python_of(raw)):
+        return None, [
+            f"scene {path.name} brings Python, which can do whatever you can: {', '.join(named)}. "
+            "Read it, then check with --trust, which imports it as a run does."
+        ]
     draft, problems = _understood(raw, path)
     if draft is None:
         return None, problems
@@ -112,10 +124,24 @@ def _understood(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str
     """The scene as far as its file alone says, with its plugins loaded, and what is wrong there."""
     raw.setdefault("name", path.stem)
     join_elbows(raw)
-    problems = load_plugins(raw, path.parent, path.name)
-    problems += inline_keyframes(raw, path.parent, path.name)
+    problems = unloaded = load_plugins(raw, path.parent, path.name)
+    problems = problems + inline_keyframes(raw, path.parent, path.name)
     draft, more = _validate(raw, path)
+    if draft is not None and unloaded:
+        draft = replace(draft, broken=draft.broken | {"plugins"})
     return draft, problems + more
+
+
+def python_of(raw: Mapping[str, Any]) -> list[str]:
+    """The Python that a scene as read names: files of plugins, then functions."""
+    plugins = raw.get("plugins", [])
+    named = [f"plugin {name}" for name in plugins] if isinstance(plugins, list) else []
+    for key in ("objectives", "wind"):
+        tables = raw.get(key, [])
+        for table in tables if isinstance(tables, list) else []:
+            if isinstance(table, dict) and "function" in table:
+                named.append(f"function {table['function']}")
+    return list(dict.fromkeys(named))
 
 
 def find(name_or_path: str | Path) -> Path:
@@ -124,10 +150,13 @@ def find(name_or_path: str | Path) -> Path:
     if text in BUILT_IN:
         return library() / f"{text}.toml"
     path = Path(name_or_path)
-    if path.is_file():
-        return path
-    if path.is_dir():
-        raise SceneError(f"scene {text} is a folder. Give the TOML file in it.")
+    try:
+        if path.is_file():
+            return path
+        if path.is_dir():
+            raise SceneError(f"scene {text} is a folder. Give the TOML file in it.")
+    except (OSError, ValueError):
+        raise SceneError(f"{text[:60]} ... is no name of a file. Shorten it.") from None
     if path.suffix == ".toml" or path.parent != Path():
         raise SceneError(f"there is no scene file {text}. Correct the path.")
     end = suggestion(text, BUILT_IN, "Give a TOML file or one of")

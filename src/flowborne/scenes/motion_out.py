@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from flowborne.errors import SceneError
+from flowborne.io.arrays_file import read_state
 from flowborne.io.bvh import write_bvh, write_clip
 from flowborne.io.clip import Clip
 from flowborne.io.run_folder import STATE_NAME, RunFolder
@@ -71,9 +72,9 @@ def _poses(states: list[Path]) -> tuple[Array, Array]:
     """(n,) s and (n, nq) of all states."""
     times, q = [], []
     for state in states:
-        with np.load(state) as file:
-            times.append(float(file["time"]))
-            q.append(file["q"].astype(np.float64))
+        arrays = read_state(state, ("time", "q"))
+        times.append(float(arrays["time"]))
+        q.append(arrays["q"].astype(np.float64))
     return np.array(times), np.array(q)
 
 

@@ -4,14 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from flowborne.scenes.bodies import SLIDE, joint_kind
+from flowborne.scenes.capture import capture_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
 from flowborne.solids.model import SolidModel
 
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
-    """Sentences for people, without a full stop.
+    """Sentences for people, without a full stop."""
+    yield from _standing_still(scene)
+    yield from _wide_probes(scene, model)
+
+
+def _standing_still(scene: Scene) -> Iterator[str]:
+    """A clip that does not loop ends before the run."""
+    table, capture = scene.clip, capture_of(scene)
+    if table is None or capture is None or table.file is None or table.loop:
+        return
+    end = min(capture.clip.duration, np.inf if table.stop is None else table.stop)
+    left, run = end - table.start, scene.time.frames * scene.frame_time
+    if left < run - 0.5 * scene.frame_time:
+        yield (
+            f"[clip]: {table.file} goes on for {left:.3g} s of the run's {run:.3g} s, and stands "
+            "still from there; loop = true lets it begin again, and fewer frames end with it"
+        )
+
+
+def _wide_probes(scene: Scene, model: SolidModel) -> Iterator[str]:
+    """Probes that are wider than a step of the rule.
 
     A descent of fixed steps comes to rest where the objective is the same at both ends of a probe:
     half a probe off an optimum that is a kink, at most, and never nearer than its step.

@@ -69,9 +69,16 @@ class WindFunction:
     def __call__(self, x: Array, time: float) -> Array:
         """(n, 3) velocity in m/s at the places x (n, 3). Raises PartError when it is not that."""
         try:
-            velocity = np.asarray(self.function(x, time), dtype=np.float64)
+            given = self.function(x, time)
         except Exception as error:
             raise PartError.failed(f"wind '{self.name}'", error) from error
+        try:
+            velocity = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise PartError(
+                f"wind '{self.name}' gave a {type(given).__name__} that is no array of numbers: "
+                "return velocities, a row (3,) for each place"
+            ) from None
         if velocity.shape not in ((3,), x.shape) or not np.isfinite(velocity).all():
             raise PartError(
                 f"wind '{self.name}' gave an array of shape {velocity.shape}, or numbers that are "

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
 from flowborne.errors import SceneError
+from flowborne.io.run_folder import OWN_NAMES
 from flowborne.scenes.bodies import bones_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.schema import Scene
@@ -25,6 +27,26 @@ FOLDER_KEYS = {
 """Element that names a file -> compiler attributes that say where its folder is, first wins."""
 
 
+class _Names:
+    """Names that files get in one folder, each once.
+
+    taken  names that no file gets, whatever their case
+    """
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = {name.casefold() for name in taken}
+
+    def name(self, file: str) -> str:
+        """The file's own name; where it is taken, with a number before it."""
+        own = name = Path(file).name
+        number = 1
+        while name.casefold() in self._taken:
+            number += 1
+            name = f"{number}-{own}"
+        self._taken.add(name.casefold())
+        return name
+
+
 def save_scene(scene: Scene, folder: Path) -> Path:
     """Write `scene_files` into `folder`, which is made when it is missing.
 
@@ -40,30 +62,35 @@ def save_scene(scene: Scene, folder: Path) -> Path:
 def scene_files(scene: Scene) -> dict[str, bytes]:
     """Everything that the scene is made of: name in its new folder -> content.
 
-    The model keeps its file name; included models and meshes go to a folder `assets`.
+    Files keep their names but where two have one, or where a run has a file of that name; included
+    models and meshes go to a folder `assets`.
     raises  SceneError when a file of the model is missing
     """
     files: dict[str, bytes] = {}
     model = scene.model_path
+    exported = (table.file for table in scene.output.exports)
+    plugins = tuple(Path(name).name for name in scene.plugins)
+    names = _Names([*OWN_NAMES, SCENE_FILE, HUMAN_FILE, ASSETS, *exported, *plugins])
     if scene.flesh:
-        tables, files = _flesh_files(scene)
+        tables, files = _flesh_files(scene, names)
         scene = scene.model_copy(update={"flesh": tables}).in_folder(scene.folder)
     if model is not None:
         assert scene.solids is not None
-        files |= _model_files(model)
-        solids = scene.solids.model_copy(update={"model": model.name})
+        name = names.name(model.name)
+        files |= _model_files(model, name)
+        solids = scene.solids.model_copy(update={"model": name})
         scene = scene.model_copy(update={"solids": solids}).in_folder(scene.folder)
     for name in scene.plugins:
         files[Path(name).name] = _read(scene.folder / name)
-    names = tuple(Path(name).name for name in scene.plugins)
-    scene = scene.model_copy(update={"plugins": names}).in_folder(scene.folder)
+    scene = scene.model_copy(update={"plugins": plugins}).in_folder(scene.folder)
     if scene.human is not None:
         files[HUMAN_FILE] = human_of(scene).encode()
     if scene.clip is not None and scene.clip.file is not None:
         path = scene.folder / scene.clip.file
-        files[path.name] = _read(path)
+        name = names.name(path.name)
+        files[name] = _read(path)
         scene = scene.model_copy(
-            update={"clip": scene.clip.model_copy(update={"file": path.name})}
+            update={"clip": scene.clip.model_copy(update={"file": name})}
         ).in_folder(scene.folder)
     return {SCENE_FILE: scene.to_toml().encode()} | files
 
@@ -80,7 +107,7 @@ def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
     return scene.model_copy(update={"flesh": tables}).in_folder(scene.folder)
 
 
-def _flesh_files(scene: Scene) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
+def _flesh_files(scene: Scene, names: _Names) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
     """The flesh's tables and the files that they name: every mesh, and the user's own surfaces."""
     from flowborne.scenes.flesh.grow import meshed
     from flowborne.scenes.flesh.mesh_file import mesh_bytes
@@ -88,22 +115,21 @@ def _flesh_files(scene: Scene) -> tuple[tuple[FleshTable, ...], dict[str, bytes]
     spec, files, tables = bones_of(scene), {}, []
     for table in scene.flesh:
         mesh, recipe = meshed(spec, table, scene.folder)
-        names = {"mesh": Path(table.mesh or f"flesh-{table.name}.vtu").name}
-        files[names["mesh"]] = mesh_bytes(mesh, recipe)
+        changed = {"mesh": names.name(table.mesh or f"flesh-{table.name}.vtu")}
+        files[changed["mesh"]] = mesh_bytes(mesh, recipe)
         if table.surface is not None:
-            path = scene.folder / table.surface
-            names["surface"] = path.name
-            files[path.name] = _read(path)
-        tables.append(table.model_copy(update=names))
+            changed["surface"] = names.name(table.surface)
+            files[changed["surface"]] = _read(scene.folder / table.surface)
+        tables.append(table.model_copy(update=changed))
     return tuple(tables), files
 
 
-def _model_files(model: Path) -> dict[str, bytes]:
-    """The model and what it names. A model that names no file is copied as it is."""
+def _model_files(model: Path, name: str) -> dict[str, bytes]:
+    """The model, under `name`, and what it names. One that names no file is copied as it is."""
     folders = _folders(model, model.parent)
     taken: dict[Path, str] = {}
     files: dict[str, bytes] = {}
-    _add_mjcf(model, model.name, model.parent, folders, taken, files)
+    _add_mjcf(model, name, model.parent, folders, taken, files)
     return files
 
 

@@ -6,7 +6,7 @@ import tomllib
 from typing import TYPE_CHECKING, Any
 
 from flowborne.io.atomic import write_atomically
-from flowborne.io.run_folder import RunFolder, RunFolderError
+from flowborne.io.run_folder import RunFolder, RunFolderError, reading
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
@@ -43,7 +43,8 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
             f"{folder.path} has no scene.toml: the run was stopped before it began; "
             "start it again with --replace"
         )
-    saved = load_scene(folder.scene)
+    with reading(folder.path):
+        saved = load_scene(folder.scene)
     ours = scene_files(saved)
     theirs = scene_files(with_frames(with_meshes_of(wanted, saved), saved.time.frames))
     if ours == theirs:

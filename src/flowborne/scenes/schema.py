@@ -10,7 +10,16 @@ from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_vali
 
 from flowborne.io.exporters import EXPORTERS, can_write, endings
 from flowborne.io.run_folder import FIXED_NAMES
-from flowborne.scenes.fields import Count, Number, Positive, Table, Text, Vector, filled
+from flowborne.scenes.fields import (
+    Count,
+    FileName,
+    Number,
+    Positive,
+    Table,
+    Text,
+    Vector,
+    filled,
+)
 from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.schema_flesh import FleshTable
@@ -37,7 +46,12 @@ from flowborne.scenes.schema_solids import (
 
 
 class TimeTable(Table):
-    """[time]: frames, and physics steps within each."""
+    """[time]: frames, and physics steps within each.
+
+    frames_per_second  states, and pictures of the film, in a second of the run
+    frames             how many the run has
+    steps_per_frame    steps of equal length in a frame
+    """
 
     frames_per_second: Positive = 24.0
     frames: Count = 120
@@ -94,7 +108,7 @@ class OutputTable(Table):
 class Scene(Table):
     """A scene, checked and with every default filled in.
 
-    name         as in the file, or the file's own name
+    name         that of the file unless given; runs are kept in runs/name
     description  one line that says what is seen
     figure       the paper's figure or section that it shows, or the case that it is of
     dimensions   2: a slab one cell thick, everything per unit depth; 3
@@ -109,7 +123,7 @@ class Scene(Table):
     dimensions: Literal[2, 3] = 3
     gravity: Vector = (0.0, 0.0, 0.0)
     constants: dict[str, Number] = Field(default_factory=dict)
-    plugins: tuple[Text, ...] = ()
+    plugins: tuple[FileName, ...] = ()
     time: TimeTable = TimeTable()
     domain: Domain | None = None
     fluid: FluidTable | None = None

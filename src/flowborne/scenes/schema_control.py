@@ -33,7 +33,11 @@ from flowborne.scenes.schema_drives import EXACT, ServoTable
 
 
 class PhaseIntervalsTable(Table):
-    """On during the intervals [start, stop) in s, which repeat with `period` when it is given."""
+    """On during intervals.
+
+    intervals  [start, stop] of each, s; it is on at start and no longer at stop
+    period     s after which they come again; they come once unless given
+    """
 
     kind: Literal["intervals"]
     intervals: Annotated[tuple[tuple[Number, Number], ...], Field(min_length=1)]
@@ -118,14 +122,21 @@ class ObjectiveTable(Table):
 
 
 class ObjectiveEffortTable(ObjectiveTable):
-    """Effort of joints (eq. 1); of every controlled joint unless `joints` are given."""
+    """Effort of joints (eq. 1).
+
+    joints  whose effort; that of every controlled joint unless given
+    """
 
     kind: Literal["effort"]
     joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
 
 
 class ObjectiveWindDragTable(ObjectiveTable):
-    """Simple wind force (eqs. 2-4) on bodies along `direction`; on every body unless given."""
+    """Simple wind force (eqs. 2-4) on bodies along a direction.
+
+    direction  of any length
+    bodies     on which it acts; every body unless given
+    """
 
     kind: Literal["wind-drag"]
     direction: Vector
@@ -133,7 +144,11 @@ class ObjectiveWindDragTable(ObjectiveTable):
 
 
 class ObjectiveDragTable(ObjectiveTable):
-    """Force of the fluid and the winds on bodies along `direction`; on every body unless given."""
+    """Force of the fluid and the winds on bodies along a direction.
+
+    direction  of any length
+    bodies     on which it acts; every body unless given
+    """
 
     kind: Literal["drag"]
     direction: Vector
@@ -141,10 +156,11 @@ class ObjectiveDragTable(ObjectiveTable):
 
 
 class ObjectivePressureTable(ObjectiveTable):
-    """Pressure force (eq. 10) on bodies along `direction`; drag and lift differ by the name alone.
+    """Pressure force (eq. 10) on bodies along a direction; drag and lift differ by the name alone.
 
-    bodies  every moving body unless given
-    frame   body on which the direction rides; fixed in the world unless given
+    direction  of any length
+    bodies     on which it acts; every moving body unless given
+    frame      body on which the direction rides; fixed in the world unless given
     """
 
     kind: Literal["pressure-drag", "pressure-lift"]
@@ -191,9 +207,10 @@ class ObjectiveInputMotionTable(ObjectiveTable):
 
 
 class ObjectiveVelocityTable(ObjectiveTable):
-    """Squared distance of a velocity from `target`, m/s.
+    """Squared distance of a velocity from a target.
 
-    body  whose velocity; that of the centre of mass of all bodies unless given
+    body    whose velocity; that of the centre of mass of all bodies unless given
+    target  m/s
     """
 
     kind: Literal["velocity"]
@@ -202,8 +219,9 @@ class ObjectiveVelocityTable(ObjectiveTable):
 
 
 class ObjectivePythonTable(ObjectiveTable):
-    """Python function "module:name" that takes a Measurement and gives a number.
+    """Python function that takes a Measurement and gives a number.
 
+    function    "module:name"; the module is one that Python finds, or a file of `plugins`
     parameters  further arguments of the function, by name
     """
 
@@ -310,16 +328,16 @@ AnyGradient = Annotated[
 class ControllerTable(Table):
     """[controller]: how the controlled joints decide.
 
-    gradient           "central" (2 trials a dof), "one-sided" (1 a dof and 1), or one's own
-    velocities         during a trial's measurement: "removed" (steady state), "present" (as now),
-                       or "probe" (those of the trial's own motion)
-    hypothetical_steps steps over which a trial makes its displacement
-    hypothetical_time  s of one such step; the time of a frame unless given
-    settle_steps       further steps of a trial in the fixed pose
-    rule               "fixed", "resilient", "golden-section" with its options, or one's own
-    every              frames between decisions
-    iterations         descent steps per decision, in the flow as it is then
-    servo              "exact", or "pd" with its frequency
+    gradient            "central" (2 trials a dof), "one-sided" (1 a dof and 1), or one's own
+    velocities          during a trial's measurement: "removed" (steady state), "present" (as now),
+                        or "probe" (those of the trial's own motion)
+    hypothetical_steps  steps over which a trial makes its displacement
+    hypothetical_time   s of one such step; the time of a frame unless given
+    settle_steps        further steps of a trial in the fixed pose
+    rule                "fixed", "resilient", "golden-section" with its options, or one's own
+    every               frames between decisions
+    iterations          descent steps per decision, in the flow as it is then
+    servo               "exact", or "pd" with its frequency
     """
 
     gradient: AnyGradient = GradientCentralTable(kind="central")

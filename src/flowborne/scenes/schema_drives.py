@@ -14,7 +14,10 @@ class ServoExact(Table):
 
 
 class ServoPD(Table):
-    """Critically damped drive of natural frequency `frequency`, Hz."""
+    """Critically damped drive.
+
+    frequency  Hz, its natural frequency
+    """
 
     kind: Literal["pd"]
     frequency: Positive

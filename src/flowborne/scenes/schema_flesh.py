@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.fields import NotNegative, Positive, Table, Text
+from flowborne.scenes.fields import FileName, NotNegative, Positive, Table, Text
 
 
 class FleshTable(Table):
@@ -36,9 +36,9 @@ class FleshTable(Table):
     name: Text
     bones: Annotated[tuple[Text, ...], Field(min_length=1)]
     thickness: Positive | None = None
-    surface: Text | None = None
+    surface: FileName | None = None
     size: Positive | None = None
-    mesh: Text | None = None
+    mesh: FileName | None = None
     young: Positive
     poisson: Annotated[float, Field(ge=0.0, lt=0.5)] = 0.4
     density: Positive = 1000.0

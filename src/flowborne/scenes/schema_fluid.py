@@ -150,7 +150,10 @@ class ClosedSide(Table):
 
 
 class NoSlipSide(Table):
-    """Wall that the fluid sticks to, sliding in its own plane with `velocity` (m/s)."""
+    """Wall that the fluid sticks to.
+
+    velocity  m/s with which it slides in its own plane
+    """
 
     kind: Literal["no-slip"]
     velocity: Vector = (0.0, 0.0, 0.0)
@@ -175,6 +178,7 @@ class InflowSide(Table):
     profile   "uniform", or "parabolic" (0 at the edges of the side)
     ramp      s over which it rises smoothly from rest
     times     s, instead of ramp: keyframes between which `factors` of the velocity change smoothly
+    factors   of the velocity at these times
     """
 
     kind: Literal["inflow"]
@@ -236,7 +240,12 @@ _CLOSED = ClosedSide(kind="closed")
 
 
 class BoundariesTable(Table):
-    """[boundaries]: what happens at each side; "open" stands for {kind = "open"}."""
+    """[boundaries]: what happens at each side; "open" stands for {kind = "open"}.
+
+    x_min, x_max  the sides across x, with the smallest and the largest x
+    y_min, y_max  across y
+    z_min, z_max  across z; not in two dimensions
+    """
 
     x_min: BoundarySide = _CLOSED
     x_max: BoundarySide = _CLOSED
@@ -276,10 +285,14 @@ class SourceTable(Table):
 class DyeBands(Table):
     """Dye that enters in bands through an inflow side.
 
+    name         of the dye
     side         the inflow side
-    count        number of bands, evenly spread over the side; their width is `width` (m)
+    count        number of bands, evenly spread over the side
+    width        m, of each of them
     bands        instead of count: [from, to] of each band in m
     across       axis along which the bands follow each other: the first free one unless given
+    value        that the dye has in them
+    start, stop  s between which it enters
     """
 
     kind: Literal["bands"]
@@ -314,7 +327,13 @@ class DyeBands(Table):
 
 
 class DyeBox(Table):
-    """Dye that is always present in a box inside the domain (corners in m)."""
+    """Dye that is always present in a box inside the domain.
+
+    name          of the dye
+    lower, upper  corners, m
+    value         that it has there
+    start, stop   s between which it is kept there
+    """
 
     kind: Literal["box"]
     name: Text = "dye"

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from flowborne.scenes.fields import (
+    FileName,
     NotNegative,
     Number,
     Positive,
@@ -57,7 +58,7 @@ class ClipTable(Table):
                  them: a root that is free floats
     """
 
-    file: Text | None = None
+    file: FileName | None = None
     unit: Positive = 1.0
     up: Literal["y", "z"] = "y"
     skip: WholeNumber = 0

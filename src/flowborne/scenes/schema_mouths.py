@@ -41,6 +41,7 @@ class MouthTable(Table):
     radius       m; half the width of a slit in two dimensions
     volume_rate  m^3/s (m^2/s in two dimensions); negative is taken in
     times        s, keyframes between which `factors` of the volume rate change smoothly
+    factors      of the volume rate at these times
     pulse        instead of keyframes: a pulse with volume_rate at its height
     factor       instead of both: a formula of the factor; negative turns the flow about
     dye          name -> value of a dye in what is expelled; what is taken in has the fluid's own

@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from flowborne.scenes.fields import (
     FUNCTION,
     ByKind,
+    FileName,
     JointValues,
     NotNegative,
     Number,
@@ -38,7 +39,7 @@ class SolidsTable(Table):
                a free joint of its own name
     """
 
-    model: Text
+    model: FileName
     density: Positive | None = None
     densities: dict[str, Positive] = Field(default_factory=dict)
     floating: tuple[Text, ...] = ()
@@ -115,7 +116,11 @@ class DrivenTable(Table):
 
 
 class MotionConstantTable(DrivenTable):
-    """Joint that keeps its place or its rate: position + rate * time."""
+    """Joint that keeps its place or its rate: position + rate * time.
+
+    position  degrees or m
+    rate      degrees/s or m/s
+    """
 
     kind: Literal["constant"]
     position: Number = 0.0
@@ -123,7 +128,13 @@ class MotionConstantTable(DrivenTable):
 
 
 class MotionSinusoidTable(DrivenTable):
-    """mean + amplitude * sin(360 degrees * time / period + phase), phase in degrees."""
+    """mean + amplitude * sin(360 degrees * time / period + phase).
+
+    amplitude  degrees or m
+    period     s
+    mean       degrees or m
+    phase      degrees
+    """
 
     kind: Literal["sinusoid"]
     amplitude: Number
@@ -177,6 +188,7 @@ class WindFacesTable(Table):
     exponent  of the wind over the ground: it grows as (z / height)^exponent; 0 is uniform
     height    m
     times     s, keyframes of gusts between which `factors` of the velocity change smoothly
+    factors   of the velocity at these times
     """
 
     kind: Literal["faces"]
@@ -216,9 +228,10 @@ class WindStreamTable(Table):
 class WindPythonTable(Table):
     """Simple wind of eq. (2) from a Python function "module:name".
 
-    function  takes places (n, 3) in m and a time in s, and gives velocities (n, 3) in m/s
-    density   kg/m^3
-    bodies    that it blows on; every body unless given
+    function    takes places (n, 3) in m and a time in s, and gives velocities (n, 3) in m/s
+    parameters  further arguments of the function, by name
+    density     kg/m^3
+    bodies      that it blows on; every body unless given
     """
 
     kind: Literal["python"]
@@ -229,7 +242,11 @@ class WindPythonTable(Table):
 
 
 class WindForceTable(Table):
-    """The same force (N; N per unit depth in two dimensions) at each body's centre of mass."""
+    """The same force at each body's centre of mass.
+
+    force   N, or N per unit depth in two dimensions
+    bodies  that it pushes; every body unless given
+    """
 
     kind: Literal["force"]
     force: Vector

@@ -44,14 +44,19 @@ COMPARED = {
 }
 
 
+LISTED = 30
+"""Most names that a sentence lists."""
+
+
 def suggestion(name: str, known: Iterable[str], what: str) -> str:
     """The end of a sentence: what was probably meant, or what there is to choose from."""
     known = list(known)
     close = get_close_matches(name, known, n=1, cutoff=0.6)
     if close:
         return f"; did you mean '{close[0]}'?"
-    listed = ", ".join(known) if known else "none"
-    return f". {what}: {listed}."
+    listed = ", ".join(known[:LISTED]) if known else "none"
+    more = f" and {len(known) - LISTED} more" if len(known) > LISTED else ""
+    return f". {what}: {listed}{more}."
 
 
 def place(file: str, keys: tuple[Key, ...], numbers: dict[str, list[int]] | None = None) -> str:

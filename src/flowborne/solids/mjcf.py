@@ -14,7 +14,7 @@ from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.shapes.shape import Mesh, Shape
-from flowborne.solids.model_numbers import impossible
+from flowborne.solids.model_numbers import impossible, misgiven
 from flowborne.solids.model_size import too_large
 from flowborne.solids.own_shapes import Own, add_shapes, own_shape
 
@@ -82,6 +82,9 @@ def bones_of(
             spec = mujoco.MjSpec.from_string(source)
     except ValueError as error:
         raise _unreadable(where, error) from error
+    wrong = next(misgiven(spec), None)
+    if wrong is not None:
+        raise ValueError(f"{where}: {wrong}")
     _set_options(spec, gravity)
     add_shapes(spec, shapes)
     for name in floating:

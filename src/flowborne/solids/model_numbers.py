@@ -39,6 +39,25 @@ PREFIX = {
 """Kind -> how the model's arrays and MJCF call it."""
 
 
+def misgiven(spec: mujoco.MjSpec) -> Iterator[str]:
+    """What is wrong with numbers that MuJoCo, or a density from elsewhere, would read over."""
+    for geom in spec.geoms:
+        for attribute in ("density", "mass"):
+            value = getattr(geom, attribute)
+            given = attribute == "density" or not np.isnan(value)
+            if given and not _possible(np.array(value), 0.0):
+                called = f"'{geom.name}'" if geom.name else f"of body '{geom.parent.name}'"
+                yield f"geom {called} has {attribute} {value:g}. Give a number of 0 or more."
+    for called, elements in (("joint", spec.joints), ("tendon", spec.tendons)):
+        for element in elements:
+            low, high = element.range
+            if low > high:
+                yield (
+                    f"{called} '{element.name}' has a range from {low:g} to {high:g}. "
+                    "Put the smaller number first."
+                )
+
+
 def impossible(mj: mujoco.MjModel) -> Iterator[str]:
     """What is wrong with the numbers of a model, element by element."""
     for table, least in ((FINITE, -np.inf), (NOT_NEGATIVE, 0.0)):

@@ -103,7 +103,7 @@ def write_film(
     rate = shot.frames_per_second or run.frames_per_second
     with closing(drawn_frames(run, shot, numbers)) as frames:
         first = next(frames)
-        with _film(path, (first.shape[1], first.shape[0]), rate) as send:
+        with film_file(path, (first.shape[1], first.shape[0]), rate) as send:
             for done, frame in enumerate(_and_then(first, frames), start=1):
                 send(frame)
                 if progress is not None:
@@ -139,7 +139,9 @@ def _and_then(first: Pixels, rest: Iterator[Pixels]) -> Iterator[Pixels]:
 
 
 @contextmanager
-def _film(path: Path, size: tuple[int, int], rate: float) -> Iterator[Callable[[Pixels], object]]:
+def film_file(
+    path: Path, size: tuple[int, int], rate: float
+) -> Iterator[Callable[[Pixels], object]]:
     """What takes one frame after the other into a file beside `path`, which then takes its place.
 
     size  width and height of the frames

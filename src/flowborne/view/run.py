@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, Self
@@ -12,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
+from flowborne.io.arrays_file import read_state
 from flowborne.io.history import history_columns, history_rows
-from flowborne.io.run_folder import STATE_NAME, RunFolder
+from flowborne.io.run_folder import STATE_NAME, RunFolder, reading
 from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.shape import Shape
 from flowborne.solids.skins import skinned
@@ -150,13 +150,19 @@ class Run:
     def read(cls, path: Path) -> Self:
         """The run in folder `path`.
 
-        raises  ValueError when it has no frame; OSError when a file is not there
+        raises  ValueError when it has no frame; RunFolderError when a file is missing or cut
         """
         folder = RunFolder(path)
         states = _states(folder.states)
         if not states:
             raise ValueError(f"{path} has no frame to draw; let the run go on with --resume")
-        scene = tomllib.loads(folder.scene.read_text(encoding="utf-8"))
+        with reading(path):
+            return cls._read(folder, states)
+
+    @classmethod
+    def _read(cls, folder: RunFolder, states: tuple[Path, ...]) -> Self:
+        path = folder.path
+        scene = folder.read_scene()
         model = json.loads(folder.model.read_text(encoding="utf-8"))
         carriers = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
         return cls(
@@ -197,11 +203,7 @@ class Run:
 
     def every(self, name: str) -> Array:
         """(n, ...) a small array of all states, such as "fluid_force"."""
-        values = []
-        for path in self.states:
-            with np.load(path) as file:
-                values.append(file[name])
-        return np.asarray(values, float)
+        return np.asarray([read_state(path, (name,))[name] for path in self.states], float)
 
     @property
     def times(self) -> Array:
@@ -213,12 +215,6 @@ class Run:
         frame = int(self.states[number].stem)
         rows = np.flatnonzero(self.history["frame"] == frame)
         return int(rows[0]) if rows.size else None
-
-
-def read_state(path: Path) -> State:
-    """Arrays of a file of states/."""
-    with np.load(path) as file:
-        return {name: file[name] for name in file.files}
 
 
 def _states(folder: Path) -> tuple[Path, ...]:

@@ -40,7 +40,7 @@ def test_the_line_leaves_the_body_at_its_surface(
     kind: str, size: tuple[float, float, float], vector: tuple[float, ...], reach: float
 ) -> None:
     state = {"geom_position": PLACE[None], "geom_rotation": TURN[None]}
-    found = skin_of(geom(kind, size)).reach(1, PLACE, np.array(vector), state)
+    found = skin_of(geom(kind, size)).reach(1, PLACE, np.array(vector), state, ())
     assert found == pytest.approx(reach, rel=0.01)
 
 
@@ -57,5 +57,5 @@ def test_of_several_parts_the_farthest_that_holds_the_place_counts() -> None:
         "geom_rotation": np.broadcast_to(np.eye(3), (4, 3, 3)),
     }
     along = np.array([2.0, 0.0, 0.0])
-    assert skin.reach(1, np.zeros(3), along, state) == pytest.approx(0.4, rel=0.01)
-    assert skin.reach(1, np.array([5.0, 0.0, 0.0]), along, state) == 0.0
+    assert skin.reach(1, np.zeros(3), along, state, ()) == pytest.approx(0.4, rel=0.01)
+    assert skin.reach(1, np.array([5.0, 0.0, 0.0]), along, state, ()) == 0.0

@@ -222,9 +222,10 @@ def test_arrows_of_forces_start_on_the_skin(arm: Path) -> None:
     assert run.flesh.bodies == (1, 2)
     state = run.state(2)
     skin = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
+    around = skin.around(state)
     for body in run.flesh.bodies:
         middle = state["fluid_centre"][body].astype(float)
-        assert 0.045 < skin.reach(body, middle, np.array([0.0, 3.0, 0.0]), state) < 0.055
+        assert 0.045 < skin.reach(body, middle, np.array([0.0, 3.0, 0.0]), state, around) < 0.055
 
 
 def test_the_camera_sees_all_of_the_skin(ball_of_flesh: Make) -> None:
@@ -292,7 +293,8 @@ def test_a_part_of_a_body_outside_flesh_still_counts() -> None:
         "geom_rotation": np.eye(3)[None],
         "flesh_vertices": places,
     }
-    tilted = np.array([1e-4, 2e-4, 3e-4])
-    assert skin.reach(1, tilted, np.array([1.0, 0.0, 0.0]), state) == pytest.approx(0.5, rel=1e-3)
-    assert skin.reach(1, tilted, np.array([0.0, 0.0, 1.0]), state) == pytest.approx(0.2, rel=0.02)
-    assert skin.reach(7, tilted, np.array([0.0, 0.0, 1.0]), state) == pytest.approx(0.2, rel=0.02)
+    tilted, around = np.array([1e-4, 2e-4, 3e-4]), skin.around(state)
+    across, up = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    assert skin.reach(1, tilted, across, state, around) == pytest.approx(0.5, rel=1e-3)
+    assert skin.reach(1, tilted, up, state, around) == pytest.approx(0.2, rel=0.02)
+    assert skin.reach(7, tilted, up, state, around) == pytest.approx(0.2, rel=0.02)

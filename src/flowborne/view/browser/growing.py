@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.io.arrays_file import read_state
 from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError
 from flowborne.view.run import Run
 
@@ -65,8 +66,7 @@ class GrowingRun(Run):
         """(n, ...) a small array of all states, such as "fluid_force"."""
         values = self.kept.setdefault(name, [])
         for path in self.states[len(values) :]:
-            with np.load(path) as file:
-                values.append(file[name])
+            values.append(read_state(path, (name,))[name])
         return np.asarray(values, float)
 
 

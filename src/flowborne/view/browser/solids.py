@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.view import style
@@ -22,6 +23,7 @@ from flowborne.view.space.skin import creased
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
 
+Array = NDArray[np.float64]
 
 THICK = 0.02
 """Thickness of what is drawn of a slab, in smaller sides of what is seen."""
@@ -73,8 +75,9 @@ class SkinMesh:
         """`side`: m, smaller side of what is seen."""
         self._run, self._skin, self._high = run, skin, THICK * side
         state = run.state(0)
-        self._vertex, self._faces = creased(skin.vertices(state), skin.triangles)
-        vertices, faces = self._surface(state)
+        places = skin.vertices(state)
+        self._vertex, self._faces = creased(places, skin.triangles)
+        vertices, faces = self._surface(state, places)
         self.mesh: MeshHandle = scene.add_mesh_simple(
             f"/run/skins/{name}",
             vertices.astype(np.float32),
@@ -84,18 +87,20 @@ class SkinMesh:
 
     def show(self, state: State, bones: bool) -> None:
         """Show the skin in a state, seen through with `bones`; not when its numbers are lost."""
-        self.mesh.visible = bool(np.isfinite(self._skin.vertices(state)).all())
+        places = self._skin.vertices(state)
+        self.mesh.visible = bool(np.isfinite(places).all())
         self.mesh.opacity = style.SEEN_THROUGH if bones else None
         if self.mesh.visible:
-            vertices, faces = self._surface(state)
+            vertices, faces = self._surface(state, places)
             self.mesh.vertices = vertices.astype(np.float32)
             if self._run.slab:
                 self.mesh.faces = faces.astype(np.uint32)
 
-    def _surface(self, state: State) -> Mesh:
+    def _surface(self, state: State, places: Array) -> Mesh:
+        """Of the skin with vertices (k, 3) m in a state."""
         if self._run.slab:
             return prism(flesh_loops(self._run, state), 0.0, self._high)
-        return self._skin.vertices(state)[self._vertex], self._faces
+        return places[self._vertex], self._faces
 
 
 class Pushes:

@@ -30,13 +30,18 @@ class Outside:
         for n, geom in enumerate(geoms):
             self._parts.setdefault(geom.body, []).append(n)
 
-    def reach(self, body: int, place: Array, vector: Array, state: State) -> float:
+    def around(self, state: State) -> list[Array]:
+        """(m, 3, 3) m, the corners of each skin's triangles in a state."""
+        return [skin.vertices(state)[skin.triangles] for skin in self._skins]
+
+    def reach(
+        self, body: int, place: Array, vector: Array, state: State, around: Sequence[Array]
+    ) -> float:
         """m along `vector` (3,) from `place` (3,) to the surface of a body or of the skin around
-        the place; 0 from outside both."""
+        the place; 0 from outside both. `around` is that of the state."""
         along = vector / np.linalg.norm(vector)
         farthest = 0.0
-        for skin in self._skins:
-            corners = skin.vertices(state)[skin.triangles]
+        for corners in around:
             farthest = max(farthest, way_out(place, along, corners))
         for part in self._parts.get(body, ()):
             turn, centre = state["geom_rotation"][part], state["geom_position"][part]
@@ -54,8 +59,9 @@ def pushes(forces: Forces, outside: Outside, state: State, pixel: float) -> tupl
     pixel  size of a pixel, m
     """
     arrows = forces.arrows(state, pixel)
+    around = outside.around(state) if arrows else []
     tails = [
-        tail + outside.reach(body, tail, vector, state) * vector / np.linalg.norm(vector)
+        tail + outside.reach(body, tail, vector, state, around) * vector / np.linalg.norm(vector)
         for body, tail, vector in arrows
     ]
     vectors = [vector for *_, vector in arrows]

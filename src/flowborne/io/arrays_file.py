@@ -1,0 +1,64 @@
+"""Archives of arrays, as NumPy writes them: read whole, or refused in one sentence."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.io.run_folder import RunFolder, RunFolderError
+
+SHORT = 200
+"""Most letters of what another library says."""
+
+
+def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
+    """Arrays of an .npz file by name.
+
+    names   which; all when None
+    raises  OSError when the file cannot be opened; ValueError when it is cut, empty or something
+            else, or lacks one of the names
+    """
+    with open(path, "rb") as file:
+        try:
+            archive = np.load(file)
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise ValueError("it is a single array")
+            return {name: archive[name] for name in names or archive.files}
+        except Exception as error:  # NumPy, zip and zlib raise whatever they stumble over
+            raise ValueError(f"{path} is cut or no archive of arrays ({_said(error)})") from error
+
+
+def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
+    """Arrays of a file of states/; raises RunFolderError when it is missing or cut."""
+    try:
+        return read_arrays(path, names)
+    except (OSError, ValueError) as error:
+        raise _without(path, error) from error
+
+
+def check_states(folder: RunFolder, frame: int) -> None:
+    """Raise RunFolderError where a state up to a frame is cut; one that is missing is no fault."""
+    for path in folder.state_files():
+        if int(path.stem) <= frame:
+            try:
+                zipfile.ZipFile(path).close()
+            except (OSError, zipfile.BadZipFile) as error:
+                raise _without(path, error) from error
+
+
+def _without(path: Path, error: Exception) -> RunFolderError:
+    return RunFolderError(
+        f"state {path} cannot be read ({_said(error)}); remove it, and films and exports go on "
+        "without its frame"
+    )
+
+
+def _said(error: Exception) -> str:
+    """What an error says, in one short line without its full stop."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text.rstrip(".") if len(text) <= SHORT else f"{text[:SHORT]} ..."

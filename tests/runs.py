@@ -1,0 +1,42 @@
+"""Runs of scenes for tests, and what has to be the same in two of them."""
+
+import csv
+import json
+import subprocess
+import sys
+import time
+
+import flowborne
+
+
+def run(scene, out, **options):
+    return flowborne.run(scene, out, **{"film": False, "workers": 1} | options)
+
+
+def numbers(folder):
+    """Everything of a run that has to be the same again, whatever happened on the way."""
+    with open(folder / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    history = [{k: v for k, v in row.items() if not k.startswith("seconds_")} for row in rows]
+    states = {path.name: path.read_bytes() for path in (folder / "states").iterdir()}
+    files = {name: (folder / name).read_bytes() for name in ("checkpoint.npz", "scene.toml")}
+    return history, states, files
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def start(arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", "flowborne", "run", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for_rows(process, path, rows):
+    while not path.exists() or path.read_text().count("\n") <= rows:
+        assert process.poll() is None, f"the run ended before {path} had {rows} rows"
+        time.sleep(0.005)
