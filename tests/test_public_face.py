@@ -44,7 +44,7 @@ def test_validation_and_benches_use_the_public_face_only(room: str) -> None:
     assert not {name: modules for name, modules in found.items() if modules}
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))])
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))])
 def test_texts_use_the_public_face_only(page: Path) -> None:
     for block in re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.S):
         assert not private(block)

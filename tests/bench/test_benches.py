@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne import Simulation, load_scene
-from flowborne.bench import chain, first_run, human, memory, parts, realtime, size, workers
+from flowborne.bench import chain, first_run, human, memory, parts, realtime, size, start, workers
 from flowborne.bench.frames import frame_times
 from flowborne.machine import PARTS, cores
 
@@ -79,6 +79,12 @@ def test_first_run_keeps_its_kernels_apart(small_scene, tmp_path, monkeypatch):
     assert judged(later, later.value < first_run.COMPILED)
     assert first_run.run_once(str(small_scene), tmp_path) > 0.0
     assert os.listdir(tmp_path / "run")
+
+
+def test_start_is_that_of_the_command():
+    result = start.help_told(repeats=1)
+    assert result.value > 0.0
+    assert judged(result, result.value < start.ALLOWED)
 
 
 def test_growth_names_time_and_memory_of_every_size():

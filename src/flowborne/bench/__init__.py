@@ -25,6 +25,7 @@ MODULES = {
     "size": "size",
     "memory": "memory",
     "first-run": "first_run",
+    "start": "start",
 }
 """Name of each bench and the module here that holds it, in the order in which they run."""
 
