@@ -2,14 +2,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test browser imports failing exporters clean
+.PHONY: demo test browser dist docs imports failing exporters fuzz messages validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
 
 test: $(VENV)/installed-test
-	$(BIN)/ruff check src tests tools
-	$(BIN)/ruff format --check src tests tools
+	$(BIN)/ruff check src tests tools docs
+	$(BIN)/ruff format --check src tests tools docs
 	$(BIN)/mypy
 	$(BIN)/pytest --numprocesses auto --dist loadfile
 
@@ -18,14 +18,30 @@ browser: $(VENV)/installed-test
 	command -v chromium || $(BIN)/playwright install --with-deps chromium
 	FLOWBORNE_SCREENSHOTS=runs/viewer $(BIN)/pytest -rs -m browser --numprocesses 0 tests/view/browser
 
+dist: $(VENV)/installed-test
+	$(BIN)/python tools/dist.py
+
+docs: $(VENV)/installed-test
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	@echo build/docs/index.html
+
 imports: $(VENV)/installed-test
 	$(BIN)/python tools/imports.py
 
 failing: $(VENV)/installed-test
 	$(BIN)/python tools/failing.py
 
+validation-page: $(VENV)/installed-test
+	$(BIN)/python tools/validation_page.py
+
 exporters: $(VENV)/installed-test
 	$(BIN)/python tools/exporters.py
+
+fuzz: $(VENV)/installed-test
+	$(BIN)/python tools/fuzz.py
+
+messages: $(VENV)/installed-test
+	$(BIN)/python tools/messages.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
@@ -41,4 +57,4 @@ $(VENV)/installed-test: pyproject.toml $(VENV)/bin/python
 	touch $@ $(VENV)/installed
 
 clean:
-	rm -rf $(VENV) runs
+	rm -rf $(VENV) build dist runs

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -19,11 +20,21 @@ from scipy.spatial.transform import Rotation
 import flowborne as fb
 from flowborne.formats.creature import Creature
 from flowborne.io.cell_fields import cell_velocity, vorticity
-from read_back import Alembic, Bvh, Gltf, Stage, VtkHdf, cells_of, grids_of, points_of
+from marked import with_part
+from read_back import (
+    Alembic,
+    Bvh,
+    Gltf,
+    Stage,
+    VtkHdf,
+    cells_of,
+    grids_of,
+    meshes_of,
+    points_of,
+)
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "exporters.md"
-BEGIN, END = "<!-- exporters: made by `make exporters` -->\n", "<!-- end of exporters -->\n"
 
 FISH = ROOT / "tests" / "formats" / "fish.toml"
 SCENES = ("swimmer", "flyer-flesh", "human-wind-back", "eel", FISH)
@@ -67,17 +78,6 @@ def lateness(times: Array, creature: Creature) -> float:
     return float(np.abs(times * creature.run.frames_per_second - np.arange(len(times))).max())
 
 
-def meshes_of(creature: Creature, frame: int) -> dict[str, Array]:
-    """Name -> (k, 3) m of every geometry and flesh of the run."""
-    state, model = creature.run.state(frame), creature.model
-    found = {
-        name: model.geom_shape[n].triangles()[0] @ state["geom_rotation"][n].T
-        + state["geom_position"][n]
-        for n, name in enumerate(model.geom_names)
-    }
-    return found | {s.name: state["flesh_vertices"][s.chosen] for s in creature.skins}
-
-
 def apart(found: dict[str, Array], wanted: dict[str, Array]) -> float:
     """Largest distance between meshes, m; raises ValueError where they have other names."""
     if set(found) != set(wanted):
@@ -97,26 +97,15 @@ def turned(first: Array, second: Array) -> float:
     return float(np.degrees(away.magnitude()).max())
 
 
-def moving(reader: Any, creature: Creature) -> Away:
+def of_motion(open_file: Callable[[Path], Any], path: Path, creature: Creature) -> Away:
     """Of a file with meshes, and with joints perhaps."""
+    reader = open_file(path)
     frames = range(len(creature.run))
     vertices = max(apart(reader.meshes(f), meshes_of(creature, f)) for f in frames)
     degrees = None
     if hasattr(reader, "joints"):
         degrees = max(astray(reader.joints(f), creature, f) for f in frames)
     return Away(vertices / creature.size, degrees, late=lateness(reader.times, creature))
-
-
-def of_glb(path: Path, creature: Creature) -> Away:
-    return moving(Gltf(path), creature)
-
-
-def of_usd(path: Path, creature: Creature) -> Away:
-    return moving(Stage(path), creature)
-
-
-def of_abc(path: Path, creature: Creature) -> Away:
-    return moving(Alembic(path), creature)
 
 
 def of_bvh(path: Path, creature: Creature) -> Away:
@@ -186,9 +175,9 @@ def of_table(path: Path, creature: Creature) -> Away:
 
 
 READ: dict[str, Callable[[Path, Creature], Away]] = {
-    ".usdc": of_usd,
-    ".glb": of_glb,
-    ".abc": of_abc,
+    ".usdc": partial(of_motion, Stage),
+    ".glb": partial(of_motion, Gltf),
+    ".abc": partial(of_motion, Alembic),
     ".bvh": of_bvh,
     ".vdb": of_vdb,
     ".vtkhdf": of_vtkhdf,
@@ -240,13 +229,9 @@ def tables(work: Path) -> str:
     return table(head, found) + "\n" + table(head, made)
 
 
-def with_tables(text: str, tables: str) -> str:
-    """The page with these tables."""
-    before, rest = text.split(BEGIN)
-    return before + BEGIN + tables + END + rest.split(END)[1]
-
-
 if __name__ == "__main__":
     with TemporaryDirectory() as work:
         made = tables(Path(work))
-    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), made), encoding="utf-8")
+    PAGE.write_text(
+        with_part(PAGE.read_text(encoding="utf-8"), "exporters", made), encoding="utf-8"
+    )

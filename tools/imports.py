@@ -70,7 +70,7 @@ def page(modules: Imports) -> str:
     boxes = [f'{room}["{room}/"]' if room in folders else f"{room}([{room}])" for room in rooms]
     drawn = without_shortcuts(rooms)
     arrows = [f"{room} --> {other}" for room, others in drawn.items() for other in others]
-    rows = [f"| {room} | {', '.join(sorted(rooms[room]))} |" for room in sorted(rooms)]
+    rows = [f"| `{room}` | {', '.join(sorted(rooms[room]))} |" for room in sorted(rooms)]
     picture = ["```mermaid", "flowchart TD", *sorted(boxes), *sorted(arrows), "```"]
     return "\n".join([HEADING, *picture, "", "| | imports |", "|---|---|", *rows, ""])
 

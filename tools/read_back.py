@@ -22,6 +22,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
+from flowborne.formats.creature import Creature
 from flowborne.io.bvh import TO_WORLD
 from flowborne.io.bvh_file import load_bvh
 
@@ -29,6 +30,17 @@ Array = NDArray[Any]
 
 UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the run's axes, z up, to y up, as rows: points @ UP leads back."""
+
+
+def meshes_of(creature: Creature, frame: int) -> dict[str, Array]:
+    """Name -> (k, 3) m of every geometry and flesh of the run."""
+    state, model = creature.run.state(frame), creature.model
+    found = {
+        name: model.geom_shape[n].triangles()[0] @ state["geom_rotation"][n].T
+        + state["geom_position"][n]
+        for n, name in enumerate(model.geom_names)
+    }
+    return found | {s.name: state["flesh_vertices"][s.chosen] for s in creature.skins}
 
 
 class Gltf:
@@ -155,12 +167,16 @@ class Alembic:
 
     def __init__(self, path: Path) -> None:
         self.top = Abc.IArchive(str(path)).getTop()
-        children = (self._moving(number) for number in range(self.top.getNumChildren()))
-        moving = max(children, key=lambda child: child.getNumSamples())
-        sampling = moving.getTimeSampling()
-        times = [sampling.getSampleTime(number) for number in range(moving.getNumSamples())]
-        self.times = np.array(times)
+        names = [self.top.getChild(n).getName() for n in range(self.top.getNumChildren())]
+        self._number = {name: number for number, name in enumerate(names)}
+        self.times = max((self.times_of(name) for name in names), key=len)
         self.faces: dict[str, Array] = {}
+
+    def times_of(self, name: str) -> Array:
+        """(samples,) s of a child of the archive; one that stays has a single sample."""
+        moving = self._moving(self._number[name])
+        sampling = moving.getTimeSampling()
+        return np.array([sampling.getSampleTime(n) for n in range(moving.getNumSamples())])
 
     def _moving(self, number: int) -> Any:
         """What has the samples of a child of the archive: its transform, or its mesh."""

@@ -1,0 +1,113 @@
+"""The documentation is built without a warning, and its tables say what the code has."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from docutils.utils.math.latex2mathml import tex2mathml
+from pydantic import BaseModel
+
+import scene_keys
+from docstrings import entries, meanings, prose
+from flowborne.scenes.load import scene_names
+from flowborne.scenes.schema import Scene
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+SAID = """What a table is.
+
+lower, upper  corners, m; they
+              may be anywhere
+kind          of it
+
+    V' - V = 0
+
+More of it.
+raises  ValueError when it is wrong
+"""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the pages, made with warnings as errors."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html"]
+    made = subprocess.run(
+        [*command, "-d", str(folder / "doctrees"), str(DOCS), str(folder / "html")],
+        capture_output=True,
+        text=True,
+    )
+    assert made.returncode == 0, made.stderr
+    return folder / "html"
+
+
+def test_every_page_is_made(site: Path) -> None:
+    pages = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md")}
+    assert pages <= {path.relative_to(site) for path in site.rglob("*.html")}
+
+
+def test_no_page_asks_a_network_for_anything(site: Path) -> None:
+    """Nothing that a browser loads by itself lies elsewhere."""
+    for page in site.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe|source)[^>]*\ssrc=\"([^\"]+)\"", text)
+        loaded += re.findall(r"<link[^>]*rel=\"stylesheet\"[^>]*href=\"([^\"]+)\"", text)
+        assert not [address for address in loaded if "//" in address], page.name
+
+
+def test_formulas_are_mathematics_in_the_page(site: Path) -> None:
+    text = (site / "method" / "coupled-solve.html").read_text(encoding="utf-8")
+    assert text.count("<math") > 10
+    assert tex2mathml(r"\hat p").splitlines()[1].strip() in text
+
+
+def tables_below(model: type[BaseModel]) -> set[type[BaseModel]]:
+    """A table of the schema, and all that stand in it."""
+    inner = {
+        one for hint in scene_keys.hints_of(model).values() for one in scene_keys.tables_in(hint)
+    }
+    return {model}.union(*(tables_below(one) for one in inner))
+
+
+def test_every_key_of_a_scene_is_there_with_its_meaning(site: Path) -> None:
+    text = (site / "scene-keys.html").read_text(encoding="utf-8")
+    found = tables_below(Scene)
+    assert len(found) > 50
+    for model in found:
+        for name, hint in scene_keys.hints_of(model).items():
+            is_section = model is Scene and list(scene_keys.tables_in(hint))
+            if name != "kind" and not is_section:
+                assert f">{name}</span>" in text, f"{model.__name__}.{name}"
+                assert scene_keys.meaning_of(model, name), f"{model.__name__}.{name}"
+            elif is_section:
+                assert f"[{name}]" in text
+
+
+def test_every_built_in_scene_is_listed(site: Path) -> None:
+    text = (site / "parts.html").read_text(encoding="utf-8")
+    assert all(f">{name}</span>" in text for name in scene_names())
+
+
+def test_columns_of_a_docstring_are_read() -> None:
+    assert meanings(SAID) == {
+        "lower": "corners, m; they may be anywhere",
+        "upper": "corners, m; they may be anywhere",
+        "kind": "of it",
+        "raises": "ValueError when it is wrong",
+    }
+    assert prose(SAID) == ["What a table is.", "V' - V = 0", "More of it."]
+    assert entries("no columns at all") is None
+
+
+def test_types_and_limits_are_told_in_words() -> None:
+    rows = {row[0]: row[1:3] for row in scene_keys.rows(scene_keys.Scene)}
+    assert rows["`dimensions`"] == ["`2` or `3`", "`3`"]
+    assert rows["`gravity`"] == ["`[x, y]` or `[x, y, z]`", "`[0, 0, 0]`"]
+    fluid = next(scene_keys.tables_in(scene_keys.hints_of(Scene)["fluid"]))
+    rows = {row[0]: row[1:3] for row in scene_keys.rows(fluid)}
+    assert rows["`tolerance`"] == ["number > 0, < 1", "`1e-09`"]
+    assert rows["`coupling`"][1] == '`"two-way"`'

@@ -1,0 +1,134 @@
+"""Sphinx extension of the documentation: parts made of the code, formulas without a network.
+
+A line `<!-- made by MODULE.FUNCTION -->` of a page becomes the Markdown that the function of a
+module in tools/ gives. Formulas become MathML, which browsers draw by themselves. Docstrings are
+read as they are written: single backticks, columns of names and meanings, indented formulas.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
+from pydantic import BaseModel
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+import api_pages
+import command_help
+import parts
+import scene_keys
+import validation_table
+from docstrings import entries, paragraphs
+
+MAKERS = {
+    module.__name__: module
+    for module in (api_pages, command_help, parts, scene_keys, validation_table)
+}
+"""Modules whose functions give parts of pages. They are imported before autodoc imports anything:
+it does so as type checkers do, which pydantic does not bear."""
+
+MADE = re.compile(r"^<!-- made by (\w+)\.(\w+) -->$", flags=re.MULTILINE)
+
+MARKUP = re.compile(r"(`[^`]+`)|([*|_\\])")
+"""What stays as it is between backticks, and what would be markup elsewhere."""
+
+PYDANTIC = ("model_config", "model_post_init")
+
+ALIAS = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+
+
+def made_parts(app: Sphinx, name: str, source: list[str]) -> None:
+    """Put what the code makes into a page."""
+
+    def made(found: re.Match[str]) -> str:
+        return str(getattr(MAKERS[found[1]], found[2])())
+
+    source[0] = MADE.sub(made, source[0])
+
+
+def inline_formula(self: Any, node: nodes.math) -> None:
+    self.body.append(tex2mathml(node.astext()))
+    raise nodes.SkipNode
+
+
+def block_formula(self: Any, node: nodes.math_block) -> None:
+    self.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>')
+    raise nodes.SkipNode
+
+
+def structured(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """A docstring as reStructuredText."""
+    made: list[str] = []
+    for paragraph in paragraphs("\n".join(lines)):
+        columns = entries(paragraph)
+        if columns is not None:
+            made += [line for name, said in columns for line in (f"``{name}``", f"   {safe(said)}")]
+        elif all(line.startswith("  ") for line in paragraph.splitlines()):
+            made += ["::", "", *paragraph.splitlines()]
+        else:
+            made += lines_of(paragraph)
+        made.append("")
+    lines[:] = made
+
+
+def readable(
+    app: Any, what: str, name: str, obj: Any, options: Any, signature: str | None, returned: str
+) -> tuple[str | None, str | None]:
+    """A signature with the names of our types, and no name for a default that is made anew; none
+    for a table of a scene, whose keys have a page of their own."""
+    if isinstance(obj, type) and issubclass(obj, BaseModel):
+        return "", None
+
+    def shown(text: str | None) -> str | None:
+        return text and ALIAS.sub(r"\1", text.replace("<factory>", "..."))
+
+    return shown(signature), shown(returned)
+
+
+def skipped(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool:
+    """Whether a member is left out: what pydantic gives to every table is."""
+    return skip or name in PYDANTIC
+
+
+def lines_of(paragraph: str) -> list[str]:
+    """A paragraph; lines of it that stand further in are shown as they are."""
+    made: list[str] = []
+    for line in paragraph.splitlines():
+        further = line.startswith("  ")
+        if made and further != made[-1].startswith("  "):
+            made += ["", "::", ""] if further else [""]
+        made.append(line if further else safe(line))
+    return made
+
+
+def safe(text: str) -> str:
+    """Text without markup but for its backticks."""
+    return MARKUP.sub(lambda m: f"`{m[1]}`" if m[1] else "\\" + m[2], text)
+
+
+class Diagram(SphinxDirective):
+    """A block of Mermaid, which needs a script to be drawn: its text, folded away."""
+
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        begin = "<details><summary>The picture, as Mermaid</summary>"
+        text = "\n".join(self.content)
+        return [
+            nodes.raw("", begin, format="html"),
+            nodes.literal_block(text, text, language="text"),
+            nodes.raw("", "</details>", format="html"),
+        ]
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("source-read", made_parts)
+    app.connect("autodoc-process-docstring", structured)
+    app.connect("autodoc-process-signature", readable)
+    app.connect("autodoc-skip-member", skipped)
+    app.add_directive("mermaid", Diagram)
+    app.add_html_math_renderer("mathml", (inline_formula, None), (block_formula, None))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
