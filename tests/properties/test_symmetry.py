@@ -69,11 +69,6 @@ def test_a_slab_turned(turn: Turn, data: st.DataObject) -> None:
     assert force < FORCE
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the control volume of a closed face between two equal cells goes with one of them "
-    "(kernels.control_volumes.find_targets): flow and forces are off by 0.38 and 0.37",
-)
 def test_a_disc_in_the_middle_of_two_cells_mirrored() -> None:
     disc = Piece(
         kind="cylinder",

@@ -6,8 +6,8 @@ The control volume of a face reaches from the middle of one of its cells to that
 
 so it obeys the same law as the cells, with the means of their fluxes through its sides (Verstappen
 and Veldman 2003). A face that is wholly closed is pushed by no pressure: what is left of its
-control volume, a small one, is merged with another, its target. So is the part of a control volume
-that is too large for the opening of its face.
+control volume, a small one, is merged with others, its targets: what lies on either side of a thin
+body stays there. So is the part of a control volume that is too large for the opening of its face.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from flowborne.kernels.control_volumes import (
     find_parts,
     find_small,
     find_targets,
-    follow_targets,
     merge_small,
     share_velocity,
 )
@@ -49,22 +48,28 @@ class ControlVolumes:
     volume  Faces, V_f, m^3; along a periodic axis the last is the first one
     merged  Faces, the same with that of the small ones at their targets, m^3
     small   (n,) of each axis, flat indices
-    targets (n,) of each axis; a small one without a target is its own
-    shares  (n,) of each axis, part of a small one that goes with its target
+    whole   (n,) of each axis, whether all of a small one goes with its targets
+    targets (n, 2) of each axis; a small one without a target is its own
+    shares  (n, 2) of each axis, parts of a small one that go with its targets
     """
 
     cells: Array
     volume: Faces
     merged: Faces
     small: tuple[Integers, Integers, Integers]
+    whole: tuple[Marks, Marks, Marks]
     targets: tuple[Integers, Integers, Integers]
     shares: Faces
 
     def follow(self, velocity: Faces, grid: Grid) -> None:
         """Give small ones with nothing of their own the velocity of their targets, in place."""
         for axis in grid.axes:
-            whole = self.shares[axis] == 1.0
-            follow_targets(velocity[axis], self.small[axis][whole], self.targets[axis][whole])
+            share_velocity(velocity[axis], *self.closed(axis))
+
+    def closed(self, axis: int) -> tuple[Integers, Integers, Array]:
+        """Small ones with nothing of their own, their targets and shares."""
+        whole = self.whole[axis] == 1
+        return self.small[axis][whole], self.targets[axis][whole], self.shares[axis][whole]
 
     def mean_velocity(self, velocity: Array, axis: int) -> Array:
         """That of each control volume across `axis`, small ones with their targets."""
@@ -92,42 +97,40 @@ def prescribed_ends(component: int, boundaries: Boundaries) -> Marks:
     return np.array([kind not in ("open", "periodic") for kind in kinds], np.uint8)
 
 
-def settled(small: Integers, targets: Integers, shares: Array) -> tuple[Integers, Integers, Array]:
-    """The small ones but for those in part that found no target."""
-    kept = (small != targets) | (shares == 1.0)
-    return small[kept], targets[kept], shares[kept]
-
-
 def control_volumes(
     cells: Array, opened: Faces, grid: Grid, boundaries: Boundaries
 ) -> ControlVolumes:
     """Control volumes of cells with these open volumes (m^3) and open parts of faces."""
-    volumes, merged, small, targets, shares = [], [], [], [], []
+    volumes, merged, small, whole, targets, shares = [], [], [], [], [], []
     periodic = boundaries.periodic()
     for axis in range(3):
         volume = means(cells, axis, periodic[axis])
         volumes.append(volume)
-        total, none = volume.copy(), np.zeros(0, np.int64)
-        own, target, part = none, none, np.zeros(0)
+        total, own, part = volume.copy(), np.zeros(0, np.int64), np.zeros(0)
+        target, share = np.zeros((0, 2), np.int64), np.zeros((0, 2))
         if axis in grid.axes:
             wraps, driven = wrapping(axis, grid, boundaries), np.empty(volume.shape, np.uint8)
             narrow, nothing = NARROW * grid.cell_volume, NOTHING * grid.cell_volume
             told, ring = prescribed_ends(axis, boundaries), periodic[axis]
             own, part = find_small(driven, opened[axis], volume, axis, told, ring, narrow, nothing)
-            target = find_targets(own, driven, volume, cells, axis, wraps)
-            own, target, part = settled(own, target, part)
-            merge_small(total, own, target, part)
+            target, share = find_targets(own, driven, volume, cells, axis, wraps)
+            share *= part[:, None]
+            kept = share.any(axis=1) | (part == 1.0)
+            own, part, target, share = own[kept], part[kept], target[kept], share[kept]
+            merge_small(total, own, target, share)
             if periodic[axis]:
                 total[edge(axis, -1)] = total[edge(axis, 0)]
         merged.append(total)
         small.append(own)
+        whole.append((part == 1.0).astype(np.uint8))
         targets.append(target)
-        shares.append(part)
+        shares.append(share)
     return ControlVolumes(
         cells,
         (volumes[0], volumes[1], volumes[2]),
         (merged[0], merged[1], merged[2]),
         (small[0], small[1], small[2]),
+        (whole[0], whole[1], whole[2]),
         (targets[0], targets[1], targets[2]),
         (shares[0], shares[1], shares[2]),
     )

@@ -42,7 +42,6 @@ from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import (
     fill_empty,
-    follow_targets,
     join_small,
     level,
     mark_cut,
@@ -270,8 +269,7 @@ class Flow:
         self.small = transport.after.small[component]
         self.targets = transport.after.targets[component]
         self.shares = transport.after.shares[component]
-        alone = self.shares == 1.0
-        self.whole, self.whole_targets = self.small[alone], self.targets[alone]
+        self.closed = transport.after.closed(component)
         self.wraps = wrapping(component, grid, sides)
         shape = grid.face_shape(component)
         self.shape = np.array(shape)
@@ -399,7 +397,7 @@ class Flow:
         if self.listed.size:
             limits = TINY * self.limit, SMALL * self.limit, self.held, self.nothing
             level(later, self.low, merged, self.listed, *limits, self.shape, self.wraps)
-            follow_targets(later, self.whole, self.whole_targets)
+            share_velocity(later, *self.closed)
             fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)
         self.join(later)
 

@@ -60,31 +60,33 @@ def find_targets(
     cells: Array,
     component: int,
     wraps: Integers,
-) -> Integers:
-    """Target of every small one, or the small one itself where there is none.
+) -> tuple[Integers, Array]:
+    """Targets (n, 2) of every small one, and which parts (n, 2) of it go with them; the small one
+    itself where there is none.
 
-    A face that is wholly closed has a control volume where a cell beside it is open in part. It
-    goes along with the opposite face of the larger of its two cells, else with that of the other,
-    else with the neighbour that has the largest volume, else with the target of a neighbour, which
-    may have it from another.
+    A face that is wholly closed has a control volume where a cell beside it is open in part. What
+    lies in each of its two cells goes along with the opposite face of that cell, where that is
+    open; else all of it goes with the neighbour that has the largest volume, else with the targets
+    of a neighbour, which may have them from another.
 
     small   (n,) closed faces with a volume
     opened   open part of each face
     volumes  of each control volume
     cells    volume of each cell
     """
-    targets, shape, cell_shape = small.copy(), np.array(opened.shape), np.array(cells.shape)
+    targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
+    shape, cell_shape = np.array(opened.shape), np.array(cells.shape)
     volume_flat = volumes.reshape(-1)
     open_flat, cell_flat = opened.reshape(-1), cells.reshape(-1)
     for n in range(small.size):
         f = small[n]
+        targets[n, :] = f
         n1, n2 = shape[1], shape[2]
         i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
-        best, most = -1, 0.0
-        for side in range(-1, 2, 2):
-            a = i - int(component == 0 and side < 0)
-            b = j - int(component == 1 and side < 0)
-            c = k - int(component == 2 and side < 0)
+        for side in range(2):
+            a = i - int(component == 0 and side == 0)
+            b = j - int(component == 1 and side == 0)
+            c = k - int(component == 2 and side == 0)
             if wraps[component] > 0:
                 if component == 0:
                     a = (a + wraps[0]) % wraps[0]
@@ -95,33 +97,34 @@ def find_targets(
             outside = a < 0 or b < 0 or c < 0
             if outside or a >= cell_shape[0] or b >= cell_shape[1] or c >= cell_shape[2]:
                 continue
-            to = neighbour(shape, wraps, f, 2 * component + int(side > 0))
+            to = neighbour(shape, wraps, f, 2 * component + side)
             volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
-            if to >= 0 and open_flat[to] > 0.0 and volume > most:
-                best, most = to, volume
-        if best < 0:
-            for way in range(6):
-                to = neighbour(shape, wraps, f, way)
-                if to >= 0 and open_flat[to] > 0.0 and volume_flat[to] > most:
-                    best, most = to, volume_flat[to]
-        if best >= 0:
-            targets[n] = best
+            if to >= 0 and open_flat[to] > 0.0 and volume > 0.0:
+                targets[n, side], parts[n, side] = to, volume
+        total = parts[n, 0] + parts[n, 1]
+        if total > 0.0:
+            parts[n] /= total
+            continue
+        most = 0.0
+        for way in range(6):
+            to = neighbour(shape, wraps, f, way)
+            if to >= 0 and open_flat[to] > 0.0 and volume_flat[to] > most:
+                targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
     led = True
     while led:
-        led, first = False, targets.copy()
+        led, first, given = False, targets.copy(), parts.copy()
         for n in range(small.size):
-            if first[n] != small[n]:
+            if given[n].any():
                 continue
-            best, most = -1, -1.0
+            most = -1.0
             for way in range(6):
                 to = neighbour(shape, wraps, small[n], way)
                 at = np.searchsorted(small, to) if to >= 0 else small.size
-                found = at < small.size and small[at] == to and first[at] != to
+                found = at < small.size and small[at] == to and given[at].any()
                 if found and volume_flat[to] > most:
-                    best, most = first[at], volume_flat[to]
-            if best >= 0:
-                targets[n], led = best, True
-    return targets
+                    targets[n], parts[n], most = first[at], given[at], volume_flat[to]
+                    led = True
+    return targets, parts
 
 
 def largest_reference(candidates: Integers, worth: Array, least: float) -> tuple[Integers, Array]:
@@ -137,7 +140,7 @@ def find_targets_reference(
     cells: Array,
     component: int,
     wraps: Integers,
-) -> Integers:
+) -> tuple[Integers, Array]:
     """`find_targets` in NumPy."""
     beside = neighbours_reference(np.array(opened.shape), wraps)[:, small]
     driven = (beside >= 0) & (opened.ravel()[beside] > 0.0)
@@ -151,31 +154,34 @@ def find_targets_reference(
         ]
     )
     opposite = slice(2 * component, 2 * component + 2)
-    volume = np.where(driven, volumes.ravel()[beside], 0.0)
-    far, reached = largest_reference(beside[opposite], np.where(driven[opposite], cell, 0.0), 0.0)
-    near, touched = largest_reference(beside, volume, 0.0)
-    first = np.where(reached, far, np.where(touched, near, small))
+    held = np.where(driven[opposite], cell, 0.0)
+    targets = np.where(held > 0.0, beside[opposite], small)
+    parts = held / np.where(held.sum(axis=0) > 0.0, held.sum(axis=0), 1.0)
+    near, touched = largest_reference(beside, np.where(driven, volumes.ravel()[beside], 0.0), 0.0)
+    alone = touched & ~parts.any(axis=0)
+    targets[0, alone], parts[0, alone] = near[alone], 1.0
     while True:
-        target = np.arange(opened.size)
-        target[small] = first
-        led = (beside >= 0) & np.isin(beside, small[first != small])
+        place = np.zeros(opened.size, np.int64)
+        place[small] = np.arange(small.size)
+        led = (beside >= 0) & np.isin(beside, small[parts.any(axis=0)])
         after, joined = largest_reference(
-            target[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
+            place[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
         )
-        new = (first == small) & joined
+        new = joined & ~parts.any(axis=0)
         if not new.any():
-            return first
-        first = np.where(new, after, first)
+            return targets.T, parts.T
+        targets[:, new], parts[:, new] = targets[:, after[new]], parts[:, after[new]]
 
 
 @njit(nogil=True, cache=True)
 def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array) -> None:
-    """Give these shares of the amounts of small ones to their targets, in place."""
+    """Give these shares (n, 2) of the amounts of small ones to their targets (n, 2), in place."""
     flat = amount.reshape(-1)
     for n in range(small.size):
-        if targets[n] != small[n]:
-            given = shares[n] * flat[small[n]]
-            flat[targets[n]] += given
+        own = flat[small[n]]
+        for m in range(2):
+            given = shares[n, m] * own
+            flat[targets[n, m]] += given
             flat[small[n]] -= given
 
 
@@ -183,10 +189,10 @@ def merge_small_reference(
     amount: Array, small: Integers, targets: Integers, shares: Array
 ) -> Array:
     """`merge_small` in NumPy: the amounts after it."""
-    merged, moved = amount.ravel().copy(), targets != small
-    given = shares[moved] * merged[small[moved]]
-    np.add.at(merged, targets[moved], given)
-    merged[small[moved]] -= given
+    merged = amount.ravel().copy()
+    given = shares * merged[small][:, None]
+    np.add.at(merged, targets, given)
+    merged[small] -= given.sum(axis=1)
     return merged.reshape(amount.shape)
 
 
@@ -199,7 +205,8 @@ def join_small(
     shares: Array,
     nothing: float,
 ) -> None:
-    """Give these shares of what small ones hold, and of their volumes, to their targets, in place.
+    """Give these shares (n, 2) of what small ones hold, and of their volumes, to their targets, in
+    place.
 
     field    value of each control volume, what is left of the amount where there is no volume above
              `nothing`
@@ -207,14 +214,17 @@ def join_small(
     """
     flat, volume = field.reshape(-1), volumes.reshape(-1)
     for n in range(small.size):
-        g, h, share = small[n], targets[n], shares[n]
-        if g == h:
-            continue
-        amount = share * flat[g] * (volume[g] if volume[g] > nothing else 1.0)
-        amount += flat[h] * (volume[h] if volume[h] > nothing else 1.0)
-        volume[h] += share * volume[g]
-        volume[g] -= share * volume[g]
-        flat[h] = amount / (volume[h] if volume[h] > nothing else 1.0)
+        g = small[n]
+        room = volume[g]
+        held = flat[g] * (room if room > nothing else 1.0)
+        for m in range(2):
+            h, share = targets[n, m], shares[n, m]
+            if share == 0.0:
+                continue
+            amount = share * held + flat[h] * (volume[h] if volume[h] > nothing else 1.0)
+            volume[h] += share * room
+            volume[g] -= share * room
+            flat[h] = amount / (volume[h] if volume[h] > nothing else 1.0)
 
 
 def join_small_reference(
@@ -230,21 +240,6 @@ def join_small_reference(
     amount = merge_small_reference(amount, small, targets, shares)
     merged = merge_small_reference(volumes, small, targets, shares)
     return amount / np.where(merged > nothing, merged, 1.0), merged
-
-
-@njit(nogil=True, cache=True)
-def follow_targets(field: Array, small: Integers, targets: Integers) -> None:
-    """Give small ones the value of their targets, in place."""
-    flat = field.reshape(-1)
-    for n in range(small.size):
-        flat[small[n]] = flat[targets[n]]
-
-
-def follow_targets_reference(field: Array, small: Integers, targets: Integers) -> Array:
-    """`follow_targets` in NumPy: the field after it."""
-    followed = field.ravel().copy()
-    followed[small] = followed[targets]
-    return followed.reshape(field.shape)
 
 
 @njit(nogil=True, cache=True)
@@ -358,12 +353,12 @@ def level_reference(
 
 @njit(nogil=True, cache=True)
 def share_velocity(field: Array, small: Integers, targets: Integers, shares: Array) -> None:
-    """Give small ones the velocity of all that goes with them, in place: these shares of them go
-    with their targets."""
+    """Give small ones the velocity of all that goes with them, in place: these shares (n, 2) of
+    them go with their targets (n, 2)."""
     flat, shared = field.reshape(-1), np.empty(small.size)
     for n in range(small.size):
-        own = flat[small[n]]
-        shared[n] = own + shares[n] * (flat[targets[n]] - own)
+        shared[n] = (1.0 - shares[n, 0] - shares[n, 1]) * flat[small[n]]
+        shared[n] += shares[n, 0] * flat[targets[n, 0]] + shares[n, 1] * flat[targets[n, 1]]
     for n in range(small.size):
         flat[small[n]] = shared[n]
 
@@ -373,7 +368,8 @@ def share_velocity_reference(
 ) -> Array:
     """`share_velocity` in NumPy: the field after it."""
     shared = field.ravel().copy()
-    shared[small] += shares * (shared[targets] - shared[small])
+    others = (shares * shared[targets]).sum(axis=1)
+    shared[small] = (1.0 - shares.sum(axis=1)) * shared[small] + others
     return shared.reshape(field.shape)
 
 
