@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Marks
 
@@ -127,7 +128,9 @@ def find_targets(
     return targets, parts
 
 
-def largest_reference(candidates: Integers, worth: Array, least: float) -> tuple[Integers, Array]:
+def largest_reference(
+    candidates: Integers, worth: Array, least: float
+) -> tuple[Integers, NDArray[np.bool_]]:
     """Of candidates (k, n) the first of largest worth (k, n), and whether that exceeds `least`."""
     best = worth.argmax(axis=0)[None]
     return np.take_along_axis(candidates, best, 0)[0], worth.max(axis=0) > least
