@@ -94,6 +94,7 @@ class SolidModel:
         self.body_mass: Array = np.array(mj.body_mass)
         self.subtree_mass: Array = np.array(mj.body_subtreemass)
         self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, self.nbody)
+        self._bodies = {name: b for b, name in enumerate(self.body_names)}
         self._set_dofs()
         self.flesh = flesh_of(self, grown) if grown else None
         self._set_geoms()
@@ -228,11 +229,11 @@ class SolidModel:
 
     def joint(self, name: str) -> int:
         """Number of a joint. Raises ValueError for an unknown name."""
-        return _index(self.joint_names, name, "joint")
+        return _number(self._joints, name, "joint")
 
     def body(self, name: str) -> int:
         """Number of a body. Raises ValueError for an unknown name."""
-        return _index(self.body_names, name, "body")
+        return _number(self._bodies, name, "body")
 
     def rest_pose(self, geom: int) -> tuple[Array, float]:
         """A geometry at rest: (3, 3) its frame to the world's, and the height of its centre, m."""
@@ -249,6 +250,7 @@ class SolidModel:
     def _set_dofs(self) -> None:
         mj = self.mj
         self.joint_names = _names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)
+        self._joints = {name: j for j, name in enumerate(self.joint_names)}
         widths = [WIDTHS[int(kind)] for kind in mj.jnt_type]
         self._joint_of_place = np.repeat(np.arange(mj.njnt), widths)
         self._joint_of_dof = np.array(mj.dof_jntid, dtype=np.int64)
@@ -340,10 +342,10 @@ def _names(mj: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ..
     return tuple(mjcf.element_name(mj, kind, i) for i in range(count))
 
 
-def _index(names: tuple[str, ...], name: str, what: str) -> int:
-    if name not in names:
-        raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(names)}.")
-    return names.index(name)
+def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
+    if name not in numbers:
+        raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(numbers)}.")
+    return numbers[name]
 
 
 def _rotations(quaternions: Array) -> Array:
