@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,9 +12,16 @@ from numpy.testing import assert_array_equal
 
 from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, library, load_scene, scene_names
+from flowborne.scenes.schema import Scene
 
 NAMES = scene_names()
 UNCONTROLLED = ("flyer-base", "swimmer-jet-only", "swimmer-no-control", "eel", "eel-room")
+
+
+@cache
+def loaded(name: str) -> Scene:
+    """A built-in scene, read once for all tests."""
+    return load_scene(name)
 
 
 def test_the_list_of_scenes_is_what_lies_in_the_library() -> None:
@@ -23,7 +31,7 @@ def test_the_list_of_scenes_is_what_lies_in_the_library() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
     assert check_scene(name) == []
-    scene = load_scene(name)
+    scene = loaded(name)
     assert scene.name == name
     assert scene.figure
     assert scene.description
@@ -35,7 +43,7 @@ def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_everything_in_the_model_has_a_name(name: str) -> None:
-    model = build(load_scene(name)).world.setup.solid.mj
+    model = build(loaded(name)).world.setup.solid.mj
     elements = [model.body(i) for i in range(model.nbody)]
     elements += [model.joint(i) for i in range(model.njnt)]
     elements += [model.geom(i) for i in range(model.ngeom)]
@@ -44,7 +52,7 @@ def test_everything_in_the_model_has_a_name(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_two_worlds_of_a_scene_are_equal_and_share_nothing(name: str) -> None:
-    first, second = (build(load_scene(name)).world.arrays() for _ in range(2))
+    first, second = (build(loaded(name)).world.arrays() for _ in range(2))
     assert first.keys() == second.keys()
     for key, values in first.items():
         assert_array_equal(values, second[key])
@@ -53,7 +61,7 @@ def test_two_worlds_of_a_scene_are_equal_and_share_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_a_worker_needs_survives_pickling(name: str) -> None:
-    made = build(load_scene(name))
+    made = build(loaded(name))
     world, controller = pickle.loads(pickle.dumps((made.world, made.controller)))
     for key, values in made.world.arrays().items():
         assert_array_equal(world.arrays()[key], values)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import mujoco
@@ -165,6 +167,44 @@ def test_idle_bones_and_loose_flesh_are_refused(tmp_path: Path) -> None:
     spec.body("ball").add_body(name="seed").add_geom(size=[0.1, 0.0, 0.0])
     with pytest.raises(ValueError, match=r"bone 'seed' holds no point .* edges of 0\.3 m"):
         skin_mesh(spec, ["ball", "seed"], 0.3, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("thickness", "size", "message"),
+    [
+        (1e18, 0.12, "flesh that reaches over 2e.18 m would have more than 3,000,000 elements"),
+        (0.06, 1e-4, "Make the size 0.0[0-9]* m at least, or the flesh smaller"),
+        (1e-9, 0.12, "a skin of 1e-09 m is too thin for bones that reach over"),
+    ],
+)
+def test_sizes_that_nothing_can_be_meshed_with_are_refused(
+    thickness: float, size: float, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        skin_mesh(mujoco.MjSpec.from_string(ARM), BONES, thickness, size)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
+def test_a_mesher_ends_with_the_process_that_began_it() -> None:
+    waiting = (
+        "import signal, sys; from flowborne.scenes.flesh.mesh_run import end_with_parent; "
+        "end_with_parent(); print('waits', flush=True); signal.pause()"
+    )
+    beginning = (
+        "import subprocess, sys; "
+        f"subprocess.Popen([sys.executable, '-c', {waiting!r}]); sys.stdin.read()"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", beginning],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert parent.stdout is not None
+    assert parent.stdout.readline() == "waits\n"
+    parent.kill()
+    assert parent.stdout.read() == "", "its end is that of all who write there"
+    parent.wait()
 
 
 def test_mesher_leaves_nothing_behind(

@@ -12,6 +12,12 @@ MOST_SAMPLES = 2_000_000
 """Where a lattice would have more samples than this, it is coarser than asked for."""
 
 
+def finest(bones: Bones, level: float) -> float:
+    """Least distance of the samples from which a contour is made, m."""
+    low, high = bones.box
+    return float(np.cbrt((high - low + 2.0 * level).prod() / MOST_SAMPLES))
+
+
 def contour(bones: Bones, level: float, pitch: float) -> Mesh:
     """Closed outward surface `level` m outside the union of the bones, in world axes.
 
@@ -19,7 +25,7 @@ def contour(bones: Bones, level: float, pitch: float) -> Mesh:
     """
     low, high = bones.box
     low, high = low - level, high + level
-    pitch = max(pitch, float(np.cbrt((high - low).prod() / MOST_SAMPLES)))
+    pitch = max(pitch, finest(bones, level))
     counts = np.ceil((high - low) / pitch).astype(int) + 5
     lattice = pv.ImageData(dimensions=counts, spacing=(pitch,) * 3, origin=low - 2.0 * pitch)
     distance = bones.distance(np.asarray(lattice.points, dtype=np.float64))

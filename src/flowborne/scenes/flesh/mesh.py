@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from flowborne.scenes.flesh.bones import Bones, bones_of
-from flowborne.scenes.flesh.contour import contour
+from flowborne.scenes.flesh.contour import contour, finest
 from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.scenes.flesh.mesher import tetrahedra_within
 from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
@@ -49,6 +49,12 @@ TIGHTER = 0.8
 TRIES = 8
 """How often flesh is meshed at most."""
 
+FILLING = 6.0 * np.sqrt(2.0)
+"""Regular tetrahedra that a cube of their edges has room for."""
+
+MOST_ELEMENTS = 3_000_000
+"""Most elements that the box of a creature may have room for: the mesher takes hours for them."""
+
 
 @dataclass(frozen=True)
 class FleshMesh:
@@ -74,10 +80,19 @@ def skin_mesh(
 
     bones   names of the bodies
     size    length of edges, m; shorter where the surface bends too much for it
-    raises  ValueError for an unknown body, for one without a geom, when the mesher fails and for
-            a bone that holds no point
+    raises  ValueError for an unknown body, for one without a geom, for a skin that is too thin for
+            its bones or too large for its edges, when the mesher fails and for a bone that holds
+            no point
     """
     chosen = bones_of(spec, bones)
+    low, high = chosen.box
+    _check_elements(high - low + 2.0 * thickness, size)
+    least = finest(chosen, thickness)
+    if thickness < least:
+        raise ValueError(
+            f"a skin of {thickness:g} m is too thin for bones that reach over "
+            f"{(high - low).max():.3g} m. Make it {least:.2g} m thick at least."
+        )
     tolerance = min(FIDELITY * size, THICKNESSES * min(thickness, chosen.thinnest))
     skin = contour(chosen, thickness, min(_pitch(chosen, size), 0.5 * thickness))
     return _fleshed(skin, None, chosen, size, tolerance)
@@ -92,8 +107,20 @@ def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: fl
     chosen = bones_of(spec, bones)
     tolerance = min(FIDELITY * size, THICKNESSES * chosen.thinnest)
     surface = read_surface(path)
+    _check_elements(np.ptp(surface[0], axis=0), size)
     check_covers(path, surface, chosen, _pitch(chosen, size), tolerance)
     return _fleshed(surface, surface, chosen, size, tolerance)
+
+
+def _check_elements(extent: Array, size: float) -> None:
+    """Raise ValueError where a box of this extent, m, has room for too many elements."""
+    most = float((FILLING / MOST_ELEMENTS * extent.prod()) ** (1.0 / 3.0))
+    if size < most:
+        raise ValueError(
+            f"flesh that reaches over {extent.max():.3g} m would have more than "
+            f"{MOST_ELEMENTS:,} elements with edges of {size:g} m. Make the size {most:.2g} m at "
+            "least, or the flesh smaller."
+        )
 
 
 def _pitch(bones: Bones, size: float) -> float:
