@@ -2,7 +2,8 @@
 
 `make fuzz` gives every input to `check`, and what it accepts to `run` for three frames; with a run
 folder it is `run --resume`, `film` and `export`. It writes the counts into docs/attack.md, and ends
-with 1 when there was any other outcome.
+with 1 when there was any other outcome. What went well is kept in build/ and not tried again when
+it was stopped, or when faults that it found are mended; without that folder it begins anew.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import sys
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,6 +34,7 @@ from fuzz_inputs import SECRET, make, torn
 from marked import with_part
 
 PAGE = Path(__file__).parents[1] / "docs" / "attack.md"
+KEPT = Path(__file__).parents[1] / "build" / "fuzz"
 
 INPUTS, SEED = 20_000, "flowborne"
 
@@ -244,22 +246,27 @@ class Worker:
             self._process.wait()
 
 
-def outcomes(inputs: int, seed: str, processes: int) -> Iterator[tuple[int, str, Outcome]]:
+def outcomes(
+    numbers: Sequence[int], seed: str, processes: int
+) -> Iterator[tuple[int, str, Outcome]]:
     """Number, what is broken, and what came of each input, as they come."""
 
-    def work(first: int) -> list[tuple[int, str, Outcome]]:
+    def work(some: Sequence[int]) -> list[tuple[int, str, Outcome]]:
         worker = Worker()
-        found = []
         try:
-            for number in range(first, min(first + 50, inputs)):
-                found.append((number, *worker.judge(number, seed)))
+            return [(number, *worker.judge(number, seed)) for number in some]
         finally:
             worker.close()
-        return found
 
     with ThreadPoolExecutor(processes) as pool:
-        for found in pool.map(work, range(0, inputs, 50)):
+        for found in pool.map(work, (numbers[n : n + 50] for n in range(0, len(numbers), 50))):
             yield from found
+
+
+def went_well(file: Path) -> dict[int, tuple[str, Outcome]]:
+    """What is kept of an earlier attack: what was broken and what came of it, by number."""
+    lines = file.read_text("utf-8").splitlines() if file.is_file() else []
+    return {number: (kind, Outcome(*rest)) for number, kind, *rest in map(json.loads, lines)}
 
 
 def table(counts: Counter[tuple[str, str]]) -> str:
@@ -277,17 +284,25 @@ def table(counts: Counter[tuple[str, str]]) -> str:
 
 def main(inputs: int, seed: str) -> int:
     """Attack with so many inputs; the exit code."""
-    counts: Counter[tuple[str, str]] = Counter()
-    several = 0
-    for number, kind, outcome in outcomes(inputs, seed, len(os.sched_getaffinity(0))):
-        counts[kind, outcome.verdict] += 1
-        several += outcome.messages > 1
-        if outcome.verdict not in WELL:
-            print(f"{seed}/{number}  {kind}  {outcome.verdict}\n{outcome.detail}\n", flush=True)
-        if (number + 1) % 500 == 0:
-            print(f"{number + 1} of {inputs}", file=sys.stderr, flush=True)
+    kept = KEPT / f"{seed}.jsonl"
+    found = went_well(kept)
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    left = [number for number in range(inputs) if number not in found]
+    with kept.open("a", encoding="utf-8") as file:
+        for number, kind, outcome in outcomes(left, seed, len(os.sched_getaffinity(0))):
+            found[number] = kind, outcome
+            if outcome.verdict in WELL:
+                print(json.dumps([number, kind, *outcome]), file=file, flush=True)
+            else:
+                told = f"{seed}/{number}  {kind}  {outcome.verdict}"
+                print(f"{told}\n{outcome.detail}\n", flush=True)
+            if len(found) % 500 == 0:
+                print(f"{len(found)} of {inputs}", file=sys.stderr, flush=True)
+    judged = [found[number] for number in range(inputs)]
+    counts = Counter((kind, outcome.verdict) for kind, outcome in judged)
     made = table(counts)
     print(made)
+    several = sum(outcome.messages > 1 for _, outcome in judged)
     print(f"{several} were told more than one thing")
     if inputs == INPUTS:
         PAGE.write_text(with_part(PAGE.read_text("utf-8"), "attack", made), "utf-8")

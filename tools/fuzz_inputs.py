@@ -87,6 +87,8 @@ def model_value(rng: random.Random) -> tuple[str, Files]:
     root = ElementTree.fromstring(files[file])
     for _ in range(rng.choice((1, 1, 2))):
         places = [(parent, child) for parent in root.iter() for child in parent]
+        if not places:
+            break
         parent, child = rng.choice(places)
         kind = rng.randrange(5)
         if kind <= 1 and child.attrib:

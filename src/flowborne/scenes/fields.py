@@ -29,6 +29,12 @@ Count = Annotated[int, Strict(), Field(ge=1)]
 WholeNumber = Annotated[int, Strict(), Field(ge=0)]
 """0, 1, 2, ..."""
 
+MOST_STEPS = 10_000
+"""Most steps in a frame or in a trial: with more of them neither comes to its end."""
+
+Steps = Annotated[int, Strict(), Field(ge=1, le=MOST_STEPS)]
+StepsOrNone = Annotated[int, Strict(), Field(ge=0, le=MOST_STEPS)]
+
 Text = Annotated[str, Field(min_length=1)]
 
 Parameters = dict[str, Any]

@@ -15,6 +15,7 @@ from flowborne.scenes.fields import (
     FileName,
     Number,
     Positive,
+    Steps,
     Table,
     Text,
     Vector,
@@ -55,7 +56,7 @@ class TimeTable(Table):
 
     frames_per_second: Positive = 24.0
     frames: Count = 120
-    steps_per_frame: Count = 1
+    steps_per_frame: Steps = 1
 
 
 def _named_file(value: Any) -> Any:

@@ -23,10 +23,11 @@ from flowborne.scenes.fields import (
     OwnTable,
     Parameters,
     Positive,
+    Steps,
+    StepsOrNone,
     Table,
     Text,
     Vector,
-    WholeNumber,
     by_kind_or_own,
 )
 from flowborne.scenes.schema_drives import EXACT, ServoTable
@@ -342,10 +343,10 @@ class ControllerTable(Table):
 
     gradient: AnyGradient = GradientCentralTable(kind="central")
     velocities: Literal["removed", "present", "probe"] = "removed"
-    hypothetical_steps: Count = 1
+    hypothetical_steps: Steps = 1
     hypothetical_time: Positive | None = None
-    settle_steps: WholeNumber = 0
+    settle_steps: StepsOrNone = 0
     rule: AnyRule = RuleFixed(kind="fixed")
     every: Count = 1
-    iterations: Count = 1
+    iterations: Steps = 1
     servo: ServoTable = EXACT
