@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from pathlib import Path
 from typing import Any
 
@@ -216,6 +217,14 @@ def test_seam_of_an_open_clip_keeps_to_ground_and_heading() -> None:
     assert max(steps) < 2.2  # the clip itself goes at 1.3 to 1.6 m/s
 
 
+def test_a_seam_follows_what_its_message_says() -> None:
+    with pytest.raises(SceneError) as refused:
+        motion(loop=True, blend=0.02)
+    said = str(refused.value)
+    (longer,) = re.findall(r"Make blend ([\d.]+) s or longer", said)
+    motion(loop=True, blend=float(longer))
+
+
 def test_low_pass_halves_the_power_at_its_frequency_and_does_not_lag() -> None:
     clip = wandering(601)
     time = clip.frame_time * np.arange(clip.frames)
@@ -247,6 +256,11 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "negative": ({"start": -0.1}, r"from -0\.1 s to 2 s"),
     "blend": ({"blend": 1.5}, r"blend 1\.5 s is more than half of the 2 s"),
     "open loop": ({"loop": True}, r"without a blend, and joint '\w+' ends [\d.]+ rad or m"),
+    "seam": (
+        {"loop": True, "blend": 0.01},
+        r"where it begins again, joint '\w+' moves \d+ times as fast as anywhere else in it, as "
+        r"a blend of 0\.01 s joins ends that differ\. Make blend 0\.\d+ s or longer, or set stop",
+    ),
     "low-pass": ({"smooth": 25.0}, r"smooth 25 Hz is not between 0 and 24\.1 Hz.* 60 frames"),
     "unknown": ({"joints": ["ancle"]}, r"'ancle' is not in the model; did you mean 'ankle'"),
     "unmapped": ({"joints": ["waist"]}, r"'waist' is to follow the clip and is mapped to none"),

@@ -20,6 +20,7 @@ from flowborne.scenes.human.body import ELBOWS, human_mjcf
 from flowborne.scenes.human.clip_skeleton import skeleton_of
 from flowborne.scenes.human.gait import gait_clip
 from flowborne.scenes.human.skeleton import SIDES, Skeleton
+from flowborne.scenes.human.soles import on_the_floor
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.mapping import mapping_of
 from flowborne.scenes.schema import Scene
@@ -57,13 +58,17 @@ def capture_of(scene: Scene) -> Capture | None:
         walk = _walk(scene.human.height)
         return replace(walk, clip=walk.clip.placed(offset, heading))
     path = scene.folder / table.file
-    clip = _read(path, _stamp(path), table.unit, table.up, table.skip).placed(offset, heading)
+    clip = _read(path, _stamp(path), table.unit, table.up, table.skip)
     if scene.human is None:
+        clip = clip.placed(offset, heading)
         return Capture(clip, _named(clip, table.mapping), None)
     mapping = mapping_of(clip, table.mapping)
     check_scale(leg_length(clip, mapping), table.unit)
     check_upright(clip, mapping, table.up)
-    return Capture(clip, mapping, skeleton_of(clip, mapping))
+    skeleton = skeleton_of(clip, mapping)
+    if table.floor == "soles":
+        clip = on_the_floor(clip, mapping, skeleton, scene.human.mass, scene.human.sex)
+    return Capture(clip.placed(offset, heading), mapping, skeleton)
 
 
 @lru_cache(maxsize=4)

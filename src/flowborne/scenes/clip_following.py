@@ -15,6 +15,7 @@ from flowborne.quaternions import about, continuous, inverse, product, twist
 from flowborne.scenes.clip_curves import UP, Columns, curves_of, row_of
 from flowborne.scenes.clip_loop import CLOSED, Stride, mismatch, stride_between
 from flowborne.scenes.clip_motion import TrajectoryClip, normalise
+from flowborne.scenes.clip_seam import check_seam
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
@@ -83,9 +84,12 @@ def trajectory_of_clip(
     pose = model.rest().q if initial is None else initial
     places = np.concatenate([model.positions_of(name) for name in columns.names])
     before = _put(columns, row_of(columns, pose[places]), spline(start))
-    return TrajectoryClip(
+    motion = TrajectoryClip(
         columns.dofs, columns, spline, start, length, blend, before, stride, overlap
     )
+    if overlap > 0.0:
+        check_seam(motion)
+    return motion
 
 
 def _check_times(clip: Clip, start: float, stop: float, blend: float) -> None:

@@ -49,6 +49,8 @@ class ClipTable(Table):
     blend        s over which it leaves the starting pose, comes to rest at the end, or passes from
                  one round of a loop to the next
     smooth       Hz below which motion is kept; all of it unless given
+    floor        "soles" puts those that stand on z = 0, where floors of captures are neither at 0
+                 nor even, or "file": heights are the file's own (both for [human])
     heading      degrees by which it is turned to the left, about where it begins
     offset       m by which it is then moved
     mapping      joint of the model -> joint of the clip, where their names do not tell
@@ -67,6 +69,7 @@ class ClipTable(Table):
     loop: bool | None = None
     blend: NotNegative = 0.0
     smooth: Positive | None = None
+    floor: Literal["soles", "file"] = "soles"
     heading: Number = 0.0
     offset: Vector = (0.0, 0.0, 0.0)
     mapping: dict[str, Text] = Field(default_factory=dict)
