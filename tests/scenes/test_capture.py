@@ -104,6 +104,22 @@ def test_a_clip_can_be_placed(write: Write) -> None:
     assert there.solid.q[7:] == pytest.approx(here.solid.q[7:], abs=1e-9)
 
 
+def test_a_blend_sets_out_from_the_first_pose_of_the_clip(write: Write) -> None:
+    """Not from the pose at rest, with its arms out; what is posed sets out from there."""
+    eased = {"unit = 0.01": "unit = 0.01\nblend = 0.3"}
+    posed = "[initial]\npositions = { left_shoulder = [1.0, 0.0, 0.0, 0.0] }\n"
+    plain, blended, other = (
+        build(load_scene(write(append, scene=s))).world
+        for append, s in (("", None), ("", eased), (posed, eased))
+    )
+    assert blended.solid.q == pytest.approx(plain.solid.q, abs=1e-9)
+    assert not blended.solid.v.any()
+    places = plain.setup.solid.positions_of("left_shoulder")
+    assert other.solid.q[places] == pytest.approx([1.0, 0.0, 0.0, 0.0])
+    kept = np.setdiff1d(np.arange(plain.solid.q.size), places)
+    assert other.solid.q[kept] == pytest.approx(plain.solid.q[kept], abs=1e-9)
+
+
 def test_a_creature_outside_the_domain_is_told_the_keys_that_place_it(write: Write) -> None:
     domain = "[domain]\nlower = [5.0, -2.0, -1.0]\nupper = [9.0, 2.0, 3.0]\nresolution = 24\n"
     problems = check_scene(write(domain))

@@ -135,20 +135,37 @@ def clip_motion(
     chosen = followers(scene, capture, model) if joints is None else joints
     if not chosen:
         return None
-    return trajectory_of_clip(
-        model,
-        capture.clip,
-        capture.mapping,
-        Passage(
-            start=table.start,
-            stop=table.stop,
-            loop=table.file is None if table.loop is None else table.loop,
-            blend=table.blend,
-            smooth=table.smooth,
-        ),
-        joints=chosen,
-        initial=start,
+    passage = Passage(
+        start=table.start,
+        stop=table.stop,
+        loop=table.file is None if table.loop is None else table.loop,
+        blend=table.blend,
+        smooth=table.smooth,
     )
+    if passage.blend > 0.0:
+        start = _where_it_begins(scene, model, start, capture, passage, chosen)
+    return trajectory_of_clip(
+        model, capture.clip, capture.mapping, passage, joints=chosen, initial=start
+    )
+
+
+def _where_it_begins(
+    scene: Scene,
+    model: SolidModel,
+    start: Array,
+    capture: Capture,
+    passage: Passage,
+    joints: tuple[str, ...],
+) -> Array:
+    """(nq,) pose with joints where the clip has them first, but for those that [initial] names."""
+    once = replace(passage, loop=False, blend=0.0)
+    motion = trajectory_of_clip(model, capture.clip, capture.mapping, once, joints=joints)
+    q = start.copy()
+    q[model.indices_of(motion.dofs)] = motion.position(0.0)
+    for joint in scene.initial.positions:
+        places = model.positions_of(joint)
+        q[places] = start[places]
+    return q
 
 
 def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:

@@ -46,8 +46,9 @@ class ClipTable(Table):
     start, stop  s, the part that is used, counted after the skipped frames
     loop         whether it starts again when it ends, from where it has come to; unless given the
                  generated walk does and a file does not
-    blend        s over which it leaves the starting pose, comes to rest at the end, or passes from
-                 one round of a loop to the next
+    blend        s over which it sets out from rest, comes to rest at the end, or passes from one
+                 round of a loop to the next. What [initial] poses sets out from there, all else
+                 from the clip's first pose
     smooth       Hz below which motion is kept; all of it unless given
     floor        "soles" puts those that stand on z = 0, where floors of captures are neither at 0
                  nor even, or "file": heights are the file's own (both for [human])
