@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from ..pages.blocks import blocks_of
+
+PAGE = Path(__file__).parents[2] / "docs" / "own-clip.md"
+
 MODEL = """
 <mujoco>
   <worldbody>
@@ -83,3 +87,12 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def swing(tmp_path: Path) -> str:
+    """Path of the handbook's scene of a walker whose arms stay close to the clip."""
+    (text,) = (block.text for block in blocks_of(PAGE) if block.file == "swing.toml")
+    path = tmp_path / "swing.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.quaternions import twist
 from flowborne.scenes.human.skeleton import SIDES
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
@@ -16,6 +17,8 @@ from flowborne.validation.blocked_arms import posture
 
 FRAMES, LATE = 80, 55
 """Run, and of them the last, over which means are taken: two strides."""
+
+SIDEWAYS = np.array([0.0, 1.0, 0.0])
 
 ARMS = [f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm", "hand")]
 
@@ -102,3 +105,27 @@ def test_a_leg_in_the_way_keeps_its_arm_ahead() -> None:
 
 def test_feet_stand_on_the_ground() -> None:
     assert walked("gravity-back").sunk < 0.005
+
+
+def swings(scene: str, settings: dict[str, str]) -> NDArray[np.float64]:
+    """(2,) degrees over which left and right upper arm go to and fro in a stride."""
+    angles = []
+    with Simulation(load_scene(scene, settings)) as simulation:
+        model = simulation.world.setup.solid
+        for _ in range(50):
+            simulation.advance_frame()
+            q = simulation.world.solid.q
+            turns = [q[model.positions_of(f"{side}_shoulder")] for side in SIDES]
+            angles.append([float(twist(turn, SIDEWAYS)) for turn in turns])
+    return np.asarray(np.degrees(np.ptp(angles[-26:], axis=0)))
+
+
+def test_arms_keep_as_much_of_their_swing_as_closeness_to_the_clip_is_worth(swing: str) -> None:
+    weights = ("3.0", "5.0", "10.0")
+    hanging, between, close = (
+        swings(swing, {f"objectives.{n}.weight": weight for n in (1, 2)}) for weight in weights
+    )
+    own = swings("human-gravity-back", {})
+    assert np.all(hanging < 0.25 * own)
+    assert np.all((between > 0.25 * own) & (between < 0.6 * own))
+    assert np.all((close > 0.7 * own) & (close < own))

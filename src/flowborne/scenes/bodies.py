@@ -51,7 +51,13 @@ def load_model(scene: Scene) -> SolidModel:
     """
     x, y, z = scene.gravity
     if scene.human is not None:
-        return SolidModel.from_string(human_of(scene), gravity=(x, y, z))
+        try:
+            return SolidModel.from_string(human_of(scene), gravity=(x, y, z))
+        except ValueError as error:
+            raise SceneError(
+                f"no person of {scene.human.mass:g} kg can be made of these bones. "
+                "Correct the mass."
+            ) from error
     path = scene.model_path
     assert path is not None
     assert scene.solids is not None

@@ -152,7 +152,7 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
         return ObjectivePressureDrag(bodies, triple(table.direction), frame, table.kind)
     if isinstance(table, tables.ObjectiveInputMotionTable):
         dofs = _dofs_of(model, (table.joint,))
-        return ObjectiveInputMotion(dofs, _reference(table, scene, model))
+        return ObjectiveInputMotion(dofs, input_motion(table, scene, model))
     if isinstance(table, tables.ObjectiveVelocityTable):
         body = None if table.body is None else model.body(table.body)
         return ObjectiveVelocity(body, triple(table.target))
@@ -162,9 +162,10 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
     return ObjectiveCallable(function, table.function)
 
 
-def _reference(
+def input_motion(
     table: tables.ObjectiveInputMotionTable, scene: Scene, model: SolidModel
 ) -> Trajectory:
+    """What a joint is to be close to: the clip, or keyframes of its own."""
     if table.values is None:
         motion = clip_motion(scene, model, posed(scene, model).q, (table.joint,))
         assert motion is not None

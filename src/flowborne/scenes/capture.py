@@ -95,6 +95,7 @@ def human_of(scene: Scene) -> str:
     """MJCF of the scene's human: with the bones of the clip's file, or else the standard ones.
 
     Controlled elbows are hinges, and arms that are controlled collide with the rest.
+    raises  SceneError when the clip cannot be used, or an elbow of it is no hinge
     """
     assert scene.human is not None
     capture = capture_of(scene)
@@ -104,7 +105,10 @@ def human_of(scene: Scene) -> str:
     controlled = set(scene.controlled_joints())
     touching = [side for side in SIDES if {f"{side}_shoulder", f"{side}_elbow"} & controlled]
     hinged = controlled & set(ELBOWS)
-    return human_mjcf(skeleton, scene.human.mass, scene.human.sex, hinged, touching)
+    try:
+        return human_mjcf(skeleton, scene.human.mass, scene.human.sex, hinged, touching)
+    except ValueError as error:
+        raise SceneError(str(error)) from error
 
 
 def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, ...]:
