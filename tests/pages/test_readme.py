@@ -1,0 +1,40 @@
+"""What the README tells to type is what the command takes, and its scenes take what it sets.
+
+The pages have the same commands and more, and a test runs those (`test_pages.py`).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import typer.main
+
+from flowborne import cli
+from flowborne.scenes.load import check_scene, scene_names
+
+from .blocks import blocks_of
+
+README = Path(__file__).parents[2] / "README.md"
+MAKE = (README.parent / "Makefile").read_text(encoding="utf-8")
+
+COMMANDS = [words for block in blocks_of(README) for words in block.commands()]
+OWN = [words[1:] for words in COMMANDS if words[0] == ".venv/bin/flowborne"]
+
+
+def test_every_line_is_a_command_of_flowborne_or_a_target_of_make() -> None:
+    others = [words for words in COMMANDS if words[0] != ".venv/bin/flowborne"]
+    assert len(OWN) > 15
+    for words in others:
+        assert words[0] == "make", f"{words}: let a test see to it"
+        assert f"\n{words[1]}:" in MAKE
+
+
+@pytest.mark.parametrize("words", OWN, ids=" ".join)
+def test_the_command_takes_it(words: list[str]) -> None:
+    command = typer.main.get_command(cli.app).commands[words[0]]
+    given = command.make_context(words[0], words[1:]).params
+    if words[0] in ("run", "check") and words[1] in scene_names() and given.get("settings"):
+        pairs = dict(pair.split("=", 1) for pair in given["settings"])
+        pairs = {key: value for key, value in pairs.items() if not key.startswith("clip.")}
+        assert check_scene(words[1], pairs) == []
