@@ -91,6 +91,30 @@ def mistakes() -> Iterator[Mistake]:
         CHECK,
     )
     yield (
+        "a loop whose ends differ, joined in 0.02 s",
+        "walk",
+        scene("walk", "blend = 0.05", "start = 0.2\nstop = 0.9\nloop = true\nblend = 0.02"),
+        CHECK,
+    )
+    yield (
+        "a person of no mass",
+        "walk",
+        scene("walk", "mass = 70.0", "mass = 1e-300"),
+        CHECK,
+    )
+    yield (
+        "a skin of 1e18 m",
+        "fish",
+        scene("fish", "thickness = 0.12", "thickness = 1e18"),
+        CHECK,
+    )
+    yield (
+        "1e18 steps in a frame",
+        "slab",
+        scene("slab", "frames = 3", f"frames = 3\nsteps_per_frame = {10**18}"),
+        CHECK,
+    )
+    yield (
         "a ball joint that starts at three numbers",
         "pendulum",
         scene("pendulum", "hinge = 40.0", "hinge = 40.0, wrist = [1.0, 2.0, 3.0]"),
