@@ -305,7 +305,7 @@ def main(inputs: int, seed: str) -> int:
     several = sum(outcome.messages > 1 for _, outcome in judged)
     print(f"{several} were told more than one thing")
     if inputs == INPUTS:
-        PAGE.write_text(with_part(PAGE.read_text("utf-8"), "attack", made), "utf-8")
+        PAGE.write_text(with_part(PAGE.read_text("utf-8"), "fuzz", made), "utf-8")
     return int(any(verdict not in WELL for _, verdict in counts))
 
 
