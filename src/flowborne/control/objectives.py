@@ -65,6 +65,8 @@ def value_of(objective: Objective, measurement: Measurement) -> float:
         value = objective.value(measurement)
     except Exception as error:
         raise PartError.failed(f"objective '{name_of(objective)}'", error) from error
+    if type(value) is float:
+        return value
     if not isinstance(value, SupportsFloat) or np.ndim(value) != 0:
         raise PartError(
             f"objective '{name_of(objective)}' gave {value!r}, which is no number: return one"

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -117,11 +118,19 @@ class Boundaries:
 
     def pair(self, axis: int) -> tuple[Boundary, Boundary]:
         """Lower and upper side across `axis`."""
-        sides = [getattr(self, name) for name in SIDES[2 * axis : 2 * axis + 2]]
-        return sides[0], sides[1]
+        return self._pairs[axis]
 
     def periodic(self) -> tuple[bool, bool, bool]:
-        x, y, z = (self.pair(axis)[0].kind == "periodic" for axis in range(3))
+        return self._periodic
+
+    @cached_property
+    def _pairs(self) -> tuple[tuple[Boundary, Boundary], ...]:
+        sides = [getattr(self, name) for name in SIDES]
+        return tuple(zip(sides[::2], sides[1::2], strict=True))
+
+    @cached_property
+    def _periodic(self) -> tuple[bool, bool, bool]:
+        x, y, z = (low.kind == "periodic" for low, _ in self._pairs)
         return x, y, z
 
     def check(self, grid: Grid) -> None:

@@ -46,7 +46,8 @@ def follow_each(model: SolidModel, q: Array) -> tuple[NDArray[np.int64], Array]:
     if model.flesh is None:
         return np.arange(model.nv), np.eye(model.nv)
     bones = np.flatnonzero(~model.flesh.dofs)
-    pose, unit = kinematics(model, q), np.eye(model.nv)[bones]
+    pose, unit = kinematics(model, q), np.zeros((bones.size, model.nv))
+    unit[np.arange(bones.size), bones] = 1.0
     return bones, np.stack([_followed(model, pose, row) for row in unit], axis=1)
 
 

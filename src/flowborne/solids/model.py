@@ -370,6 +370,10 @@ def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
         for joint in range(mj.body_jntadr[body], mj.body_jntadr[body] + mj.body_jntnum[body]):
             kind, first = int(mj.jnt_type[joint]), int(mj.jnt_dofadr[joint])
             axis = np.array(mj.jnt_axis[joint])
+            if kind == SLIDE:
+                slides.append(axis)
+                conserved[first] = True
+                continue
             spanned = np.linalg.matrix_rank(np.array(slides), tol=1e-9) if slides else 0
             if kind == HINGE and slides:
                 across = np.array(slides) - np.outer(np.array(slides) @ axis, axis)
@@ -377,10 +381,6 @@ def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
                 turned &= spanned == 3 or bool(np.abs(np.array(slides) @ axis).max() < 1e-9)
             else:
                 turned = not slides or spanned == 3
-            if kind == SLIDE:
-                slides.append(axis)
-                conserved[first] = True
-                continue
             conserved[first : first + len(SUFFIXES[kind])] = turned
             break
     return conserved
