@@ -13,6 +13,7 @@ from flowborne.coupling.world import World
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 
+BLOCK = {"domain.resolution": "64"}
 FLYER = {"domain.resolution": "20"}
 SWIMMER = {
     "domain.lower": "[-8.0, -8.0, -10.0]",
@@ -35,10 +36,10 @@ def gradient(controller: Controller, world: World) -> np.ndarray:
 @pytest.mark.parametrize(
     ("scene", "settings"),
     [
-        ("ns-block-effort", {}),
-        ("ns-block-drag-min", {}),
-        ("ns-block-drag-max", {}),
-        ("ns-chain-4", {}),
+        ("ns-block-effort", BLOCK),
+        ("ns-block-drag-min", BLOCK),
+        ("ns-block-drag-max", BLOCK),
+        ("ns-chain-4", BLOCK),
         ("flyer-twist", FLYER),
         ("flyer-flesh", FLYER),
         ("swimmer", SWIMMER),

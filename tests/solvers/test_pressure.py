@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flowborne.kernels import jit
-from flowborne.kernels.jit import kernel_threads
 from flowborne.solvers.mobility import dense_mobility
 from flowborne.solvers.pressure import NO_TERM, LowRankTerm, PressureSystem
 
@@ -279,22 +277,6 @@ def test_nothing_to_solve_gives_zero():
     assert found.converged
     assert found.iterations == 0
     assert not found.pressure.any()
-
-
-def test_threads_do_not_change_a_bit(monkeypatch):
-    shape = (60, 43, 48)
-    weights = random_weights(shape, ("closed", "periodic", "open"), blocked=0.1)
-    term = random_term(shape, 2)
-    rhs = np.random.default_rng(4).standard_normal(shape)
-    periodic = (False, True, False)
-    serial = PressureSystem(weights, periodic).solve(rhs, None, term)
-    assert serial.converged
-    monkeypatch.setattr(jit, "cores", lambda: 3)
-    monkeypatch.setattr(jit, "AGAIN", 1)
-    for threads in (2, 3):
-        with kernel_threads(threads):
-            parallel = PressureSystem(weights, periodic).solve(rhs, None, term)
-        np.testing.assert_array_equal(serial.pressure, parallel.pressure)
 
 
 def test_systems_of_one_shape_do_not_disturb_each_other():

@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from flowborne.validation import controller_in_flow, figures
+from flowborne.validation.blocked_arms import blocked_rows
 
 
 def test_figures_are_written_and_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -19,6 +20,7 @@ def test_figures_are_written_and_printed(tmp_path: Path, monkeypatch: pytest.Mon
     found = {scene: arrived for scene in controller_in_flow.SCENES.values()}
     found["ns-block-effort"] = wandering
     monkeypatch.setattr(figures, "course", found.__getitem__)
+    monkeypatch.setattr(figures, "blocked_rows", lambda: blocked_rows(frames=12))
     monkeypatch.setattr(figures, "frame_seconds", lambda joints, workers: 0.1 * joints / workers)
     text = io.StringIO()
     figures.make_figures(tmp_path / "new", ["2", "9b", "10"], Console(file=text, width=200))

@@ -36,7 +36,7 @@ def test_D3_stiff_flesh_feels_what_a_rigid_flag_does() -> None:
     for flow in (rigid, stiff):
         world = flags.channel(44, flow)
         flags.start(world, flow, None)
-        found.append(flags.march(world, flow, 2.0)[-1, :2])
+        found.append(flags.march(world, flow, 1.0)[-1, :2])
     np.testing.assert_allclose(found[1], found[0], rtol=2e-3)
 
 

@@ -21,7 +21,7 @@ def test_K11_twisted_wings_are_drawn_up_with_less_drag() -> None:
 
 def test_K11_wings_of_flesh_fold_on_their_way_up() -> None:
     brief = {**UPSTROKE, "domain.resolution": "26"}
-    straight, bent = (fly("flyer-flesh", 0.2, brief, controlled) for controlled in (False, True))
+    straight, bent = (fly("flyer-flesh", 0.1, brief, controlled) for controlled in (False, True))
     ((_, pressed),), ((_, folded),) = straight.impulses(), bent.impulses()
     assert pressed < -8.0
     assert folded > 0.5 * pressed
