@@ -32,8 +32,8 @@ FAILED, WRONG, INTERRUPTED = 1, 2, 130
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Our solves are small: more threads in BLAS are slower, and their sums differ."""
 
-FILE_KEYS = ("clip.file", "solids.model")
-"""Keys of a scene that name files: on the command line a path starts from where one is."""
+FILE_KEYS = ("clip.file", "earlier.run", "solids.model")
+"""Keys of a scene that name files or folders; on the command line a path starts from here."""
 
 app = typer.Typer(
     name="flowborne",
@@ -425,7 +425,7 @@ def _overrides(settings: list[str]) -> dict[str, str]:
         if not equals or not key.strip():
             raise InputError(f"--set {setting} has no KEY=VALUE; write for example fluid.density=1")
         key, value = key.strip(), value.strip()
-        if key in FILE_KEYS and Path(value).is_file():
+        if key in FILE_KEYS and Path(value).exists():
             value = str(Path(value).absolute())
         overrides[key] = value
     return overrides

@@ -24,6 +24,7 @@ from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, che
 from flowborne.io.summary import peak_memory, summarise, versions
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
+from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
 from flowborne.simulation import BlowUpError, Simulation
@@ -150,6 +151,7 @@ class _Run:
         self.files = files
         self.checkpoint_every = simulation.scene.output.checkpoint_every
         self.frames = simulation.frames
+        self.taken = earlier_joints(simulation.scene)
         self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
@@ -297,6 +299,7 @@ class _Run:
             controlled=list(simulation.scene.controlled_joints()),
             frames_per_second=1.0 / simulation.frame_time,
             wind=[list(stream)] if (stream := simulation.scene.stream()) else [],
+            taken=self.taken,
         )
         folder.drop_states_after(-1)
         self.history = History.create(folder.history, self.columns)

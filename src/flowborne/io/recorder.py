@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -142,15 +143,18 @@ def write_model(
     controlled: list[str],
     frames_per_second: float,
     wind: list[list[float]],
+    taken: Sequence[str] = (),
 ) -> None:
-    """Write model.json: what does not move, but is needed to draw the run.
+    """Write model.json: what does not move, but is needed to draw the run or to go on from it.
 
     controlled  names of the controlled joints
     wind        directions and speeds of the streams, m/s, to draw as arrows
+    taken       names of the joints that did what they did in an earlier run
     """
     solid, fluid = setup.solid, setup.fluid
     joint_bodies = solid.mj.jnt_bodyid
     of_bones = np.flatnonzero(joint_bodies < solid.nbody)
+    names = [solid.joint_names[joint] for joint in of_bones]
     grid = None
     if fluid is not None:
         grid = {
@@ -163,9 +167,11 @@ def write_model(
         {
             "slab": solid.slab,
             "bodies": list(solid.body_names),
-            "joints": [solid.joint_names[joint] for joint in of_bones],
+            "joints": names,
             "joint_bodies": joint_bodies[of_bones].tolist(),
             "controlled": controlled,
+            "decided": [*taken, *controlled],
+            "places": {name: _places(solid, name) for name in names},
             "grid": grid,
             "geoms": _geoms(solid),
             "flesh": None if solid.flesh is None else _flesh(solid.flesh),
@@ -174,6 +180,12 @@ def write_model(
             "wind": wind,
         },
     )
+
+
+def _places(solid: SolidModel, joint: str) -> list[int]:
+    """Where the entries of q of a joint begin and end."""
+    places = solid.positions_of(joint)
+    return [int(places[0]), int(places[-1]) + 1]
 
 
 def _geoms(solid: SolidModel) -> list[dict[str, Any]]:

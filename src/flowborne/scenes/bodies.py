@@ -14,6 +14,7 @@ from flowborne.errors import SceneError
 from flowborne.scenes.build_drives import driven, servo_of
 from flowborne.scenes.build_shapes import placed_shapes
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
+from flowborne.scenes.earlier import earlier_motion
 from flowborne.scenes.formula import Formula
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import (
@@ -146,16 +147,17 @@ def _told(table: MotionTable, model: SolidModel, constants: Mapping[str, float])
 
 
 def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Trajectory, ...]:
-    """All prescribed motions: those of [[motion]] in their order, then that of [clip].
+    """All prescribed motions: those of [[motion]] in their order, then that of [clip], then that of
+    [earlier].
 
     start   (nq,) pose from which a clip is entered
-    raises  SceneError when the clip cannot be used
+    raises  SceneError when the clip or the earlier run cannot be used
     """
     motions: list[Trajectory] = [
         trajectory_of(table, model, scene.constants) for table in scene.motion
     ]
-    clip = clip_motion(scene, model, start)
-    return (*motions,) if clip is None else (*motions, clip)
+    found = clip_motion(scene, model, start), earlier_motion(scene, model)
+    return (*motions, *(motion for motion in found if motion is not None))
 
 
 def posed(scene: Scene, model: SolidModel) -> SolidState:

@@ -16,6 +16,7 @@ from flowborne.io.clip import Clip
 from flowborne.scenes.clip_following import Passage, trajectory_of_clip
 from flowborne.scenes.clip_motion import TrajectoryClip
 from flowborne.scenes.clip_scale import check_scale, check_upright, leg_length
+from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.human.body import ELBOWS, human_mjcf
 from flowborne.scenes.human.clip_skeleton import skeleton_of
 from flowborne.scenes.human.gait import gait_clip
@@ -116,6 +117,7 @@ def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, .
     assert scene.clip is not None
     taken = {*scene.controlled_joints(), *scene.clip.free}
     taken |= {table.joint for table in scene.motion}
+    taken |= set(earlier_joints(scene))
     chosen = capture.mapping if scene.clip.joints is None else scene.clip.joints
     return tuple(
         joint

@@ -7,6 +7,7 @@ from flowborne.scenes.bodies import load_model
 from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
 from flowborne.scenes.check_clip import check_clip, check_followers
 from flowborne.scenes.check_control import check_control
+from flowborne.scenes.check_earlier import check_earlier, check_earlier_joints
 from flowborne.scenes.check_flesh import check_flesh
 from flowborne.scenes.check_fluid import check_dimensions, check_fluid
 from flowborne.scenes.check_mouths import check_mouth_cells, check_mouths
@@ -16,7 +17,7 @@ from flowborne.scenes.draft import Draft
 def cross_check(draft: Draft) -> list[str]:
     """Everything that is wrong with a scene that the schema accepts."""
     problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
-    unusable = [*check_clip(draft), *check_flesh(draft)]
+    unusable = [*check_earlier(draft), *check_clip(draft), *check_flesh(draft)]
     problems += unusable
     scene = draft.scene
     if (
@@ -30,7 +31,7 @@ def cross_check(draft: Draft) -> list[str]:
     except SceneError as error:
         table = "human" if scene.human is not None else "flesh" if scene.flesh else "solids"
         return problems + [f"{draft.at(table)}: {problem}" for problem in error.problems]
-    lost = list(check_followers(draft, model))
+    lost = [*check_earlier_joints(draft, model), *check_followers(draft, model)]
     if lost:
         return problems + lost
     problems += [*check_bodies(draft, model), *check_mouths(draft, model)]

@@ -21,6 +21,7 @@ from flowborne.scenes.bodies import (
 from flowborne.scenes.check_flesh import check_flesh_places
 from flowborne.scenes.check_formulas import check_formulas
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
 from flowborne.scenes.wording import Key, suggestion
@@ -29,6 +30,7 @@ from flowborne.solids.model import SolidModel
 
 NEEDS_BODIES = (
     "clip",
+    "earlier",
     "constants",
     "flesh",
     "shapes",
@@ -136,7 +138,8 @@ def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
             f"{draft.at('initial', 'impulse')}: 'none' is for creatures that float, and the model "
             "has no free joint. Drop it."
         )
-    moved = {table.joint for table in draft.scene.motion}
+    moved = {table.joint: "a [[motion]]" for table in draft.scene.motion}
+    moved |= dict.fromkeys(earlier_joints(draft.scene), "a motion of the [earlier] run")
     for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
         for joint, numbers in values.items():
             where = draft.at("initial", key)
@@ -153,7 +156,7 @@ def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
                 )
             elif joint in moved:
                 yield (
-                    f"{where}: joint '{joint}' has a [[motion]], which says where it starts. "
+                    f"{where}: joint '{joint}' has {moved[joint]}, which says where it starts. "
                     "Drop one of them."
                 )
             elif key == "positions" and kind in (BALL, FREE) and not any(numbers[-4:]):

@@ -12,6 +12,7 @@ from flowborne.scenes.bodies import posed
 from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.check_bodies import check_initial, unknown_joint
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema_human import ClipTable
 from flowborne.solids.model import SolidModel
 
@@ -78,6 +79,7 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
     others = {joint: "controlled" for joint in scene.controlled_joints()}
     others |= {table.joint: "moved by a [[motion]]" for table in scene.motion}
     others |= dict.fromkeys(scene.clip.free, "free")
+    others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
     found = False
     for joint in (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free):
         unknown = unknown_joint(draft, model, joint, "clip")

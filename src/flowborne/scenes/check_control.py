@@ -9,6 +9,7 @@ from flowborne.scenes.bodies import FREE, HINGE, JOINT_KINDS, SLIDE, joint_kind
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.check_bodies import out_of_plane, unknown_body, unknown_joint
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema_control import (
     ObjectiveDragTable,
@@ -101,6 +102,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
     scene, table = draft.scene, draft.scene.objectives[index]
     where = draft.at("objectives", index)
     driven = {*scene.controlled_joints(), *(motion.joint for motion in scene.motion)}
+    driven |= set(earlier_joints(scene))
     capture = capture_of(scene)
     if capture is not None:
         driven |= set(followers(scene, capture, model))
@@ -112,7 +114,7 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
             if not unknown and joint not in driven and whole:
                 yield (
                     f"{where}: joint '{joint}' makes no effort, being free. "
-                    "Name joints of [[control]], [[motion]] or [clip]."
+                    "Name joints of [[control]], [[motion]], [clip] or [earlier]."
                 )
     if isinstance(table, ObjectiveWindDragTable | ObjectiveDragTable | ObjectivePressureTable):
         for body in table.bodies or ():

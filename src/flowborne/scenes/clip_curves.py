@@ -20,7 +20,7 @@ from flowborne.io.clip import Clip
 from flowborne.quaternions import continuous, inverse, product, turned, twist
 from flowborne.scenes.wording import suggestion
 from flowborne.solids import mjcf
-from flowborne.solids.model import BALL, FREE, HINGE, SolidModel
+from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,7 +30,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Where things are in a row of numbers: quaternions, then places of free joints, then angles.
+    """Where things are in a row of numbers: quaternions, then places of free joints, then angles
+    and, of slides, ways.
 
     names     of the joints, as the model numbers them
     owners    joint, by its place in `names`, of each quaternion, place and angle
@@ -105,7 +106,7 @@ def curves_of(
             turn = np.unwrap(twist(local, np.array(model.mj.jnt_axis[joint])))
             angles.append(turn[:, None] + model.mj.qpos0[model.mj.jnt_qposadr[joint]])
     rows = [*map(continuous, quaternions), *positions, *angles]
-    return _columns(model, followed), np.concatenate(rows, axis=1)
+    return columns_of(model, followed), np.concatenate(rows, axis=1)
 
 
 def row_of(columns: Columns, q: Array) -> Array:
@@ -159,16 +160,17 @@ def _ancestor(model: SolidModel, bodies: Mapping[int, int], body: int) -> int | 
     return None
 
 
-def _columns(model: SolidModel, joints: Sequence[int]) -> Columns:
+def columns_of(model: SolidModel, joints: Sequence[int]) -> Columns:
+    """Where the positions of joints, by their numbers in ascending order, are in a row."""
     kinds = [int(model.mj.jnt_type[joint]) for joint in joints]
     turning = [n for n, kind in enumerate(kinds) if kind in (FREE, BALL)]
     free = [n for n, kind in enumerate(kinds) if kind == FREE]
-    hinges = [n for n, kind in enumerate(kinds) if kind == HINGE]
+    scalars = [n for n, kind in enumerate(kinds) if kind in (HINGE, SLIDE)]
     q: list[int] = []
     v: list[int] = []
     for n, kind in enumerate(kinds):
-        if kind == HINGE:
-            after = 3 * len(free) + hinges.index(n)
+        if kind in (HINGE, SLIDE):
+            after = 3 * len(free) + scalars.index(n)
             q.append(4 * len(turning) + after)
             v.append(3 * len(turning) + after)
             continue
@@ -181,7 +183,7 @@ def _columns(model: SolidModel, joints: Sequence[int]) -> Columns:
     names = tuple(model.joint_names[joint] for joint in joints)
     return Columns(
         names=names,
-        owners=(*turning, *free, *hinges),
+        owners=(*turning, *free, *scalars),
         balls=len(turning),
         free=np.array([turning.index(n) for n in free], dtype=np.int64),
         q=np.array(q, dtype=np.int64),

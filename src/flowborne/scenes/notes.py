@@ -9,6 +9,7 @@ import numpy as np
 from flowborne.scenes.bodies import SLIDE, joint_kind, joint_unit
 from flowborne.scenes.build_control import input_motion
 from flowborne.scenes.capture import capture_of
+from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import ObjectiveInputMotionTable, RuleFixed
 from flowborne.scenes.schema_drives import ServoPD
@@ -26,12 +27,18 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
 
 
 def _standing_still(scene: Scene) -> Iterator[str]:
-    """A clip that does not loop ends before the run."""
+    """A clip that does not loop ends before the run, or the earlier run does."""
+    earlier, run = earlier_of(scene), scene.time.frames * scene.frame_time
+    if earlier is not None and earlier.length < run - 0.5 * scene.frame_time:
+        yield (
+            f"[earlier]: that run is {earlier.length:.3g} s long and this one {run:.3g} s; its "
+            "joints stand still from there. It goes on with --resume and --frames"
+        )
     table, capture = scene.clip, capture_of(scene)
     if table is None or capture is None or table.file is None or table.loop:
         return
     end = min(capture.clip.duration, np.inf if table.stop is None else table.stop)
-    left, run = end - table.start, scene.time.frames * scene.frame_time
+    left = end - table.start
     if left < run - 0.5 * scene.frame_time:
         yield (
             f"[clip]: {table.file} goes on for {left:.3g} s of the run's {run:.3g} s, and stands "

@@ -10,6 +10,7 @@ from flowborne.errors import SceneError
 from flowborne.io.run_folder import OWN_NAMES
 from flowborne.scenes.bodies import bones_of
 from flowborne.scenes.capture import human_of
+from flowborne.scenes.earlier import EARLIER_FILE, earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_flesh import FleshTable
 
@@ -91,6 +92,13 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
         files[name] = _read(path)
         scene = scene.model_copy(
             update={"clip": scene.clip.model_copy(update={"file": name})}
+        ).in_folder(scene.folder)
+    earlier = earlier_of(scene)
+    if earlier is not None and scene.earlier is not None:
+        name = names.name(EARLIER_FILE)
+        files[name] = earlier.to_bytes()
+        scene = scene.model_copy(
+            update={"earlier": scene.earlier.model_copy(update={"run": name})}
         ).in_folder(scene.folder)
     return {SCENE_FILE: scene.to_toml().encode()} | files
 

@@ -22,6 +22,7 @@ from flowborne.scenes.fields import (
     filled,
 )
 from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
+from flowborne.scenes.schema_earlier import EarlierTable
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.schema_flesh import FleshTable
 from flowborne.scenes.schema_fluid import (
@@ -136,6 +137,7 @@ class Scene(Table):
     flesh: tuple[FleshTable, ...] = ()
     human: HumanTable | None = None
     clip: ClipTable | None = None
+    earlier: EarlierTable | None = None
     initial: InitialTable = InitialTable()
     motion: tuple[MotionTable, ...] = ()
     wind: tuple[WindTable, ...] = ()

@@ -1,0 +1,155 @@
+"""Passes: joints that do again what they did in an earlier run, while others are decided.
+
+Paper: section 8 names a design in several passes as future work.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from flowborne.errors import SceneError
+from flowborne.io.arrays_file import read_arrays, read_state
+from flowborne.io.run_folder import RunFolder, RunFolderError, reading
+from flowborne.quaternions import continuous
+from flowborne.scenes.clip_curves import columns_of, row_of
+from flowborne.scenes.clip_motion import TrajectoryClip
+from flowborne.scenes.schema import Scene
+from flowborne.solids.model import SolidModel
+
+Array = NDArray[np.float64]
+
+EARLIER_FILE = "earlier.npz"
+"""What a run took from the one before it."""
+
+TIME = "time"
+"""Name of the times in that file; all others are of joints."""
+
+LEAST = 2
+"""Poses that make a motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """What joints did in an earlier run.
+
+    times  (n,) s
+    poses  joint -> (n, m) its entries of q in MuJoCo's order, rad and m
+    """
+
+    times: Array
+    poses: Mapping[str, Array]
+
+    @property
+    def length(self) -> float:
+        """s from its first frame to its last."""
+        return float(self.times[-1] - self.times[0])
+
+    def to_bytes(self) -> bytes:
+        """An archive of arrays, of which `earlier_of` makes the same."""
+        file = io.BytesIO()
+        np.savez(file, **{TIME: self.times}, **self.poses)  # type: ignore[arg-type]
+        return file.getvalue()
+
+
+def earlier_of(scene: Scene) -> Earlier | None:
+    """What the joints of the scene's earlier run did; None in a scene without one.
+
+    raises  SceneError when there is no such run, or it cannot be read
+    """
+    table = scene.earlier
+    if table is None:
+        return None
+    path = scene.folder / table.run
+    try:
+        if path.is_file():
+            return _read_file(path, path.stat().st_mtime_ns)
+        files = RunFolder.existing(path).state_files()
+        stamp = (len(files), max((file.stat().st_mtime_ns for file in files), default=0))
+        return _read_run(path.resolve(), stamp)
+    except RunFolderError as error:
+        raise SceneError(f"{error}.") from None
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{error}. Give the folder of a run.") from None
+
+
+def earlier_joints(scene: Scene) -> tuple[str, ...]:
+    """Names of the joints that do what they did in the earlier run; none without one.
+
+    raises  as `earlier_of`
+    """
+    earlier, table = earlier_of(scene), scene.earlier
+    if earlier is None or table is None:
+        return ()
+    if table.joints is not None:
+        return table.joints
+    moved = {*scene.controlled_joints(), *(motion.joint for motion in scene.motion)}
+    return tuple(joint for joint in earlier.poses if joint not in moved)
+
+
+def earlier_motion(scene: Scene, model: SolidModel) -> TrajectoryClip | None:
+    """The motion that the earlier run gives to joints; None without one, or without joints.
+
+    Through the poses of its frames goes a cubic spline. Behind the last one it goes on for a frame:
+    the velocity at the end of a run is that of the middle of the step after it. Then joints stand
+    still.
+    """
+    earlier, joints = earlier_of(scene), earlier_joints(scene)
+    if earlier is None or not joints:
+        return None
+    columns = columns_of(model, sorted(model.joint(joint) for joint in joints))
+    poses = np.concatenate([earlier.poses[name] for name in columns.names], axis=1)
+    rows = np.stack([row_of(columns, pose) for pose in poses])
+    quaternions = columns.quaternions(rows)
+    for ball in range(columns.balls):
+        quaternions[:, ball] = continuous(quaternions[:, ball])
+    times = earlier.times - earlier.times[0]
+    length = float(times[-1] + (times[-1] - times[-2]))
+    spline = CubicSpline(times, rows)
+    return TrajectoryClip(columns.dofs, columns, spline, 0.0, length, 0.0, rows[0], None, 0.0)
+
+
+@lru_cache(maxsize=4)
+def _read_file(path: Path, stamp: int) -> Earlier:
+    """A file is read once, though joints, motion and checks all ask for it."""
+    poses = {name: np.asarray(values, float) for name, values in read_arrays(path).items()}
+    return _whole(path, Earlier(poses.pop(TIME, np.zeros(0)), poses))
+
+
+@lru_cache(maxsize=4)
+def _read_run(path: Path, stamp: tuple[int, int]) -> Earlier:
+    """What the controlled joints of a run did, and those that it had from an earlier one."""
+    folder = RunFolder(path)
+    with reading(path):
+        model = json.loads(folder.model.read_text(encoding="utf-8"))
+        places = {name: slice(*model["places"][name]) for name in model["decided"]}
+        states = [read_state(file, ("time", "q")) for file in sorted(folder.state_files())]
+        times = np.array([float(state["time"]) for state in states])
+        q = np.array([state["q"] for state in states], float)
+        found = Earlier(times, {name: q[:, at] for name, at in places.items()})
+    return _whole(path, found)
+
+
+def _whole(path: Path, earlier: Earlier) -> Earlier:
+    """What was read, if it is a motion. Raises ValueError when it is not."""
+    times, poses = earlier.times, earlier.poses
+    if not poses:
+        raise ValueError(f"{path} has no joint that was controlled")
+    alike = all(values.ndim == 2 and len(values) == len(times) for values in poses.values())
+    if not (times.ndim == 1 and alike and all(map(_finite, (times, *poses.values())))):
+        raise ValueError(f"{path} does not hold what joints did in a run")
+    if len(times) < LEAST or not np.all(np.diff(times) > 0.0):
+        raise ValueError(f"{path} has no frame yet, or frames that do not follow each other")
+    return earlier
+
+
+def _finite(values: Array) -> bool:
+    return bool(np.isfinite(values).all())
