@@ -10,7 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flowborne.control.rules import FixedStep, GoldenSection, ResilientStep, descent
+from flowborne.control.gradients import Displaced, GradientCentral
+from flowborne.control.rules import (
+    FixedStep,
+    GoldenSection,
+    QuasiNewton,
+    ResilientStep,
+    Rule,
+    descent,
+)
 
 
 @dataclass
@@ -27,6 +35,9 @@ class Line:
     def values(self, displacements: np.ndarray) -> np.ndarray:
         self.evaluations += len(displacements)
         return np.array([self.function(d) for d in displacements])
+
+    def gradient(self, displacement: np.ndarray) -> np.ndarray:
+        return GradientCentral(1e-4).estimate(Displaced(self, displacement)).gradient
 
 
 @given(
@@ -49,8 +60,8 @@ def test_step_of_one_dof_is_its_strength_however_small_the_gradient(gradient: fl
         assert step == [-sign * 0.03]
 
 
-@pytest.mark.parametrize("rule", [FixedStep(), GoldenSection()])
-def test_no_gradient_no_step(rule: FixedStep | GoldenSection) -> None:
+@pytest.mark.parametrize("rule", [FixedStep(), GoldenSection(), QuasiNewton()])
+def test_no_gradient_no_step(rule: Rule) -> None:
     line = Line(lambda d: 0.0, 2)
     assert not rule.step(line, np.zeros(2), np.ones(2)).any()
     assert line.evaluations == 0
@@ -120,3 +131,83 @@ def test_resilient_steps_and_probes_find_a_lopsided_kink(kink: float, steep: flo
 def test_paces_that_cannot_settle_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="give"):
         ResilientStep(**bad)
+
+
+def valley(x: np.ndarray) -> float:
+    """A quadratic a thousand times as steep across its valley, x = y, as along it."""
+    return float(500.0 * (x[0] - x[1]) ** 2 + 0.5 * (x[0] + x[1]) ** 2)
+
+
+def rosenbrock(x: np.ndarray) -> float:
+    return float(100.0 * (x[1] - x[0] ** 2) ** 2 + (1.0 - x[0]) ** 2)
+
+
+def after(
+    rule: Rule, function: Callable[[np.ndarray], float], at: tuple[float, float], decisions: int
+) -> np.ndarray:
+    """Where decisions with a strength of a tenth lead."""
+    place = np.array(at)
+    for _ in range(decisions):
+        here = place.copy()
+        line = Line(lambda d, here=here: function(here + d), 2)  # type: ignore[misc]
+        place = place + rule.step(line, line.gradient(np.zeros(2)), np.full(2, 0.1))
+    return place
+
+
+def test_quasi_newton_goes_along_a_valley_in_which_the_steepest_way_stalls() -> None:
+    """From (1, 0.6) to the origin in ten decisions that could go as far as 1."""
+    assert np.abs(after(QuasiNewton(), valley, (1.0, 0.6), 10)).max() < 1e-6
+    for rule in (FixedStep(), GoldenSection()):
+        assert np.abs(after(rule, valley, (1.0, 0.6), 40)).max() > 0.7
+    assert after(QuasiNewton(), rosenbrock, (-1.0, 1.0), 40) == pytest.approx([1, 1], abs=1e-3)
+    for rule in (FixedStep(), GoldenSection()):
+        assert after(rule, rosenbrock, (-1.0, 1.0), 40)[0] < -0.7
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_quasi_newton_stays_within_strength_whatever_the_unit(scale: float) -> None:
+    """The least within a box of unequal sides: at its corner."""
+    line = Line(lambda d: scale * float((d[0] - 3.0) ** 2 + (d[1] + 5.0) ** 2), 2)
+    limit = np.array([0.5, 0.02])
+    step = QuasiNewton().step(line, line.gradient(np.zeros(2)), limit)
+    assert step == pytest.approx([0.5, -0.02])
+
+
+def test_quasi_newton_heeds_the_range_of_joints() -> None:
+    @dataclass
+    class Ranged(Line):
+        def within_range(self, displacement: np.ndarray) -> np.ndarray:
+            return np.clip(displacement, -1.0, 0.01)
+
+    tried: list[np.ndarray] = []
+
+    def bowl(d: np.ndarray) -> float:
+        tried.append(d.copy())
+        return float((d[0] - 1.0) ** 2 + (d[1] + 0.05) ** 2 + d[0] * d[1])
+
+    line = Ranged(bowl, 2)
+    step = QuasiNewton().step(line, line.gradient(np.zeros(2)), np.full(2, 0.1))
+    assert step == pytest.approx([0.01, -0.055], abs=1e-4)
+    assert np.max(tried) <= 0.01
+
+
+@pytest.mark.parametrize("gradients", [1, 2, 3])
+def test_quasi_newton_costs_no_more_than_it_may(gradients: int) -> None:
+    """A gradient is four trials here; that of the present pose has been paid for."""
+    line = Line(lambda d: rosenbrock(d - 1.0), 2)
+    slope = line.gradient(np.zeros(2))
+    line.evaluations = 0
+    step = QuasiNewton(gradients).step(line, slope, np.full(2, 0.5))
+    assert line.evaluations == 4 * (gradients - 1) + gradients + 1
+    assert line.function(step) < line.function(np.zeros(2))
+
+
+def test_quasi_newton_goes_nowhere_when_nothing_is_better() -> None:
+    """A slope that was estimated wrongly, as beside a kink."""
+    line = Line(lambda d: float(np.abs(d).sum()), 2)
+    assert not QuasiNewton().step(line, np.array([1.0, 1.0]), np.full(2, 0.1)).any()
+
+
+def test_quasi_newton_needs_a_gradient() -> None:
+    with pytest.raises(ValueError, match="give at least 1"):
+        QuasiNewton(0)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from flowborne.control.executors import Serial
+from flowborne.control.gradients import GradientCentral
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum
 from flowborne.control.phases import PhaseIntervals
@@ -125,12 +126,15 @@ def test_trial_starts_from_its_pose_and_leaves_the_world_alone(
         Hypothesis(0.1),
         SHOULDER,
         np.array([0.5, 0.0, 0.0]),
+        GradientCentral(0.1),
         Serial(),
         np.array([0]),
     )
     values = trials.values(np.array([[0.1], [-0.2]]))
     assert values == pytest.approx([0.6, 0.3], abs=1e-14)
     assert trials.evaluations == 2
+    assert trials.gradient(np.array([0.3])) == pytest.approx([1.0])
+    assert trials.evaluations == 4
     assert {name: values.tobytes() for name, values in world.arrays().items()} == before
 
 

@@ -211,13 +211,17 @@ class Controller:
         pose: Array | None = None,
         objective: ObjectiveSum | None = None,
         places: Integers | None = None,
+        pace: Array | None = None,
     ) -> Trials:
         """An objective as a function of displacements from `pose` (nq,); None: the present.
 
         objective  the controller's own when None
         places     (m,) those of the controlled dofs that are displaced; all when None
+        pace       (n,) part of the gradient's displacements, 1 when None
         """
         _, state = creature.parts(world)
+        places = np.arange(self.dofs.size) if places is None else places
+        pace = np.ones(self.dofs.size) if pace is None else pace
         return Trials(
             world,
             step,
@@ -225,8 +229,9 @@ class Controller:
             self.hypothesis,
             self.dofs,
             (state.q if pose is None else pose).copy(),
+            self.gradient.of(places, pace[places]),
             self.executor,
-            np.arange(self.dofs.size) if places is None else places,
+            places,
         )
 
     def positions(self, world: World) -> Array:
@@ -262,8 +267,8 @@ class Controller:
         for iteration in range(self.iterations):
             displacement = np.zeros(model.nv)
             for places, wanted in groups:
-                trials = self.trials(world, step, pose, wanted, places)
-                estimate = self.gradient.of(places, pace[places]).estimate(trials)
+                trials = self.trials(world, step, pose, wanted, places, pace)
+                estimate = trials.estimator.estimate(trials)
                 slopes = estimate.gradient
                 if iteration == 0:
                     value, gradient[places] = value + estimate.value, slopes

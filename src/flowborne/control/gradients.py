@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Poses(Protocol):
-    """The objective as a function of the pose, which is all that differences and searches see.
+    """The objective as a function of the pose, which is all that gradients and rules see.
 
     count  n, number of controlled dofs
     """
@@ -29,6 +29,36 @@ class Poses(Protocol):
     def values(self, displacements: Array) -> Array:
         """(m,) objective in poses displaced by the rows of (m, n), each row on its own."""
         ...
+
+    def gradient(self, displacement: Array) -> Array:
+        """(n,) gradient in a displaced pose by the displacement, per rad or m, as the scene wants
+        it estimated."""
+        ...
+
+
+@dataclass(frozen=True)
+class Displaced:
+    """Poses about a displaced one: displacements add up.
+
+    poses  about the present pose
+    by     (n,) rad or m
+    """
+
+    poses: Poses
+    by: Array
+
+    @property
+    def count(self) -> int:
+        return self.poses.count
+
+    def within_range(self, displacement: Array) -> Array:
+        return self.poses.within_range(self.by + displacement) - self.by
+
+    def values(self, displacements: Array) -> Array:
+        return self.poses.values(self.by + displacements)
+
+    def gradient(self, displacement: Array) -> Array:
+        return self.poses.gradient(self.by + displacement)
 
 
 @dataclass(frozen=True)

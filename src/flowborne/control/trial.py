@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from flowborne.control import creature
 from flowborne.control.executors import Mapper
+from flowborne.control.gradients import Displaced, Gradient
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.coupling.motion import JointCommand
@@ -196,9 +197,10 @@ class Trials:
     Dye and smoke are not carried along, so no objective sees them.
 
     world, step, objective, hypothesis, dofs, pose  as in `Trial`
-    mapper  runs the trials
-    places  (m,) those of `dofs` that are displaced, of which all displacements here speak; the
-            others stay
+    estimator  of the gradient
+    mapper     runs the trials
+    places     (m,) those of `dofs` that are displaced, of which all displacements here speak; the
+               others stay
     evaluations  number of trials run so far
     """
 
@@ -208,6 +210,7 @@ class Trials:
     hypothesis: Hypothesis
     dofs: Integers
     pose: Array
+    estimator: Gradient
     mapper: Mapper
     places: Integers
     evaluations: int = 0
@@ -228,6 +231,10 @@ class Trials:
         full = np.zeros(model.nv)
         full[self.dofs[self.places]] = displacement
         return creature.within_range(model, self.pose, full)[self.dofs[self.places]]
+
+    def gradient(self, displacement: Array) -> Array:
+        """(m,) gradient in a displaced pose by the displacement (m,). Raises TrialError."""
+        return self.estimator.estimate(Displaced(self, displacement)).gradient
 
     def values(self, displacements: Array) -> Array:
         """(k,) objective in poses displaced by the rows of (k, m). Raises TrialError."""

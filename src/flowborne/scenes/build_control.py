@@ -29,7 +29,14 @@ from flowborne.control.objectives import (
     WeightedObjective,
 )
 from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseTrack
-from flowborne.control.rules import RULES, FixedStep, GoldenSection, ResilientStep, Rule
+from flowborne.control.rules import (
+    RULES,
+    FixedStep,
+    GoldenSection,
+    QuasiNewton,
+    ResilientStep,
+    Rule,
+)
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Trajectory
 from flowborne.scenes import schema_control as tables
@@ -120,6 +127,8 @@ def _rule(table: tables.AnyRule, scene: Scene, model: SolidModel) -> Rule:
         return FixedStep()
     if isinstance(table, tables.RuleResilient):
         return ResilientStep(least=table.least)
+    if isinstance(table, tables.RuleQuasiNewton):
+        return QuasiNewton(table.gradients)
     unit = joint_unit(model, scene.controlled_joints()[0])
     reach = None if table.reach is None else unit * table.reach
     return GoldenSection(reach, table.tolerance)

@@ -284,6 +284,16 @@ class RuleGoldenSection(Table):
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.02
 
 
+class RuleQuasiNewton(Table):
+    """Limited-memory BFGS over all joints that want the same.
+
+    gradients  most in a decision, in as many poses
+    """
+
+    kind: Literal["quasi-newton"]
+    gradients: Steps = 8
+
+
 class RuleOwn(Table, OwnTable):
     """A rule of the user's own; every further key is a parameter of it."""
 
@@ -292,7 +302,9 @@ class RuleOwn(Table, OwnTable):
 
 AnyRule = Annotated[
     Annotated[
-        RuleFixed | RuleResilient | RuleGoldenSection, Field(discriminator="kind"), Tag(BUILT_IN)
+        RuleFixed | RuleResilient | RuleGoldenSection | RuleQuasiNewton,
+        Field(discriminator="kind"),
+        Tag(BUILT_IN),
     ]
     | Annotated[RuleOwn, Tag(OWN)],
     *by_kind_or_own(RULES),
@@ -335,7 +347,8 @@ class ControllerTable(Table):
     hypothetical_steps  steps over which a trial makes its displacement
     hypothetical_time   s of one such step; the time of a frame unless given
     settle_steps        further steps of a trial in the fixed pose
-    rule                "fixed", "resilient", "golden-section" with its options, or one's own
+    rule                "fixed", "resilient", "golden-section" or "quasi-newton" with their options,
+                        or one's own
     every               frames between decisions
     iterations          descent steps per decision, in the flow as it is then
     servo               "exact", or "pd" with its frequency
