@@ -12,6 +12,7 @@ from math import prod
 from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.result import Result, verdict
 from flowborne.machine import peak_memory, state_bytes
+from flowborne.worker_process import end_with_parent
 
 NAME = "memory"
 SCENE = "ns-block-drag-max"
@@ -48,7 +49,7 @@ def footprint(scene: Scene, early: int = EARLY, late: int = LATE) -> list[Result
 
     It runs in a process of its own, whose size nothing else has raised.
     """
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as executor:
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), end_with_parent) as executor:
         before, after = executor.submit(held, scene, (early, late)).result()
     world = Simulation(scene, 1).world
     cells = prod(world.flow()[0].grid.shape)

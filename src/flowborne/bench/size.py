@@ -19,6 +19,7 @@ from flowborne.bench.memory import held
 from flowborne.bench.result import Result, timed
 from flowborne.machine import PARTS, cores, kernel_threads, memory_bandwidth
 from flowborne.operators import PressureSystem, faces_of
+from flowborne.worker_process import end_with_parent
 
 NAME = "size"
 SCENES = {"flyer-base": (32, 64, 96), "swimmer-jet-only": (72, 120, 168)}
@@ -43,7 +44,9 @@ def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     cells, seconds, lines = [], [], []
     for scene in scenes:
         shape, steps, spent = parts_of(scene, frames)
-        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as executor:
+        with ProcessPoolExecutor(
+            1, multiprocessing.get_context("spawn"), end_with_parent
+        ) as executor:
             (memory,) = executor.submit(held, scene, (2,)).result()
         cells.append(prod(shape))
         seconds.append(sum(spent.values()))

@@ -20,6 +20,7 @@ from typing import Any, Protocol, TypeVar
 
 from flowborne.errors import WorkerError
 from flowborne.kernels.jit import allowed_threads, cores, kernel_threads
+from flowborne.worker_process import end_with_parent
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -155,7 +156,7 @@ class Processes(Pool):
             self._executor = ProcessPoolExecutor(
                 self.workers,
                 mp_context=multiprocessing.get_context("spawn"),
-                initializer=receive_shared,
+                initializer=begin_worker,
                 initargs=(pickle.dumps(shared),),
             )
         size = math.ceil(len(tasks) / self.workers)
@@ -241,8 +242,14 @@ def pack(item: object, shared: object) -> bytes:
     return file.getvalue()
 
 
+def begin_worker(pickled: bytes) -> None:
+    """First thing that a worker process does: keep an eye on its parent, and the shared object."""
+    end_with_parent()
+    receive_shared(pickled)
+
+
 def receive_shared(pickled: bytes) -> None:
-    """First thing that a worker process does: keep the shared object."""
+    """Keep the shared object."""
     _received["shared"] = pickle.loads(pickled)
 
 

@@ -132,6 +132,22 @@ def step_together(world: World, dt: float, command: JointCommand, timer: Timer) 
     return done
 
 
+def move_as_told(world: World, dt: float, command: JointCommand) -> bool:
+    """Advance bodies by dt, in place, where every dof is told how to move: no force is asked for.
+
+    returns  False, and does nothing, where there is a fluid or a dof that answers forces
+    """
+    if world.setup.fluid is not None:
+        return False
+    command = joint_command(world, dt, command)
+    if not np.all(command.prescribed & np.isinf(command.torque_limit)):
+        return False
+    move_positions(world, command, dt)
+    world.solid.v[:] = command.final_velocity
+    advance_clock(world, dt)
+    return True
+
+
 def joint_command(world: World, dt: float, command: JointCommand | None) -> JointCommand:
     """The drive with prescribed motions and a slab's locked dofs added."""
     model = world.setup.solid

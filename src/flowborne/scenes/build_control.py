@@ -43,6 +43,7 @@ from flowborne.scenes import schema_control as tables
 from flowborne.scenes.bodies import joint_unit, posed
 from flowborne.scenes.build_drives import servo_of
 from flowborne.scenes.capture import clip_motion
+from flowborne.scenes.clip_motion import TrajectoryPart
 from flowborne.scenes.fields import triple
 from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema import Scene
@@ -86,7 +87,7 @@ def controller_of(
     how = scene.controller
     return Controller(
         np.array(dofs, dtype=np.int64),
-        ObjectiveSum(tuple(_weighted(o, scene, model, motions) for o in scene.objectives)),
+        _objectives(scene, model, motions),
         Hypothesis(
             scene.frame_time if how.hypothetical_time is None else how.hypothetical_time,
             how.hypothetical_steps,
@@ -134,19 +135,25 @@ def _rule(table: tables.AnyRule, scene: Scene, model: SolidModel) -> Rule:
     return GoldenSection(reach, table.tolerance)
 
 
-def _weighted(
-    table: tables.AnyObjective, scene: Scene, model: SolidModel, motions: tuple[Trajectory, ...]
-) -> WeightedObjective:
-    sign = 1.0 if table.goal == "least" else -1.0
-    return WeightedObjective(
-        _objective(table, scene, model),
-        sign * table.weight,
-        _phases(table.phases, scene, model, motions),
-        None if table.wanted_by is None else _dofs_of(model, table.wanted_by),
-    )
+def _objectives(scene: Scene, model: SolidModel, motions: tuple[Trajectory, ...]) -> ObjectiveSum:
+    wanted, weighted = input_motions(scene, model), []
+    for number, table in enumerate(scene.objectives):
+        sign = 1.0 if table.goal == "least" else -1.0
+        weighted.append(
+            WeightedObjective(
+                _objective(table, scene, model, wanted.get(number)),
+                sign * table.weight,
+                _phases(table.phases, scene, model, motions),
+                None if table.wanted_by is None else _dofs_of(model, table.wanted_by),
+            )
+        )
+    return ObjectiveSum(tuple(weighted))
 
 
-def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> Objective:
+def _objective(
+    table: tables.AnyObjective, scene: Scene, model: SolidModel, wanted: Trajectory | None
+) -> Objective:
+    """wanted  what an input-motion is to be close to"""
     if isinstance(table, tables.ObjectiveEffortTable):
         if table.joints is None:
             return ObjectiveEffort(_dofs_of(model, scene.controlled_joints()))
@@ -160,8 +167,8 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
         bodies = _bodies(model, table.bodies)
         return ObjectivePressureDrag(bodies, triple(table.direction), frame, table.kind)
     if isinstance(table, tables.ObjectiveInputMotionTable):
-        dofs = _dofs_of(model, (table.joint,))
-        return ObjectiveInputMotion(dofs, input_motion(table, scene, model))
+        assert wanted is not None
+        return ObjectiveInputMotion(_dofs_of(model, (table.joint,)), wanted)
     if isinstance(table, tables.ObjectiveVelocityTable):
         body = None if table.body is None else model.body(table.body)
         return ObjectiveVelocity(body, triple(table.target))
@@ -171,19 +178,27 @@ def _objective(table: tables.AnyObjective, scene: Scene, model: SolidModel) -> O
     return ObjectiveCallable(function, table.function)
 
 
-def input_motion(
-    table: tables.ObjectiveInputMotionTable, scene: Scene, model: SolidModel
-) -> Trajectory:
-    """What a joint is to be close to: the clip, or keyframes of its own."""
-    if table.values is None:
-        motion = clip_motion(scene, model, posed(scene, model).q, (table.joint,))
-        assert motion is not None
-        return motion
-    unit, dofs = joint_unit(model, table.joint), model.dofs_of(table.joint)
-    values = tuple(unit * value for value in table.values)
-    if len(values) == 1:
-        return TrajectoryConstant(dofs, values[0])
-    return TrajectoryKeyframes(dofs, Curve(table.keyframe_times(), values))
+def input_motions(scene: Scene, model: SolidModel) -> dict[int, Trajectory]:
+    """What joints are to be close to, by the number of the objective, from 0: keyframes or clip."""
+    tables_of = {
+        number: table
+        for number, table in enumerate(scene.objectives)
+        if isinstance(table, tables.ObjectiveInputMotionTable)
+    }
+    of_clip = {table.joint for table in tables_of.values() if table.values is None}
+    clip = clip_motion(scene, model, posed(scene, model).q, tuple(of_clip)) if of_clip else None
+    found: dict[int, Trajectory] = {}
+    for number, table in tables_of.items():
+        unit, dofs = joint_unit(model, table.joint), model.dofs_of(table.joint)
+        if table.values is None:
+            assert clip is not None
+            found[number] = TrajectoryPart.of(clip, model, dofs)
+        elif len(table.values) == 1:
+            found[number] = TrajectoryConstant(dofs, unit * table.values[0])
+        else:
+            values = tuple(unit * value for value in table.values)
+            found[number] = TrajectoryKeyframes(dofs, Curve(table.keyframe_times(), values))
+    return found
 
 
 def _bodies(model: SolidModel, names: tuple[str, ...] | None) -> Integers:

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from flowborne.quaternions import inverse, product
 from flowborne.scenes.clip_curves import Columns
 from flowborne.scenes.clip_loop import Stride
+from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -125,6 +126,34 @@ class TrajectoryClip:
         row, rate = self.spline(self.start + time), self.spline(self.start + time, 1)
         normalise(self.columns, row, rate)
         return row, rate
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryPart:
+    """Some joints of a clip; where all of them are is found once for all parts.
+
+    clip        motion of these joints and others
+    dofs        (k,) all dofs of these, ascending
+    positions   (m,) places of their entries among the clip's positions
+    velocities  (k,) places of theirs among its velocities
+    """
+
+    clip: TrajectoryClip
+    dofs: Integers
+    positions: Integers
+    velocities: Integers
+
+    @staticmethod
+    def of(clip: TrajectoryClip, model: SolidModel, dofs: Integers) -> TrajectoryPart:
+        """The part of `dofs`, which are the clip's."""
+        positions = np.searchsorted(model.indices_of(clip.dofs), model.indices_of(dofs))
+        return TrajectoryPart(clip, dofs, positions, np.searchsorted(clip.dofs, dofs))
+
+    def position(self, time: float) -> Array:
+        return self.clip.position(time)[self.positions]
+
+    def velocity(self, time: float) -> Array:
+        return self.clip.velocity(time)[self.velocities]
 
 
 def smooth_step(u: float) -> tuple[float, float]:

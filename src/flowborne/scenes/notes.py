@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.scenes.bodies import SLIDE, joint_kind, joint_unit
-from flowborne.scenes.build_control import input_motion
+from flowborne.scenes.build_control import input_motions
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
@@ -77,17 +77,18 @@ def _too_slow(scene: Scene, model: SolidModel) -> Iterator[str]:
     if isinstance(able.servo, ServoPD):
         share = min(1.0, np.pi * able.servo.frequency * time)
     times = np.linspace(0.0, scene.time.frames * scene.frame_time, LOOKED_AT)
-    for number, table in enumerate(scene.objectives, start=1):
-        if not isinstance(table, ObjectiveInputMotionTable):
-            continue
-        motion, unit = input_motion(table, scene, model), joint_unit(model, table.joint)
+    for number, motion in input_motions(scene, model).items():
+        table = scene.objectives[number]
+        assert isinstance(table, ObjectiveInputMotionTable)
+        unit = joint_unit(model, table.joint)
         wanted = max(float(np.linalg.norm(motion.velocity(at))) for at in times) / unit
         for place, control in enumerate(scene.control, start=1):
             if table.joint in control.joints and wanted > share * control.strength:
                 rate = "m/s" if joint_kind(model, table.joint) == SLIDE else "degrees/s"
+                goes = f"goes at {share * control.strength:.3g} at most"
                 yield (
-                    f"[[objectives]] {number}: '{table.joint}' is to be close to a motion of up to "
-                    f"{wanted:.3g} {rate}, and goes at {share * control.strength:.3g} at most; "
+                    f"[[objectives]] {number + 1}: '{table.joint}' is to be close to a motion of "
+                    f"up to {wanted:.3g} {rate}, and {goes}; "
                     f"a larger strength in [[control]] {place}"
                     + (" or frequency of its servo" if share < 1.0 else "")
                     + " lets it follow"

@@ -3,47 +3,76 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
-from typing import TypeVar
+from multiprocessing.connection import Connection, wait
+from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
+
+from flowborne.worker_process import GRACE, end_with_parent
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 
+class DiedError(Exception):
+    """The process died on the way, killed or out of memory."""
+
+
 class Worker:
-    """A process that does one task after the other; a new one takes its place when it dies."""
+    """A process that does one task after the other, and ends with its parent."""
 
     def __init__(self) -> None:
-        self._pool = ProcessPoolExecutor(
-            1, multiprocessing.get_context("spawn"), initializer=begin_worker
-        )
-        self._process = self._pool.submit(os.getpid)
+        spawned = multiprocessing.get_context("spawn")
+        self.pipe, theirs = spawned.Pipe()
+        self._process = spawned.Process(target=serve, args=(theirs,))
+        self._process.start()
+        theirs.close()
 
-    def submit(self, function: Callable[[Task], Answer], task: Task) -> Future[Answer]:
-        """The answer to come; it raises BrokenProcessPool when the process dies on the way."""
-        return self._pool.submit(function, task)
+    def begin(self, function: Callable[[Any], Any], task: object) -> None:
+        """Let it do a task; `pipe` can be read when that has ended."""
+        try:
+            self.pipe.send((function, task))
+        except BrokenPipeError:
+            return  # it has died, which `answer` finds
+
+    def answer(self) -> Any:
+        """What the task gave. Raises what it raised, and DiedError when the process died on it."""
+        try:
+            answer, error = self.pipe.recv()
+        except (EOFError, ConnectionResetError):
+            raise DiedError from None
+        if error is not None:
+            raise error
+        return answer
 
     def end(self) -> None:
         """End the process, what it is doing too."""
-        with suppress(BrokenProcessPool, ProcessLookupError):
-            os.kill(self._process.result(), signal.SIGTERM)
-        self._pool.shutdown(cancel_futures=True)
+        self._process.terminate()
+        self._process.join(GRACE)
+        self._process.kill()
+        self._process.join()
+        self.pipe.close()
 
 
-def begin_worker() -> None:
-    """Leave Ctrl-C to the parent, which ends its workers; small solves keep BLAS on one thread."""
+def serve(pipe: Connection) -> None:
+    """What a worker does; small solves keep BLAS on one thread, and Ctrl-C is the parent's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    end_with_parent()
     threadpool_limits(limits=1, user_api="blas")
+    while True:
+        try:
+            function, task = pipe.recv()
+        except EOFError:
+            return
+        try:
+            pipe.send((function(task), None))
+        except Exception as error:
+            pipe.send((None, error))
 
 
 def side_by_side(
@@ -60,22 +89,24 @@ def side_by_side(
     """
     waiting = deque(tasks)
     free = [Worker() for _ in range(min(workers, len(tasks)))]
-    busy: dict[Future[Answer], tuple[Worker, Task]] = {}
+    busy: dict[Any, tuple[Worker, Task]] = {}
     try:
         while waiting or busy:
             while waiting and free:
                 worker, task = free.pop(), waiting.popleft()
-                busy[worker.submit(function, task)] = worker, task
+                worker.begin(function, task)
+                busy[worker.pipe] = worker, task
                 on_begin(task)
-            for future in wait(busy, return_when=FIRST_COMPLETED).done:
-                worker, task = busy.pop(future)
+            for pipe in wait(list(busy)):
+                worker, task = busy[pipe]
+                answer: Answer | None = None
                 try:
-                    answer = future.result()
-                except BrokenProcessPool:
-                    answer = None
+                    answer = worker.answer()
+                    free.append(worker)
+                except DiedError:
                     worker.end()
-                    worker = Worker()
-                free.append(worker)
+                    free.append(Worker())
+                del busy[pipe]
                 yield task, answer
     finally:
         for worker in (*free, *(worker for worker, _ in busy.values())):
