@@ -1,4 +1,4 @@
-"""What a run takes of the machine: threads, memory, seconds by part."""
+"""What a run takes of the machine: threads, memory, seconds by part; processes that end with it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,18 @@ from flowborne.io.checkpoint import state_bytes
 from flowborne.io.summary import peak_memory
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.kernels.vectors import turn
+from flowborne.worker_process import GRACE, end_with_parent
 
-__all__ = ["PARTS", "cores", "kernel_threads", "memory_bandwidth", "peak_memory", "state_bytes"]
+__all__ = [
+    "GRACE",
+    "PARTS",
+    "cores",
+    "end_with_parent",
+    "kernel_threads",
+    "memory_bandwidth",
+    "peak_memory",
+    "state_bytes",
+]
 
 STREAM = (100, 100, 1000)
 """Shape of arrays that fit into no cache."""

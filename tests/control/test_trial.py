@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from flowborne.control import trial
+from flowborne.control.controller import Controller
 from flowborne.control.executors import Serial
 from flowborne.control.gradients import GradientCentral
 from flowborne.control.measurement import Measurement
@@ -20,6 +22,7 @@ from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
+from flowborne.simulation import Simulation
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]
@@ -62,6 +65,13 @@ def trial_of(
     return Trial(world, step, objective, hypothesis, dofs, pose, np.array(displacement))
 
 
+@pytest.fixture
+def every_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps whose forces nobody reads are taken like all others, so that they can be recorded."""
+    monkeypatch.setattr(trial, "move_as_told", lambda world, dt, command: False)
+
+
+@pytest.mark.usefixtures("every_step")
 def test_K7_displacement_is_exact_over_any_number_of_steps(
     make_world: MakeWorld, step: Step
 ) -> None:
@@ -88,6 +98,7 @@ def test_outboard_joints_are_rigid_and_others_free(make_world: MakeWorld, step: 
     assert np.all(np.isinf(command.torque_limit))
 
 
+@pytest.mark.usefixtures("every_step")
 @pytest.mark.parametrize(
     ("velocities", "shoulder", "elbow"),
     [("removed", 0.0, 0.0), ("present", 0.5, 0.6), ("probe", 4.0, 0.0)],
@@ -110,6 +121,32 @@ def test_velocities_that_are_held_are_there_from_the_first_step(
     assert moves[2:] == pytest.approx(np.tile(last, (3, 1)), abs=1e-12)
     assert moves[:2] == pytest.approx(np.tile([4.0, 0.0] - 1.5 * last, (2, 1)), abs=1e-12)
     assert recorder.worlds[-1].solid.q == pytest.approx([0.4, 0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "skipped"), [("human-wind-all", True), ("human-gravity-arms", True), ("eel", False)]
+)
+def test_steps_before_the_last_ask_for_no_forces_where_all_is_told(
+    name: str, skipped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And change no bit of the objective. An eel that floats answers the forces on it."""
+    coarse = {"domain.resolution": "32"} if name == "eel" else {}
+    simulation = Simulation(load_scene(name, coarse), workers=1)
+    world, controller = simulation.world, simulation.controller
+    if controller is None:
+        controller = Controller(
+            np.array([world.setup.solid.nv - 1]),
+            ObjectiveSum.of(ObjectiveCallable(angle)),
+            Hypothesis(0.01, 2),
+            1.0,
+        )
+    moves = np.zeros((2, controller.dofs.size))
+    moves[1] = 0.02
+    recorder = Recorder(stepping.step)
+    quick = controller.trials(world, recorder).values(moves)
+    assert len(recorder.worlds) == 2 * (1 if skipped else controller.hypothesis.steps)
+    monkeypatch.setattr(trial, "move_as_told", lambda world, dt, command: False)
+    assert controller.trials(world, stepping.step).values(moves).tobytes() == quick.tobytes()
 
 
 def test_trial_starts_from_its_pose_and_leaves_the_world_alone(

@@ -11,8 +11,7 @@ from math import prod
 
 from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.result import Result, verdict
-from flowborne.machine import peak_memory, state_bytes
-from flowborne.worker_process import end_with_parent
+from flowborne.machine import end_with_parent, peak_memory, state_bytes
 
 NAME = "memory"
 SCENE = "ns-block-drag-max"

@@ -17,9 +17,8 @@ import numpy as np
 from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.memory import held
 from flowborne.bench.result import Result, timed
-from flowborne.machine import PARTS, cores, kernel_threads, memory_bandwidth
+from flowborne.machine import PARTS, cores, end_with_parent, kernel_threads, memory_bandwidth
 from flowborne.operators import PressureSystem, faces_of
-from flowborne.worker_process import end_with_parent
 
 NAME = "size"
 SCENES = {"flyer-base": (32, 64, 96), "swimmer-jet-only": (72, 120, 168)}

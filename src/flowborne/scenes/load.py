@@ -42,6 +42,7 @@ BUILT_IN = (
     "human-wind-back",
     "human-wind-arms",
     "human-wind-drag",
+    "human-wind-all",
     "flyer-base",
     "flyer-twist",
     "flyer-flesh",

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from flowborne.worker_process import GRACE, end_with_parent
+from flowborne.machine import GRACE, end_with_parent
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
