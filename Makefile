@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test browser dist docs imports failing exporters fuzz messages validation-page clean
+.PHONY: closeness demo test browser dist docs imports failing exporters fuzz messages validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -42,6 +42,9 @@ fuzz: $(VENV)/installed-test
 
 messages: $(VENV)/installed-test
 	$(BIN)/python tools/messages.py
+
+closeness: $(VENV)/installed-test
+	$(BIN)/python tools/closeness.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -1,0 +1,77 @@
+"""The walker's closeness to its clip against its effort: a picture and a table of the docs.
+
+Every weight of an input-motion in `human-wind-all` is multiplied by a factor, from 0.03 to 100.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from flowborne import Scene, Simulation, load_scene
+from flowborne.scenes.build_control import input_motions
+from flowborne.scenes.schema_control import ObjectiveInputMotionTable
+
+SCENE = "human-wind-all"
+FACTORS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+FIRST, FRAMES = 24, 120
+PICTURE = Path(__file__).parents[1] / "docs" / "closeness.webp"
+
+
+def weighted(scene: Scene, factor: float) -> Scene:
+    """The scene with all closeness worth so many times as much."""
+    objectives = tuple(
+        table.model_copy(update={"weight": factor * table.weight})
+        if isinstance(table, ObjectiveInputMotionTable)
+        else table
+        for table in scene.objectives
+    )
+    return scene.model_copy(update={"objectives": objectives}).in_folder(scene.folder)
+
+
+def walked(scene: Scene) -> tuple[float, float]:
+    """Root mean square of a joint's angle from the clip, degrees, and the median over frames of the
+    torques of all joints together, N m."""
+    wanted = input_motions(scene, Simulation(scene, workers=1).setup.solid)
+    away, torque = [], []
+    with Simulation(scene, workers=1) as simulation:
+        model = simulation.setup.solid
+        for frame in range(FRAMES):
+            report = simulation.advance_frame()
+            if frame < FIRST:
+                continue
+            state, goal = simulation.world.solid, simulation.world.solid.q.copy()
+            for motion in wanted.values():
+                goal[model.indices_of(motion.dofs)] = motion.position(simulation.world.time)
+            gap = model.difference(goal, state.q)
+            away.append([np.sum(gap[motion.dofs] ** 2) for motion in wanted.values()])
+            drives = [report.step.actuator[motion.dofs] for motion in wanted.values()]
+            torque.append(float(sum(np.linalg.norm(drive) for drive in drives)))
+    return float(np.degrees(np.sqrt(np.mean(away)))), float(np.median(torque))
+
+
+def main() -> None:
+    scene = load_scene(SCENE)
+    found = [walked(weighted(scene, factor)) for factor in FACTORS]
+    for factor, (angle, torque) in zip(FACTORS, found, strict=True):
+        print(f"| {factor:g} | {angle:.1f} | {torque:.0f} |")
+    figure, axes = plt.subplots(figsize=(5.0, 3.4), layout="constrained")
+    angles, torques = zip(*found, strict=True)
+    axes.plot(angles, torques, "o-", color="#d08a00")
+    for factor, angle, torque in zip(FACTORS, angles, torques, strict=True):
+        axes.annotate(
+            f"{factor:g}", (angle, torque), (5, 4), textcoords="offset points", fontsize=8
+        )
+    axes.set(
+        xlabel="angle of a joint from the clip, rms, degrees",
+        ylabel="torques above the hips, N m",
+        ylim=(0.0, None),
+        xlim=(0.0, None),
+    )
+    figure.savefig(PICTURE, dpi=120)
+
+
+if __name__ == "__main__":
+    main()
