@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from flowborne import Scene, Simulation, load_scene
+from flowborne.control.creature import away
 from flowborne.scenes.build_control import input_motions
 from flowborne.scenes.schema_control import ObjectiveInputMotionTable
 
@@ -34,22 +35,20 @@ def weighted(scene: Scene, factor: float) -> Scene:
 def walked(scene: Scene) -> tuple[float, float]:
     """Root mean square of a joint's angle from the clip, degrees, and the median over frames of the
     torques of all joints together, N m."""
-    wanted = input_motions(scene, Simulation(scene, workers=1).setup.solid)
-    away, torque = [], []
+    angles, torques = [], []
     with Simulation(scene, workers=1) as simulation:
-        model = simulation.setup.solid
+        wanted = input_motions(scene, simulation.setup.solid).values()
         for frame in range(FRAMES):
-            report = simulation.advance_frame()
+            actuator = simulation.advance_frame().step.actuator
             if frame < FIRST:
                 continue
-            state, goal = simulation.world.solid, simulation.world.solid.q.copy()
-            for motion in wanted.values():
-                goal[model.indices_of(motion.dofs)] = motion.position(simulation.world.time)
-            gap = model.difference(goal, state.q)
-            away.append([np.sum(gap[motion.dofs] ** 2) for motion in wanted.values()])
-            drives = [report.step.actuator[motion.dofs] for motion in wanted.values()]
-            torque.append(float(sum(np.linalg.norm(drive) for drive in drives)))
-    return float(np.degrees(np.sqrt(np.mean(away)))), float(np.median(torque))
+            world = simulation.world
+            angles.append(
+                [np.linalg.norm(away(world, m.dofs, m.position(world.time))) for m in wanted]
+            )
+            torques.append([np.linalg.norm(actuator[motion.dofs]) for motion in wanted])
+    rms = np.sqrt(np.mean(np.square(angles)))
+    return float(np.degrees(rms)), float(np.median(np.sum(torques, axis=1)))
 
 
 def main() -> None:

@@ -33,7 +33,7 @@ BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREA
 """Our solves are small: more threads in BLAS are slower, and their sums differ."""
 
 FILE_KEYS = ("clip.file", "earlier.run", "solids.model")
-"""Keys of a scene that name files or folders; on the command line a path starts from here."""
+"""Keys of scenes that name files or folders: a path in a command starts from where one is."""
 
 app = typer.Typer(
     name="flowborne",

@@ -44,12 +44,8 @@ def measure() -> Iterator[Result]:
 
 
 def footprint(scene: Scene, early: int = EARLY, late: int = LATE) -> list[Result]:
-    """Most that a run holds per cell, and what it holds after `late` frames over `early`.
-
-    It runs in a process of its own, whose size nothing else has raised.
-    """
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), end_with_parent) as executor:
-        before, after = executor.submit(held, scene, (early, late)).result()
+    """Most that a run holds per cell, and what it holds after `late` frames over `early`."""
+    before, after = held_apart(scene, (early, late))
     world = Simulation(scene, 1).world
     cells = prod(world.flow()[0].grid.shape)
     ratio = max(after.now / before.now, after.process / before.process)
@@ -74,6 +70,12 @@ def footprint(scene: Scene, early: int = EARLY, late: int = LATE) -> list[Result
             ],
         ),
     ]
+
+
+def held_apart(scene: Scene, frames: tuple[int, ...]) -> list[Held]:
+    """As `held`, in a process of its own, whose size nothing else has raised."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), end_with_parent) as executor:
+        return executor.submit(held, scene, frames).result()
 
 
 def held(scene: Scene, frames: tuple[int, ...]) -> list[Held]:

@@ -7,17 +7,15 @@ McCalpin 1995), on one core and on all: where one takes most of what there is, o
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from math import prod
 
 import numpy as np
 
 from flowborne import Scene, Simulation, load_scene
-from flowborne.bench.memory import held
+from flowborne.bench.memory import held_apart
 from flowborne.bench.result import Result, timed
-from flowborne.machine import PARTS, cores, end_with_parent, kernel_threads, memory_bandwidth
+from flowborne.machine import PARTS, cores, kernel_threads, memory_bandwidth
 from flowborne.operators import PressureSystem, faces_of
 
 NAME = "size"
@@ -43,10 +41,7 @@ def growth(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     cells, seconds, lines = [], [], []
     for scene in scenes:
         shape, steps, spent = parts_of(scene, frames)
-        with ProcessPoolExecutor(
-            1, multiprocessing.get_context("spawn"), end_with_parent
-        ) as executor:
-            (memory,) = executor.submit(held, scene, (2,)).result()
+        (memory,) = held_apart(scene, (2,))
         cells.append(prod(shape))
         seconds.append(sum(spent.values()))
         unit = 1e9 / cells[-1] / steps

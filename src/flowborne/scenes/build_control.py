@@ -185,8 +185,8 @@ def input_motions(scene: Scene, model: SolidModel) -> dict[int, Trajectory]:
         for number, table in enumerate(scene.objectives)
         if isinstance(table, tables.ObjectiveInputMotionTable)
     }
-    of_clip = {table.joint for table in tables_of.values() if table.values is None}
-    clip = clip_motion(scene, model, posed(scene, model).q, tuple(of_clip)) if of_clip else None
+    of_clip = tuple(dict.fromkeys(t.joint for t in tables_of.values() if t.values is None))
+    clip = clip_motion(scene, model, posed(scene, model).q, of_clip) if of_clip else None
     found: dict[int, Trajectory] = {}
     for number, table in tables_of.items():
         unit, dofs = joint_unit(model, table.joint), model.dofs_of(table.joint)

@@ -101,8 +101,7 @@ def _check_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
 def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[str]:
     scene, table = draft.scene, draft.scene.objectives[index]
     where = draft.at("objectives", index)
-    driven = {*scene.controlled_joints(), *(motion.joint for motion in scene.motion)}
-    driven |= set(earlier_joints(scene))
+    driven = {*scene.told_joints(), *earlier_joints(scene)}
     capture = capture_of(scene)
     if capture is not None:
         driven |= set(followers(scene, capture, model))

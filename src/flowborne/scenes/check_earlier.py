@@ -25,9 +25,7 @@ def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
     scene, earlier = draft.scene, earlier_of(draft.scene)
     if earlier is None:
         return
-    others = {joint: "controlled" for joint in scene.controlled_joints()}
-    others |= {table.joint: "moved by a [[motion]]" for table in scene.motion}
-    joints = earlier_joints(scene)
+    others, joints = scene.told_joints(), earlier_joints(scene)
     if not joints:
         yield (
             f"{draft.at('earlier')}: what was controlled there is so here, or has a [[motion]]: "

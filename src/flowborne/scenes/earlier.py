@@ -91,8 +91,8 @@ def earlier_joints(scene: Scene) -> tuple[str, ...]:
         return ()
     if table.joints is not None:
         return table.joints
-    moved = {*scene.controlled_joints(), *(motion.joint for motion in scene.motion)}
-    return tuple(joint for joint in earlier.poses if joint not in moved)
+    told = scene.told_joints()
+    return tuple(joint for joint in earlier.poses if joint not in told)
 
 
 def earlier_motion(scene: Scene, model: SolidModel) -> TrajectoryClip | None:

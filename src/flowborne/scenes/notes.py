@@ -83,12 +83,12 @@ def _too_slow(scene: Scene, model: SolidModel) -> Iterator[str]:
         unit = joint_unit(model, table.joint)
         wanted = max(float(np.linalg.norm(motion.velocity(at))) for at in times) / unit
         for place, control in enumerate(scene.control, start=1):
-            if table.joint in control.joints and wanted > share * control.strength:
+            fastest = share * control.strength
+            if table.joint in control.joints and wanted > fastest:
                 rate = "m/s" if joint_kind(model, table.joint) == SLIDE else "degrees/s"
-                goes = f"goes at {share * control.strength:.3g} at most"
                 yield (
                     f"[[objectives]] {number + 1}: '{table.joint}' is to be close to a motion of "
-                    f"up to {wanted:.3g} {rate}, and {goes}; "
+                    f"up to {wanted:.3g} {rate}, and goes at {fastest:.3g} at most; "
                     f"a larger strength in [[control]] {place}"
                     + (" or frequency of its servo" if share < 1.0 else "")
                     + " lets it follow"

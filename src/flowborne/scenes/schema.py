@@ -197,6 +197,11 @@ class Scene(Table):
         """Names of the controlled joints in the order of the controller."""
         return tuple(joint for table in self.control for joint in table.joints)
 
+    def told_joints(self) -> dict[str, str]:
+        """Joints that [[control]] and [[motion]] move -> which of them does, in words."""
+        told = dict.fromkeys(self.controlled_joints(), "controlled")
+        return told | {table.joint: "moved by a [[motion]]" for table in self.motion}
+
     def scalars(self) -> tuple[str, ...]:
         """Names of the dyes, each once, in the order of the file."""
         names = [table.name for table in self.dye]
