@@ -42,7 +42,8 @@ class Measures:
       target_<joint>_rad, target_<joint>_m      the controlled ones among them
       objective, objective_<term>               the controller's, weighted sum and unweighted terms
       tried_objective                           the sum as the last decision's trials found it, at
-                                                rest, in scenes whose trials remove velocities
+                                                rest in scenes whose trials remove velocities,
+                                                and with knots as the mean over the plan
       drag_N, lift_N                            force of fluid and winds on all bodies along and
                                                 across the stream (a quarter turn to its left)
       effort                                    |drive force| dt over the controlled dofs, N m s
@@ -93,7 +94,7 @@ class Measures:
         ]
         self.controlled = [column for column, _, dof in self._joints if dof in places]
         self._terms = [] if controller is None else _terms(controller)
-        self._at_rest = controller is not None and controller.hypothesis.velocities == "removed"
+        self._tried = controller is not None and controller.tries_otherwise
         self.columns = self._columns()
 
     def values(self, world: World, frame: int, report: FrameReport | None) -> dict[str, float]:
@@ -129,7 +130,7 @@ class Measures:
         names = ["frame", "time_s", *(column for column, _, _ in self._joints)]
         names += [column for column, _ in self._targets]
         names += ["objective", *(f"objective_{term}" for term in self._terms)]
-        names += ["tried_objective"] if self._at_rest else []
+        names += ["tried_objective"] if self._tried else []
         names += ["drag_N", "lift_N", "effort", "work_J"]
         if self._model.flesh is not None:
             names += ["flesh_least_detF", "flesh_inside_out"]
@@ -146,7 +147,7 @@ class Measures:
     def _of_frame(self, report: FrameReport) -> dict[str, float]:
         steps, last = report.steps, report.step
         values: dict[str, float] = {"objective": report.objective}
-        values |= {"tried_objective": report.tried} if self._at_rest else {}
+        values |= {"tried_objective": report.tried} if self._tried else {}
         values |= {f"objective_{term}": report.terms[term] for term in self._terms}
         values |= {column: float(report.targets[place]) for column, place in self._targets}
         force = last.fluid_wrench()[1:, :3].sum(axis=0)

@@ -10,10 +10,12 @@ import pytest
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import (
     ObjectiveCallable,
+    ObjectiveDistance,
     ObjectiveDrag,
     ObjectiveEffort,
     ObjectiveInputMotion,
     ObjectivePressureDrag,
+    ObjectiveSpeed,
     ObjectiveSum,
     ObjectiveVelocity,
     ObjectiveWindDrag,
@@ -43,6 +45,17 @@ def test_effort_is_the_impulse_of_its_scope(measured: Measurement) -> None:
     assert ObjectiveEffort(np.array([0, 1])).value(measured) == pytest.approx(5.0 * 0.05)
     assert ObjectiveEffort(np.array([0, 1, 2])).value(measured) == pytest.approx(13.0 * 0.05)
     assert ObjectiveEffort(np.array([2])).value(measured) == pytest.approx(12.0 * 0.05)
+
+
+def test_speed_is_along_a_unit_vector_and_distance_from_a_point(measured: Measurement) -> None:
+    """The upper arm, of 1 m, stands along y and turns by 2 rad/s: its end goes along -x."""
+    lower = measured.world.setup.solid.body("lower")
+    assert ObjectiveSpeed(lower, (-3.0, 4.0, 0.0)).value(measured) == pytest.approx(2.0 * 0.6)
+    whole = ObjectiveSpeed(None, (1.0, 0.0, 0.0)).value(measured)
+    assert whole == pytest.approx(measured.whole_velocity()[0])
+    assert ObjectiveDistance(lower, (3.0, 5.0, 0.0)).value(measured) == pytest.approx(5.0)
+    with pytest.raises(ValueError, match="direction"):
+        ObjectiveSpeed(None, (0.0, 0.0, 0.0))
 
 
 def test_drags_are_forces_of_their_scope_along_a_unit_vector(measured: Measurement) -> None:

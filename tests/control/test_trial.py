@@ -10,12 +10,13 @@ import pytest
 
 from flowborne.control import trial
 from flowborne.control.controller import Controller
+from flowborne.control.course import TrialError, Trials
 from flowborne.control.executors import Serial
 from flowborne.control.gradients import GradientCentral
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum
 from flowborne.control.phases import PhaseIntervals
-from flowborne.control.trial import Hypothesis, Trial, TrialError, Trials, without_scalars
+from flowborne.control.trial import Hypothesis, PoseCourse, Trial, without_scalars
 from flowborne.coupling import step as stepping
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
@@ -157,12 +158,8 @@ def test_trial_starts_from_its_pose_and_leaves_the_world_alone(
     world.memory["target"] = np.array([1.0, 2.0, 3.0])
     before = {name: values.tobytes() for name, values in world.arrays().items()}
     trials = Trials(
-        world,
-        step,
+        PoseCourse(world, step, Hypothesis(0.1), SHOULDER, np.array([0.5, 0.0, 0.0])),
         ObjectiveSum.of(ObjectiveCallable(angle)),
-        Hypothesis(0.1),
-        SHOULDER,
-        np.array([0.5, 0.0, 0.0]),
         GradientCentral(0.1),
         Serial(),
         np.array([0]),
@@ -192,7 +189,7 @@ def test_trial_in_a_flow_leaves_it_alone_and_needs_no_dye() -> None:
         controller.objective,
         controller.hypothesis,
         controller.dofs,
-        trials.pose,
+        world.solid.q,
         np.array([0.1]),
     )
     assert dyed.run() == value

@@ -132,7 +132,28 @@ ONE_FAULT = {
     "an objective without its kind": (
         {'kind = "effort"': 'goal = "least"'},
         "scene swim.toml, [[objectives]] 1: key 'kind' is missing. Give one of: effort, wind-drag, "
-        "drag, pressure-drag, pressure-lift, input-motion, velocity, python.",
+        "drag, pressure-drag, pressure-lift, input-motion, velocity, speed, distance, python.",
+    ),
+    "a speed without direction": (
+        {'kind = "effort"': 'kind = "speed"\ndirection = [0.0, 0.0]'},
+        "scene swim.toml, [[objectives]] 1: direction is 0. "
+        "Give a direction such as [1.0, 0.0, 0.0].",
+    ),
+    "a distance of a body that is not there": (
+        {'kind = "effort"': 'kind = "distance"\nbody = "hnad"\npoint = [0.0, 0.0]'},
+        "scene swim.toml, [[objectives]] 1: body 'hnad' is not in model squid.xml; "
+        "did you mean 'hand'?",
+    ),
+    "knots and what only trials of poses have": (
+        {"[solids]": '[controller]\nknots = 3\nvelocities = "probe"\n\n[solids]'},
+        "scene swim.toml, [controller] has knots, and velocities, which is for trials of poses. "
+        "Give one of the two.",
+    ),
+    "steps of a plan that miss its knots": (
+        {"[solids]": "[controller]\nknots = 3\nhypothetical_time = 0.03\n\n[solids]"},
+        "scene swim.toml, [controller]: hypothetical_time is 0.03 s, and there are 0.04167 s from "
+        "decision to decision, which is no whole number of steps. Give 0.04167, or leave it out "
+        "to step by frames.",
     ),
     "a wind objective without wind": (
         {'kind = "effort"': 'kind = "wind-drag"\ndirection = [1.0, 0.0]'},

@@ -15,13 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.control import creature
+from flowborne.control.approach import approach
+from flowborne.control.course import Course, Step, Trials
 from flowborne.control.executors import Mapper, Threads
 from flowborne.control.gradients import Gradient, GradientCentral
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.control.phases import Phases
+from flowborne.control.plan import Horizon, PlanCourse
 from flowborne.control.rules import FixedStep, Rule
-from flowborne.control.trial import Hypothesis, Step, Trials
+from flowborne.control.trial import Hypothesis, PoseCourse
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.servo import Servo, ServoExact
@@ -75,12 +78,14 @@ class Controller:
     """Gradient descent on an objective over the controlled joints, within the creature's strength.
 
     Its own state is in the world's memory: "target" (nq,), "displacement" (n,), "gradient" (n,),
-    "objective" (1,), "pace" (2, n): that of the rule and the gradient that it came from, and
-    "schedule" (2,): frames left after this one until the next decision, and the frame time in s.
+    "objective" (1,), "pace" (2, n): that of the rule and the gradient that it came from,
+    "schedule" (2,): frames left after this one until the next decision, and the frame time in s,
+    and with a horizon "plan" (knots, n): displacements from knot to knot; "pace" is then
+    (2, knots n).
 
     dofs        (n,) controlled dofs, indices into v
     objective   what to minimise
-    hypothesis  how a pose is tried
+    hypothesis  how a pose is tried, or how far a plan looks ahead
     strength    rad/s or m/s, the fastest that a dof moves; one for all dofs or one each
     gradient    finite difference
     rule        how far to go down the gradient
@@ -98,7 +103,7 @@ class Controller:
 
     dofs: Integers
     objective: ObjectiveSum
-    hypothesis: Hypothesis
+    hypothesis: Hypothesis | Horizon
     strength: float | tuple[float, ...]
     gradient: Gradient = field(default_factory=partial(GradientCentral, math.radians(10.0)))
     rule: Rule = field(default_factory=FixedStep)
@@ -134,6 +139,12 @@ class Controller:
                 "both must be at least 1"
             )
 
+    @property
+    def tries_otherwise(self) -> bool:
+        """Whether trials read the objective in another motion than that of a real step."""
+        how = self.hypothesis
+        return isinstance(how, Horizon) or how.velocities == "removed"
+
     def decide(self, world: World, frame_time: float, step: Step) -> Decision:
         """Choose the target for the coming frames; call at the start of every frame.
 
@@ -147,12 +158,14 @@ class Controller:
         if "schedule" in memory and memory["schedule"][0] >= 1.0:
             memory["schedule"] = np.array([memory["schedule"][0] - 1.0, frame_time])
             return self._decision(world, False, 0, started)
-        pose, value, gradient, evaluations = self._descend(world, frame_time, step)
+        course, value, gradient, evaluations = self._descend(world, frame_time, step)
         model, state = creature.parts(world)
-        memory["target"] = pose
-        memory["displacement"] = model.difference(state.q, pose)[self.dofs]
-        memory["gradient"] = gradient
+        memory["target"] = course.goal
+        memory["displacement"] = model.difference(state.q, course.goal)[self.dofs]
+        memory["gradient"] = gradient[: self.dofs.size]
         memory["objective"] = np.array([value])
+        if isinstance(course, PlanCourse):
+            memory["plan"] = course.moves.reshape(-1, self.dofs.size)
         memory["schedule"] = np.array([self.every - 1.0, frame_time])
         return self._decision(world, True, evaluations, started)
 
@@ -182,22 +195,14 @@ class Controller:
         frame_end_time  s, end of the frame that the step is in
         dt              s, length of the step
         """
-        model, state = creature.parts(world)
-        command = JointCommand.none(model.nv)
-        rate: Array | float = 0.0
-        final: Array | float = 0.0
-        if "target" in world.memory:
-            left, frame_time = world.memory["schedule"]
-            remaining = max(frame_end_time + left * frame_time - world.time, dt)
-            gap = model.difference(state.q, world.memory["target"])[self.dofs]
-            v = state.v[self.dofs]
-            rate, final = self.servo.velocity(gap, v, float(remaining), dt)
-            # a drive that may give way moves with the velocity it has: it steers the step after
-            later = float(max(remaining - dt, dt))
-            ahead, _ = self.servo.velocity(gap - dt * v, v, later, dt)
-            final = np.where(np.isfinite(self.servo.torque_limit), ahead, final)
-        command.set(self.dofs, rate, final, np.asarray(self.servo.torque_limit, dtype=np.float64))
-        return command
+        if "target" not in world.memory:
+            command = JointCommand.none(world.solid.v.size)
+            command.set(self.dofs, 0.0, 0.0, np.asarray(self.servo.torque_limit, dtype=np.float64))
+            return command
+        left, frame_time = world.memory["schedule"]
+        remaining = float(frame_end_time + left * frame_time - world.time)
+        target = world.memory["target"]
+        return approach(world, self.dofs, self.servo, target, remaining, dt)
 
     def measure(self, world: World, report: StepReport) -> dict[str, float]:
         """After a real step: the weighted sum as "objective", then every term's own value."""
@@ -208,31 +213,56 @@ class Controller:
         self,
         world: World,
         step: Step,
-        pose: Array | None = None,
+        course: Course | None = None,
         objective: ObjectiveSum | None = None,
         places: Integers | None = None,
         pace: Array | None = None,
     ) -> Trials:
-        """An objective as a function of displacements from `pose` (nq,); None: the present.
+        """An objective as a function of what a course in `world` is displaced by.
 
+        course     the present pose when None
         objective  the controller's own when None
-        places     (m,) those of the controlled dofs that are displaced; all when None
-        pace       (n,) part of the gradient's displacements, 1 when None
+        places     (m,) those of the course's numbers that are displaced; all when None
+        pace       (N,) part of the gradient's displacements, 1 when None
         """
-        _, state = creature.parts(world)
-        places = np.arange(self.dofs.size) if places is None else places
-        pace = np.ones(self.dofs.size) if pace is None else pace
+        course = self._here(world, step) if course is None else course
+        places = np.arange(course.count) if places is None else places
+        pace = np.ones(course.count) if pace is None else pace
         return Trials(
-            world,
-            step,
+            course,
             self.objective if objective is None else objective,
-            self.hypothesis,
-            self.dofs,
-            (state.q if pose is None else pose).copy(),
-            self.gradient.of(places, pace[places]),
+            self.gradient.of(places % self.dofs.size, pace[places]),
             self.executor,
             places,
         )
+
+    def course(self, world: World, frame_time: float, step: Step) -> Course:
+        """From which a decision sets out: the present pose, or what is left of the last plan.
+
+        frame_time  s
+        """
+        if isinstance(self.hypothesis, Hypothesis):
+            return self._here(world, step)
+        most = self._limit(world.time, frame_time)
+        moves = world.memory.get("plan", np.zeros((1, self.dofs.size)))[1:].ravel()
+        moves = np.append(moves, np.zeros(most.size - moves.size))
+        how = self.hypothesis
+        course = PlanCourse(world, step, how, self.dofs, self.servo, most, moves)
+        return course.displaced(course.within_range(np.zeros(course.count)))
+
+    def _here(self, world: World, step: Step) -> PoseCourse:
+        """The present pose, with a horizon too: its trials move as far in one of its steps."""
+        _, state = creature.parts(world)
+        how = self.hypothesis
+        how = Hypothesis(how.dt, velocities="probe") if isinstance(how, Horizon) else how
+        return PoseCourse(world, step, how, self.dofs, state.q.copy())
+
+    def _limit(self, time: float, frame_time: float) -> Array:
+        """(N,) what strength allows of each number of a course that is decided at `time` (s)."""
+        knots = self.hypothesis.knots if isinstance(self.hypothesis, Horizon) else 1
+        interval = self.every * frame_time
+        strength = [self.strength_at(time + knot * interval) for knot in range(knots)]
+        return interval * np.concatenate(strength)
 
     def positions(self, world: World) -> Array:
         """(n,) present positions of controlled scalar joints, rad or m; NaN for ball dofs."""
@@ -249,39 +279,47 @@ class Controller:
 
     def _descend(
         self, world: World, frame_time: float, step: Step
-    ) -> tuple[Array, float, Array, int]:
-        """Pose to go to; objective and gradient in the present pose; number of trials run.
+    ) -> tuple[Course, float, Array, int]:
+        """Course to take; objective and gradient (N,) on that from which the decision set out;
+        number of trials run.
 
-        Dofs that want different things each descend on what they want, all from the same pose.
+        Dofs that want different things each descend on what they want, all from the same course.
         """
-        n = self.dofs.size
-        model, state = creature.parts(world)
-        pose, value, gradient, evaluations = state.q.copy(), 0.0, np.zeros(n), 0
-        pace, slope = world.memory.get("pace", np.array([np.ones(n), np.zeros(n)])).copy()
-        limit = self.strength_at(world.time) * (self.every * frame_time)
-        groups = [
-            (places, wanted)
-            for places, wanted in self.objective.shared_out(self.dofs)
-            if wanted.active(world.time)
-        ]
+        course = self.course(world, frame_time, step)
+        size, value, evaluations = course.count, 0.0, 0
+        gradient = np.zeros(size)
+        pace, slope = world.memory.get("pace", np.array([np.ones(size), gradient])).copy()
+        limit = self._limit(world.time, frame_time)
+        groups = self._groups(world, size)
         for iteration in range(self.iterations):
-            displacement = np.zeros(model.nv)
+            displacement = np.zeros(size)
             for places, wanted in groups:
-                trials = self.trials(world, step, pose, wanted, places, pace)
+                trials = self.trials(world, step, course, wanted, places, pace)
                 estimate = trials.estimator.estimate(trials)
                 slopes = estimate.gradient
                 if iteration == 0:
                     value, gradient[places] = value + estimate.value, slopes
                 pace[places] = self.rule.pace(pace[places], slope[places], slopes)
                 slope[places] = slopes
-                rate = pace[places] * self._step(trials, slopes, limit[places])
-                displacement[self.dofs[places]] = trials.within_range(rate)
+                way = pace[places] * self._step(trials, slopes, limit[places])
+                displacement[places] = trials.within_range(way)
                 evaluations += trials.evaluations
             if not displacement.any():
                 break
-            pose = creature.moved(model, pose, displacement)
+            course = course.displaced(displacement)
         world.memory["pace"] = np.array([pace, slope])
-        return pose, value, gradient, evaluations
+        return course, value, gradient, evaluations
+
+    def _groups(self, world: World, size: int) -> list[tuple[Integers, ObjectiveSum]]:
+        """Places among the numbers (N,) of a course that want the same, each group with its sum;
+        none of those whose sum has no term that counts. On a plan terms come into force on the
+        way."""
+        knots = self.dofs.size * np.arange(size // self.dofs.size)[:, None]
+        return [
+            ((knots + places).ravel(), wanted)
+            for places, wanted in self.objective.shared_out(self.dofs)
+            if isinstance(self.hypothesis, Horizon) or wanted.active(world.time)
+        ]
 
     def _step(self, trials: Trials, gradient: Array, limit: Array) -> Array:
         """(m,) what the rule says. Raises PartError when that is no such displacement."""

@@ -139,6 +139,12 @@ def body_rotation(world: World, body: int) -> Array:
     return kinematics(model, state.q).body_rotation[body]
 
 
+def body_position(world: World, body: int) -> Array:
+    """(3,) origin of the body's frame, m."""
+    model, state = parts(world)
+    return kinematics(model, state.q).body_position[body]
+
+
 def body_velocity(world: World, body: int) -> Array:
     """(3,) velocity of the origin of the body's frame, m/s."""
     model, state = parts(world)

@@ -75,6 +75,10 @@ class Measurement:
         """(3, 3) columns are the body's axes in the world."""
         return creature.body_rotation(self.world, body)
 
+    def body_position(self, body: int) -> Array:
+        """(3,) origin of the body's frame, m."""
+        return creature.body_position(self.world, body)
+
     def body_velocity(self, body: int) -> Array:
         """(3,) velocity of the origin of the body's frame, m/s."""
         return creature.body_velocity(self.world, body)

@@ -46,6 +46,8 @@ OBJECTIVES: Registry[Objective] = Registry(
         "pressure-lift",
         "input-motion",
         "velocity",
+        "speed",
+        "distance",
         "python",
     ),
     keys=("goal", "weight", "phases", "wanted_by"),
@@ -86,6 +88,11 @@ def unit(direction: Vector) -> Array:
 def force(wrench: Array, bodies: Integers) -> Array:
     """(3,) total force on `bodies` of the wrenches (nbody, 6), N."""
     return wrench[bodies, :3].sum(axis=0)
+
+
+def velocity_of(body: int | None, measurement: Measurement) -> Array:
+    """(3,) velocity of a body at the origin of its frame, or of the centre of mass of all, m/s."""
+    return measurement.whole_velocity() if body is None else measurement.body_velocity(body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,13 +210,42 @@ class ObjectiveVelocity:
     name: str = "velocity"
 
     def value(self, measurement: Measurement) -> float:
-        present = (
-            measurement.whole_velocity()
-            if self.body is None
-            else measurement.body_velocity(self.body)
-        )
-        missing = present - np.asarray(self.target)
+        missing = velocity_of(self.body, measurement) - np.asarray(self.target)
         return float(missing @ missing)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveSpeed:
+    """Velocity along a direction, m/s. Over a plan it is the way made, by its time.
+
+    body    whose velocity it is, at the origin of its frame; None is the centre of mass of all
+    raises  ValueError for a direction of no length
+    """
+
+    body: int | None
+    direction: Vector
+    name: str = "speed"
+
+    def __post_init__(self) -> None:
+        unit(self.direction)
+
+    def value(self, measurement: Measurement) -> float:
+        return float(velocity_of(self.body, measurement) @ unit(self.direction))
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveDistance:
+    """Distance of the origin of a body's frame from a point, m.
+
+    point  m, in the world
+    """
+
+    body: int
+    point: Vector
+    name: str = "distance"
+
+    def value(self, measurement: Measurement) -> float:
+        return float(np.linalg.norm(measurement.body_position(self.body) - np.asarray(self.point)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ objective is read), 3.3 and 5 (what is outboard is rigid), 3.3 and 4.3 (steady s
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -15,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.control import creature
-from flowborne.control.executors import Mapper
-from flowborne.control.gradients import Displaced, Gradient
+from flowborne.control.course import Step, TrialError, advance
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.step import move_as_told
 
 if TYPE_CHECKING:
@@ -29,12 +26,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Velocities = Literal["removed", "present", "probe"]
-Step = Callable[["World", float, JointCommand | None], StepReport]
-"""step(world, dt, drive): advances `world` in place and says what it did."""
-
-
-class TrialError(ArithmeticError):
-    """A hypothetical step, or the objective after it, is not a finite number."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +118,10 @@ class Trial:
                 command.rate[self.dofs] = self._pace(command)
             # what is on the way to the last step is not read, and where all is told, not felt
             if number == whole or not move_as_told(world, hypothesis.dt, command):
-                report = self._advance(world, command)
+                report = advance(world, self.step, hypothesis.dt, command, self._tried)
         value = self.objective.value(Measurement(world, report, self.world.time))
         if not np.isfinite(value):
-            raise TrialError(self._complaint(f"the objective is {value}"))
+            raise TrialError.of(hypothesis.dt, self._tried, f"the objective is {value}")
         return value
 
     def _prepare(self, world: World) -> JointCommand:
@@ -163,65 +154,34 @@ class Trial:
         final = command.final_velocity[self.dofs]
         return final if self.hypothesis.velocities == "present" else np.zeros_like(final)
 
-    def _advance(self, world: World, command: JointCommand) -> StepReport:
-        report = self.step(world, self.hypothesis.dt, command)
-        if report.outcome in (Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE):
-            raise TrialError(self._complaint(report.outcome.value))
-        return report
-
-    def _complaint(self, what: str) -> str:
+    @property
+    def _tried(self) -> str:
+        """What is tried and when, in words."""
         model, _ = creature.parts(self.world)
         tried = ", ".join(
             f"{model.dof_names[dof]} by {by:.4g}"
             for dof, by in zip(self.dofs, self.displacement, strict=True)
         )
-        return (
-            f"in a hypothetical step of {self.hypothesis.dt:.4g} s that moves {tried} at time "
-            f"{self.world.time:.6g} s, {what}; try a smaller displacement or a shorter step"
-        )
+        return f"moves {tried} at time {self.world.time:.6g} s"
 
 
-def run(trial: Trial) -> float:
-    """Run a trial; a function at module level, so that any executor can take it."""
-    return trial.run()
+@dataclass(frozen=True, eq=False)
+class PoseCourse:
+    """Going straight to a pose: what a decision of the paper is about.
 
-
-def without_scalars(world: World) -> World:
-    """The same world, its arrays shared, without dye and smoke: they push nothing."""
-    if world.fluid is None:
-        return world
-    return replace(world, fluid=replace(world.fluid, scalars={}))
-
-
-@dataclass(eq=False)
-class Trials:
-    """The objective as a function of the pose, in the flow and time of `world`.
-
-    Dye and smoke are not carried along, so no objective sees them.
-
-    world, step, objective, hypothesis, dofs, pose  as in `Trial`
-    estimator  of the gradient
-    mapper     runs the trials
-    places     (m,) those of `dofs` that are displaced, of which all displacements here speak; the
-               others stay
-    evaluations  number of trials run so far
+    world, step, hypothesis, dofs, pose  as in `Trial`
     """
 
     world: World
     step: Step
-    objective: ObjectiveSum
     hypothesis: Hypothesis
     dofs: Integers
     pose: Array
-    estimator: Gradient
-    mapper: Mapper
-    places: Integers
-    evaluations: int = 0
 
     @property
     def count(self) -> int:
-        """m, number of dofs that are displaced."""
-        return int(self.places.size)
+        """n, a displacement for each of the controlled dofs."""
+        return int(self.dofs.size)
 
     @cached_property
     def rigid(self) -> Integers:
@@ -229,33 +189,43 @@ class Trials:
         return creature.outboard(self.world, self.dofs)
 
     def within_range(self, displacement: Array) -> Array:
-        """(m,) the part of a displacement (m,) that the joints' ranges allow."""
+        """(n,) the part of a displacement that the joints' ranges allow."""
+        model, _ = creature.parts(self.world)
+        return creature.within_range(model, self.pose, self._full(displacement))[self.dofs]
+
+    def trial(self, objective: ObjectiveSum, displacement: Array) -> Trial:
+        """Dye and smoke are not carried along: they push nothing, and no objective sees them."""
+        return Trial(
+            without_scalars(self.world),
+            self.step,
+            objective,
+            self.hypothesis,
+            self.dofs,
+            self.pose,
+            displacement,
+            self.rigid,
+        )
+
+    def displaced(self, displacement: Array) -> PoseCourse:
+        model, _ = creature.parts(self.world)
+        pose = creature.moved(model, self.pose, self._full(displacement))
+        return replace(self, pose=pose)
+
+    @property
+    def goal(self) -> Array:
+        """(nq,) the pose."""
+        return self.pose
+
+    def _full(self, displacement: Array) -> Array:
+        """(nv,) a displacement (n,) of the controlled dofs among all."""
         model, _ = creature.parts(self.world)
         full = np.zeros(model.nv)
-        full[self.dofs[self.places]] = displacement
-        return creature.within_range(model, self.pose, full)[self.dofs[self.places]]
+        full[self.dofs] = displacement
+        return full
 
-    def gradient(self, displacement: Array) -> Array:
-        """(m,) gradient in a displaced pose by the displacement (m,). Raises TrialError."""
-        return self.estimator.estimate(Displaced(self, displacement)).gradient
 
-    def values(self, displacements: Array) -> Array:
-        """(k,) objective in poses displaced by the rows of (k, m). Raises TrialError."""
-        world = without_scalars(self.world)
-        moves = np.zeros((len(displacements), self.dofs.size))
-        moves[:, self.places] = displacements
-        trials = [
-            Trial(
-                world,
-                self.step,
-                self.objective,
-                self.hypothesis,
-                self.dofs,
-                self.pose,
-                displacement,
-                self.rigid,
-            )
-            for displacement in moves
-        ]
-        self.evaluations += len(trials)
-        return np.array(self.mapper.map(run, trials, self.world.setup))
+def without_scalars(world: World) -> World:
+    """The same world, its arrays shared, without dye and smoke."""
+    if world.fluid is None:
+        return world
+    return replace(world, fluid=replace(world.fluid, scalars={}))

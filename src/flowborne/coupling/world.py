@@ -78,6 +78,11 @@ class Setup:
         tolerance = max(self.fluid.tolerance, HYPOTHETICAL)
         return self.but(fluid=replace(self.fluid, tolerance=tolerance), trial=True)
 
+    @cached_property
+    def rehearsed(self) -> Setup:
+        """The same for hypothetical steps that go on as those of the world itself do."""
+        return self.hypothetical.but(trial=False)
+
     def but(self, **parts: Any) -> Setup:
         """The same with other `parts`, but the same bodies on the same grid: sampled once."""
         other = replace(self, **parts)

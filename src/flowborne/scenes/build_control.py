@@ -19,16 +19,19 @@ from flowborne.control.objectives import (
     OBJECTIVES,
     Objective,
     ObjectiveCallable,
+    ObjectiveDistance,
     ObjectiveDrag,
     ObjectiveEffort,
     ObjectiveInputMotion,
     ObjectivePressureDrag,
+    ObjectiveSpeed,
     ObjectiveSum,
     ObjectiveVelocity,
     ObjectiveWindDrag,
     WeightedObjective,
 )
 from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseTrack
+from flowborne.control.plan import Horizon
 from flowborne.control.rules import (
     RULES,
     FixedStep,
@@ -88,12 +91,7 @@ def controller_of(
     return Controller(
         np.array(dofs, dtype=np.int64),
         _objectives(scene, model, motions),
-        Hypothesis(
-            scene.frame_time if how.hypothetical_time is None else how.hypothetical_time,
-            how.hypothetical_steps,
-            how.settle_steps,
-            how.velocities,
-        ),
+        _hypothesis(how, scene.frame_time),
         tuple(strength),
         gradient=_gradient(how.gradient, tuple(probe)),
         rule=_rule(how.rule, scene, model),
@@ -103,6 +101,16 @@ def controller_of(
         executor=executor,
         in_phases=tuple(in_phases),
     )
+
+
+def _hypothesis(table: tables.ControllerTable, frame_time: float) -> Hypothesis | Horizon:
+    """How a decision tries poses, or a plan."""
+    dt = frame_time if table.hypothetical_time is None else table.hypothetical_time
+    if table.knots is None:
+        return Hypothesis(dt, table.hypothetical_steps, table.settle_steps, table.velocities)
+    interval = table.every * frame_time
+    steps = round(interval / dt)
+    return Horizon(interval / steps, steps, table.knots)
 
 
 def _free_dofs(model: SolidModel, joint: str) -> list[int]:
@@ -172,6 +180,11 @@ def _objective(
     if isinstance(table, tables.ObjectiveVelocityTable):
         body = None if table.body is None else model.body(table.body)
         return ObjectiveVelocity(body, triple(table.target))
+    if isinstance(table, tables.ObjectiveSpeedTable):
+        body = None if table.body is None else model.body(table.body)
+        return ObjectiveSpeed(body, triple(table.direction))
+    if isinstance(table, tables.ObjectiveDistanceTable):
+        return ObjectiveDistance(model.body(table.body), triple(table.point))
     if isinstance(table, tables.ObjectiveOwnTable):
         return OBJECTIVES.make(table.kind, table.parameters)
     function = with_parameters(table.function, table.parameters)

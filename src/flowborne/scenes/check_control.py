@@ -12,11 +12,13 @@ from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema_control import (
+    ObjectiveDistanceTable,
     ObjectiveDragTable,
     ObjectiveEffortTable,
     ObjectiveInputMotionTable,
     ObjectivePressureTable,
     ObjectivePythonTable,
+    ObjectiveSpeedTable,
     ObjectiveVelocityTable,
     ObjectiveWindDragTable,
     PhaseIntervalsTable,
@@ -24,6 +26,9 @@ from flowborne.scenes.schema_control import (
 )
 from flowborne.scenes.wording import suggestion
 from flowborne.solids.model import SolidModel
+
+WHOLE = 1e-3
+"""Part by which a number of steps may miss a whole one: times are written with a few digits."""
 
 
 def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
@@ -43,6 +48,24 @@ def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
     for index in range(len(scene.objectives)):
         yield from _check_objective(draft, model, index)
     yield from _check_wishes(draft)
+    if draft.sound("controller", "time"):
+        yield from _check_horizon(draft)
+
+
+def _check_horizon(draft: Draft) -> Iterator[str]:
+    """The steps of a plan come out even with its knots."""
+    able, frame_time = draft.scene.controller, draft.scene.frame_time
+    if able.knots is None or able.hypothetical_time is None:
+        return
+    interval = able.every * frame_time
+    steps = interval / able.hypothetical_time
+    if round(steps) < 1 or abs(steps - round(steps)) > WHOLE * steps:
+        number = max(round(steps), 1)
+        yield (
+            f"{draft.at('controller')}: hypothetical_time is {able.hypothetical_time:g} s, and "
+            f"there are {interval:.4g} s from decision to decision, which is no whole number of "
+            f"steps. Give {interval / number:.4g}, or leave it out to step by frames."
+        )
 
 
 def _check_wishes(draft: Draft) -> Iterator[str]:
@@ -115,11 +138,12 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
                     f"{where}: joint '{joint}' makes no effort, being free. "
                     "Name joints of [[control]], [[motion]], [clip] or [earlier]."
                 )
-    if isinstance(table, ObjectiveWindDragTable | ObjectiveDragTable | ObjectivePressureTable):
+    directed = ObjectiveWindDragTable | ObjectiveDragTable | ObjectivePressureTable
+    if isinstance(table, directed):
         for body in table.bodies or ():
             yield from unknown_body(draft, model, body, "objectives", index)
-        if not any(table.direction):
-            yield f"{where}: direction is 0. Give a direction such as [1.0, 0.0, 0.0]."
+    if isinstance(table, directed | ObjectiveSpeedTable) and not any(table.direction):
+        yield f"{where}: direction is 0. Give a direction such as [1.0, 0.0, 0.0]."
     if isinstance(table, ObjectiveWindDragTable) and not scene.wind and draft.sound("wind"):
         yield f"{where}: there is no wind to drag. Add a [[wind]], or use 'pressure-drag'."
     if isinstance(table, ObjectivePressureTable):
@@ -147,7 +171,8 @@ def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[st
                 f"{where}: joint '{table.joint}' is not controlled. "
                 "Add it to [[control]], or drop the objective."
             )
-    if isinstance(table, ObjectiveVelocityTable) and table.body is not None:
+    of_body = ObjectiveVelocityTable | ObjectiveSpeedTable | ObjectiveDistanceTable
+    if isinstance(table, of_body) and table.body is not None:
         yield from unknown_body(draft, model, table.body, "objectives", index)
     if isinstance(table, ObjectivePythonTable) and draft.sound("plugins"):
         try:

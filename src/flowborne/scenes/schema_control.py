@@ -219,6 +219,30 @@ class ObjectiveVelocityTable(ObjectiveTable):
     target: Vector
 
 
+class ObjectiveSpeedTable(ObjectiveTable):
+    """Velocity along a direction; on a plan of several `knots`, the way made by its time.
+
+    body       whose velocity; that of the centre of mass of all bodies unless given
+    direction  of any length
+    """
+
+    kind: Literal["speed"]
+    body: Text | None = None
+    direction: Vector
+
+
+class ObjectiveDistanceTable(ObjectiveTable):
+    """Distance of a body from a point.
+
+    body   whose; the origin of its frame counts
+    point  m
+    """
+
+    kind: Literal["distance"]
+    body: Text
+    point: Vector
+
+
 class ObjectivePythonTable(ObjectiveTable):
     """Python function that takes a Measurement and gives a number.
 
@@ -245,6 +269,8 @@ AnyObjective = Annotated[
         | ObjectivePressureTable
         | ObjectiveInputMotionTable
         | ObjectiveVelocityTable
+        | ObjectiveSpeedTable
+        | ObjectiveDistanceTable
         | ObjectivePythonTable,
         Field(discriminator="kind"),
         Tag(BUILT_IN),
@@ -341,11 +367,14 @@ AnyGradient = Annotated[
 class ControllerTable(Table):
     """[controller]: how the controlled joints decide.
 
+    knots               decisions that a plan looks ahead, with a pose at each; a trial goes along
+                        it, and objectives are their means on the way. Without it a decision tries
+                        single poses
     gradient            "central" (2 trials a dof), "one-sided" (1 a dof and 1), or one's own
     velocities          during a trial's measurement: "removed" (steady state), "present" (as now),
                         or "probe" (those of the trial's own motion)
     hypothetical_steps  steps over which a trial makes its displacement
-    hypothetical_time   s of one such step; the time of a frame unless given
+    hypothetical_time   s of one such step, or of one of a plan; the time of a frame unless given
     settle_steps        further steps of a trial in the fixed pose
     rule                "fixed", "resilient", "golden-section" or "quasi-newton" with their options,
                         or one's own
@@ -354,6 +383,7 @@ class ControllerTable(Table):
     servo               "exact", or "pd" with its frequency
     """
 
+    knots: Steps | None = None
     gradient: AnyGradient = GradientCentralTable(kind="central")
     velocities: Literal["removed", "present", "probe"] = "removed"
     hypothetical_steps: Steps = 1
@@ -363,3 +393,15 @@ class ControllerTable(Table):
     every: Count = 1
     iterations: Steps = 1
     servo: ServoTable = EXACT
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.knots is None:
+            return self
+        of_poses = ("velocities", "hypothetical_steps", "settle_steps")
+        found = [key for key in of_poses if key in self.model_fields_set]
+        if found:
+            raise ValueError(
+                f"has knots, and {found[0]}, which is for trials of poses. Give one of the two"
+            )
+        return self

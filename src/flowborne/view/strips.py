@@ -43,9 +43,11 @@ def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
 
 
 def objective_curve(run: Run) -> Array | None:
-    """The objective in every frame, at rest where it is sought at rest; None where there is none.
+    """The objective in every frame, as trials found it where theirs is another motion; None where
+    there is none.
 
-    Of a creature that moves it holds what the motion itself drags, which nobody asked for.
+    Of a creature that moves it holds what the motion itself drags, which nobody asked for where it
+    is sought at rest.
     """
     values = run.history.get("tried_objective", run.history.get("objective"))
     return None if values is None or not np.isfinite(values).any() else values
@@ -78,7 +80,7 @@ def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
     if objective is not None:
         terms = [column.removeprefix("objective_").replace("_", " ") for column in _terms(run)]
         title = f"objective: {terms[0]}" if len(terms) == 1 else "objective"
-        title += " at rest" if "tried_objective" in run.history else ""
+        title += " as tried" if "tried_objective" in run.history else ""
         strips.append((title, {"": objective}))
     efforts = effort_curves(run)
     if efforts:

@@ -1,0 +1,142 @@
+"""What a decision is about, and its trials: the objective as a function of a displacement.
+
+A decision changes a course: the pose that the joints go straight to (`trial`), or the poses of a
+plan that looks ahead (`plan`). Gradients and rules see neither, but numbers in rad or m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.control.executors import Mapper
+from flowborne.control.gradients import Displaced, Gradient
+from flowborne.control.objectives import ObjectiveSum
+from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.report import Outcome, StepReport
+
+if TYPE_CHECKING:
+    from flowborne.coupling.world import World
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Step = Callable[["World", float, JointCommand | None], StepReport]
+"""step(world, dt, drive): advances `world` in place and says what it did."""
+
+
+class TrialError(ArithmeticError):
+    """A hypothetical step, or the objective after it, is not a finite number."""
+
+    @classmethod
+    def of(cls, dt: float, tried: str, what: str) -> TrialError:
+        """That of a step of dt (s).
+
+        tried  what the step did to the joints and when, as "moves knee by 0.1 at time 2 s"
+        what   is wrong
+        """
+        return cls(
+            f"in a hypothetical step of {dt:.4g} s that {tried}, {what}; "
+            "try a smaller displacement or a shorter step"
+        )
+
+
+def advance(world: World, step: Step, dt: float, command: JointCommand, tried: str) -> StepReport:
+    """Take a hypothetical step. Raises TrialError when its numbers are not finite.
+
+    tried  see `TrialError`
+    """
+    report = step(world, dt, command)
+    if report.outcome in (Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE):
+        raise TrialError.of(dt, tried, report.outcome.value)
+    return report
+
+
+class Evaluation(Protocol):
+    """One evaluation of an objective, complete in itself: it may run in any thread or process."""
+
+    def run(self) -> float:
+        """The objective. Raises TrialError when it is not finite."""
+        ...
+
+
+def run(evaluation: Evaluation) -> float:
+    """Run an evaluation; a function at module level, so that any executor can take it."""
+    return evaluation.run()
+
+
+class Course(Protocol):
+    """What the controlled joints are to do, and what it may change by.
+
+    world  in the flow and time of which it is tried
+    count  N, numbers that say by how much it differs from another one
+    goal   (nq,) pose in which it is when the next decision is due
+    """
+
+    @property
+    def world(self) -> World: ...
+
+    @property
+    def count(self) -> int: ...
+
+    @property
+    def goal(self) -> Array: ...
+
+    def within_range(self, displacement: Array) -> Array:
+        """(N,) the part of a displacement, rad or m, that the joints allow."""
+        ...
+
+    def trial(self, objective: ObjectiveSum, displacement: Array) -> Evaluation:
+        """What the objective is on the course displaced by (N,)."""
+        ...
+
+    def displaced(self, displacement: Array) -> Self:
+        """The course displaced by (N,)."""
+        ...
+
+
+@dataclass(eq=False)
+class Trials:
+    """The objective as a function of what the course is displaced by.
+
+    estimator    of the gradient
+    mapper       runs the trials
+    places       (m,) those of the course's numbers that are displaced, of which all displacements
+                 here speak; the others stay
+    evaluations  number of trials run so far
+    """
+
+    course: Course
+    objective: ObjectiveSum
+    estimator: Gradient
+    mapper: Mapper
+    places: Integers
+    evaluations: int = 0
+
+    @property
+    def count(self) -> int:
+        """m, how many numbers are displaced."""
+        return int(self.places.size)
+
+    def within_range(self, displacement: Array) -> Array:
+        """(m,) the part of a displacement (m,) that the joints allow."""
+        return self.course.within_range(self._full(displacement))[self.places]
+
+    def gradient(self, displacement: Array) -> Array:
+        """(m,) gradient on a displaced course by the displacement (m,). Raises TrialError."""
+        return self.estimator.estimate(Displaced(self, displacement)).gradient
+
+    def values(self, displacements: Array) -> Array:
+        """(k,) objective on courses displaced by the rows of (k, m). Raises TrialError."""
+        trials = [self.course.trial(self.objective, self._full(row)) for row in displacements]
+        self.evaluations += len(trials)
+        return np.array(self.mapper.map(run, trials, self.course.world.setup))
+
+    def _full(self, displacement: Array) -> Array:
+        """(N,) a displacement (m,) among all numbers of the course."""
+        full = np.zeros(self.course.count)
+        full[self.places] = displacement
+        return full
