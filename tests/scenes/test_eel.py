@@ -44,6 +44,23 @@ def test_in_a_room_it_swims_as_it_does_in_a_slab_but_less() -> None:
     assert 0.001 < ways[1] < ways[0]
 
 
+def test_free_joints_find_out_how_to_swim() -> None:
+    """The first second on cells of 2 cm, at the limits of the slower gait, which is overtaken."""
+    ways = []
+    for name in ("eel", "eel-free"):
+        with Simulation(load_scene(name, {"domain.resolution": "61"})) as simulation:
+            model = simulation.world.setup.solid
+            joints = model.positions_of("joint_1")[0] + np.arange(5)
+            for _ in range(60):
+                before = simulation.world.solid.q[joints].copy()
+                simulation.advance_frame()
+                angles = simulation.world.solid.q[joints]
+                assert np.abs(angles).max() <= np.radians(20.0) + 1e-9
+                assert np.abs(angles - before).max() <= np.radians(62.84) / 60.0
+            ways.append(simulation.world.solid.q[1])
+    assert ways[1] > 1.5 * ways[0] > 0.0
+
+
 @pytest.mark.parametrize("amplitude", [20.0, 40.0])
 def test_it_swims_forward_by_its_gait_alone(amplitude: float) -> None:
     """The first 1.5 s on cells of 2 cm."""

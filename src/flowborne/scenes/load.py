@@ -53,6 +53,7 @@ BUILT_IN = (
     "swimmer-held",
     "eel",
     "eel-room",
+    "eel-free",
 )
 
 
