@@ -151,6 +151,17 @@ def test_a_killed_run_in_a_flow_ends_with_the_same_numbers(tmp_path):
         assert numbers(out) == numbers(tmp_path / "whole")
 
 
+def test_a_run_that_plans_goes_on_between_two_decisions(small_scene, tmp_path):
+    settings = {"controller": "{ knots = 3, every = 4 }"}
+    scene = flowborne.load_scene(small_scene, settings)
+    run(scene, tmp_path / "whole", frames=FRAMES)
+    for frames in (6, FRAMES):
+        run(scene, tmp_path / "parts", frames=frames, resume=frames > 6)
+    assert numbers(tmp_path / "parts") == numbers(tmp_path / "whole")
+    with np.load(tmp_path / "parts" / "checkpoint.npz") as checkpoint:
+        assert any("plan" in name for name in checkpoint.files)
+
+
 def test_a_run_killed_before_its_scene_was_written_says_how_to_start_again(small_scene, tmp_path):
     out = tmp_path / "run"
     RunFolder.create(out)

@@ -399,7 +399,8 @@ class ControllerTable(Table):
         if self.knots is None:
             return self
         of_poses = ("velocities", "hypothetical_steps", "settle_steps")
-        found = [key for key in of_poses if key in self.model_fields_set]
+        fields = type(self).model_fields  # a saved scene names all, with their defaults
+        found = [key for key in of_poses if getattr(self, key) != fields[key].default]
         if found:
             raise ValueError(
                 f"has knots, and {found[0]}, which is for trials of poses. Give one of the two"
