@@ -24,7 +24,7 @@ from flowborne.control.objectives import ObjectiveSum
 from flowborne.control.phases import Phases
 from flowborne.control.plan import Horizon, PlanCourse
 from flowborne.control.rules import FixedStep, Rule
-from flowborne.control.trial import Hypothesis, PoseCourse
+from flowborne.control.trial import Hypothesis, PoseCourse, without_scalars
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.servo import Servo, ServoExact
@@ -160,8 +160,8 @@ class Controller:
             return self._decision(world, False, 0, started)
         course, value, gradient, evaluations = self._descend(world, frame_time, step)
         model, state = creature.parts(world)
-        memory["target"] = course.goal
-        memory["displacement"] = model.difference(state.q, course.goal)[self.dofs]
+        memory["target"] = goal = course.goal
+        memory["displacement"] = model.difference(state.q, goal)[self.dofs]
         memory["gradient"] = gradient[: self.dofs.size]
         memory["objective"] = np.array([value])
         if isinstance(course, PlanCourse):
@@ -247,7 +247,7 @@ class Controller:
         moves = world.memory.get("plan", np.zeros((1, self.dofs.size)))[1:].ravel()
         moves = np.append(moves, np.zeros(most.size - moves.size))
         how = self.hypothesis
-        course = PlanCourse(world, step, how, self.dofs, self.servo, most, moves)
+        course = PlanCourse(without_scalars(world), step, how, self.dofs, self.servo, most, moves)
         return course.displaced(course.within_range(np.zeros(course.count)))
 
     def _here(self, world: World, step: Step) -> PoseCourse:
@@ -255,7 +255,7 @@ class Controller:
         _, state = creature.parts(world)
         how = self.hypothesis
         how = Hypothesis(how.dt, velocities="probe") if isinstance(how, Horizon) else how
-        return PoseCourse(world, step, how, self.dofs, state.q.copy())
+        return PoseCourse(without_scalars(world), step, how, self.dofs, state.q.copy())
 
     def _limit(self, time: float, frame_time: float) -> Array:
         """(N,) what strength allows of each number of a course that is decided at `time` (s)."""

@@ -32,31 +32,35 @@ class TrialError(ArithmeticError):
     """A hypothetical step, or the objective after it, is not a finite number."""
 
     @classmethod
-    def of(cls, dt: float, tried: str, what: str) -> TrialError:
-        """That of a step of dt (s).
-
-        tried  what the step did to the joints and when, as "moves knee by 0.1 at time 2 s"
-        what   is wrong
-        """
+    def of(cls, evaluation: Evaluation, dt: float, what: str) -> TrialError:
+        """That of a step of dt (s) in an evaluation; `what` is wrong."""
         return cls(
-            f"in a hypothetical step of {dt:.4g} s that {tried}, {what}; "
+            f"in a hypothetical step of {dt:.4g} s that {evaluation.tried}, {what}; "
             "try a smaller displacement or a shorter step"
         )
 
 
-def advance(world: World, step: Step, dt: float, command: JointCommand, tried: str) -> StepReport:
-    """Take a hypothetical step. Raises TrialError when its numbers are not finite.
-
-    tried  see `TrialError`
-    """
-    report = step(world, dt, command)
+def advance(evaluation: Evaluation, world: World, dt: float, command: JointCommand) -> StepReport:
+    """Take `world` through a hypothetical step of an evaluation. Raises TrialError when its numbers
+    are not finite."""
+    report = evaluation.step(world, dt, command)
     if report.outcome in (Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE):
-        raise TrialError.of(dt, tried, report.outcome.value)
+        raise TrialError.of(evaluation, dt, report.outcome.value)
     return report
 
 
 class Evaluation(Protocol):
-    """One evaluation of an objective, complete in itself: it may run in any thread or process."""
+    """One evaluation of an objective, complete in itself: it may run in any thread or process.
+
+    step   the physics
+    tried  what it does to the joints and when, as "moves knee by 0.1 at time 2 s"
+    """
+
+    @property
+    def step(self) -> Step: ...
+
+    @property
+    def tried(self) -> str: ...
 
     def run(self) -> float:
         """The objective. Raises TrialError when it is not finite."""

@@ -21,7 +21,6 @@ from flowborne.control.approach import approach
 from flowborne.control.course import Step, TrialError, advance
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
-from flowborne.control.trial import without_scalars
 from flowborne.coupling.servo import Servo
 
 if TYPE_CHECKING:
@@ -79,15 +78,19 @@ class Rehearsal:
         """Mean of the objective over the steps. Raises TrialError when it is not finite."""
         world, dt, total = self.world.copy(), self.horizon.dt, 0.0
         world.setup = world.setup.rehearsed
-        tried = f"follows a plan made at time {world.time:.6g} s"
         for pose in self.poses:
             for left in range(self.horizon.steps, 0, -1):
                 command = approach(world, self.dofs, self.servo, pose, left * dt, dt)
-                report = advance(world, self.step, dt, command, tried)
+                report = advance(self, world, dt, command)
                 total += self.objective.value(Measurement(world, report))
         if not np.isfinite(total):
-            raise TrialError.of(dt, tried, f"the objective is {total}")
+            raise TrialError.of(self, dt, f"the objective is {total}")
         return total / (len(self.poses) * self.horizon.steps)
+
+    @property
+    def tried(self) -> str:
+        """What is tried and when, in words."""
+        return f"follows a plan made at time {self.world.time:.6g} s"
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +123,8 @@ class PlanCourse:
         return np.concatenate(allowed) - self.moves
 
     def trial(self, objective: ObjectiveSum, displacement: Array) -> Rehearsal:
-        """Dye and smoke are not carried along: they push nothing, and no objective sees them."""
         return Rehearsal(
-            without_scalars(self.world),
+            self.world,
             self.step,
             objective,
             self.horizon,

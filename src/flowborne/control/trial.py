@@ -118,10 +118,10 @@ class Trial:
                 command.rate[self.dofs] = self._pace(command)
             # what is on the way to the last step is not read, and where all is told, not felt
             if number == whole or not move_as_told(world, hypothesis.dt, command):
-                report = advance(world, self.step, hypothesis.dt, command, self._tried)
+                report = advance(self, world, hypothesis.dt, command)
         value = self.objective.value(Measurement(world, report, self.world.time))
         if not np.isfinite(value):
-            raise TrialError.of(hypothesis.dt, self._tried, f"the objective is {value}")
+            raise TrialError.of(self, hypothesis.dt, f"the objective is {value}")
         return value
 
     def _prepare(self, world: World) -> JointCommand:
@@ -155,7 +155,7 @@ class Trial:
         return final if self.hypothesis.velocities == "present" else np.zeros_like(final)
 
     @property
-    def _tried(self) -> str:
+    def tried(self) -> str:
         """What is tried and when, in words."""
         model, _ = creature.parts(self.world)
         tried = ", ".join(
@@ -194,9 +194,8 @@ class PoseCourse:
         return creature.within_range(model, self.pose, self._full(displacement))[self.dofs]
 
     def trial(self, objective: ObjectiveSum, displacement: Array) -> Trial:
-        """Dye and smoke are not carried along: they push nothing, and no objective sees them."""
         return Trial(
-            without_scalars(self.world),
+            self.world,
             self.step,
             objective,
             self.hypothesis,
@@ -225,7 +224,8 @@ class PoseCourse:
 
 
 def without_scalars(world: World) -> World:
-    """The same world, its arrays shared, without dye and smoke."""
+    """The same world, its arrays shared, without dye and smoke, which push nothing: trials do not
+    carry them along, and no objective sees them."""
     if world.fluid is None:
         return world
     return replace(world, fluid=replace(world.fluid, scalars={}))

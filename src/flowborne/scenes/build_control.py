@@ -105,12 +105,11 @@ def controller_of(
 
 def _hypothesis(table: tables.ControllerTable, frame_time: float) -> Hypothesis | Horizon:
     """How a decision tries poses, or a plan."""
-    dt = frame_time if table.hypothetical_time is None else table.hypothetical_time
     if table.knots is None:
+        dt = frame_time if table.hypothetical_time is None else table.hypothetical_time
         return Hypothesis(dt, table.hypothetical_steps, table.settle_steps, table.velocities)
-    interval = table.every * frame_time
-    steps = round(interval / dt)
-    return Horizon(interval / steps, steps, table.knots)
+    steps = round(table.steps_between(frame_time))
+    return Horizon(table.every * frame_time / steps, steps, table.knots)
 
 
 def _free_dofs(model: SolidModel, joint: str) -> list[int]:

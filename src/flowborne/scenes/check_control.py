@@ -57,8 +57,7 @@ def _check_horizon(draft: Draft) -> Iterator[str]:
     able, frame_time = draft.scene.controller, draft.scene.frame_time
     if able.knots is None or able.hypothetical_time is None:
         return
-    interval = able.every * frame_time
-    steps = interval / able.hypothetical_time
+    interval, steps = able.every * frame_time, able.steps_between(frame_time)
     if round(steps) < 1 or abs(steps - round(steps)) > WHOLE * steps:
         number = max(round(steps), 1)
         yield (

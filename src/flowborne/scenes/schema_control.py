@@ -394,6 +394,11 @@ class ControllerTable(Table):
     iterations: Steps = 1
     servo: ServoTable = EXACT
 
+    def steps_between(self, frame_time: float) -> float:
+        """Hypothetical steps from decision to decision, a whole number where there are knots."""
+        step = frame_time if self.hypothetical_time is None else self.hypothetical_time
+        return self.every * frame_time / step
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.knots is None:
