@@ -13,8 +13,8 @@ from flowborne.control.objectives import name_of
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.frame_report import FrameReport
+from flowborne.joint_measures import JointMeasures
 from flowborne.solids.dynamics import kinematics
-from flowborne.solids.model import SolidModel
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
@@ -27,9 +27,6 @@ IMPULSES = ("exchanged", "advection", "boundary", "crossed", "forces")
 LISTED = 3
 """Most columns that a message names."""
 
-SLIDE, HINGE = 2, 3
-"""Kinds of joints, by MuJoCo's numbers."""
-
 
 class Measures:
     """Which numbers there are for a scene, and what they are now.
@@ -38,8 +35,7 @@ class Measures:
     impulses of all its steps; convergence is that of its worst step.
 
       frame, time_s
-      angle_<joint>_rad, position_<joint>_m     every hinge and slide joint
-      target_<joint>_rad, target_<joint>_m      the controlled ones among them
+      angle_<joint>_rad … power_<joint>_W       joints and their drives; see `joint_measures`
       objective, objective_<term>               the controller's, weighted sum and unweighted terms
       tried_objective                           the sum as the last decision's trials found it, at
                                                 rest in scenes whose trials remove velocities,
@@ -76,6 +72,7 @@ class Measures:
         controller: Controller | None,
         stream: tuple[float, ...] | None,
         bodies: tuple[str, ...] = (),
+        joints: bool | tuple[str, ...] = True,
     ) -> None:
         self._model = setup.solid
         self._controller = controller
@@ -83,16 +80,9 @@ class Measures:
         self._dyed = setup.fluid is not None and bool(setup.fluid.scalars)
         self._along, self._across = _axes(stream)
         self._named = BodyMeasures(setup.solid, bodies)
-        self._joints = _scalar_joints(setup.solid)
-        places = (
-            {} if controller is None else {int(dof): n for n, dof in enumerate(controller.dofs)}
-        )
-        self._targets = [
-            (f"target_{column.split('_', 1)[1]}", places[dof])
-            for column, _, dof in self._joints
-            if dof in places
-        ]
-        self.controlled = [column for column, _, dof in self._joints if dof in places]
+        dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
+        self._joints = JointMeasures(setup, dofs, joints)
+        self.controlled = list(self._joints.places)
         self._terms = [] if controller is None else _terms(controller)
         self._tried = controller is not None and controller.tries_otherwise
         self.columns = self._columns()
@@ -101,7 +91,7 @@ class Measures:
         """column -> number, in the order of `columns`; nan where only a step can tell."""
         values: dict[str, float] = dict.fromkeys(self.columns, np.nan)
         values |= {"frame": frame, "time_s": world.time}
-        values |= {column: float(world.solid.q[place]) for column, place, _ in self._joints}
+        values |= self._joints.values(world.solid.q, world.time, report)
         values |= self._poses(world.solid.q) | self._flesh(world.solid.q)
         values |= self._named.values(world.solid.q, None if report is None else report.step)
         if report is not None:
@@ -123,12 +113,10 @@ class Measures:
         if controller is None:
             return {}
         steps = controller.greatest_strength() * controller.every * frame_time
-        places = [place for _, place in self._targets]
-        return {c: float(steps[n]) for c, n in zip(self.controlled, places, strict=True)}
+        return {column: float(steps[n]) for column, n in self._joints.places.items()}
 
     def _columns(self) -> tuple[str, ...]:
-        names = ["frame", "time_s", *(column for column, _, _ in self._joints)]
-        names += [column for column, _ in self._targets]
+        names = ["frame", "time_s", *self._joints.columns]
         names += ["objective", *(f"objective_{term}" for term in self._terms)]
         names += ["tried_objective"] if self._tried else []
         names += ["drag_N", "lift_N", "effort", "work_J"]
@@ -149,7 +137,6 @@ class Measures:
         values: dict[str, float] = {"objective": report.objective}
         values |= {"tried_objective": report.tried} if self._tried else {}
         values |= {f"objective_{term}": report.terms[term] for term in self._terms}
-        values |= {column: float(report.targets[place]) for column, place in self._targets}
         force = last.fluid_wrench()[1:, :3].sum(axis=0)
         values |= {"drag_N": float(force @ self._along), "lift_N": float(force @ self._across)}
         values |= {"effort": self._effort(last), "work_J": sum(step.work for step in steps)}
@@ -206,18 +193,6 @@ def quaternion(rotation: Array) -> Array:
     unit = np.zeros(4)
     mujoco.mju_mat2Quat(unit, np.ascontiguousarray(rotation).ravel())
     return unit if unit[0] >= 0.0 else -unit
-
-
-def _scalar_joints(model: SolidModel) -> list[tuple[str, int, int]]:
-    """(column, place in q, dof) of every hinge and slide joint."""
-    mj, joints = model.mj, []
-    for joint, name in enumerate(model.joint_names):
-        if model.flesh is not None and model.flesh.dofs[mj.jnt_dofadr[joint]]:
-            continue
-        column = {HINGE: f"angle_{name}_rad", SLIDE: f"position_{name}_m"}.get(mj.jnt_type[joint])
-        if column:
-            joints.append((column, int(mj.jnt_qposadr[joint]), int(mj.jnt_dofadr[joint])))
-    return joints
 
 
 def _terms(controller: Controller) -> list[str]:

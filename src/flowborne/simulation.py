@@ -110,8 +110,9 @@ class Simulation:
         self.frame_time = built.frame_time
         self.steps_per_frame = built.steps_per_frame
         self.frames = built.frames
+        output, stream = self.scene.output, self.scene.stream()
         self.measures = Measures(
-            built.world.setup, self.controller, self.scene.stream(), self.scene.output.bodies
+            built.world.setup, self.controller, stream, output.bodies, output.joints
         )
         self._moment = _Moment(built.world, 0, None)
         self._started = False

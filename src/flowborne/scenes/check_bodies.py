@@ -54,11 +54,13 @@ def check_without_bodies(draft: Draft) -> Iterator[str]:
                 f"{draft.at(table)}: there are no bodies. "
                 "Add [solids] with a model, or drop this table."
             )
-    if draft.scene.output.bodies:
-        yield (
-            f"{draft.at('output', 'bodies')}: there are no bodies. "
-            "Add [solids] with a model, or drop this key."
-        )
+    output = draft.scene.output
+    for key, named in (("bodies", output.bodies), ("joints", output.joints)):
+        if named and named is not True:
+            yield (
+                f"{draft.at('output', key)}: there are no bodies. "
+                "Add [solids] with a model, or drop this key."
+            )
 
 
 def unknown_joint(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> list[str]:
@@ -101,6 +103,9 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
         named += unknown_body(draft, model, body, "solids", "densities")
     for body in scene.output.bodies:
         named += unknown_body(draft, model, body, "output", "bodies")
+    joints = scene.output.joints
+    for joint in () if isinstance(joints, bool) else joints:
+        named += unknown_joint(draft, model, joint, "output", "joints")
     if scene.film.camera.follow not in ("bodies", "nothing"):
         named += unknown_body(draft, model, scene.film.camera.follow, "film", "camera", "follow")
     for index, wind in enumerate(scene.wind):

@@ -37,6 +37,17 @@ StepsOrNone = Annotated[int, Strict(), Field(ge=0, le=MOST_STEPS)]
 
 Text = Annotated[str, Field(min_length=1)]
 
+
+def _switch_or_names(value: Any) -> Any:
+    listed = isinstance(value, list | tuple) and all(isinstance(name, str) for name in value)
+    if not (listed or isinstance(value, bool)):
+        raise ValueError(f"is {value!r}. Give true, false, or a list of names in quotes")
+    return value
+
+
+SwitchOrNames = Annotated[bool | tuple[str, ...], BeforeValidator(_switch_or_names)]
+"""All of something, none of it, or what is named."""
+
 Parameters = dict[str, Any]
 """Arguments of a Python function by name: numbers, texts, lists of them."""
 

@@ -16,6 +16,7 @@ from flowborne.scenes.fields import (
     Number,
     Positive,
     Steps,
+    SwitchOrNames,
     Table,
     Text,
     Vector,
@@ -99,11 +100,14 @@ class OutputTable(Table):
     checkpoint_every  frames between checkpoints
     bodies            whose centre of mass, velocity, and force and torque of the fluid the history
                       holds
+    joints            with torque or force, power and target of whose drives the history holds: true
+                      for all driven joints, false for none, or names
     exports           files for other programs, written at the end: names, or tables with file
     """
 
     checkpoint_every: Count = 24
     bodies: tuple[Text, ...] = ()
+    joints: SwitchOrNames = True
     exports: tuple[Annotated[ExportTable, BeforeValidator(_named_file)], ...] = ()
 
 
