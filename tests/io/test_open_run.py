@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,44 @@ def test_a_data_set_has_units_and_places(folder: Path) -> None:
     assert float(found["pressure"].sel(time=1 / 24, method="nearest").max()) == pytest.approx(
         float(run.state(1)["pressure"].max())
     )
+
+
+def test_a_data_set_has_the_drives_of_joints_by_name(folder: Path) -> None:
+    pytest.importorskip("xarray")
+    run = fb.open_run(folder)
+    found = run.dataset()
+    assert list(found["joint"].values) == list(run.joints)
+    joint = run.joints[-1]
+    assert found["torque"].dims == ("time", "joint")
+    assert found["torque"].attrs["units"] == "N m"
+    for name, column in (
+        ("torque", f"torque_{joint}_Nm"),
+        ("power", f"power_{joint}_W"),
+        ("target_angle", f"target_{joint}_rad"),
+    ):
+        told = found[name].sel(joint=joint).values
+        assert np.isnan(told[0])
+        assert_array_equal(told[1:], run.history[column])
+    assert_array_equal(found["drag"].values[1:], run.history["drag_N"])
+    assert found["time"].attrs["units"] == "s"
+
+
+def test_a_run_without_drives_in_its_history_opens(folder: Path, tmp_path: Path) -> None:
+    """As runs were written before there were such columns; its history lags a frame behind."""
+    pytest.importorskip("xarray")
+    old = tmp_path / "old"
+    shutil.copytree(folder, old)
+    rows = [line.split(",") for line in (old / "history.csv").read_text().splitlines()]
+    kept = [n for n, name in enumerate(rows[0]) if not name.startswith(("torque_", "power_"))]
+    lines = [",".join(row[n] for n in kept) + "\n" for row in rows[:-1]]
+    (old / "history.csv").write_text("".join(lines))
+    found = fb.open_run(old).dataset()
+    assert "torque" not in found
+    assert "power" not in found
+    angle = found["angle"].isel(joint=0).values
+    assert_array_equal(np.isnan(angle), [True, False, False, True])
+    with pytest.raises(fb.RunFolderError, match="other columns than this version writes; start"):
+        fb.run(fb.load_scene(old / "scene.toml"), old, resume=True, film=False)
 
 
 def test_a_missing_xarray_is_one_message(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,38 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.io.atomic import replaced_whole, write_text
+from flowborne.io.columns import unit_of
 from flowborne.io.exporters import provided
 from flowborne.io.open_run import OpenRun
 from flowborne.io.optional import optional
 
-UNITS = {
-    "s": "s",
-    "m": "m",
-    "rad": "rad",
-    "m/s": "m/s",
-    "rad/s": "rad/s",
-    "1/s": "1/s",
-    "N": "N",
-    "Nm": "N m",
-    "Ns": "N s",
-    "J": "J",
-    "m3": "m^3",
-}
-"""What may end the name of a column after its last underscore, and the unit that it stands for."""
-
 COUNTS = ("frame", "solver_iterations", "contacts", "flesh_inside_out")
 """Columns of whole numbers."""
-
-
-def unit_of(column: str) -> str:
-    """Unit of a column of the history; "1" where it has none, "" where an objective decides."""
-    if column.startswith(("objective", "tried_objective")):
-        return ""
-    if column == "effort":
-        return "N m s"
-    if column.startswith("seconds_"):
-        return "s"
-    return UNITS.get(column.rpartition("_")[2], "1")
 
 
 def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:

@@ -12,6 +12,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from flowborne.fluid.grid import Grid
+from flowborne.io.columns import HistoryArray
 from flowborne.io.state_arrays import StateArray
 
 
@@ -37,18 +38,24 @@ class LazyStates(BackendArray):
 def dataset_of(
     arrays: Mapping[str, StateArray],
     frames: Sequence[int],
+    history: Mapping[str, HistoryArray],
+    rows: NDArray[np.int64],
     bodies: Sequence[str],
+    joints: Sequence[str],
     grid: Grid | None,
     about: Mapping[str, Any],
 ) -> xarray.Dataset:
     """The arrays of a run, see `OpenRun.dataset`.
 
-    frames  number of the frame of each state
-    bodies  names
-    grid    of the fluid, None without
-    about   attributes of the whole
+    frames   number of the frame of each state
+    history  name -> quantity of the history
+    rows     (k,) frame of each of its rows
+    bodies   names
+    joints   names
+    grid     of the fluid, None without
+    about    attributes of the whole
     """
-    variables = {}
+    variables = {name: _of_history(array, rows, frames) for name, array in history.items()}
     for name, array in arrays.items():
         if name != "time":
             data = indexing.LazilyIndexedArray(LazyStates(array))
@@ -58,11 +65,25 @@ def dataset_of(
         "time": ("time", np.asarray(arrays["time"]), {"units": "s"}),
         "frame": ("time", np.array(frames)),
         "body": ("body", list(bodies)),
+        "joint": ("joint", list(joints)),
         "axis": ("axis", list("xyz")),
     }
     if grid is not None:
         coordinates |= _places(grid)
     return xarray.Dataset(variables, coordinates, about)
+
+
+def _of_history(
+    array: HistoryArray, rows: NDArray[np.int64], frames: Sequence[int]
+) -> xarray.Variable:
+    """A quantity of the history at the times of the states, nan where it has no row."""
+    values = np.full((len(frames), *array.values.shape[1:]), np.nan)
+    _, here, there = np.intersect1d(np.array(frames), rows, return_indices=True)
+    values[here] = array.values[there]
+    about = {"units": array.unit, "long_name": array.meaning}
+    return xarray.Variable(
+        ("time", *array.dimensions), values, {key: text for key, text in about.items() if text}
+    )
 
 
 def _places(grid: Grid) -> dict[str, Any]:

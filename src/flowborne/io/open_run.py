@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.io.arrays_file import read_state
+from flowborne.io.columns import history_arrays
 from flowborne.io.history import history_columns, history_rows
 from flowborne.io.optional import optional
 from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
@@ -125,10 +126,15 @@ class OpenRun:
         return np.asarray(self.arrays[name], float)
 
     def dataset(self) -> xarray.Dataset:
-        """All arrays as an xarray data set, which reads a state when its numbers are asked for.
+        """All arrays and the history as an xarray data set; a state is read when its numbers are
+        asked for.
 
-        Each has its dimensions, and its unit and meaning as attributes; times, bodies, and places
-        of cells and faces are coordinates.
+        Each has its dimensions, and its unit and meaning as attributes; times, bodies, joints, and
+        places of cells and faces are coordinates. Of the history there are `torque`, `force`,
+        `power`, `angle`, `position`, `target_angle` and `target_position` of joints, `torque_xyz`
+        and `force_xyz` of ball and free joints, `body_force` and so on of the bodies that the scene
+        names, and all else under the name of its column without the unit; nan at the start, where
+        the history has no row.
         raises  SceneError when xarray is not installed
         """
         optional("xarray", "xarray", "xarray", "data sets")
@@ -136,7 +142,17 @@ class OpenRun:
 
         about: dict[str, Any] = {"scene": self.name, "frames_per_second": self.frames_per_second}
         about["slab"] = int(self.is_slab)
-        return dataset_of(self.arrays, self.frames, self.bodies, self.grid, about)
+        history, rows = self.history, self.history["frame"].astype(np.int64)
+        return dataset_of(
+            self.arrays,
+            self.frames,
+            history_arrays(history, self.bodies, self.joints),
+            rows,
+            self.bodies,
+            self.joints,
+            self.grid,
+            about,
+        )
 
 
 def open_run(folder: str | Path) -> OpenRun:
