@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from flowborne.scenes.build import build
+from flowborne.scenes.formula import Formula
 from flowborne.scenes.load import load_scene
+from flowborne.scenes.tracks import TrajectoryFormula
 from flowborne.simulation import Simulation
 
 THICKNESS, LENGTH, WATER = 0.016, 0.61, 1000.0
@@ -59,6 +63,20 @@ def test_free_joints_find_out_how_to_swim() -> None:
                 assert np.abs(angles - before).max() <= np.radians(62.84) / 60.0
             ways.append(simulation.world.solid.q[1])
     assert ways[1] > 1.5 * ways[0] > 0.0
+
+
+@pytest.mark.parametrize("hertz", ["0.5", "1.5"])
+def test_one_constant_is_the_frequency_of_its_gait(hertz: str) -> None:
+    """To the last bit what formulas with the number in place of its name give."""
+    settings = {"domain.resolution": "61"}
+    settings |= {} if hertz == "0.5" else {"constants.frequency": hertz}
+    motions = build(load_scene("eel", settings)).world.setup.motions
+    for n, motion in enumerate(motions, start=1):
+        formula = Formula(f"20.0 * ramp(t) * sin(2*pi*({hertz}*t - 0.14*{n}))")
+        told = TrajectoryFormula(motion.dofs, formula, math.pi / 180.0)
+        for t in np.linspace(0.0, 4.0, 61):
+            assert motion.position(t) == told.position(t)
+            assert motion.velocity(t) == told.velocity(t)
 
 
 @pytest.mark.parametrize("amplitude", [20.0, 40.0])
