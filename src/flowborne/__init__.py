@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from flowborne.coupling.report import Momentum, Outcome, StepReport
     from flowborne.coupling.step import step
     from flowborne.coupling.world import Fluid, Setup, World
+    from flowborne.error_bars import ErrorBar, Refinement, error_bar
     from flowborne.errors import PartError, SceneError
     from flowborne.exporting import export
     from flowborne.fluid.grid import Array, Faces, Grid
@@ -58,6 +59,7 @@ __all__ = [
     "BodyState",
     "Controller",
     "Decision",
+    "ErrorBar",
     "Faces",
     "Fluid",
     "FluidState",
@@ -71,6 +73,7 @@ __all__ = [
     "OpenRun",
     "Outcome",
     "PartError",
+    "Refinement",
     "RunFolderError",
     "RunInterrupted",
     "RunResult",
@@ -89,6 +92,7 @@ __all__ = [
     "advance",
     "bodies",
     "boundaries",
+    "error_bar",
     "executors",
     "export",
     "exporters",
@@ -136,6 +140,7 @@ _PLACES = {
     "BodyState": "flowborne.coupling.named",
     "Controller": "flowborne.control.controller",
     "Decision": "flowborne.control.controller",
+    "ErrorBar": "flowborne.error_bars",
     "Faces": "flowborne.fluid.grid",
     "Fluid": "flowborne.coupling.world",
     "FluidState": "flowborne.fluid.state",
@@ -149,6 +154,7 @@ _PLACES = {
     "OpenRun": "flowborne.io.open_run",
     "Outcome": "flowborne.coupling.report",
     "PartError": "flowborne.errors",
+    "Refinement": "flowborne.error_bars",
     "RunFolderError": "flowborne.io.run_folder",
     "RunInterrupted": "flowborne.running",
     "RunResult": "flowborne.running",
@@ -164,6 +170,7 @@ _PLACES = {
     "Velocities": "flowborne.control.trial",
     "World": "flowborne.coupling.world",
     "advance": "flowborne.worlds",
+    "error_bar": "flowborne.error_bars",
     "export": "flowborne.exporting",
     "import_character": "flowborne.characters.folder",
     "load_scene": "flowborne.scenes.load",

@@ -6,6 +6,7 @@ import os
 import platform
 import sys
 from collections import deque
+from functools import cache
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -87,12 +88,16 @@ def summarise(path: Path, within: dict[str, float]) -> dict[str, Any]:
     }
 
 
+_version = cache(version)
+"""Version of a package, read from its metadata once."""
+
+
 def versions() -> dict[str, str]:
     """Versions of what the numbers depend on."""
     return {
         "flowborne": __version__,
         "python": platform.python_version(),
-        **{name: version(name) for name in ("numpy", "scipy", "numba", "mujoco-core")},
+        **{name: _version(name) for name in ("numpy", "scipy", "numba", "mujoco-core")},
         "system": platform.platform(),
     }
 

@@ -1,0 +1,259 @@
+"""Error bars of a number of a scene, from its values on several grids and with several steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from flowborne.errors import SceneError
+from flowborne.io.open_run import OpenRun
+from flowborne.running import RunOutcome, run
+from flowborne.scenes.load import load_scene
+
+Array = NDArray[np.float64]
+
+FORMAL_ORDER = 2.0
+"""Order of the scheme in grid and step, where all is smooth."""
+
+LEAST_ORDER, MOST_ORDER = 0.5, 2.0
+"""Bounds of the order in the bar: a higher one, by chance, would make it too short."""
+
+SAFE, CAUTIOUS = 1.25, 3.0
+"""Factors of safety where the order seen is that of the scheme, and where it is not."""
+
+NEAR = 0.1
+"""Part of the scheme's order by which the order seen may differ from it in the former case."""
+
+STEEPEST = 30.0
+"""Largest order that is looked for."""
+
+
+Convergence = Literal["monotone", "equal", "none", "unknown"]
+"""How the last three values come closer to each other: from one side; they are all the same; they
+swing, or their differences grow; there are only two."""
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A number at several resolutions, and what follows from its last three values.
+
+    The error of value i is C h_i^p with h_i = 1 / resolution_i. Three values give C and p; without
+    an order, where values swing or their differences grow, the bar is how far they are apart.
+
+    resolutions   from coarse to fine: cells, or steps per frame
+    values        one each
+    convergence   of the last three: "monotone", "equal", "none" or "unknown"
+    order         p as seen; nan unless they approach a value from one side
+    extrapolated  value at h = 0 of Richardson's extrapolation with that p; nan where there is none,
+                  or one below 0.5, with which next to nothing is known of it
+    uncertainty   half width of the bar around the finest value, never negative
+    spread        largest value less the smallest, of all
+    """
+
+    resolutions: tuple[float, ...]
+    values: tuple[float, ...]
+    convergence: Convergence
+    order: float
+    extrapolated: float
+    uncertainty: float
+    spread: float
+
+    @classmethod
+    def of(cls, resolutions: Sequence[float], values: Sequence[float]) -> Refinement:
+        """What follows from known values, in the order of the resolutions.
+
+        raises  ValueError for less than two values, resolutions that do not grow or are not
+                positive, and numbers that are not finite
+        source  order for any ratio of spacings: Celik et al. 2008, "Procedure for estimation and
+                reporting of uncertainty due to discretization in CFD applications", J. Fluids Eng.
+                130, 078001; factors of safety and bounds of the order: Oberkampf and Roy 2010,
+                "Verification and validation in scientific computing", section 8.5; two values:
+                Roache 1994, "Perspective: a method for uniform reporting of grid refinement
+                studies", J. Fluids Eng. 116, 405
+        """
+        _check(resolutions, values)
+        h = 1.0 / np.array(resolutions[-3:], float)
+        f = np.array(values[-3:], float)
+        apart = float(np.ptp(f))
+        convergence: Convergence = "none"
+        order, extrapolated, bar = math.nan, math.nan, apart
+        if apart == 0.0:
+            convergence, extrapolated = "equal", float(f[-1])
+        elif len(f) == 2:
+            convergence, bar = "unknown", CAUTIOUS * _remaining(f, h, FORMAL_ORDER)
+        elif not math.isnan(order := order_of(h, f)):
+            convergence = "monotone"
+            if order >= LEAST_ORDER:
+                extrapolated = float(f[-1] + np.sign(f[-1] - f[-2]) * _remaining(f, h, order))
+            near = abs(order - FORMAL_ORDER) <= NEAR * FORMAL_ORDER
+            bounded = min(max(order, LEAST_ORDER), MOST_ORDER)
+            bar = (SAFE if near else CAUTIOUS) * _remaining(f, h, bounded)
+        spread = float(np.ptp(np.array(values, float)))
+        return cls(
+            tuple(map(float, resolutions)),
+            tuple(map(float, values)),
+            convergence,
+            order,
+            extrapolated,
+            bar,
+            spread,
+        )
+
+    @property
+    def value(self) -> float:
+        """That of the finest."""
+        return self.values[-1]
+
+    def __str__(self) -> str:
+        order = "no order" if math.isnan(self.order) else f"order {self.order:.2g}"
+        return f"{self.value:.4g} ± {self.uncertainty:.2g} ({order})"
+
+
+@dataclass(frozen=True)
+class ErrorBar:
+    """A number of a scene with its numerical uncertainty.
+
+    value        on the finest grid with the shortest step
+    uncertainty  half width of its bar: those of grids and steps added
+    spread       largest value less the smallest, of all runs
+    grids        its values on all grids, with the shortest step; None for one grid
+    steps        its values with all steps, on the finest grid; None for one step
+    """
+
+    value: float
+    uncertainty: float
+    spread: float
+    grids: Refinement | None
+    steps: Refinement | None
+
+    def __str__(self) -> str:
+        found = {"grid": self.grids, "step": self.steps}
+        parts = [f"{name} {one.uncertainty:.2g}" for name, one in found.items() if one is not None]
+        return f"{self.value:.4g} ± {self.uncertainty:.2g} ({', '.join(parts)})"
+
+
+def error_bar(
+    scene: str | Path,
+    measure: str | Callable[[OpenRun], float],
+    resolutions: Sequence[int] = (),
+    steps: Sequence[int] = (),
+    *,
+    frames: int | None = None,
+    settings: Mapping[str, str] | None = None,
+    out: Path | str | None = None,
+) -> ErrorBar:
+    """Run a scene on several grids, and with several steps, and put a bar on a number.
+
+    The grids are run with the last number of steps, the steps on the last grid. The bar is of grid
+    and step alone: it says nothing of what the model leaves out.
+
+    scene        name of a built-in scene, or path of a scene file
+    measure      a column of the history, of which the mean over all frames is taken, or what gives
+                 the number of a run
+    resolutions  values of [domain] resolution, ascending; three or more show an order. That of the
+                 scene unless given
+    steps        values of [time] steps_per_frame, ascending; as before
+    frames       how many are run; as many as the scene has unless given
+    settings     further keys of the scene, as `load_scene` takes them
+    out          folder that keeps the runs; they are thrown away unless given
+    returns      the number on the finest grid with the shortest step, and its bar
+    raises       ValueError when there are not at least two grids or two numbers of steps, or they
+                 do not grow, for an unknown column, and a number that is not finite; SceneError
+                 when the scene is wrong, or one of its runs does not come to its end;
+                 RunFolderError when `out` has such runs already
+    """
+    for name, given in (("resolutions", resolutions), ("steps", steps)):
+        if len(given):
+            _check_growing(name, given)
+    if max(len(resolutions), len(steps)) < 2:
+        raise ValueError("an error bar needs two grids or two steps. Give resolutions or steps.")
+    cells_of = list(resolutions) if len(resolutions) else [None]
+    counts = list(steps) if len(steps) else [None]
+    finest, shortest = cells_of[-1], counts[-1]
+    grids = [(cells, shortest) for cells in cells_of]
+    times = [(finest, count) for count in counts]
+    values: dict[tuple[int | None, int | None], float] = {}
+    with TemporaryDirectory() as thrown_away:
+        folder = Path(thrown_away if out is None else out)
+        for cells, count in dict.fromkeys([*grids, *times]):
+            keys = {"domain.resolution": cells, "time.steps_per_frame": count}
+            chosen = {key: str(number) for key, number in keys.items() if number is not None}
+            name = "-".join(["run", *chosen.values()])
+            loaded = load_scene(scene, {**(settings or {}), **chosen})
+            result = run(loaded, folder / name, frames=frames, film=False)
+            if result.outcome is not RunOutcome.DONE:
+                raise SceneError(f"no error bar of {scene} with {chosen}: {result.message}.")
+            values[cells, count] = _measured(OpenRun(folder / name), measure)
+    of_grids = [values[key] for key in grids]
+    of_steps = [values[key] for key in times]
+    grid = Refinement.of(resolutions, of_grids) if len(grids) > 1 else None
+    step = Refinement.of(steps, of_steps) if len(times) > 1 else None
+    found = [one for one in (grid, step) if one is not None]
+    return ErrorBar(
+        values[finest, shortest],
+        sum(one.uncertainty for one in found),
+        float(np.ptp(list(values.values()))),
+        grid,
+        step,
+    )
+
+
+def order_of(spacings: Array, values: Array) -> float:
+    """Order p > 0 of three values from coarse to fine, (f1 - f2) / (f2 - f3) =
+    (h1^p - h2^p) / (h2^p - h3^p); nan where there is none."""
+    before, last = np.diff(values)
+    if before * last <= 0.0:
+        return math.nan
+    first, second = np.log(spacings[:2] / spacings[1:])
+
+    def excess(p: float) -> float:
+        """Logarithm of the ratio of differences that an order makes, over that which is seen."""
+        made = p * second + math.log(np.expm1(p * first) / np.expm1(p * second))
+        return float(made - math.log(before / last))
+
+    least = 1e-6
+    if excess(least) >= 0.0:
+        return math.nan
+    return STEEPEST if excess(STEEPEST) <= 0.0 else float(brentq(excess, least, STEEPEST))
+
+
+def _remaining(values: Array, spacings: Array, order: float) -> float:
+    """Size of the error of the finest value, from the last two and their order."""
+    ratio = spacings[-2] / spacings[-1]
+    return float(abs(values[-1] - values[-2]) / (ratio**order - 1.0))
+
+
+def _measured(done: OpenRun, measure: str | Callable[[OpenRun], float]) -> float:
+    if callable(measure):
+        return float(measure(done))
+    if measure not in done.history:
+        raise ValueError(
+            f"the history has no column '{measure}'. Its columns are: {', '.join(done.history)}."
+        )
+    return float(done.history[measure].mean())
+
+
+def _check(resolutions: Sequence[float], values: Sequence[float]) -> None:
+    """Raise ValueError for what no bar can be put on."""
+    if len(values) != len(resolutions) or len(values) < 2:
+        raise ValueError(
+            f"there are {len(values)} values at {len(resolutions)} resolutions. "
+            "Give two or more, one for each."
+        )
+    _check_growing("resolutions", resolutions)
+    if not np.isfinite(values).all():
+        raise ValueError(f"the values are {list(values)}. Give finite numbers.")
+
+
+def _check_growing(name: str, numbers: Sequence[float]) -> None:
+    """Raise ValueError unless they are positive, and each is larger than the one before."""
+    if not (numbers[0] > 0 and np.isfinite(numbers).all() and np.all(np.diff(numbers) > 0)):
+        raise ValueError(f"{name} are {list(numbers)}. Give positive numbers, from small to large.")
