@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from flowborne import Simulation, load_scene
-from flowborne.bench import chain, first_run, human, memory, parts, realtime, size, start, workers
+from flowborne.bench import (
+    chain,
+    first_run,
+    human,
+    memory,
+    parts,
+    realtime,
+    size,
+    start,
+    threads,
+    workers,
+)
 from flowborne.bench.frames import frame_times
 from flowborne.machine import PARTS, cores
 
@@ -111,3 +122,10 @@ def test_a_human_is_timed_in_every_way():
     result = human.speed(load_scene("human-gravity-back"), frames=1)
     assert judged(result, result.value >= 1.0)
     assert [line.split()[1] for line in result.lines] == ["serial", "threads", "processes"]
+
+
+def test_threads_change_no_bit():
+    """On 16 cells no kernel starts a thread: what is tested is the comparison."""
+    result = threads.compare(load_scene("flyer-base", {"domain.resolution": "16"}), frames=1)
+    assert judged(result, True)
+    assert result.value == 0

@@ -27,8 +27,6 @@ from flowborne.coupling import flow
 from flowborne.coupling.flow import carry_fluid, face_masses, volumes_of
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import move_bodies
-from flowborne.kernels import jit
-from flowborne.kernels.jit import kernel_threads
 from flowborne.motions import JointCommand, TrajectorySinusoid
 from flowborne.operators import Passage, cut_by_bodies
 from flowborne.scenes.inflow import FactorSteady
@@ -271,20 +269,3 @@ def test_dye_goes_with_the_same_fluxes_in_either_scheme(advection: str) -> None:
     world.setup = replace(world.setup, fluid=replace(fluid, advection=advection))
     for _ in range(5):
         assert taken(world).dye_error < 1e-12
-
-
-def test_a_step_has_the_same_bits_on_any_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All kernels of it, the pressure solve's among them, are large enough to run their twins."""
-    monkeypatch.setattr(jit, "cores", lambda: 3)
-    monkeypatch.setattr(jit, "AGAIN", 1)
-    found = []
-    for threads in (1, 2, 3):
-        world = with_dye(free(Grid((60, 43, 48), 1.0 / 48, (0.0, 0.0, 0.0)), ROUND_AND_THROUGH))
-        with kernel_threads(threads):
-            for _ in range(2):
-                taken(world)
-        found.append(world.arrays())
-    assert np.abs(found[0]["fluid/pressure"]).max() > 0.0
-    for others in found[1:]:
-        for name, values in found[0].items():
-            np.testing.assert_array_equal(values, others[name], err_msg=name)

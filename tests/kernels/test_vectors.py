@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.kernels import jit
+from flowborne.kernels.jit import kernel_threads
 from flowborne.kernels.vectors import (
     cells_of,
     descend,
+    descend_on,
     dot,
     largest,
     load_cells,
     scaled,
     scaled_cells,
+    scaled_dot,
     true_residual,
     turn,
 )
@@ -54,3 +58,26 @@ def test_copies(shape: tuple[int, int, int]) -> None:
     expected[inside] = np.where(diagonal[inside] > 0.0, left[inside], 0.0)
     load_cells(target := np.ones(shape), np.ascontiguousarray(left[inside]), diagonal)
     np.testing.assert_array_equal(target, expected)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_sums_have_the_same_bits_on_any_number_of_threads(
+    threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bench `threads` compares the bits of a whole step, which takes minutes to compile."""
+    monkeypatch.setattr(jit, "cores", lambda: threads)
+    monkeypatch.setattr(jit, "AGAIN", 1)
+    x, r, p, q = fields((40, 52, 53), 4)
+    assert x.size >= jit.LARGE
+    b = np.zeros(x.shape, np.float32)
+
+    def sums() -> tuple[float, ...]:
+        at, left, direction = x.copy(), r.copy(), p.copy()
+        turn(direction, q, 0.7)
+        after = descend_on(at, left, direction, q, 0.3, b, 2.0)
+        squared = true_residual(left, at, q)
+        return dot(at, left), scaled_dot(b, left, 0.5), after, squared
+
+    expected = sums()
+    with kernel_threads(threads):
+        assert sums() == expected

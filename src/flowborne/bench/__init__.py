@@ -24,6 +24,7 @@ MODULES = {
     "parts": "parts",
     "size": "size",
     "memory": "memory",
+    "threads": "threads",
     "first-run": "first_run",
     "start": "start",
 }
