@@ -11,7 +11,7 @@ test: $(VENV)/installed-test
 	$(BIN)/ruff check src tests tools docs
 	$(BIN)/ruff format --check src tests tools docs
 	$(BIN)/mypy
-	$(BIN)/pytest --numprocesses auto --dist loadfile
+	$(BIN)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 browser: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --editable '.[browser]'

@@ -1,9 +1,16 @@
 """Fixtures that several folders share."""
 
+import os
+from collections import Counter
+from pathlib import Path
+
 import pytest
 from hypothesis import settings
 
-from flowborne.kernels.jit import cores
+from flowborne.kernels import jit
+from flowborne.machine import cores
+
+TESTS = Path(__file__).parent
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
@@ -56,9 +63,36 @@ checkpoint_every = 5
 """
 
 
+FIRST = "coupling/test_flux_form.py"
+"""What compiles nearly all of a step in a fluid. While one process does that, another one takes
+what needs little of it, and neither compiles what the other does."""
+
+DRY = ("characters", "clips", "io", "shapes", "solids", "view")
+"""Folders whose tests need little of a fluid."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files in the order in which processes take them up: see FIRST; then those of most tests."""
+    tests = Counter(item.path for item in items)
+
+    def order(item: pytest.Item) -> tuple[int, int, str]:
+        path = item.path.relative_to(TESTS)
+        late = 0 if path.as_posix() == FIRST else 1 if path.parts[0] in DRY else 2
+        return late, -tests[item.path], path.as_posix()
+
+    items.sort(key=order)
+
+
 def pytest_xdist_auto_num_workers() -> int:
     """Test processes side by side: one a core, but no more than memory has room for."""
     return min(cores(), 4)
+
+
+@pytest.fixture(autouse=True)
+def share_of_the_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels of a test run on its process's share of the cores, as a validation's do."""
+    share = max(1, cores() // int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+    monkeypatch.setattr(jit, "cores", lambda: share)
 
 
 @pytest.fixture
