@@ -1,4 +1,5 @@
 import os
+import shutil
 from collections import namedtuple
 
 import pytest
@@ -125,3 +126,36 @@ def test_space_is_looked_for_where_the_folder_will_be(tmp_path, monkeypatch):
     with pytest.raises(RunFolderError, match=r"needs about 10 MB.* 0 MB are free"):
         check_space(tmp_path / "not" / "yet", 10_000_000)
     assert asked == [tmp_path, tmp_path]
+
+
+@pytest.mark.parametrize("linked", ["meshes", "states", "history.csv", "meshes/deep"])
+def test_nothing_behind_a_link_is_written_or_removed(tmp_path, linked):
+    folder = finished_run(tmp_path / "run")
+    folder.mark(["block.xml", "meshes/fin.obj", "meshes/deep/thesis.obj"])
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    for name in ("fin.obj", "000001.npz", "thesis.obj"):
+        (outside / name).write_text("mine")
+    before = files_in(outside)
+    link = folder.path / linked
+    if link.is_dir():
+        shutil.rmtree(link)
+    link.unlink(missing_ok=True)
+    link.symlink_to(outside / "fin.obj" if link.suffix else outside)
+    for touch in (
+        lambda: RunFolder.create(folder.path, replace=True),
+        folder.check_writable,
+        folder.remove,
+    ):
+        with pytest.raises(RunFolderError, match=rf"{linked} is a symbolic link.*remove the link"):
+            touch()
+    assert files_in(outside) == before
+    assert folder.is_run()
+
+
+@pytest.mark.parametrize(
+    "summary", ['["flowborne"]', '{"flowborne": 1, "model_files": 3}', "[" * 9999]
+)
+def test_a_summary_of_another_form_names_no_files(tmp_path, summary):
+    (tmp_path / "summary.json").write_text(summary)
+    assert RunFolder(tmp_path).model_files() == []

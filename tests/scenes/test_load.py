@@ -8,9 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import tomli_w
 
 from flowborne.errors import SceneError
-from flowborne.scenes.load import load_scene, override, scene_names
+from flowborne.scenes.load import check_scene, load_scene, override, scene_names
 from flowborne.scenes.save import save_scene, scene_files
 from flowborne.scenes.schema import Scene
 
@@ -185,3 +186,18 @@ def test_what_toml_allows_and_no_scene_needs_is_one_message(
     (tmp_path / "swim.toml").write_text(text)
     with pytest.raises(SceneError, match=re.escape(f"scene swim.toml: {said}")):
         load_scene(tmp_path / "swim.toml")
+
+
+@pytest.mark.parametrize(
+    "name", ["/abs/path", "../../x", "..", "a/b", "a\\b", ".hidden", "a\nb", "a\0b", "n" * 300]
+)
+def test_a_name_that_leaves_the_run_folder_is_refused(tmp_path: Path, name: str) -> None:
+    for keys, where in (
+        ({"name": name}, ", name"),
+        ({"output": {"exports": [f"{name}.csv"]}}, ", [output] exports, entry 1.file"),
+    ):
+        (tmp_path / "scene.toml").write_text(tomli_w.dumps({"dimensions": 2, **keys}))
+        problems = check_scene(tmp_path / "scene.toml")
+        said = [one for one in problems if f"scene scene.toml{where}" in one]
+        assert len(said) == 1, problems
+        assert "a run calls its own folder or file by it. Take a name" in said[0]

@@ -134,10 +134,24 @@ class RunFolder:
 
     def check_writable(self) -> None:
         """Raise RunFolderError unless a run that is there can go on."""
+        self.check_links()
         if not os.access(self.path, os.W_OK):
             raise RunFolderError(
                 f"{self.path} cannot be written; give yourself the right to write it"
             )
+
+    def check_links(self) -> None:
+        """Raise RunFolderError where something in the folder is a symbolic link.
+
+        A run that writes or removes by such a name would do so somewhere else.
+        """
+        for place, folders, files in os.walk(self.path):
+            for name in (*folders, *files):
+                if (found := Path(place) / name).is_symlink():
+                    raise RunFolderError(
+                        f"{found} is a symbolic link, and a run writes and removes nothing behind "
+                        "one; remove the link, or name another folder with --out"
+                    )
 
     def check_new(self, *, replace: bool) -> None:
         """Raise RunFolderError unless a new run may be written here; touches nothing."""
@@ -164,13 +178,15 @@ class RunFolder:
             raise RunFolderError(
                 f"{path} is not empty and was not made by a run; name another folder with --out"
             )
+        self.check_links()
 
     def is_run(self) -> bool:
         """Whether a run has made this folder."""
         try:
-            return MARK in json.loads(self.summary.read_text(encoding="utf-8"))
-        except (OSError, ValueError, TypeError):
+            summary = json.loads(self.summary.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
             return False
+        return isinstance(summary, dict) and MARK in summary
 
     def goes_on(self) -> bool:
         """Whether a run is being written here, or was and has been killed."""
@@ -198,11 +214,15 @@ class RunFolder:
     def model_files(self) -> list[str]:
         """Names of the files that this run has copied beside its scene, none outside the folder."""
         copied = self.read_summary().get("model_files", []) if self.is_run() else []
-        paths = [Path(str(name)) for name in copied]
+        paths = [Path(str(name)) for name in copied] if isinstance(copied, list) else []
         return [str(path) for path in paths if not path.is_absolute() and ".." not in path.parts]
 
     def remove(self) -> None:
-        """Remove everything that a run has written here, and the folder when it is then empty."""
+        """Remove everything that a run has written here, and the folder when it is then empty.
+
+        raises  RunFolderError where a link has been put into it since the run began
+        """
+        self.check_links()
         self._remove_partial()
         self._remove_run()
         for path in (self.states, self.path):

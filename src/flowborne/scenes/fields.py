@@ -74,6 +74,28 @@ def _possible_name(value: str) -> str:
 FileName = Annotated[Text, AfterValidator(_possible_name)]
 """A file, found from the folder of the scene file."""
 
+LONGEST_NAME = 200
+"""Most bytes of a name that files are called by: they add an ending and a mark of what is half
+written, and no system has file names of more than 255."""
+
+
+def _plain_name(value: str) -> str:
+    if not value.isprintable() or value[:1] in (".", " ") or set(value) & set("/\\"):
+        raise ValueError(
+            f"is {value[:60]!r}, and a run calls its own folder or file by it. Take a name without "
+            "'/', '\\' and letters of no width, with a letter or a number first"
+        )
+    if (size := len(value.encode())) > LONGEST_NAME:
+        raise ValueError(
+            f"has {size} bytes, and a run calls its own folder or file by it. Take a name of at "
+            f"most {LONGEST_NAME}"
+        )
+    return value
+
+
+PlainName = Annotated[Text, AfterValidator(_plain_name)]
+"""What a folder or a file that a run writes is called by: never a path."""
+
 Corner = Annotated[tuple[Number, ...], AfterValidator(_two_or_three)]
 """A place: (x, y) or (x, y, z) in m."""
 

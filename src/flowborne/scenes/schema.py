@@ -14,6 +14,7 @@ from flowborne.scenes.fields import (
     Count,
     FileName,
     Number,
+    PlainName,
     Positive,
     Steps,
     SwitchOrNames,
@@ -73,7 +74,7 @@ class ExportTable(Table):
 
     model_config = ConfigDict(extra="allow")
 
-    file: Annotated[str, Field(pattern=r"^[^/\\]+\.\w+$")]
+    file: PlainName
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -123,7 +124,7 @@ class Scene(Table):
     plugins      Python files, found from the scene's folder, that register parts of one's own
     """
 
-    name: Text
+    name: PlainName
     description: str = ""
     figure: str = ""
     dimensions: Literal[2, 3] = 3

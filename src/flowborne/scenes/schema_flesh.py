@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.fields import FileName, NotNegative, Positive, Table, Text
+from flowborne.scenes.fields import FileName, NotNegative, PlainName, Positive, Table, Text
 
 
 class FleshTable(Table):
@@ -33,7 +33,7 @@ class FleshTable(Table):
     law        "neo-hookean" comes back when it is turned inside out, "st-venant-kirchhoff" does not
     """
 
-    name: Text
+    name: PlainName
     bones: Annotated[tuple[Text, ...], Field(min_length=1)]
     thickness: Positive | None = None
     surface: FileName | None = None
