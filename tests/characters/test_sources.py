@@ -66,7 +66,7 @@ def test_what_is_wrong_with_a_file_is_one_message(
         ("cat.fbx", r"cat\.fbx: \.fbx .* Make a \.glb of it, in Blender .*'cat\.glb'"),
         ("cat.max", r"cat\.max is none of \.glb, \.gltf, \.usd"),
         ("cat.glb", r"there is no file .*cat\.glb\. Correct its name"),
-        ("cut.glb", r"cut\.glb cannot be read as glTF: .*Export it anew"),
+        ("cut.glb", r"cut\.glb cannot be read as glTF: it has no JSON chunk. Export it anew"),
         ("cut.usda", r"cut\.usda cannot be read as USD"),
     ):
         with pytest.raises(SceneError, match=said):
@@ -81,7 +81,6 @@ def test_what_is_wrong_with_a_file_is_one_message(
     rigged.write_glb(tmp_path / "still.glb", clips=0)
     with pytest.raises(SceneError, match=r"has no clip\. Name a file that has one"):
         clip_number(read_source(tmp_path / "still.glb"), None, "still.glb")
-    for module, extra, name in (("pygltflib", "gltf", "box.glb"), ("pxr.Usd", "usd", "cut.usda")):
-        monkeypatch.setitem(sys.modules, module, None)
-        with pytest.raises(SceneError, match=rf"are read by .*flowborne\[{extra}\]"):
-            read_source(tmp_path / name)
+    monkeypatch.setitem(sys.modules, "pxr.Usd", None)
+    with pytest.raises(SceneError, match=r"are read by .*flowborne\[usd\]"):
+        read_source(tmp_path / "cut.usda")

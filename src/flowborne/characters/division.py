@@ -24,6 +24,9 @@ from flowborne.shapes.shape import Mesh
 SAME = 1e-7
 """Points this close, relative to the size of the surface, are one."""
 
+CROWDED = 50
+"""Points that may be one, on average."""
+
 HALF = 0.5 + 1e-7
 """Weight with which a point lies beyond a joint; above a half, so that no point lies beyond two."""
 
@@ -65,10 +68,15 @@ def divided(rig: Rig, surface: Surface, name: str) -> Division:
     """The bodies of a character.
 
     name    of its file, for messages
-    raises  SceneError when the surface is not closed
+    raises  SceneError when the surface is not closed, or has no inside
     """
     whole = closed(surface, name)
     volume = _volume((whole.vertices, whole.faces))
+    if not volume > 0.0:
+        raise SceneError(
+            f"{name}: the surface holds {volume:.3g} m^3. Turn its faces outward (in Blender: "
+            "Mesh, Normals, Recalculate Outside), and take a surface with an inside."
+        )
     own = _pieces(rig, np.arange(len(rig.names)), whole)
     owners, leader = _merged(rig, np.array([_volume(piece) for piece in own]) / volume)
     cut = _pieces(rig, owners, whole)
@@ -268,10 +276,18 @@ def _loops(edges: Integers) -> list[Integers]:
 
 def _welded(points: Array) -> tuple[Integers, Integers]:
     """Points that are not the same as an earlier one, and for every point its number there."""
-    size = float(np.ptp(points, axis=0).max())
-    pairs = cKDTree(points).query_pairs(SAME * size, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    number = np.asarray(connected_components(links, directed=False)[1])
+    near = SAME * float(np.ptp(points, axis=0).max())
+    single, of_point = np.unique(points, axis=0, return_inverse=True)
+    tree = cKDTree(single)
+    crowd = tree.count_neighbors(tree, near)
+    if crowd > CROWDED * len(points):
+        raise SceneError(
+            f"the surface has {crowd / len(points):.3g} points within {near:.3g} m of each other, "
+            f"and {CROWDED} are the most: most of it is tiny for its size. Look for stray points."
+        )
+    pairs = tree.query_pairs(near, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(single), len(single)))
+    number = np.asarray(connected_components(links, directed=False)[1])[of_point.ravel()]
     return np.unique(number, return_index=True)[1], number
 
 

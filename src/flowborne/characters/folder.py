@@ -8,11 +8,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import tomli_w
 
 from flowborne.characters.division import Division, divided
+from flowborne.characters.limits import check_work
 from flowborne.characters.model import model_files
 from flowborne.characters.pose import as_cycle, clip_of, posed
-from flowborne.characters.rig import Action, Array, Rig, Surface
+from flowborne.characters.rig import Action, Array, Rig, Surface, printable
 from flowborne.characters.source import clip_number, read_source
 from flowborne.errors import SceneError
 from flowborne.io.bvh import write_clip
@@ -21,6 +23,9 @@ from flowborne.solids.skins import skinned
 
 ROOM = 0.35
 """Water on every side of all that the clip reaches, in sizes of the character."""
+
+LONGEST_STEM = 150
+"""Bytes of the name that all files of a character begin with."""
 
 CELLS = 64
 """Cells along the longest side of the domain."""
@@ -77,7 +82,8 @@ def import_character(
     moves = path if animations is None else Path(animations)
     moving = source if animations is None else read_source(moves)
     number = clip_number(moving, clip, moves.name)
-    rig = source.rig
+    rig, action = source.rig, moving.action(number)
+    check_work(len(action.position), len(rig.names), len(surface.vertices), moves.name)
     shared = set(rig.names) & set(moving.rig.names)
     if not shared:
         raise SceneError(
@@ -85,12 +91,12 @@ def import_character(
             f"{', '.join(rig.names)}. Give clips of the same skeleton."
         )
     division = divided(rig, surface, path.name)
-    pose = posed(rig, moving.rig, moving.action(number))
+    pose = posed(rig, moving.rig, action)
     once, strays = clip_of(rig, division, pose)
     motion = as_cycle(once) or once
     files = model_files(name, rig, division, surface, density)
     files[f"{name}.bvh"] = _bvh(motion)
-    called = f"{path.name}, {moving.clips[number]}"
+    called = printable(f"{path.name}, {moving.clips[number]}")
     text = _scene(name, called, motion, as_cycle(once) is not None, _reach(rig, surface, pose))
     files[f"{name}.toml"] = text.encode()
     for made, content in files.items():
@@ -103,7 +109,8 @@ def import_character(
 
 def _plain(stem: str) -> str:
     """A name for files and models."""
-    return "".join(c if c.isalnum() or c in "-_" else "-" for c in stem) or "character"
+    plain = "".join(c if c.isalnum() or c in "-_" else "-" for c in stem) or "character"
+    return plain.encode()[:LONGEST_STEM].decode(errors="ignore")
 
 
 def _bvh(clip: Clip) -> bytes:
@@ -116,12 +123,11 @@ def _reach(rig: Rig, surface: Surface, pose: Action) -> tuple[Array, Array]:
     """(3,) lower and upper corner of the surface at rest and in every frame, m."""
     turn = pose.rotation @ np.swapaxes(rig.rotation, 1, 2)
     shift = pose.position - np.einsum("fnij,nj->fni", turn, rig.position)
-    places = (
-        skinned(surface.vertices, surface.weights, turned, shifted)
-        for turned, shifted in zip(turn, shift, strict=True)
-    )
-    every = np.concatenate([surface.vertices, *places])
-    return every.min(axis=0), every.max(axis=0)
+    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+    for turned, shifted in zip(turn, shift, strict=True):
+        places = skinned(surface.vertices, surface.weights, turned, shifted)
+        low, high = np.minimum(low, places.min(axis=0)), np.maximum(high, places.max(axis=0))
+    return low, high
 
 
 def _scene(name: str, called: str, clip: Clip, loop: bool, reach: tuple[Array, Array]) -> str:
@@ -129,7 +135,7 @@ def _scene(name: str, called: str, clip: Clip, loop: bool, reach: tuple[Array, A
     low, high = reach
     room = ROOM * float((high - low).max())
     root, last = clip.names[0], clip.names[-1]
-    return f"""description = "{called}"
+    return f"""description = {_quoted(called)}
 dimensions = 3
 
 [time]
@@ -156,14 +162,14 @@ model = "{name}.xml"
 [clip]
 file = "{name}.bvh"
 loop = {str(loop).lower()}
-free = ["{root}"]
+free = [{_quoted(root)}]
 
 # it starts in the clip's first pose, at the speed at which it and the water have no impulse
 [initial]
 impulse = "none"
 
 # [[control]]
-# joints = ["{last}"]
+# joints = [{_quoted(last)}]
 # strength = 60.0
 #
 # [[objectives]]
@@ -172,6 +178,11 @@ impulse = "none"
 [output]
 exports = ["{name}.glb"]
 """
+
+
+def _quoted(text: str) -> str:
+    """A text as TOML has it."""
+    return tomli_w.dumps({"text": text}).partition("= ")[2].strip()
 
 
 def _sides() -> str:

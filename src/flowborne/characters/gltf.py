@@ -1,4 +1,4 @@
-"""Skins, weights and animations of glTF 2.0, by pygltflib.
+"""Skins, weights and animations of glTF 2.0.
 
 source  Khronos glTF 2.0 specification, sections 3.6 (accessors), 3.7.3 (skins), 3.11 and appendix C
         (animations)
@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pygltflib as gl
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from flowborne.characters.gltf_accessors import Accessors
+from flowborne.characters.gltf_document import Node, Primitive, Skin, read_document
+from flowborne.characters.gltf_gate import WIDTH, check_document, joint_sets
+from flowborne.characters.limits import check_size, check_surface
 from flowborne.characters.rig import (
     Z_UP,
     Action,
@@ -25,19 +26,9 @@ from flowborne.characters.rig import (
     frame_times,
     one_tree,
     own_names,
-    rotations_in,
+    placed,
 )
 from flowborne.errors import SceneError
-
-KINDS = {
-    gl.BYTE: np.int8,
-    gl.UNSIGNED_BYTE: np.uint8,
-    gl.SHORT: np.int16,
-    gl.UNSIGNED_SHORT: np.uint16,
-    gl.UNSIGNED_INT: np.uint32,
-    gl.FLOAT: np.float32,
-}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 """Extensions that hide the numbers."""
@@ -54,22 +45,17 @@ class GltfSource:
 
     def __init__(self, path: Path) -> None:
         self._name = path.name
-        try:
-            self._gltf = gl.GLTF2().load(str(path))
-            self._gltf.convert_buffers(gl.BufferFormat.BINARYBLOB)
-            self._blob = self._gltf.binary_blob() or b""
-        except Exception as error:  # its reader raises whatever goes wrong in it
-            raise SceneError(
-                f"{path.name} cannot be read as glTF: {error}. Export it anew."
-            ) from error
-        packed = [name for name in PACKED if name in (self._gltf.extensionsRequired or [])]
+        self._gltf, buffers = read_document(path)
+        packed = [name for name in PACKED if name in self._gltf.extensions_required]
         if packed:
             raise SceneError(
                 f"{path.name} is compressed ({packed[0]}). Export it without compression."
             )
+        self._arrays = Accessors(path.name, self._gltf, buffers)
+        check_document(path.name, self._gltf, self._arrays)
         self._parents = [-1] * len(self._gltf.nodes)
         for number, node in enumerate(self._gltf.nodes):
-            for child in node.children or []:
+            for child in node.children:
                 self._parents[child] = number
         self._order = self._parents_first()
         skinned = {joint for skin in self._gltf.skins for joint in skin.joints}
@@ -84,9 +70,11 @@ class GltfSource:
         return tuple(clip.name or f"animation_{n}" for n, clip in enumerate(found))
 
     @cached_property
+    @np.errstate(all="ignore")  # what overflows is found in the end
     def rig(self) -> Rig:
         """The joints where their skin is bound to them; every node of a file without a skin."""
-        names = own_names([self._gltf.nodes[node].name or "" for node in self._joints])
+        check_size(len(self._joints), 0, self._name)
+        names = own_names([self._gltf.nodes[node].name for node in self._joints])
         number = {node: joint for joint, node in enumerate(self._joints)}
         parents = []
         for node in self._joints:
@@ -99,30 +87,27 @@ class GltfSource:
             inner = self._into_world(skin)
             for node, inverse in zip(skin.joints, self._inverse_binds(skin), strict=True):
                 bind[number[node]] = inner @ np.linalg.inv(inverse)
-        turned = rotations_in(bind[:, :3, :3])
-        return Rig(names, one_tree(parents), bind[:, :3, 3], turned)
+        return Rig(names, one_tree(parents), *placed(bind, f"{self._name}, joints at rest"))
 
     @property
+    @np.errstate(all="ignore")
     def surface(self) -> Surface | None:
         """All skinned meshes as one; None when there is none."""
         vertices, faces, weights, count = [], [], [], 0
         number = {node: joint for joint, node in enumerate(self._joints)}
-        for node in self._gltf.nodes:
-            if node.mesh is None or node.skin is None:
-                continue
+        carried = [n for n in self._gltf.nodes if n.mesh is not None and n.skin is not None]
+        check_size(len(self._joints), sum(self._points(node) for node in carried), self._name)
+        for node in carried:
+            assert node.mesh is not None
+            assert node.skin is not None
             skin = self._gltf.skins[node.skin]
             inner = self._into_world(skin)
             own = np.array([number[joint] for joint in skin.joints])
             for part in self._gltf.meshes[node.mesh].primitives:
-                if part.mode not in (None, gl.TRIANGLES):
-                    raise SceneError(
-                        f"{self._name}: a mesh of '{node.name}' is not made of triangles. "
-                        "Triangulate it before exporting."
-                    )
-                points = self._array(part.attributes.POSITION).astype(float)
+                points = self._arrays.read(part.attributes["POSITION"]).astype(float)
                 corners = np.arange(len(points))
                 if part.indices is not None:
-                    corners = self._array(part.indices).ravel().astype(np.int64)
+                    corners = self._arrays.read(part.indices).ravel().astype(np.int64)
                 triangles = corners.reshape(-1, 3)
                 if np.linalg.det(inner[:3, :3]) < 0.0:
                     triangles = triangles[:, ::-1]
@@ -132,8 +117,16 @@ class GltfSource:
                 count += len(points)
         if not vertices:
             return None
+        check_surface(np.concatenate(vertices), self._name)
         return Surface(np.concatenate(vertices), np.concatenate(faces), np.concatenate(weights))
 
+    def _points(self, node: Node) -> int:
+        """Number of vertices of a node's mesh."""
+        assert node.mesh is not None
+        parts = self._gltf.meshes[node.mesh].primitives
+        return sum(self._arrays.table(part.attributes["POSITION"]).count for part in parts)
+
+    @np.errstate(all="ignore")
     def action(self, clip: int) -> Action:
         """The `clip`-th animation, sampled at its own rate.
 
@@ -142,20 +135,24 @@ class GltfSource:
         animation = self._gltf.animations[clip]
         curves: dict[tuple[int, str], Curve] = {}
         for channel in animation.channels:
-            if channel.target.node is None or channel.target.path == "weights":
+            if channel.target.node is None or channel.target.path not in WIDTH:
                 continue
             sampler = animation.samplers[channel.sampler]
-            times = self._array(sampler.input).ravel().astype(float)
-            values = self._array(sampler.output).astype(float)
-            kind = sampler.interpolation or "LINEAR"
-            curves[channel.target.node, channel.target.path] = times, values, kind
+            times = self._arrays.read(sampler.input).ravel().astype(float)
+            values = self._arrays.read(sampler.output).astype(float)
+            curves[channel.target.node, channel.target.path] = times, values, sampler.interpolation
         if not curves:
             raise SceneError(f"{self._name}: clip '{self.clips[clip]}' moves no joint.")
         keys = [times for times, _, _ in curves.values()]
-        times = frame_times(np.concatenate(keys), max(keys, key=len))
-        world = self._worlds(times, curves)[:, self._joints]
+        where = f"{self._name}, clip '{self.clips[clip]}'"
+        nodes = len(self._gltf.nodes)
+        times = frame_times(np.concatenate(keys), max(keys, key=len), nodes, where)
+        try:
+            world = self._worlds(times, curves)[:, self._joints]
+        except ValueError as error:  # a spline of quaternions goes through 0
+            raise SceneError(f"{where} has a rotation that is none. Export it anew.") from error
         step = float(times[-1] - times[0]) / (len(times) - 1) or 1.0
-        return Action(step, world[..., :3, 3], rotations_in(world[..., :3, :3]))
+        return Action(step, *placed(world, where))
 
     @cached_property
     def _rest(self) -> Array:
@@ -167,9 +164,10 @@ class GltfSource:
         while pending:
             node = pending.pop(0)
             order.append(node)
-            pending = [*(self._gltf.nodes[node].children or []), *pending]
+            pending = [*(self._gltf.nodes[node].children), *pending]
         return order
 
+    @np.errstate(all="ignore")
     def _worlds(self, times: Array, curves: dict[tuple[int, str], Curve]) -> Array:
         """(frames, nodes, 4, 4) every node's frame to the world's, z up."""
         world = np.empty((len(times), len(self._parents), 4, 4))
@@ -184,76 +182,35 @@ class GltfSource:
             world[:, number] = (turned if above < 0 else world[:, above]) @ local
         return world
 
-    def _into_world(self, skin: gl.Skin) -> Array:
+    def _into_world(self, skin: Skin) -> Array:
         """(4, 4) from the axes of a skin's meshes to the world's: by its first joint, at rest."""
         first = min(range(len(skin.joints)), key=lambda n: self._order.index(skin.joints[n]))
         return np.asarray(self._rest[skin.joints[first]] @ self._inverse_binds(skin)[first])
 
-    def _inverse_binds(self, skin: gl.Skin) -> Array:
+    def _inverse_binds(self, skin: Skin) -> Array:
         """(joints, 4, 4) world of a skin's meshes to each joint's frame."""
-        if skin.inverseBindMatrices is None:
-            raise SceneError(
-                f"{self._name}: skin '{skin.name}' has no inverse bind matrices. Export it with "
-                "the mesh bound to the armature."
-            )
-        columns = self._array(skin.inverseBindMatrices).astype(float)
+        assert skin.inverse_bind_matrices is not None
+        columns = self._arrays.read(skin.inverse_bind_matrices)[: len(skin.joints)].astype(float)
         return columns.reshape(-1, 4, 4).swapaxes(1, 2)
 
-    def _weights(self, part: gl.Primitive, joints: Integers, count: int) -> Array:
+    def _weights(self, part: Primitive, joints: Integers, count: int) -> Array:
         """(count, n) shares of all joints, which need not sum to one in the file."""
         shares = np.zeros((count, len(self._joints)))
-        attributes, number = vars(part.attributes), 0
-        while attributes.get(f"JOINTS_{number}") is not None:
-            own = joints[self._array(attributes[f"JOINTS_{number}"]).astype(np.int64)]
-            weights = self._array(attributes[f"WEIGHTS_{number}"]).astype(float)
+        for number, weight in joint_sets(part):
+            own = joints[self._arrays.read(part.attributes[number]).astype(np.int64)]
+            weights = self._arrays.read(part.attributes[weight]).astype(float)
             np.add.at(shares, (np.arange(count)[:, None], own), weights)
-            number += 1
         total = shares.sum(axis=1)
         shares[total <= 0.0, joints[0]] = 1.0
         return np.asarray(shares / np.where(total > 0.0, total, 1.0)[:, None])
 
-    def _array(self, number: int) -> NDArray[Any]:
-        """(count, width) the elements of an accessor."""
-        accessor = self._gltf.accessors[number]
-        kind, width = np.dtype(KINDS[accessor.componentType]), WIDTHS[accessor.type]
-        if accessor.bufferView is None:
-            values = np.zeros((accessor.count, width), kind)
-        else:
-            first = accessor.byteOffset or 0
-            values = self._view(accessor.bufferView, first, kind, accessor.count, width)
-        if accessor.sparse is not None:
-            where, new = accessor.sparse.indices, accessor.sparse.values
-            chosen, count = np.dtype(KINDS[where.componentType]), accessor.sparse.count
-            rows = self._view(where.bufferView, where.byteOffset or 0, chosen, count, 1)
-            values = values.copy()
-            values[rows.ravel()] = self._view(
-                new.bufferView, new.byteOffset or 0, kind, count, width
-            )
-        if accessor.normalized and kind.kind in "iu":
-            largest = 2.0 ** (8 * kind.itemsize - (kind.kind == "i")) - 1.0
-            return np.maximum(values.astype(float) / largest, -1.0)
-        return values
 
-    def _view(
-        self, number: int, first: int, kind: np.dtype[Any], count: int, width: int
-    ) -> NDArray[Any]:
-        view = self._gltf.bufferViews[number]
-        step = view.byteStride or width * kind.itemsize
-        return np.ndarray(
-            (count, width),
-            kind,
-            self._blob,
-            (view.byteOffset or 0) + first,
-            (step, kind.itemsize),
-        )
-
-
-def _local(node: gl.Node, number: int, times: Array, curves: dict[tuple[int, str], Curve]) -> Array:
+def _local(node: Node, number: int, times: Array, curves: dict[tuple[int, str], Curve]) -> Array:
     """(frames, 4, 4) a node's frame to its parent's."""
     still = {
-        "translation": node.translation or (0.0, 0.0, 0.0),
-        "rotation": node.rotation or (0.0, 0.0, 0.0, 1.0),
-        "scale": node.scale or (1.0, 1.0, 1.0),
+        "translation": node.translation,
+        "rotation": node.rotation,
+        "scale": node.scale,
     }
     now = {
         path: _sampled(*curves[number, path], times, turns=path == "rotation")

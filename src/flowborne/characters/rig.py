@@ -8,6 +8,8 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.characters.limits import LONGEST_NAME, check_frames, check_poses
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -72,13 +74,19 @@ class Action:
 
 
 def own_names(names: list[str]) -> tuple[str, ...]:
-    """Names of joints, each once, also where a file has none or one twice."""
+    """Names of joints, each once, also where a file has none or one twice; in one short line."""
+    names = [printable(name)[:LONGEST_NAME] for name in names]
     found = list[str]()
     for number, name in enumerate(names):
         base = name or f"joint_{number}"
         again = (f"{base}_{n}" for n in count(2))
         found.append(base if base not in found else next(n for n in again if n not in found))
     return tuple(found)
+
+
+def printable(text: str) -> str:
+    """A text with '_' in place of each letter that has no width or breaks a line."""
+    return "".join(letter if letter.isprintable() else "_" for letter in text)
 
 
 def one_tree(parents: list[int]) -> Integers:
@@ -94,13 +102,28 @@ def rotations_in(matrices: Array) -> Array:
     return np.asarray(left @ right)
 
 
-def frame_times(keys: Array, densest: Array) -> Array:
+def placed(matrices: Array, where: str) -> tuple[Array, Array]:
+    """(..., 3) m and (..., 3, 3), places and rotations of frames (..., 4, 4).
+
+    where   the file and what of it they are
+    raises  SceneError when they are not finite, or too far away
+    """
+    check_poses(matrices, where)
+    return matrices[..., :3, 3], rotations_in(matrices[..., :3, :3])
+
+
+def frame_times(keys: Array, densest: Array, nodes: int, where: str) -> Array:
     """(frames,) s evenly from the first key to the last.
 
     keys     s of all curves of a clip
     densest  s of the curve that has most: its usual step is the frames'
+    nodes    number of things that are posed in every frame
+    where    the file and its clip
+    raises   SceneError when these are more frames, or closer ones, than a run can have
     """
     first, last = float(keys.min()), float(keys.max())
     step = float(np.median(np.diff(densest))) if len(densest) > 1 else 0.0
+    if len(densest) > 1:
+        check_frames((last - first) / step, step, nodes, where)
     count = max(round((last - first) / step), 1) if step > 0.0 else 1
     return np.linspace(first, last, count + 1)

@@ -60,7 +60,6 @@ def read_source(path: Path) -> Source:
     if not path.is_file():
         raise SceneError(f"there is no file {path}. Correct its name.")
     if ending in GLTF:
-        optional("pygltflib", "pygltflib", "gltf", f"characters in '{ending}' files", verb="read")
         from flowborne.characters.gltf import GltfSource
 
         return GltfSource(path)

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from pxr import Tf, Usd, UsdGeom, UsdSkel
+from pxr import Usd, UsdGeom, UsdSkel
 
+from flowborne.characters.limits import check_size, check_surface
 from flowborne.characters.rig import (
     Z_UP,
     Action,
@@ -23,7 +23,16 @@ from flowborne.characters.rig import (
     frame_times,
     one_tree,
     own_names,
-    rotations_in,
+    placed,
+)
+from flowborne.characters.usd_gate import (
+    check_faces,
+    check_influences,
+    check_samples,
+    check_topology,
+    open_stage,
+    points_of,
+    reading_usd,
 )
 from flowborne.errors import SceneError
 
@@ -38,10 +47,11 @@ class UsdSource:
 
     def __init__(self, path: Path) -> None:
         self._name = path.name
-        try:
-            stage = Usd.Stage.Open(str(path))
-        except Tf.ErrorException as error:
-            raise SceneError(f"{path.name} cannot be read as USD. Export it anew.") from error
+        with reading_usd(path.name):
+            self._open(path)
+
+    def _open(self, path: Path) -> None:
+        stage = open_stage(path)
         self._stage, self._cache, self._bound = stage, UsdSkel.Cache(), []
         prims = list(Usd.PrimRange.Stage(stage, EVERYTHING))
         for root in (prim for prim in prims if prim.IsA(UsdSkel.Root)):
@@ -53,11 +63,18 @@ class UsdSource:
             raise SceneError(f"{path.name} has no skeleton. Export the armature as UsdSkel.")
         self._skeleton = skeletons[0]
         self._query = self._cache.GetSkelQuery(self._skeleton)
+        if not self._query:
+            raise SceneError(f"{path.name}: its skeleton is damaged. Export it anew.")
+        check_size(len(self._query.GetJointOrder()), 0, path.name)
+        check_topology(self._query, path.name)
         self._animations = [UsdSkel.Animation(p) for p in prims if p.IsA(UsdSkel.Animation)]
         self._world = UsdGeom.XformCache(Usd.TimeCode.Default())
         turn = np.eye(3) if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else Z_UP
         self._turned = np.eye(4)
-        self._turned[:3, :3] = UsdGeom.GetStageMetersPerUnit(stage) * turn
+        unit = UsdGeom.GetStageMetersPerUnit(stage)
+        if not 1e-9 <= unit <= 1e9:
+            raise SceneError(f"{path.name}: metersPerUnit is {unit:.3g}. Set it to 1 or 0.01.")
+        self._turned[:3, :3] = unit * turn
 
     @property
     def clips(self) -> tuple[str, ...]:
@@ -67,6 +84,24 @@ class UsdSource:
     @cached_property
     def rig(self) -> Rig:
         """The joints where their skin is bound to them."""
+        with reading_usd(self._name):
+            return self._rig()
+
+    @property
+    def surface(self) -> Surface | None:
+        """All meshes bound to the skeleton as one; None when there is none."""
+        with reading_usd(self._name):
+            return self._surface()
+
+    def action(self, clip: int) -> Action:
+        """The `clip`-th animation, sampled at its own rate.
+
+        raises  SceneError when it moves nothing
+        """
+        with reading_usd(self._name):
+            return self._action(clip)
+
+    def _rig(self) -> Rig:
         topology = self._query.GetTopology()
         paths = [str(joint) for joint in self._query.GetJointOrder()]
         bind = self._to_world(self._skeleton.GetPrim()) @ _matrices(
@@ -74,11 +109,9 @@ class UsdSource:
         )
         parents = [topology.GetParent(joint) for joint in range(len(paths))]
         names = own_names([path.rpartition("/")[2] for path in paths])
-        return Rig(names, one_tree(parents), bind[:, :3, 3], rotations_in(bind[:, :3, :3]))
+        return Rig(names, one_tree(parents), *placed(bind, f"{self._name}, joints at rest"))
 
-    @property
-    def surface(self) -> Surface | None:
-        """All meshes bound to the skeleton as one; None when there is none."""
+    def _surface(self) -> Surface | None:
         vertices, faces, weights, count = [], [], [], 0
         into = self._to_world(self._skeleton.GetPrim())
         for binding in self._bound:
@@ -88,25 +121,22 @@ class UsdSource:
                 mesh = UsdGeom.Mesh(target.GetPrim())
                 if not mesh or not target.HasJointInfluences():
                     continue
-                points = np.array(mesh.GetPointsAttr().Get(Usd.TimeCode.Default()), float)
-                if not len(points):
-                    points = np.array(mesh.GetPointsAttr().Get(Usd.TimeCode.EarliestTime()), float)
+                where = f"{self._name}, {mesh.GetPath()}"
+                points = points_of(mesh, where)
+                check_size(len(self._query.GetJointOrder()), count + len(points), self._name)
                 own = into @ _matrices([target.GetGeomBindTransform()])[0]
                 vertices.append(points @ own[:3, :3].T + own[:3, 3])
                 turned = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
                 mirrored = (np.linalg.det(own[:3, :3]) < 0.0) != turned
-                faces.append(_triangles(mesh, mirrored) + count)
+                faces.append(_triangles(mesh, len(points), mirrored, where) + count)
                 weights.append(self._weights(target, len(points)))
                 count += len(points)
         if not vertices:
             return None
+        check_surface(np.concatenate(vertices), self._name)
         return Surface(np.concatenate(vertices), np.concatenate(faces), np.concatenate(weights))
 
-    def action(self, clip: int) -> Action:
-        """The `clip`-th animation, sampled at its own rate.
-
-        raises  SceneError when it moves nothing
-        """
+    def _action(self, clip: int) -> Action:
         query = self._cache.GetAnimQuery(self._animations[clip])
         codes = np.array(query.GetJointTransformTimeSamples())
         joints = list(query.GetJointOrder())
@@ -114,20 +144,29 @@ class UsdSource:
         known = [order.index(joint) for joint in joints if joint in order]
         if not codes.size or not known:
             raise SceneError(f"{self._name}: clip '{self.clips[clip]}' moves no joint.")
+        where = f"{self._name}, clip '{self.clips[clip]}'"
         rate = self._stage.GetTimeCodesPerSecond()
-        times = frame_times(codes / rate, codes / rate)
+        if not 1e-6 <= rate <= 1e6:
+            raise SceneError(f"{self._name}: timeCodesPerSecond is {rate:.3g}. Set it to 24.")
+        check_samples(len(codes), len(order), where)
+        times = frame_times(codes / rate, codes / rate, len(order), where)
         rest = _matrices(self._query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True))
         local = np.tile(rest, (len(times), 1, 1, 1))
         own = [n for n, joint in enumerate(joints) if joint in order]
         for frame, time in enumerate(times):
-            local[frame, known] = _matrices(query.ComputeJointLocalTransforms(time * rate))[own]
+            poses = query.ComputeJointLocalTransforms(time * rate)
+            if len(poses or ()) != len(joints):
+                raise SceneError(
+                    f"{where} has not a pose for each of its {len(joints)} joints. Export it anew."
+                )
+            local[frame, known] = _matrices(poses)[own]
         world, into = local.copy(), self._to_world(self._skeleton.GetPrim())
         for joint in range(len(order)):
             parent = self._query.GetTopology().GetParent(joint)
             above = into if parent < 0 else world[:, parent]
             world[:, joint] = above @ local[:, joint]
         step = float(times[-1] - times[0]) / (len(times) - 1) or 1.0
-        return Action(step, world[..., :3, 3], rotations_in(world[..., :3, :3]))
+        return Action(step, *placed(world, where))
 
     def _to_world(self, prim: Usd.Prim) -> Array:
         """(4, 4) a prim's frame to the world's, m, z up."""
@@ -136,15 +175,22 @@ class UsdSource:
 
     def _weights(self, target: UsdSkel.SkinningQuery, count: int) -> Array:
         """(count, n) shares of the skeleton's joints, which need not sum to one in the file."""
-        indices, shares = target.ComputeVaryingJointInfluences(count)
+        where = f"{self._name}, {target.GetPrim().GetPath()}"
         width = target.GetNumInfluencesPerComponent()
+        found_for = target.ComputeVaryingJointInfluences(count) or ((), ())
+        indices, shares = np.array(found_for[0], np.int64), np.array(found_for[1], float)
         order = [str(joint) for joint in self._query.GetJointOrder()]
         own = target.GetJointOrder()
+        if lost := [str(joint) for joint in own or () if str(joint) not in order]:
+            raise SceneError(
+                f"{where} names joint '{lost[0]}', which is not in the skeleton. Export it anew."
+            )
         number = np.array([order.index(str(joint)) for joint in own] if own else range(len(order)))
+        check_influences(indices, shares, count * width, len(number), where)
         found = np.zeros((count, len(order)))
         rows = np.arange(count)[:, None]
-        joints = number[np.array(indices, np.int64).reshape(count, width)]
-        np.add.at(found, (rows, joints), np.array(shares, float).reshape(count, width))
+        joints = number[indices.reshape(count, width)]
+        np.add.at(found, (rows, joints), shares.reshape(count, width))
         total = found.sum(axis=1)
         found[total <= 0.0, 0] = 1.0
         return np.asarray(found / np.where(total > 0.0, total, 1.0)[:, None])
@@ -155,10 +201,12 @@ def _matrices(transforms: Any) -> Array:
     return np.array([np.array(transform) for transform in transforms]).swapaxes(1, 2)
 
 
-def _triangles(mesh: UsdGeom.Mesh, mirrored: bool) -> Integers:
+def _triangles(mesh: UsdGeom.Mesh, points: int, mirrored: bool, where: str) -> Integers:
     """(m, 3) the faces of a mesh as fans, outward."""
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(), np.int64)
-    corners: NDArray[np.int64] = np.array(mesh.GetFaceVertexIndicesAttr().Get(), np.int64)
+    earliest = Usd.TimeCode.EarliestTime()
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(earliest) or (), np.int64)
+    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(earliest) or (), np.int64)
+    check_faces(counts, corners, points, where)
     starts = np.cumsum(counts) - counts
     fans = [
         corners[[start, start + n, start + n + 1]]

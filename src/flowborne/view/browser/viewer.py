@@ -18,6 +18,7 @@ from flowborne.view.browser.camera_keys import CameraKeys
 from flowborne.view.browser.fluid import Fluid
 from flowborne.view.browser.growing import GrowingRun
 from flowborne.view.browser.legend import legend_html
+from flowborne.view.browser.origins import only_own_requests
 from flowborne.view.browser.panel import Panel
 from flowborne.view.browser.settings import Settings
 from flowborne.view.browser.solids import Bodies, Pushes, SkinMesh
@@ -144,7 +145,8 @@ def open_viewer(folder: Path, host: str, port: int) -> Viewer:
     viser = optional("viser", "viser", "view", "views in a browser")
     run = GrowingRun.opened(folder)
     _check_free(host, port)
-    server = viser.ViserServer(host=host, port=port, verbose=False)
+    with only_own_requests(host):
+        server = viser.ViserServer(host=host, port=port, verbose=False)
     return Viewer(server, run, str(folder))
 
 

@@ -1,0 +1,159 @@
+"""Numbers of a glTF file: every accessor is held against its view and buffer before it is read.
+
+source  Khronos glTF 2.0 specification, sections 3.6.1 and 3.6.2 (buffers and accessors)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.characters.gltf_document import Accessor, Document
+from flowborne.characters.rig import Array, Integers
+from flowborne.errors import SceneError
+
+KINDS = {
+    5120: np.int8,
+    5121: np.uint8,
+    5122: np.int16,
+    5123: np.uint16,
+    5125: np.uint32,
+    5126: np.float32,
+}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+MOST_NUMBERS = 30_000_000
+"""Of an accessor, three to a point."""
+
+
+class Accessors:
+    """The arrays of a document.
+
+    raises  SceneError when one of them lies outside its view or its buffer
+    """
+
+    def __init__(self, name: str, document: Document, buffers: list[memoryview]) -> None:
+        self._name, self._document, self._buffers = name, document, buffers
+        for number, view in enumerate(document.buffer_views):
+            where = f"{name}, bufferViews[{number}]"
+            within(view.buffer, buffers, f"{where}.buffer", "buffers")
+            end, size = view.byte_offset + view.byte_length, len(buffers[view.buffer])
+            if end > size:
+                raise wrong(f"{where} ends at byte {end} of a buffer of {size}")
+        for number, accessor in enumerate(document.accessors):
+            self._check(accessor, f"{name}, accessors[{number}]")
+
+    def __len__(self) -> int:
+        return len(self._document.accessors)
+
+    def table(self, number: int) -> Accessor:
+        """What the document says of an accessor."""
+        return self._document.accessors[number]
+
+    def read(self, number: int) -> NDArray[Any]:
+        """(count, width) the elements of an accessor, whole numbers that stand for parts of one as
+        floats."""
+        accessor = self.table(number)
+        kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
+        if accessor.buffer_view is None:
+            values = np.zeros((accessor.count, width), kind)
+        else:
+            first = accessor.byte_offset
+            values = self._view(accessor.buffer_view, first, kind, accessor.count, width)
+        if accessor.sparse is not None:
+            new, count = accessor.sparse.values, accessor.sparse.count
+            values = values.copy()
+            values[self._rows(accessor)] = self._view(
+                new.buffer_view, new.byte_offset, kind, count, width
+            )
+        if accessor.normalized and kind.kind in "iu":
+            largest = 2.0 ** (8 * kind.itemsize - (kind.kind == "i")) - 1.0
+            return np.maximum(values.astype(float) / largest, -1.0)
+        return values
+
+    def numbers(self, number: int, where: str) -> Array:
+        """(count, width) the same as floats; raises SceneError unless all of them are finite."""
+        values = self.read(number).astype(float)
+        if not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+            raise wrong(f"{where} (accessors[{number}]): element {row} is not a finite number")
+        return values
+
+    def indices(self, number: int, count: int, where: str, what: str) -> Integers:
+        """(count, width) the same as whole numbers, each of which has to be below `count`."""
+        values = self.read(number).astype(np.int64)
+        if (largest := int(values.max())) >= count:
+            raise wrong(f"{where} (accessors[{number}]) names number {largest} of {count} {what}")
+        return values
+
+    def _check(self, accessor: Accessor, where: str) -> None:
+        kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
+        if accessor.count * width > MOST_NUMBERS:
+            raise SceneError(
+                f"{where} asks for {accessor.count * width:,} numbers, and {MOST_NUMBERS:,} are "
+                "the most. Export fewer points or keys."
+            )
+        if accessor.buffer_view is not None:
+            self._fits(
+                accessor.buffer_view, accessor.byte_offset, kind, accessor.count, width, where
+            )
+        if accessor.sparse is not None:
+            where, sparse = f"{where}.sparse", accessor.sparse
+            if sparse.count > accessor.count:
+                raise wrong(f"{where} replaces {sparse.count} elements of {accessor.count}")
+            own, new = sparse.indices, sparse.values
+            chosen = np.dtype(KINDS[own.component_type])
+            self._fits(own.buffer_view, own.byte_offset, chosen, sparse.count, 1, where)
+            self._fits(new.buffer_view, new.byte_offset, kind, sparse.count, width, where)
+            if (largest := int(self._rows(accessor).max())) >= accessor.count:
+                raise wrong(f"{where} names element {largest} of {accessor.count}")
+
+    def _rows(self, accessor: Accessor) -> NDArray[Any]:
+        """(count,) elements that the sparse part of an accessor replaces."""
+        assert accessor.sparse is not None
+        own, count = accessor.sparse.indices, accessor.sparse.count
+        kind = np.dtype(KINDS[own.component_type])
+        return self._view(own.buffer_view, own.byte_offset, kind, count, 1).ravel()
+
+    def _fits(
+        self, number: int, first: int, kind: np.dtype[Any], count: int, width: int, where: str
+    ) -> None:
+        """Raise SceneError unless so many elements lie within a view."""
+        views = self._document.buffer_views
+        within(number, views, f"{where}.bufferView", "bufferViews")
+        size = width * kind.itemsize
+        step = views[number].byte_stride or size
+        if step < size:
+            raise wrong(f"{where}: its elements have {size} bytes, and byteStride is {step}")
+        end = first + step * (count - 1) + size
+        if end > views[number].byte_length:
+            raise wrong(
+                f"{where} ends at byte {end} of bufferViews[{number}], which has "
+                f"{views[number].byte_length}"
+            )
+
+    def _view(
+        self, number: int, first: int, kind: np.dtype[Any], count: int, width: int
+    ) -> NDArray[Any]:
+        view = self._document.buffer_views[number]
+        step = view.byte_stride or width * kind.itemsize
+        return np.ndarray(
+            (count, width),
+            kind,
+            self._buffers[view.buffer],
+            view.byte_offset + first,
+            (step, kind.itemsize),
+        )
+
+
+def within(number: int, things: Any, where: str, what: str) -> None:
+    """Raise SceneError unless a list has an entry of that number."""
+    if number >= len(things):
+        raise wrong(f"{where} is {number}, and the file has {len(things)} {what}")
+
+
+def wrong(said: str) -> SceneError:
+    """The error of a file that contradicts itself."""
+    return SceneError(f"{said}. Export it anew.")

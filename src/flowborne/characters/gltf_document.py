@@ -1,0 +1,276 @@
+"""A glTF file as plain tables, each value of its type: what is there, and not yet whether it fits.
+
+source  Khronos glTF 2.0 specification, sections 3.4, 3.6 and 4.4 (GLB), and appendix C
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from urllib.parse import unquote, urlsplit
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, model_validator
+from pydantic.alias_generators import to_camel
+
+from flowborne.errors import SceneError
+
+LARGEST_FILE = 1 << 30
+"""Bytes of a file, and of all its buffers together."""
+
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+
+Index = Annotated[int, Strict(), Field(ge=0, lt=1 << 53)]
+Size = Annotated[int, Strict(), Field(ge=1, lt=1 << 53)]
+Number = Annotated[float, Field(strict=True, ge=-1e30, le=1e30, allow_inf_nan=False)]
+Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Four = Annotated[list[Number], Field(min_length=4, max_length=4)]
+Sixteen = Annotated[list[Number], Field(min_length=16, max_length=16)]
+
+
+class _Table(BaseModel):
+    """Keys that nothing here reads are left out; null is as if a key were not there."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, alias_generator=to_camel)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_null(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            return {key: value for key, value in data.items() if value is not None}
+        return data
+
+
+class Buffer(_Table):
+    byte_length: Size
+    uri: str | None = None
+
+
+class BufferView(_Table):
+    buffer: Index
+    byte_offset: Index = 0
+    byte_length: Size
+    byte_stride: Annotated[int, Strict(), Field(ge=0, le=252)] = 0
+
+
+class SparseIndices(_Table):
+    buffer_view: Index
+    byte_offset: Index = 0
+    component_type: Literal[5121, 5123, 5125]
+
+
+class SparseValues(_Table):
+    buffer_view: Index
+    byte_offset: Index = 0
+
+
+class Sparse(_Table):
+    count: Size
+    indices: SparseIndices
+    values: SparseValues
+
+
+class Accessor(_Table):
+    buffer_view: Index | None = None
+    byte_offset: Index = 0
+    component_type: Literal[5120, 5121, 5122, 5123, 5125, 5126]
+    normalized: bool = False
+    count: Size
+    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    sparse: Sparse | None = None
+
+
+class Node(_Table):
+    name: str = ""
+    children: list[Index] = []
+    mesh: Index | None = None
+    skin: Index | None = None
+    matrix: Sixteen | None = None
+    translation: Three = [0.0, 0.0, 0.0]
+    rotation: Four = [0.0, 0.0, 0.0, 1.0]
+    scale: Three = [1.0, 1.0, 1.0]
+
+
+class Primitive(_Table):
+    attributes: dict[str, Index]
+    indices: Index | None = None
+    mode: Index = 4
+
+
+class Mesh(_Table):
+    primitives: Annotated[list[Primitive], Field(min_length=1)]
+
+
+class Skin(_Table):
+    name: str = ""
+    joints: Annotated[list[Index], Field(min_length=1)]
+    inverse_bind_matrices: Index | None = None
+
+
+class Target(_Table):
+    node: Index | None = None
+    path: str
+
+
+class Channel(_Table):
+    sampler: Index
+    target: Target
+
+
+class Sampler(_Table):
+    input: Index
+    output: Index
+    interpolation: Literal["LINEAR", "STEP", "CUBICSPLINE"] = "LINEAR"
+
+
+class Animation(_Table):
+    name: str = ""
+    channels: list[Channel]
+    samplers: list[Sampler]
+
+
+class Document(_Table):
+    """What of a glTF document a character is made of."""
+
+    extensions_required: list[str] = []
+    buffers: list[Buffer] = []
+    buffer_views: list[BufferView] = []
+    accessors: list[Accessor] = []
+    nodes: list[Node] = []
+    meshes: list[Mesh] = []
+    skins: list[Skin] = []
+    animations: list[Animation] = []
+
+
+def read_document(path: Path) -> tuple[Document, list[memoryview]]:
+    """The tables of a .glb or .gltf file, and the bytes of its buffers.
+
+    raises  SceneError when it is too large, cut, no glTF, or has a buffer outside its folder
+    """
+    data, binary = _bounded(path, path.name), None
+    if data[:4] == b"glTF":
+        data, binary = _chunks(path.name, data)
+    try:
+        document = Document.model_validate(json.loads(data))
+    except ValidationError as error:
+        first = error.errors()[0]
+        value = "" if first["type"] == "missing" else f", not {repr(first['input'])[:60]}"
+        raise SceneError(
+            f"{path.name}, {_place(first['loc'])}: {first['msg']}{value}. Export it anew."
+        ) from None
+    except RecursionError:
+        raise SceneError(
+            f"{path.name}: its JSON is nested hundreds deep. Export it anew."
+        ) from None
+    except ValueError as error:
+        raise SceneError(
+            f"{path.name} cannot be read as glTF: {str(error)[:100]}. Export it anew."
+        ) from None
+    return document, _buffers(path, document, binary)
+
+
+def _bounded(path: Path, shown: str) -> bytes:
+    """The bytes of a file; raises SceneError when there are too many, or none can be read."""
+    try:
+        with open(path, "rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        said = getattr(error, "strerror", None) or str(error)
+        raise SceneError(
+            f"{shown} cannot be read ({said}). Put it there, or export the character as one .glb."
+        ) from None
+    if len(data) > LARGEST_FILE:
+        raise SceneError(
+            f"{shown} has more than {LARGEST_FILE / 2**30:g} GB, which is the most. Export fewer "
+            "meshes and clips."
+        )
+    return data
+
+
+def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
+    """JSON and binary chunk of a GLB file."""
+    found: dict[int, bytes] = {}
+    start = 12
+    while start + 8 <= len(data):
+        length, kind = struct.unpack_from("<II", data, start)
+        if start + 8 + length > len(data):
+            raise SceneError(
+                f"{name} cannot be read as glTF: a chunk of {length} bytes at byte {start} ends "
+                f"after the file, which has {len(data)}. Export it anew."
+            )
+        found.setdefault(kind, data[start + 8 : start + 8 + length])
+        start += 8 + length
+    if JSON_CHUNK not in found:
+        raise SceneError(f"{name} cannot be read as glTF: it has no JSON chunk. Export it anew.")
+    return found[JSON_CHUNK], found.get(BINARY_CHUNK)
+
+
+def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memoryview]:
+    asked = sum(buffer.byte_length for buffer in document.buffers)
+    if asked > LARGEST_FILE:
+        raise SceneError(
+            f"{path.name}: its buffers ask for {asked / 2**30:.3g} GB, and {LARGEST_FILE / 2**30:g}"
+            " GB is the most. Export fewer meshes and clips."
+        )
+    found = []
+    for number, buffer in enumerate(document.buffers):
+        where = f"{path.name}, buffers[{number}]"
+        if buffer.uri is not None:
+            data = _from_uri(path, buffer.uri, where)
+        elif number == 0 and binary is not None:
+            data = binary
+        else:
+            raise SceneError(f"{where} has neither a uri nor a binary chunk. Export it anew.")
+        if len(data) < buffer.byte_length:
+            raise SceneError(
+                f"{where} has {len(data)} bytes, and its byteLength is {buffer.byte_length}. "
+                "Export it anew."
+            )
+        found.append(memoryview(data)[: buffer.byte_length])
+    return found
+
+
+def _from_uri(path: Path, uri: str, where: str) -> bytes:
+    """What a uri holds, or the file in the folder of `path` that it names."""
+    if uri[:5].lower() == "data:":
+        head, _, text = uri.partition(",")
+        try:
+            if not head.endswith(";base64"):
+                raise ValueError
+            return base64.b64decode(text, validate=True)
+        except (ValueError, binascii.Error):
+            raise SceneError(f"{where}: its data uri is not base64. Export it anew.") from None
+    file = path.parent / inside(uri, path.parent, where)
+    return _bounded(file, f"{where}, {uri[:100]!r},")
+
+
+def inside(uri: str, folder: Path, where: str) -> Path:
+    """The path of a file in `folder`, relative to it, that a percent-encoded reference names.
+
+    raises  SceneError when it leaves the folder: by a scheme, a host, an absolute path, a part '..'
+            or a symbolic link
+    """
+    plain = unquote(uri).replace("\\", "/")
+    relative = Path(plain)
+    try:
+        parts = urlsplit(plain)
+        leaves = bool(parts.scheme or parts.netloc) or "\0" in plain or ":" in plain
+        leaves = leaves or relative.is_absolute() or ".." in relative.parts
+        leaves = leaves or not (folder / relative).resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):
+        leaves = True
+    if leaves:
+        raise SceneError(
+            f"{where} names {uri[:100]!r}, which is not in the folder of the file. Put what it "
+            "names beside the file, or export the character as one file."
+        )
+    return relative
+
+
+def _place(keys: tuple[int | str, ...]) -> str:
+    """accessors[3].count of ("accessors", 3, "count")."""
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
+    return text.lstrip(".") or "document"

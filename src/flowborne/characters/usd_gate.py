@@ -1,0 +1,186 @@
+"""What a USD file has to be before a character is made of it.
+
+source  OpenUSD: UsdGeomMesh, UsdSkelBindingAPI; SdfLayer.GetCompositionAssetDependencies
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdSkel
+
+from flowborne.characters.gltf_document import LARGEST_FILE
+from flowborne.characters.limits import MOST_POSES
+from flowborne.characters.rig import Array, Integers
+from flowborne.errors import SceneError
+
+MOST_LAYERS = 1000
+MOST_PRIMS = 100_000
+
+
+def open_stage(path: Path) -> Usd.Stage:
+    """The stage of a file, when it and all that it is composed of are in the file's folder.
+
+    raises  SceneError when it cannot be read, is too large, or reads elsewhere
+    """
+    folder, pending, known = path.parent.resolve(), [str(path)], {str(path)}
+    while pending:
+        own = pending.pop()
+        where = path.name if own == str(path) else f"{path.name}, layer {Path(own).name}"
+        layer = _layer(own, where)
+        for reference in _named_files(layer):
+            below = layer.ComputeAbsolutePath(reference)
+            file = Path(Ar.SplitPackageRelativePathOuter(below)[0])
+            if not (file.resolve().is_relative_to(folder) and file.is_file()):
+                raise SceneError(
+                    f"{where} names {reference[:100]!r}, which is not a file in the folder of "
+                    f"{path.name}. Put it there, or export the character as one file."
+                )
+            if below not in known:
+                known.add(below)
+                pending.append(below)
+        if len(known) > MOST_LAYERS:
+            raise SceneError(
+                f"{path.name} is made of more than {MOST_LAYERS} files, which is the most. Flatten "
+                "it into one (usdcat --flatten)."
+            )
+    stage = Usd.Stage.Open(str(path))
+    everything = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+    for number, _ in enumerate(Usd.PrimRange.Stage(stage, everything)):
+        if number >= MOST_PRIMS:
+            raise SceneError(
+                f"{path.name} has more than {MOST_PRIMS:,} prims, which is the most. Export the "
+                "character alone."
+            )
+    return stage
+
+
+@contextmanager
+def reading_usd(name: str) -> Iterator[None]:
+    """Context for calls of usd-core, which prints to the terminal's errors whatever it finds odd.
+
+    raises  SceneError where it raises an error of its own
+    """
+    with open(os.devnull, "wb") as nowhere, np.errstate(all="ignore"):
+        kept = os.dup(2)
+        os.dup2(nowhere.fileno(), 2)
+        try:
+            yield
+        except (Tf.ErrorException, TypeError, RuntimeError) as error:
+            raise _unreadable(name) from error
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+
+
+def check_topology(query: UsdSkel.SkeletonQuery, name: str) -> None:
+    """Raise SceneError unless a skeleton's joints are a tree with a pose for each of them."""
+    joints = len(query.GetJointOrder())
+    valid, reason = query.GetTopology().Validate() if joints else (False, "it has none")
+    if not valid:
+        raise _wrong(f"{name}: the skeleton's joints are no tree ({reason})")
+    for what, poses in (
+        ("bindTransforms", query.GetJointWorldBindTransforms()),
+        ("restTransforms", query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True)),
+    ):
+        if len(poses or ()) != joints:
+            raise _wrong(f"{name}: the skeleton has {len(poses or ())} {what} for {joints} joints")
+
+
+def points_of(mesh: UsdGeom.Mesh, where: str) -> Array:
+    """(k, 3) the points of a mesh, by default or at its first time."""
+    for time in (Usd.TimeCode.Default(), Usd.TimeCode.EarliestTime()):
+        points = mesh.GetPointsAttr().Get(time)
+        if points:
+            return np.array(points, float)
+    raise _wrong(f"{where}: it has no points")
+
+
+def check_faces(counts: Integers, corners: Integers, points: int, where: str) -> None:
+    """Raise SceneError unless the faces of a mesh, by their sizes and corners, fit its points."""
+    if not len(counts) or counts.min() < 3:
+        raise _wrong(f"{where}.faceVertexCounts: a face needs 3 corners or more")
+    if counts.sum() != len(corners):
+        raise _wrong(
+            f"{where}.faceVertexCounts add up to {counts.sum()}, and there are {len(corners)} "
+            "faceVertexIndices"
+        )
+    if corners.min() < 0 or corners.max() >= points:
+        raise _wrong(
+            f"{where}.faceVertexIndices are {corners.min()} to {corners.max()}, and the mesh has "
+            f"{points} points"
+        )
+
+
+def check_influences(indices: Integers, weights: Array, size: int, joints: int, where: str) -> None:
+    """Raise SceneError unless `size` weights carry a mesh on a skeleton of so many joints."""
+    if len(indices) != size or len(weights) != size:
+        raise _wrong(
+            f"{where} has {len(indices)} jointIndices and {len(weights)} jointWeights, not {size}"
+        )
+    if size and (indices.min() < 0 or indices.max() >= joints):
+        raise _wrong(
+            f"{where}.jointIndices are {indices.min()} to {indices.max()}, and there are {joints} "
+            "joints"
+        )
+    if not np.isfinite(weights).all() or (weights < 0.0).any():
+        raise _wrong(f"{where}.jointWeights are not all finite numbers from 0")
+
+
+def check_samples(samples: int, joints: int, where: str) -> None:
+    """Raise SceneError where a clip has more samples of so many joints than can be read."""
+    if samples * joints > MOST_POSES:
+        raise SceneError(
+            f"{where} asks for {samples:,} samples of {joints} joints, and {MOST_POSES:,} poses "
+            "are the most. Export a shorter clip."
+        )
+
+
+def _layer(name: str, where: str) -> Sdf.Layer:
+    """The layer of a file, or of one within a package."""
+    file = Path(Ar.SplitPackageRelativePathOuter(name)[0])
+    if (size := file.stat().st_size) > LARGEST_FILE:
+        raise SceneError(
+            f"{where} has {size / 2**30:.3g} GB, and {LARGEST_FILE / 2**30:g} GB is the most. "
+            "Export fewer meshes and clips."
+        )
+    layer = Sdf.Layer.FindOrOpen(name)
+    if layer is None:
+        raise _unreadable(where)
+    return layer
+
+
+def _named_files(layer: Sdf.Layer) -> list[str]:
+    """Other files that a layer is composed of, clips of values included."""
+    named = {str(name) for name in layer.GetCompositionAssetDependencies()}
+
+    def add(value: Any) -> None:
+        if isinstance(value, Sdf.AssetPath):
+            named.add(value.path)
+        elif isinstance(value, dict):
+            for inner in value.values():
+                add(inner)
+        elif isinstance(value, list | tuple | Sdf.AssetPathArray):
+            for inner in value:
+                add(inner)
+
+    def visit(at: Sdf.Path) -> None:
+        spec = layer.GetObjectAtPath(at)
+        if isinstance(spec, Sdf.PrimSpec):
+            add(spec.GetInfo("clips"))
+
+    layer.Traverse(layer.pseudoRoot.path, visit)
+    return sorted(name for name in named if name)
+
+
+def _unreadable(where: str) -> SceneError:
+    return SceneError(f"{where} cannot be read as USD. Export it anew.")
+
+
+def _wrong(said: str) -> SceneError:
+    return SceneError(f"{said}. Export it anew.")
