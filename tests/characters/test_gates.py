@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import struct
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -264,6 +265,20 @@ def test_a_usd_file_that_contradicts_itself_is_refused(
     assert capfd.readouterr().err == ""
 
 
+def test_a_binary_usd_file_that_ends_its_reader_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usd = pytest.importorskip("pxr.Usd")
+    rigged.write_usd(tmp_path / "box.usda")
+    usd.Stage.Open(str(tmp_path / "box.usda")).Export(str(tmp_path / "box.usdc"))
+    assert read_source(tmp_path / "box.usdc").rig.names == rigged.NAMES
+    (tmp_path / "crash").write_text("#!/bin/sh\nkill -SEGV $$\n")
+    (tmp_path / "crash").chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "crash"))
+    with pytest.raises(SceneError, match=r"box\.usdc cannot be read as USD: it ends the program"):
+        read_source(tmp_path / "box.usdc")
+
+
 def test_usd_layers_are_read_from_the_files_own_folder_only(tmp_path: Path) -> None:
     pytest.importorskip("pxr.Usd")
     rigged.write_usd(tmp_path / "box.usda")
@@ -298,6 +313,12 @@ def test_sizes_that_cannot_finish_are_refused_with_the_limit() -> None:
         check_frames(1e30, 1e-30, 50, "cat, clip 'run'")
     with pytest.raises(SceneError, match=r"2\.5e\+11 sums, and 5e\+10 are the most"):
         check_work(10_000, 50, 500_000, "cat")
+
+
+@pytest.mark.parametrize("density", [0.0, -1.0, float("nan"), 1e30])
+def test_a_density_that_no_body_has_is_refused(tmp_path: Path, density: float) -> None:
+    with pytest.raises(SceneError, match=r"density is .* kg/m\^3, and 0\.001 to 1e\+06 can be"):
+        fb.import_character(tmp_path / "box.glb", tmp_path / "out", density=density)
 
 
 def test_a_stray_point_that_makes_all_others_one_is_refused() -> None:

@@ -24,6 +24,9 @@ from flowborne.solids.skins import skinned
 ROOM = 0.35
 """Water on every side of all that the clip reaches, in sizes of the character."""
 
+DENSITIES = (1e-3, 1e6)
+"""kg/m^3"""
+
 LONGEST_STEM = 150
 """Bytes of the name that all files of a character begin with."""
 
@@ -64,6 +67,11 @@ def import_character(
     raises      SceneError when a file cannot be used, a library is missing, or the scene is there
                 already; OSError when the folder cannot be written
     """
+    if not DENSITIES[0] <= density <= DENSITIES[1]:
+        raise SceneError(
+            f"density is {density:g} kg/m^3, and {DENSITIES[0]:g} to {DENSITIES[1]:g} can be. Give "
+            "1000 for what floats in water."
+        )
     path = Path(file)
     name = _plain(path.stem)
     scene = Path(out) / f"{name}.toml"

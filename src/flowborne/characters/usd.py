@@ -45,13 +45,14 @@ class UsdSource:
     raises  SceneError when it cannot be read, or has no skeleton
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, probed: bool = False) -> None:
+        """probed  whether this process may end by what is damaged in a binary file"""
         self._name = path.name
         with reading_usd(path.name):
-            self._open(path)
+            self._open(path, probed)
 
-    def _open(self, path: Path) -> None:
-        stage = open_stage(path)
+    def _open(self, path: Path, probed: bool) -> None:
+        stage = open_stage(path, probed=probed)
         self._stage, self._cache, self._bound = stage, UsdSkel.Cache(), []
         prims = list(Usd.PrimRange.Stage(stage, EVERYTHING))
         for root in (prim for prim in prims if prim.IsA(UsdSkel.Root)):

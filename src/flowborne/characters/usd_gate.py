@@ -17,21 +17,26 @@ from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdSkel
 from flowborne.characters.gltf_document import LARGEST_FILE
 from flowborne.characters.limits import MOST_POSES
 from flowborne.characters.rig import Array, Integers
+from flowborne.characters.usd_probe import probe
 from flowborne.errors import SceneError
 
 MOST_LAYERS = 1000
 MOST_PRIMS = 100_000
 
 
-def open_stage(path: Path) -> Usd.Stage:
+def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
     """The stage of a file, when it and all that it is composed of are in the file's folder.
 
+    probed  whether binary files may be opened as they are; else they are probed first
     raises  SceneError when it cannot be read, is too large, or reads elsewhere
     """
     folder, pending, known = path.parent.resolve(), [str(path)], {str(path)}
     while pending:
         own = pending.pop()
         where = path.name if own == str(path) else f"{path.name}, layer {Path(own).name}"
+        if not (probed or _is_text(own)):
+            probe(path)
+            probed = True
         layer = _layer(own, where)
         for reference in _named_files(layer):
             below = layer.ComputeAbsolutePath(reference)
@@ -71,7 +76,7 @@ def reading_usd(name: str) -> Iterator[None]:
         os.dup2(nowhere.fileno(), 2)
         try:
             yield
-        except (Tf.ErrorException, TypeError, RuntimeError) as error:
+        except (Tf.ErrorException, TypeError, RuntimeError, ValueError, MemoryError) as error:
             raise _unreadable(name) from error
         finally:
             os.dup2(kept, 2)
@@ -139,6 +144,15 @@ def check_samples(samples: int, joints: int, where: str) -> None:
             f"{where} asks for {samples:,} samples of {joints} joints, and {MOST_POSES:,} poses "
             "are the most. Export a shorter clip."
         )
+
+
+def _is_text(name: str) -> bool:
+    """Whether a layer is a text file, which is parsed and not mapped into the memory."""
+    file = Path(name)
+    if not file.is_file():  # it is within a package
+        return False
+    with open(file, "rb") as opened:
+        return opened.read(5) == b"#usda"
 
 
 def _layer(name: str, where: str) -> Sdf.Layer:
