@@ -183,6 +183,29 @@ def test_check_tells_every_problem_at_once(command, small_scene):
     assert "frames" in err
 
 
+def test_check_counts_its_warnings_and_strictly_ends_with_3(command, small_scene):
+    narrow = ("--set", "control.0.probe=2.0")
+    slow = ("check", small_scene, *narrow, "--set", "control.0.strength=0.5")
+    code, out, err = command(*slow)
+    assert (code, err) == (0, "")
+    assert out.startswith("1 warning\n  warning: [[control]] 1: a strength of 0.5 degrees/s takes")
+    assert command(*slow, "--strict") == (cli.WARNED, out, "")
+    assert cli.WARNED == 3
+    assert command("check", small_scene, *narrow, "--strict") == (0, "nothing wrong\n", "")
+
+
+def test_a_run_says_how_many_warnings_there_are_and_keeps_them(command, small_scene, tmp_path):
+    radians = ("--set", "control.0.strength=0.5", "--set", "control.0.probe=0.02")
+    code, _, err = command("run", small_scene, "--no-film", "--frames", 1, "--out", "run", *radians)
+    assert code == 0
+    assert "warnings: 2; flowborne check lists them\n" in err
+    kept = json.loads((tmp_path / "run" / "summary.json").read_text())["warnings"]
+    assert [warning.split(" of ")[0] for warning in kept] == [
+        "[[control]] 1: a strength",
+        "[[control]] 1: a probe",
+    ]
+
+
 def test_scenes_are_listed_with_their_figures(command):
     code, out, _ = command("scenes")
     assert code == 0

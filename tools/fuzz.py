@@ -53,7 +53,14 @@ LONGEST = 1500
 RAN, STOPPED, REFUSED = "ran", "stopped in one message", "refused in one message"
 WELL = (RAN, STOPPED, REFUSED)
 
-TOLD = ("first frame after ", "frame ", "compiling", "drawing the film", "starting")
+TOLD = (
+    "first frame after ",
+    "frame ",
+    "compiling",
+    "drawing the film",
+    "starting",
+    "warnings: ",
+)
 """How lines on stderr begin that are no messages."""
 
 

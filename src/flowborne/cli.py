@@ -1,7 +1,8 @@
 """The command `flowborne`.
 
 Whatever is wrong with the input is one message on stderr and exit code 2; a run that blew up or
-could not be written ends with 1, and one that was interrupted with 130.
+could not be written ends with 1, one that was interrupted with 130, and `check --strict` with 3
+where there are warnings.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from flowborne.version import __version__
 if TYPE_CHECKING:
     from flowborne.running import RunResult
 
-FAILED, WRONG, INTERRUPTED = 1, 2, 130
+FAILED, WRONG, WARNED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes besides 0."""
 
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -147,15 +148,21 @@ def check(
     trust: Annotated[
         bool, typer.Option("--trust", help="Import the Python that the scene names, as run does.")
     ] = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="End with exit code 3 if there are warnings.")
+    ] = False,
 ) -> None:
-    """Say everything that is wrong with a scene, and how the fluid sees its bodies.
+    """Say everything that is wrong with a scene, what is implausible, and how the fluid meets its
+    bodies.
 
-    Bodies and fluid are set going, as in a run.
+    Bodies and fluid are set going, as in a run. A warning does not stop a run; it names a value
+    that will do.
     """
     from flowborne.coupling.seen import seen_bodies
     from flowborne.progress import ProgressDisplay, RunProgress
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.notes import notes_of
+    from flowborne.scenes.warn import headline, warnings_of
 
     loaded = load_scene(scene, _overrides(settings or []), trust=trust)
     began = perf_counter()
@@ -168,11 +175,16 @@ def check(
 
         with compilation_watched(tell), Simulation(loaded, workers=1) as simulation:
             setup = simulation.world.setup
-    print("nothing wrong")
+    found = warnings_of(loaded, setup)
+    print(headline(found))
+    for warning in found:
+        print(f"  warning: {warning}")
     for note in notes_of(loaded, setup.solid):
         print(f"  {note}")
     for seen in seen_bodies(setup):
         print(f"  {seen.sentence()}")
+    if strict and found:
+        raise typer.Exit(WARNED)
 
 
 @app.command()

@@ -30,6 +30,7 @@ class RunProgress:
     frames     frames wanted
     seconds    since the run began
     kernels    number of kernels compiled so far
+    warnings   number of warnings about the scene
     objective  after the frame; nan where there is none
     joints     (column of the history, rad or m) of each controlled joint
     """
@@ -39,6 +40,7 @@ class RunProgress:
     frames: int
     seconds: float
     kernels: int = 0
+    warnings: int = 0
     objective: float = math.nan
     joints: tuple[tuple[str, float], ...] = ()
 
@@ -79,6 +81,8 @@ class ProgressDisplay:
     def __call__(self, news: RunProgress) -> None:
         if news.stage == "start":
             self._started_at = news.frame
+            if news.warnings:
+                self.say(f"warnings: {news.warnings}; flowborne check lists them")
         if news.stage == "frame" and self._first is None:
             self._first = news.seconds
             self.say(f"first frame after {news.seconds:.1f} s")

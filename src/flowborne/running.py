@@ -27,6 +27,7 @@ from flowborne.progress import RunProgress, Stage
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
+from flowborne.scenes.warn import warnings_of
 from flowborne.simulation import BlowUpError, Simulation
 
 if TYPE_CHECKING:
@@ -152,6 +153,7 @@ class _Run:
         self.checkpoint_every = simulation.scene.output.checkpoint_every
         self.frames = simulation.frames
         self.taken = earlier_joints(simulation.scene)
+        self.warnings = warnings_of(simulation.scene, simulation.setup)
         self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
@@ -348,6 +350,7 @@ class _Run:
             "message": message,
             **summarise(self.folder.history, strength),
             "cells": cells,
+            "warnings": self.warnings,
             "notes": list(notes_of(simulation.scene, world.setup.solid)),
             "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],
             "state_bytes": state_bytes(world),
@@ -406,6 +409,7 @@ class _Run:
                 frames=self.frames,
                 seconds=perf_counter() - self._started,
                 kernels=kernels,
+                warnings=len(self.warnings),
                 objective=objective,
                 joints=() if values is None else tuple((c, values[c]) for c in joints),
             )

@@ -67,9 +67,9 @@ class Seen:
 def seen_bodies(setup: Setup) -> list[Seen]:
     """Every body and flesh that the fluid sees, of each the thinnest part and the longest tips.
 
-    None without a fluid.
+    None without a fluid, or with one that does not feel the bodies.
     """
-    if setup.fluid is None:
+    if setup.fluid is None or setup.fluid.one_way:
         return []
     grid = setup.fluid.grid
     parts: dict[str, list[Seen]] = {}
@@ -97,7 +97,7 @@ def _bones(model: SolidModel, grid: Grid) -> Iterator[Seen]:
 
 def _flesh(setup: Setup, grid: Grid) -> Iterator[Seen]:
     flesh = setup.solid.flesh
-    if flesh is None or (setup.fluid is not None and setup.fluid.one_way):
+    if flesh is None:
         return
     least = 2.0 * WATERTIGHT[grid.is_slab] * grid.spacing
     for name, thickness, skin in zip(flesh.names, flesh.thickness, flesh.skins, strict=True):

@@ -93,9 +93,15 @@ def check_fluid(draft: Draft) -> Iterator[str]:
         )
 
 
+def fits_memory(counts: list[int]) -> bool:
+    """Whether this machine holds a grid of so many cells along each axis, as far as is known."""
+    has = machine_memory()
+    return has is None or math.prod(counts) * BYTES_PER_CELL <= has
+
+
 def _check_memory(draft: Draft, domain: Domain) -> Iterator[str]:
     cells, has = math.prod(domain.counts()), machine_memory()
-    if has is not None and cells * BYTES_PER_CELL > has:
+    if has is not None and not fits_memory(domain.counts()):
         yield (
             f"{draft.at('domain')}: {cells:.3g} cells take {cells * BYTES_PER_CELL / 2**30:.3g} GB "
             f"of memory or more, and this machine has {has / 2**30:.3g} GB. Make the grid coarser."

@@ -1,4 +1,4 @@
-"""What is not wrong with a scene, and still worth knowing before it runs."""
+"""What is neither wrong nor implausible in a scene, and worth knowing before it runs."""
 
 from __future__ import annotations
 
@@ -6,24 +6,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.scenes.bodies import SLIDE, joint_kind, joint_unit
-from flowborne.scenes.build_control import input_motions
+from flowborne.scenes.bodies import SLIDE, joint_kind
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_control import ObjectiveInputMotionTable, RuleFixed
-from flowborne.scenes.schema_drives import ServoPD
+from flowborne.scenes.schema_control import RuleFixed
 from flowborne.solids.model import SolidModel
-
-LOOKED_AT = 200
-"""Times of a run at which the speed of a motion is looked at."""
 
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Sentences for people, without a full stop."""
     yield from _standing_still(scene)
     yield from _wide_probes(scene, model)
-    yield from _too_slow(scene, model)
 
 
 def _standing_still(scene: Scene) -> Iterator[str]:
@@ -64,32 +58,3 @@ def _wide_probes(scene: Scene, model: SolidModel) -> Iterator[str]:
                 f"{step:.3g}, so that a sharp optimum is met to half a probe only; rule "
                 "'resilient' of [controller] narrows both"
             )
-
-
-def _too_slow(scene: Scene, model: SolidModel) -> Iterator[str]:
-    """Joints that are to be close to a motion which is faster than they can be.
-
-    A target is no farther ahead of its joint than strength lets it be in a decision, and a PD law
-    is 2 / w behind a steady rate: it goes at w / 2 times what the target is ahead.
-    """
-    able, time = scene.controller, scene.controller.every * scene.frame_time
-    share = 1.0
-    if isinstance(able.servo, ServoPD):
-        share = min(1.0, np.pi * able.servo.frequency * time)
-    times = np.linspace(0.0, scene.time.frames * scene.frame_time, LOOKED_AT)
-    for number, motion in input_motions(scene, model).items():
-        table = scene.objectives[number]
-        assert isinstance(table, ObjectiveInputMotionTable)
-        unit = joint_unit(model, table.joint)
-        wanted = max(float(np.linalg.norm(motion.velocity(at))) for at in times) / unit
-        for place, control in enumerate(scene.control, start=1):
-            fastest = share * control.strength
-            if table.joint in control.joints and wanted > fastest:
-                rate = "m/s" if joint_kind(model, table.joint) == SLIDE else "degrees/s"
-                yield (
-                    f"[[objectives]] {number + 1}: '{table.joint}' is to be close to a motion of "
-                    f"up to {wanted:.3g} {rate}, and goes at {fastest:.3g} at most; "
-                    f"a larger strength in [[control]] {place}"
-                    + (" or frequency of its servo" if share < 1.0 else "")
-                    + " lets it follow"
-                )

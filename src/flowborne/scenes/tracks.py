@@ -13,6 +13,9 @@ from flowborne.scenes.formula import Formula
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+LOOKED_AT = 200
+"""Times of a run at which the speed of a motion is looked at."""
+
 
 @dataclass
 class TrajectoryConstant:

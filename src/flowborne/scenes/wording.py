@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from difflib import get_close_matches
 from typing import Any, Literal, get_args, get_origin
 
@@ -196,3 +197,23 @@ def _choices(keys: tuple[Key, ...], raw: Any) -> list[type[Table]]:
         if isinstance(key, str):
             tables = [inner for table in tables for inner in tables_of(table, key)]
     return tables
+
+
+def and_more(names: Sequence[str]) -> str:
+    """The first of some names, and how many more there are."""
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+
+
+def rounded_up(value: float) -> str:
+    """A number of three digits, no smaller than `value` up to its ninth digit."""
+    return _rounded(value, ROUND_CEILING)
+
+
+def rounded_down(value: float) -> str:
+    """A number of three digits, no larger than `value` up to its ninth digit."""
+    return _rounded(value, ROUND_FLOOR)
+
+
+def _rounded(value: float, rounding: str) -> str:
+    plain = Context(prec=9).create_decimal(value)
+    return f"{float(Context(prec=3, rounding=rounding).plus(plain)):.6g}"

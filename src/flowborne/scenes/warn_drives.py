@@ -1,0 +1,126 @@
+"""Warnings about joints: angles in radians, too little strength, nothing that drives them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.world import HYPOTHETICAL, Setup
+from flowborne.scenes.bodies import BALL, HINGE, SLIDE, joint_kind, joint_unit
+from flowborne.scenes.build_control import input_motions
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_control import ObjectiveInputMotionTable
+from flowborne.scenes.schema_drives import ServoPD
+from flowborne.scenes.tracks import LOOKED_AT
+from flowborne.scenes.wording import and_more, rounded_up
+
+LEAST_STRENGTH = 2.0 * math.pi
+"""Degrees/s. Whoever types radians for anything up to a turn a second types less than this; in
+degrees it is a right angle in 14 s."""
+
+GRADIENT_ERROR = 1e-3
+"""Relative error of a gradient that trials are solved for (`coupling.world.HYPOTHETICAL`)."""
+
+LEAST_PROBE = math.degrees(HYPOTHETICAL / GRADIENT_ERROR)
+"""Degrees, 0.57. The pressure of a trial is right to HYPOTHETICAL of itself, and two trials differ
+by about the probe in radians of it: a smaller probe has a gradient worse than GRADIENT_ERROR."""
+
+
+def angles_in_radians(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Strengths and probes of turning joints so small that they are radians by their looks."""
+    for number, table in enumerate(scene.control, start=1):
+        if joint_kind(setup.solid, table.joints[0]) == SLIDE:
+            continue
+        strength = max([table.strength, *(other.strength for other in table.in_phases)])
+        if strength < LEAST_STRENGTH * (1.0 - 1e-9):
+            yield (
+                f"[[control]] {number}: a strength of {strength:g} degrees/s takes "
+                f"{90.0 / strength:.3g} s to a right angle; "
+                f"{_meant(strength, LEAST_STRENGTH, 'rad/s', 'degrees/s')}"
+            )
+        if table.probe < LEAST_PROBE * (1.0 - 1e-9):
+            yield (
+                f"[[control]] {number}: a probe of {table.probe:g} degrees is too small for a "
+                f"gradient; {_meant(table.probe, LEAST_PROBE, 'rad', 'degrees')}"
+            )
+
+
+def _meant(value: float, least: float, radians: str, degrees: str) -> str:
+    """The number in degrees, if it was radians, and if not, or if that is no better, the least."""
+    turned = f"{math.degrees(value):.3g}"
+    if float(turned) >= least:
+        return f"{value:g} {radians} are {turned} {degrees}"
+    return f"{rounded_up(least)} {degrees} will do"
+
+
+def too_slow(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Joints that are to be close to a motion which is faster than they can be.
+
+    A target is no farther ahead of its joint than strength lets it be in a decision, and a PD law
+    is 2 / w behind a steady rate: it goes at w / 2 times what the target is ahead.
+    """
+    able, time, model = scene.controller, scene.controller.every * scene.frame_time, setup.solid
+    share = 1.0
+    if isinstance(able.servo, ServoPD):
+        share = min(1.0, np.pi * able.servo.frequency * time)
+    times = np.linspace(0.0, scene.time.frames * scene.frame_time, LOOKED_AT)
+    for number, motion in input_motions(scene, model).items():
+        table = scene.objectives[number]
+        assert isinstance(table, ObjectiveInputMotionTable)
+        unit = joint_unit(model, table.joint)
+        needed = max(float(np.linalg.norm(motion.velocity(at))) for at in times) / unit
+        for place, control in enumerate(scene.control, start=1):
+            fastest = share * control.strength
+            if table.joint in control.joints and needed > fastest * (1.0 + 1e-9):
+                rate = "m/s" if joint_kind(model, table.joint) == SLIDE else "degrees/s"
+                yield (
+                    f"[[objectives]] {number + 1}: '{table.joint}' is to be close to a motion of "
+                    f"up to {needed:.3g} {rate}, and goes at {fastest:.3g} at most; a strength of "
+                    f"{rounded_up(needed / share)} in [[control]] {place}"
+                    + (" or a larger frequency of its servo" if share < 1.0 else "")
+                    + " lets it follow"
+                )
+
+
+def driven_dofs(scene: Scene, setup: Setup) -> NDArray[np.bool_]:
+    """(nv,) which dofs are moved by a motion, a clip or the controller, or locked in a slab."""
+    driven = setup.solid.locked.copy()
+    for motion in setup.motions:
+        driven[motion.dofs] = True
+    for joint in scene.controlled_joints():
+        driven[setup.solid.dofs_of(joint)] = True
+    return driven
+
+
+def limp_joints(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Joints between bodies that nothing drives and that have no stiffness.
+
+    Joints on the world are those that a creature floats or swings on as a whole; joints within a
+    flesh, between bones that hold it, are as stiff as that.
+    """
+    model = setup.solid
+    mj = model.mj
+    driven = driven_dofs(scene, setup)
+    limp = []
+    for j, name in enumerate(model.joint_names):
+        body = int(mj.jnt_bodyid[j])
+        if body >= model.nbody or mj.jnt_type[j] not in (HINGE, SLIDE, BALL):
+            continue
+        dofs, parent = model.dofs_of(name), int(mj.body_parentid[body])
+        ends = {model.body_names[body], model.body_names[parent]}
+        if (
+            model.moves[parent].any()
+            and mj.jnt_stiffness[j] == 0.0
+            and not driven[dofs].all()
+            and not any(ends <= set(flesh.bones) for flesh in scene.flesh)
+        ):
+            limp.append(name)
+    if limp:
+        yield (
+            f"[solids]: nothing drives {and_more(limp)}, and no stiffness holds "
+            f"{'it' if len(limp) == 1 else 'them'}; a [[motion]] of kind 'constant' holds a joint, "
+            "[[control]] moves it, and stiffness in the model makes it a spring"
+        )

@@ -1,0 +1,197 @@
+"""Warnings about steps in which bodies or the flow cross too many cells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.mouths import Mouth
+from flowborne.coupling.world import Setup
+from flowborne.fluid.transport import LASTING
+from flowborne.scenes.bodies import initial_state, joint_unit
+from flowborne.scenes.fields import MOST_STEPS
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_fluid import InflowSide
+from flowborne.scenes.tracks import LOOKED_AT
+from flowborne.scenes.warn_drives import driven_dofs
+from flowborne.solids.outline import Outline
+
+Array = NDArray[np.float64]
+
+BODY_CELLS = 1.0
+"""Cells that a body may cross in a step: from there on cells lie before it at the start and behind
+it at the end, and what was in them passes through (docs/momentum.md: 9 % of a dye in 100 steps of
+2.4 cells)."""
+
+FLOW_CELLS = LASTING[0]
+"""Cells that the undisturbed flow may cross in a step, the axes added up. Up to there the pressure
+and the forces of the last step go along with it; the transport itself is done in substeps."""
+
+AFTER_CELLS = 1.0
+"""Cells a step that proposed steps lead to: around a body the flow is a few times as fast."""
+
+
+FASTEST_TIMES = 20
+"""Times of the LOOKED_AT of a run for which all bodies are placed, at some ms each with flesh."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Cells that something crosses in a step.
+
+    who    what crosses them
+    cells  how many, at most
+    """
+
+    who: str
+    cells: float
+
+
+def fast_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Bodies that cross more than a cell in a step as they are moved, thrown or driven."""
+    fluid = setup.fluid
+    if fluid is None or fluid.one_way or not setup.solid.ngeom:
+        return
+    yield from _said(scene, lambda dt: _fastest_body(scene, setup, dt), BODY_CELLS)
+
+
+def fast_flow(scene: Scene, setup: Setup) -> Iterator[str]:
+    """A stream, a source or a jet that crosses more cells in a step than FLOW_CELLS."""
+    if setup.fluid is None:
+        return
+    h = setup.fluid.grid.spacing
+    speeds = [*_streams(scene), *((m.name, _jet(m, scene)) for m in setup.mouths)]
+    who, speed = max(speeds, key=lambda each: each[1])
+    yield from _said(scene, lambda dt: Crossing(who, speed * dt / h), FLOW_CELLS)
+
+
+def _said(scene: Scene, crossing: Callable[[float], Crossing], most: float) -> Iterator[str]:
+    """The warning, if more than `most` cells are crossed in a step, with the steps that mend it."""
+    steps = scene.time.steps_per_frame
+    found = crossing(scene.frame_time / steps)
+    if not found.cells > most * (1.0 + 1e-9):
+        return
+    count, left = steps, found.cells
+    while left > AFTER_CELLS * (1.0 + 1e-9) and count <= MOST_STEPS:
+        count = max(count + 1, math.ceil(min(count * left / AFTER_CELLS, MOST_STEPS + 1)))
+        left = crossing(scene.frame_time / count).cells
+    if count <= MOST_STEPS:
+        remedy = f"time.steps_per_frame = {count} makes it one at most"
+    else:
+        remedy = f"as slow as {1.0 / found.cells:.2g} of that it crosses one"
+    yield f"[time]: {found.who} crosses up to {found.cells:.3g} cells in one step; {remedy}"
+
+
+def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
+    """How far any place of a body goes in a step of dt s, and of which one.
+
+    The bodies are as they start, thrown, or moved by a joint that the controller moves at its
+    strength, or by all prescribed motions at times of the run. Creatures that float recoil.
+    """
+    assert setup.fluid is not None
+    model, h = setup.solid, setup.fluid.grid.spacing
+    outline, axes = Outline(model), list(setup.fluid.grid.axes)
+    state, floating = initial_state(scene, model), _floating(scene, setup)
+
+    def moved(start: Array, end: Array, recoils: bool) -> Crossing:
+        places = outline.at(start)
+        way = outline.at(end) - places
+        for root in floating if recoils else ():
+            of = model.mj.body_rootid[outline.body] == root
+            if of.any():
+                way[of] -= rigid_part(places[of], way[of], outline.mass[of])
+        cells = np.linalg.norm(way[:, axes], axis=1) / h
+        place = int(np.argmax(cells))
+        return Crossing(model.body_names[outline.body[place]], float(cells[place]))
+
+    with np.errstate(all="ignore"):
+        found = [moved(state.q, model.integrate(state.q, state.v, dt), False)]
+        found += [moved(*ends, True) for ends in _driven_moves(scene, setup, state.q, dt)]
+    return max(found, key=lambda crossing: crossing.cells)
+
+
+def _floating(scene: Scene, setup: Setup) -> list[int]:
+    """Bodies on the world that some joint lets move as nothing drives them."""
+    model = setup.solid
+    free = ~driven_dofs(scene, setup) & (model.dof_body == model.dof_root)
+    return [int(root) for root in np.unique(model.dof_root[free])]
+
+
+def rigid_part(places: Array, way: Array, mass: Array) -> Array:
+    """(n, 3) the displacement as a whole that is in those of places (n, 3), small and of masses
+    (n,): without it they have neither linear nor angular momentum. None where they overflow."""
+    if not mass.sum() > 0.0:
+        return np.zeros_like(way)
+    centre, mean = (np.average(values, axis=0, weights=mass) for values in (places, way))
+    arm = places - centre
+    turned = (mass[:, None] * np.cross(arm, way)).sum(axis=0)
+    inertia = (mass * (arm**2).sum(axis=1)).sum() * np.eye(3) - (mass * arm.T) @ arm
+    if not (np.isfinite(inertia).all() and np.isfinite(turned).all()):
+        return np.zeros_like(way)
+    angle = np.linalg.pinv(inertia, rcond=1e-9, hermitian=True) @ turned
+    return np.asarray(mean + np.cross(angle, arm))
+
+
+def _driven_moves(
+    scene: Scene, setup: Setup, start: Array, dt: float
+) -> Iterator[tuple[Array, Array]]:
+    """Positions (nq,) before and after a step, for each controlled joint and for the motions."""
+    model = setup.solid
+    for table in scene.control:
+        strength = max([table.strength, *(other.strength for other in table.in_phases)])
+        for joint in table.joints:
+            for dof in model.dofs_of(joint):
+                velocity = np.zeros(model.nv)
+                velocity[dof] = strength * joint_unit(model, joint)
+                yield start, model.integrate(start, velocity, dt)
+    with suppress(ArithmeticError):  # a formula that has no value there: the run says so
+        for time in _fastest_times(scene, setup, dt):
+            ends = start.copy(), start.copy()
+            for motion in setup.motions:
+                places = model.indices_of(motion.dofs)
+                for q, at in zip(ends, (time, time + dt), strict=True):
+                    q[places] = motion.position(at)
+            yield ends
+
+
+def _fastest_times(scene: Scene, setup: Setup, dt: float) -> list[float]:
+    """The FASTEST_TIMES steps of the run, s, in whose middle the prescribed motions are fastest."""
+    if not setup.motions:
+        return []
+    times = np.linspace(0.0, scene.time.frames * scene.frame_time - dt, LOOKED_AT)
+    rates = [
+        np.linalg.norm([np.linalg.norm(m.velocity(float(time) + 0.5 * dt)) for m in setup.motions])
+        for time in times
+    ]
+    return [float(time) for time in times[np.argsort(rates)[-FASTEST_TIMES:]]]
+
+
+def _streams(scene: Scene) -> Iterator[tuple[str, float]]:
+    """Speeds in m/s, the axes added up, of the flow at the start, at the sides and in sources."""
+    yield "the initial flow", _added(scene.fluid.velocity if scene.fluid else ())
+    for name, side in scene.boundaries or ():
+        if isinstance(side, InflowSide):
+            peak = 1.5 ** (scene.dimensions - 1) if side.profile == "parabolic" else 1.0
+            factor = max(map(abs, side.factors)) if side.factors else 1.0
+            yield f"the stream at {name}", peak * factor * _added(side.velocity)
+    for number, source in enumerate(scene.sources, start=1):
+        yield f"the flow of [[sources]] {number}", _added(source.velocity or ())
+
+
+def _added(velocity: tuple[float, ...]) -> float:
+    return sum(map(abs, velocity))
+
+
+def _jet(mouth: Mouth, scene: Scene) -> float:
+    """Largest mean speed at a mouth at times of the run, m/s."""
+    area = 2.0 * mouth.radius if scene.is_slab else math.pi * mouth.radius**2
+    factor = 0.0
+    with suppress(ArithmeticError):
+        for time in np.linspace(0.0, scene.time.frames * scene.frame_time, LOOKED_AT):
+            factor = max(factor, abs(mouth.strength.at(float(time))))
+    return factor * abs(mouth.volume_rate) / area if area > 0.0 else math.inf
