@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import flowborne as fb
+import flowborne.error_bars as error_bars
 from flowborne import Refinement
+from flowborne.running import RunOutcome
 
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 2.0, 3.0])
@@ -91,6 +95,53 @@ def test_what_no_bar_can_be_put_on_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=problem):
         Refinement.of(resolutions, values)
+
+
+@dataclass
+class Runs:
+    """Stands in for runs, whose number would be 3 - 50 / cells^2 - 4 / steps^2."""
+
+    outcome: RunOutcome = RunOutcome.DONE
+    scenes: list[fb.Scene] = field(default_factory=list)
+
+    def run(self, scene: fb.Scene, out: Path, **options: object) -> SimpleNamespace:
+        self.scenes.append(scene)
+        return SimpleNamespace(outcome=self.outcome, message="it blew up in frame 3, step 1")
+
+    def number(self, run: object) -> float:
+        domain, time = self.scenes[-1].domain, self.scenes[-1].time
+        assert domain is not None
+        assert domain.resolution is not None
+        return 3.0 - 50.0 / domain.resolution**2 - 4.0 / time.steps_per_frame**2
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> Runs:
+    made = Runs()
+    monkeypatch.setattr(error_bars, "run", made.run)
+    monkeypatch.setattr(error_bars, "OpenRun", lambda folder: None)
+    return made
+
+
+def test_bars_of_grid_and_step_are_added_and_no_run_is_made_twice(runs: Runs) -> None:
+    found = fb.error_bar("eel", runs.number, (20, 40, 80), (1, 2, 4))
+    assert len(runs.scenes) == 5
+    assert found.grids is not None
+    assert found.steps is not None
+    assert (found.grids.order, found.steps.order) == pytest.approx((2.0, 2.0))
+    assert found.value == pytest.approx(3.0 - 50.0 / 6400.0 - 0.25)
+    assert found.uncertainty == pytest.approx(1.25 * (50.0 / 6400.0 + 0.25))
+    assert found.spread == pytest.approx(4.0 - 0.25)
+    assert str(found) == "2.742 ± 0.32 (grid 0.0098, step 0.31)"
+    assert str(found.grids) == "2.742 ± 0.0098 (order 2)"
+
+
+def test_a_run_that_ends_early_has_no_error_bar(runs: Runs) -> None:
+    runs.outcome = RunOutcome.BLEW_UP
+    with pytest.raises(
+        fb.SceneError, match=r"bar of eel with domain\.resolution=20: it blew up in"
+    ):
+        fb.error_bar("eel", runs.number, (20, 40))
 
 
 SPRING = """

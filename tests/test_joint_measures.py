@@ -55,9 +55,9 @@ def missing_energy(steps: int) -> float:
     before, work = energy(world, dt), 0.0
     for _ in range(20):
         frame = frame_of(world, dt, steps)
-        told = measures.values(world.solid.q, world.time, frame)
-        assert frame_time * told["power_rail_W"] == pytest.approx(sum(s.work for s in frame.steps))
-        work += frame_time * told["power_rail_W"]
+        row = measures.values(world.solid.q, world.time, frame)
+        assert frame_time * row["power_rail_W"] == pytest.approx(sum(s.work for s in frame.steps))
+        work += frame_time * row["power_rail_W"]
     assert abs(work) > 0.5
     return abs(energy(world, dt) - before - work)
 
@@ -73,14 +73,14 @@ def test_force_and_power_are_means_over_the_frame() -> None:
     drive = TrajectorySinusoid(np.array([0]), 0.3, PERIOD)
     world = make_world(CART, slab=False, motions=(drive,))
     frame = frame_of(world, 0.01, 5)
-    told = JointMeasures(world.setup, NOTHING, True).values(world.solid.q, world.time, frame)
+    row = JointMeasures(world.setup, NOTHING, True).values(world.solid.q, world.time, frame)
     forces = [step.actuator[0] for step in frame.steps]
-    assert told["force_rail_N"] == pytest.approx(np.mean(forces))
-    assert np.ptp(forces) > 0.1 * abs(told["force_rail_N"])
-    assert told["target_rail_m"] == pytest.approx(drive.position(0.05)[0])
-    assert told["target_rail_m"] == pytest.approx(told["position_rail_m"])
-    assert "target_elbow_rad" not in told
-    assert "torque_elbow_Nm" not in told
+    assert row["force_rail_N"] == pytest.approx(np.mean(forces))
+    assert np.ptp(forces) > 0.1 * abs(row["force_rail_N"])
+    assert row["target_rail_m"] == pytest.approx(drive.position(0.05)[0])
+    assert row["target_rail_m"] == pytest.approx(row["position_rail_m"])
+    assert "target_elbow_rad" not in row
+    assert "torque_elbow_Nm" not in row
 
 
 @dataclass
@@ -100,10 +100,10 @@ def test_a_ball_joint_has_three_torques() -> None:
     """3 kg, held 1 m to the side."""
     world = make_world(BALL, slab=False, gravity=(0.0, 0.0, -9.81), motions=(HeldBall(),))
     measures = JointMeasures(world.setup, NOTHING, True)
-    told = measures.values(world.solid.q, world.time, frame_of(world, 0.01, 2))
-    assert list(told) == list(measures.columns)
-    assert_allclose([told[f"torque_shoulder_{a}_Nm"] for a in "xyz"], [0.0, -29.43, 0.0], atol=1e-9)
-    assert told["power_shoulder_W"] == 0.0
+    row = measures.values(world.solid.q, world.time, frame_of(world, 0.01, 2))
+    assert list(row) == list(measures.columns)
+    assert_allclose([row[f"torque_shoulder_{a}_Nm"] for a in "xyz"], [0.0, -29.43, 0.0], atol=1e-9)
+    assert row["power_shoulder_W"] == 0.0
 
 
 def test_joints_are_chosen_as_the_scene_says() -> None:
@@ -122,10 +122,10 @@ def test_joints_are_chosen_as_the_scene_says() -> None:
         "force_head_x_N",
         "power_head_x_W",
     }
-    told = every.values(eel.solid.q, 0.75, None)
+    row = every.values(eel.solid.q, 0.75, None)
     wave = np.radians(20.0) * (3 * 0.75**2 - 2 * 0.75**3)
-    assert told["target_joint_3_rad"] == pytest.approx(wave * np.sin(2 * np.pi * (0.375 - 0.42)))
-    assert np.isnan(told["torque_joint_3_Nm"])
+    assert row["target_joint_3_rad"] == pytest.approx(wave * np.sin(2 * np.pi * (0.375 - 0.42)))
+    assert np.isnan(row["torque_joint_3_Nm"])
 
 
 def test_controlled_joints_have_their_target_in_any_case() -> None:

@@ -163,7 +163,7 @@ def error_bar(
     steps        values of [time] steps_per_frame, ascending; as before
     frames       how many are run; as many as the scene has unless given
     settings     further keys of the scene, as `load_scene` takes them
-    out          folder that keeps the runs; they are thrown away unless given
+    out          folder that keeps the runs; each is thrown away when it is measured unless given
     returns      the number on the finest grid with the shortest step, and its bar
     raises       ValueError when there are not at least two grids or two numbers of steps, or they
                  do not grow, for an unknown column, and a number that is not finite; SceneError
@@ -181,17 +181,17 @@ def error_bar(
     grids = [(cells, shortest) for cells in cells_of]
     times = [(finest, count) for count in counts]
     values: dict[tuple[int | None, int | None], float] = {}
-    with TemporaryDirectory() as thrown_away:
-        folder = Path(thrown_away if out is None else out)
-        for cells, count in dict.fromkeys([*grids, *times]):
-            keys = {"domain.resolution": cells, "time.steps_per_frame": count}
-            chosen = {key: str(number) for key, number in keys.items() if number is not None}
-            name = "-".join(["run", *chosen.values()])
-            loaded = load_scene(scene, {**(settings or {}), **chosen})
-            result = run(loaded, folder / name, frames=frames, film=False)
+    for cells, count in dict.fromkeys([*grids, *times]):
+        keys = {"domain.resolution": cells, "time.steps_per_frame": count}
+        chosen = {key: str(number) for key, number in keys.items() if number is not None}
+        name = ", ".join(f"{key}={number}" for key, number in chosen.items())
+        loaded = load_scene(scene, {**(settings or {}), **chosen})
+        with TemporaryDirectory() as thrown_away:
+            folder = Path(thrown_away if out is None else out) / name.replace(", ", " ")
+            result = run(loaded, folder, frames=frames, film=False)
             if result.outcome is not RunOutcome.DONE:
-                raise SceneError(f"no error bar of {scene} with {chosen}: {result.message}.")
-            values[cells, count] = _measured(OpenRun(folder / name), measure)
+                raise SceneError(f"no error bar of {scene} with {name}: {result.message}.")
+            values[cells, count] = _measured(OpenRun(folder), measure)
     of_grids = [values[key] for key in grids]
     of_steps = [values[key] for key in times]
     grid = Refinement.of(resolutions, of_grids) if len(grids) > 1 else None

@@ -88,9 +88,9 @@ def test_a_data_set_has_the_drives_of_joints_by_name(folder: Path) -> None:
         ("power", f"power_{joint}_W"),
         ("target_angle", f"target_{joint}_rad"),
     ):
-        told = found[name].sel(joint=joint).values
-        assert np.isnan(told[0])
-        assert_array_equal(told[1:], run.history[column])
+        values = found[name].sel(joint=joint).values
+        assert np.isnan(values[0])
+        assert_array_equal(values[1:], run.history[column])
     assert_array_equal(found["drag"].values[1:], run.history["drag_N"])
     assert found["time"].attrs["units"] == "s"
 

@@ -73,10 +73,10 @@ def test_one_constant_is_the_frequency_of_its_gait(hertz: str) -> None:
     motions = build(load_scene("eel", settings)).world.setup.motions
     for n, motion in enumerate(motions, start=1):
         formula = Formula(f"20.0 * ramp(t) * sin(2*pi*({hertz}*t - 0.14*{n}))")
-        told = TrajectoryFormula(motion.dofs, formula, math.pi / 180.0)
+        expected = TrajectoryFormula(motion.dofs, formula, math.pi / 180.0)
         for t in np.linspace(0.0, 4.0, 61):
-            assert motion.position(t) == told.position(t)
-            assert motion.velocity(t) == told.velocity(t)
+            assert motion.position(t) == expected.position(t)
+            assert motion.velocity(t) == expected.velocity(t)
 
 
 @pytest.mark.parametrize("amplitude", [20.0, 40.0])
