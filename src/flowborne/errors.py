@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -31,6 +32,21 @@ class PartError(ValueError):
 
     The text says which one, and what it did.
     """
+
+    @classmethod
+    @contextmanager
+    def guarding(cls, part: str, *passing: type[Exception]) -> Iterator[None]:
+        """Context in which all that the part raises is a PartError: SystemExit, too, with which it
+        would end the run.
+
+        passing  what is raised as it is, besides KeyboardInterrupt and another part's PartError
+        """
+        try:
+            yield
+        except (KeyboardInterrupt, PartError, *passing):
+            raise
+        except BaseException as error:
+            raise cls.failed(part, error) from error
 
     @classmethod
     def failed(cls, part: str, error: BaseException) -> PartError:

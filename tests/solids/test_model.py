@@ -338,3 +338,13 @@ def test_numbers_that_a_density_from_elsewhere_hides_are_refused(joint, geom, to
     <geom name="g" size="0.1" {geom}/></body></worldbody></mujoco>"""
     with pytest.raises(ValueError, match=told):
         SolidModel.from_string(text, density=500.0)
+
+
+def test_nothing_but_ours_is_said_of_a_mesh_without_volume(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    flat = np.random.RandomState(0).rand(12, 3) * [1.0, 1.0, 1e-14]
+    vertices = " ".join(map(str, flat.ravel()))
+    with pytest.raises(ValueError, match="qhull error"):
+        SolidModel.from_string(TETRAHEDRON.replace("0 0 0  2 0 0  0 2 0  0 0 2", vertices))
+    assert capfd.readouterr() == ("", "")

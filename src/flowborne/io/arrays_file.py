@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.given_files import check_file
 from flowborne.io.run_folder import RunFolder, RunFolderError
 
 SHORT = 200
 """Most letters of what another library says."""
+
+MOST_UNPACKED = 1 << 30
+"""Bytes that arrays may take where their file is smaller: those of runs are not compressed."""
 
 
 def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
@@ -21,13 +25,19 @@ def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDA
 
     names   which; all when None
     raises  OSError when the file cannot be opened; ValueError when it is cut, empty or something
-            else, or lacks one of the names
+            else, unpacks to more than MOST_UNPACKED, or lacks one of the names
     """
+    check_file(path, None)
     with open(path, "rb") as file:
         try:
-            archive = np.load(file)
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise ValueError("it is a single array")
+            archive = np.lib.npyio.NpzFile(file)
+            assert archive.zip is not None
+            asked = sum(member.file_size for member in archive.zip.infolist())
+            most = max(MOST_UNPACKED, path.stat().st_size)
+            if asked > most:
+                raise ValueError(
+                    f"it unpacks to {asked / 2**30:.3g} GB, and {most / 2**30:.3g} GB are the most"
+                )
             return {name: archive[name] for name in names or archive.files}
         except Exception as error:  # NumPy, zip and zlib raise whatever they stumble over
             raise ValueError(f"{path} is cut or no archive of arrays ({_said(error)})") from error
@@ -46,6 +56,7 @@ def check_states(folder: RunFolder, frame: int) -> None:
     for path in folder.state_files():
         if int(path.stem) <= frame:
             try:
+                check_file(path, None)
                 zipfile.ZipFile(path).close()
             except (OSError, zipfile.BadZipFile) as error:
                 raise _without(path, error) from error

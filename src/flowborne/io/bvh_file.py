@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
+from flowborne.given_files import read_file
 from flowborne.io.bvh_hierarchy import BvhJoint, number_in, read_hierarchy
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ class BvhFile:
 def load_bvh(path: Path) -> BvhFile:
     """Read a BVH file. Raises SceneError with the line when it is none, is cut or is no number."""
     try:
-        raw = path.read_bytes()
+        raw = read_file(path)
     except FileNotFoundError:
         raise SceneError(f"there is no file {path}. Correct the name.") from None
     except OSError as error:

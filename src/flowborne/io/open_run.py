@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
+from flowborne.given_files import read_json
 from flowborne.io.arrays_file import read_state
 from flowborne.io.columns import history_arrays
 from flowborne.io.history import history_columns, history_rows
@@ -47,7 +47,7 @@ class OpenRun:
         self._files = files
         self.scene = files.read_scene()
         with reading(self.folder):
-            self._model = json.loads(files.model.read_text(encoding="utf-8"))
+            self._model = read_json(files.model)
             names = sorted(p.name for p in files.states.iterdir() if STATE_NAME.fullmatch(p.name))
             self.name = str(self.scene.get("name", files.path.name))
             self.bodies: tuple[str, ...] = tuple(self._model["bodies"])

@@ -13,11 +13,9 @@ preview.mp4      the film
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +24,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from flowborne.errors import SceneError
+from flowborne.given_files import read_json, read_toml
 from flowborne.io.atomic import partial_name, write_json
 from flowborne.version import __version__
 
@@ -100,6 +99,7 @@ class RunFolder:
     def existing(cls, path: Path) -> RunFolder:
         """Folder of an earlier run. Raises RunFolderError when it is none."""
         folder = cls(path)
+        check_name(path)
         if not path.is_dir():
             raise RunFolderError(f"there is no folder {path}; give the folder of an earlier run")
         if not folder.is_run():
@@ -156,6 +156,7 @@ class RunFolder:
     def check_new(self, *, replace: bool) -> None:
         """Raise RunFolderError unless a new run may be written here; touches nothing."""
         path = self.path
+        check_name(path)
         if path.exists() and not path.is_dir():
             raise RunFolderError(f"{path} is a file; name a folder with --out")
         if not path.exists():
@@ -183,8 +184,8 @@ class RunFolder:
     def is_run(self) -> bool:
         """Whether a run has made this folder."""
         try:
-            summary = json.loads(self.summary.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
+            summary = read_json(self.summary)
+        except (OSError, ValueError):
             return False
         return isinstance(summary, dict) and MARK in summary
 
@@ -203,13 +204,13 @@ class RunFolder:
         write_json(self.summary, {MARK: __version__, **summary})
 
     def read_summary(self) -> dict[str, Any]:
-        summary: dict[str, Any] = json.loads(self.summary.read_text(encoding="utf-8"))
+        summary: dict[str, Any] = read_json(self.summary)
         return summary
 
     def read_scene(self) -> dict[str, Any]:
         """scene.toml as nested dictionaries; raises RunFolderError when it cannot be read."""
         with reading(self.path):
-            return tomllib.loads(self.scene.read_text(encoding="utf-8"))
+            return read_toml(self.scene)
 
     def model_files(self) -> list[str]:
         """Names of the files that this run has copied beside its scene, none outside the folder."""
@@ -298,6 +299,16 @@ def reading(folder: Path) -> Iterator[None]:
         raise RunFolderError(
             f"the files of run {folder} cannot be read ({said}); start the run again with --replace"
         ) from error
+
+
+def check_name(path: Path) -> None:
+    """Raise RunFolderError for a path that no folder can have."""
+    try:
+        path.exists()
+    except OSError as error:
+        raise RunFolderError(
+            f"{str(path)[:60]} ... is no name of a folder ({error.strerror}); shorten it"
+        ) from None
 
 
 def cannot_write(path: Path, error: OSError) -> RunFolderError:

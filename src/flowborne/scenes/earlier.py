@@ -6,7 +6,6 @@ Paper: section 8 names a design in several passes as future work.
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flowborne.errors import SceneError
+from flowborne.given_files import read_json
 from flowborne.io.arrays_file import read_arrays, read_state
 from flowborne.io.run_folder import RunFolder, RunFolderError, reading
 from flowborne.quaternions import continuous
@@ -129,7 +129,7 @@ def _read_run(path: Path, stamp: tuple[int, int]) -> Earlier:
     """What the controlled joints of a run did, and those that it had from an earlier one."""
     folder = RunFolder(path)
     with reading(path):
-        model = json.loads(folder.model.read_text(encoding="utf-8"))
+        model = read_json(folder.model)
         places = {name: slice(*model["places"][name]) for name in model["decided"]}
         states = [read_state(file, ("time", "q")) for file in sorted(folder.state_files())]
         times = np.array([float(state["time"]) for state in states])

@@ -20,13 +20,28 @@ from pydantic import (
 
 from flowborne.registry import Registry
 
-Number = Annotated[float, Strict()]
-"""A finite number; text such as "3" is not one."""
+LARGEST, SMALLEST = 1e100, 1e-100
+"""Sizes of numbers whose squares neither overflow nor vanish."""
 
-Positive = Annotated[float, Strict(), Field(gt=0)]
-NotNegative = Annotated[float, Strict(), Field(ge=0)]
-Count = Annotated[int, Strict(), Field(ge=1)]
-WholeNumber = Annotated[int, Strict(), Field(ge=0)]
+
+def _sized(value: float) -> float:
+    if 0.0 < abs(value) < SMALLEST or abs(value) > LARGEST:
+        raise ValueError(
+            f"is {value:g}. Give a number of a size between {SMALLEST:g} and {LARGEST:g}"
+        )
+    return value
+
+
+MOST_COUNT = 1_000_000
+"""Most frames, cells along an axis, or whatever else is counted."""
+
+Number = Annotated[float, Strict(), AfterValidator(_sized)]
+"""A finite number of a size that can be squared; text such as "3" is not one."""
+
+Positive = Annotated[float, Strict(), Field(gt=0), AfterValidator(_sized)]
+NotNegative = Annotated[float, Strict(), Field(ge=0), AfterValidator(_sized)]
+Count = Annotated[int, Strict(), Field(ge=1, le=MOST_COUNT)]
+WholeNumber = Annotated[int, Strict(), Field(ge=0, le=MOST_COUNT)]
 """0, 1, 2, ..."""
 
 MOST_STEPS = 10_000
@@ -34,6 +49,9 @@ MOST_STEPS = 10_000
 
 Steps = Annotated[int, Strict(), Field(ge=1, le=MOST_STEPS)]
 StepsOrNone = Annotated[int, Strict(), Field(ge=0, le=MOST_STEPS)]
+
+MOST_NAME, MOST_PATH = 200, 2000
+"""Bytes of a file's name, with room for what is put around it (systems take 255), and of a path."""
 
 Text = Annotated[str, Field(min_length=1)]
 
@@ -65,13 +83,15 @@ def _three(values: tuple[float, ...]) -> tuple[float, ...]:
     return _two_or_three(values) + (0.0,) * (3 - len(values))
 
 
-def _possible_name(value: str) -> str:
-    if "\0" in value or any(len(part.encode()) > 255 for part in Path(value).parts):
+def possible_name(value: str) -> str:
+    """A name that a file can have, as it is. Raises ValueError for any other."""
+    lengths = [len(part.encode()) for part in Path(value).parts]
+    if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > MOST_NAME:
         raise ValueError("is no name that a file can have. Shorten it, without letters of no width")
     return value
 
 
-FileName = Annotated[Text, AfterValidator(_possible_name)]
+FileName = Annotated[Text, AfterValidator(possible_name)]
 """A file, found from the folder of the scene file."""
 
 LONGEST_NAME = 200

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import csv
 import math
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from flowborne.errors import SceneError
+from flowborne.given_files import read_file
+from flowborne.scenes.fields import possible_name
 from flowborne.scenes.wording import place, suggestion
 
 
@@ -38,6 +41,10 @@ def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
                 raise SceneError(f"{where} has both a file and a table. Keep one of them.")
             if not (isinstance(path, str) and isinstance(column, str)):
                 raise SceneError(f"{where}: file and column are names. Put them in quotes.")
+            try:
+                possible_name(path)
+            except ValueError as error:
+                raise SceneError(f"{where}, file {error}.") from None
             motion["times"], motion["values"] = read_columns(folder / path, column, where)
         except SceneError as error:
             problems += error.problems
@@ -48,8 +55,8 @@ def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
 def read_columns(path: Path, column: str, where: str) -> tuple[list[float], list[float]]:
     """Columns `time` and `column` of a CSV file. Raises SceneError with the file's line."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(stream)]
+        text = StringIO(read_file(path).decode("utf-8-sig"), newline="")
+        rows = [[cell.strip() for cell in row] for row in csv.reader(text)]
     except FileNotFoundError:
         raise SceneError(f"{where}: there is no file {path}. Correct the name.") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from flowborne.errors import SceneError
+from flowborne.given_files import read_file
 from flowborne.io.run_folder import reading
 from flowborne.scenes.check import cross_check
 from flowborne.scenes.draft import Draft
@@ -167,7 +168,7 @@ def find(name_or_path: str | Path) -> Path:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return tomllib.loads(read_file(path).decode("utf-8-sig"))
     except OSError as error:
         raise SceneError(f"scene {path} cannot be read: {error.strerror}. Mend that.") from None
     except UnicodeDecodeError as error:

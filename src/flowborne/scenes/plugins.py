@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flowborne.errors import PartError, SceneError
+from flowborne.given_files import read_file
 
 LOADED: dict[str, bytes] = {}
 """Module -> text of the file that it was made from."""
@@ -43,7 +44,7 @@ def _load(path: Path) -> None:
     if path.suffix != ".py" or not name.isidentifier():
         raise SceneError(f"'{path.name}' is no Python module. Name a file such as reach.py.")
     try:
-        text = path.read_bytes()
+        text = read_file(path)
     except OSError as error:
         raise SceneError(f"file {path} cannot be read: {error.strerror}. Put it there.") from None
     if name in LOADED:
@@ -64,11 +65,13 @@ def _load(path: Path) -> None:
     assert spec.loader is not None
     sys.modules[name] = module_from_spec(spec)
     try:
-        spec.loader.exec_module(sys.modules[name])
-    except (Exception, SystemExit) as error:
+        with PartError.guarding(f"plugin '{path.name}'"):
+            spec.loader.exec_module(sys.modules[name])
+    except BaseException as error:
         del sys.modules[name]
-        failed = PartError.failed(f"plugin '{path.name}'", error)
-        raise SceneError(f"{failed}.") from error
+        if isinstance(error, PartError):
+            raise SceneError(f"{error}.") from error
+        raise
     LOADED[name] = text
     if folder not in sys.path:
         _FOLDERS.append(folder)

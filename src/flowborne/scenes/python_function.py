@@ -21,7 +21,9 @@ def find_function(name: str) -> Callable[..., Any]:
     """The function "module:function". Raises SceneError when Python does not find it."""
     module, _, function = name.partition(":")
     try:
-        found = getattr(importlib.import_module(module), function)
+        with PartError.guarding(f"module '{module}'", ModuleNotFoundError):
+            imported = importlib.import_module(module)
+        found = getattr(imported, function)
     except ModuleNotFoundError as error:
         raise SceneError(
             f"Python does not find module '{error.name}' of '{name}'. "
@@ -31,10 +33,8 @@ def find_function(name: str) -> Callable[..., Any]:
         raise SceneError(
             f"module '{module}' has no function '{function}'. Correct the name."
         ) from None
-    except (Exception, SystemExit) as error:
-        raise SceneError(
-            f"module '{module}' cannot be imported ({type(error).__name__}: {error}). Mend it."
-        ) from error
+    except PartError as error:
+        raise SceneError(f"{error}.") from error
     if not callable(found):
         raise SceneError(f"'{name}' is {found!r} and no function. Correct the name.")
     return found
@@ -68,10 +68,8 @@ class WindFunction:
 
     def __call__(self, x: Array, time: float) -> Array:
         """(n, 3) velocity in m/s at the places x (n, 3). Raises PartError when it is not that."""
-        try:
+        with PartError.guarding(f"wind '{self.name}'"):
             given = self.function(x, time)
-        except Exception as error:
-            raise PartError.failed(f"wind '{self.name}'", error) from error
         try:
             velocity = np.asarray(given, dtype=np.float64)
         except (TypeError, ValueError):

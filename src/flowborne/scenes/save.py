@@ -7,25 +7,20 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from flowborne.errors import SceneError
+from flowborne.given_files import read_file
 from flowborne.io.run_folder import OWN_NAMES
 from flowborne.scenes.bodies import bones_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.earlier import EARLIER_FILE, earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_flesh import FleshTable
+from flowborne.solids.model_files import folders
 
 SCENE_FILE = "scene.toml"
 HUMAN_FILE = "human.xml"
 """The model of a scene's human, for other programs; the scene itself makes it anew."""
 
 ASSETS = "assets"
-FOLDER_KEYS = {
-    "mesh": ("meshdir", "assetdir"),
-    "hfield": ("assetdir",),
-    "skin": ("assetdir",),
-    "texture": ("texturedir", "assetdir"),
-}
-"""Element that names a file -> compiler attributes that say where its folder is, first wins."""
 
 
 class _Names:
@@ -134,10 +129,9 @@ def _flesh_files(scene: Scene, names: _Names) -> tuple[tuple[FleshTable, ...], d
 
 def _model_files(model: Path, name: str) -> dict[str, bytes]:
     """The model, under `name`, and what it names. One that names no file is copied as it is."""
-    folders = _folders(model, model.parent)
     taken: dict[Path, str] = {}
     files: dict[str, bytes] = {}
-    _add_mjcf(model, name, model.parent, folders, taken, files)
+    _add_mjcf(model, name, model.parent, folders(model), taken, files)
     return files
 
 
@@ -145,7 +139,7 @@ def _add_mjcf(
     path: Path,
     name: str,
     main_folder: Path,
-    folders: dict[str, str],
+    folder_of: dict[str, str],
     taken: dict[Path, str],
     files: dict[str, bytes],
 ) -> None:
@@ -162,12 +156,12 @@ def _add_mjcf(
             if element.tag == "include":
                 source = main_folder / given
             else:
-                source = main_folder / folders.get(element.tag, "") / given
+                source = main_folder / folder_of.get(element.tag, "") / given
             source = source.resolve()
             if source not in taken:
                 taken[source] = f"{ASSETS}/{len(taken)}-{source.name}"
                 if element.tag == "include":
-                    _add_mjcf(source, taken[source], main_folder, folders, taken, files)
+                    _add_mjcf(source, taken[source], main_folder, folder_of, taken, files)
                 else:
                     files[taken[source]] = _read(source)
             element.attrib[key] = taken[source]
@@ -175,24 +169,8 @@ def _add_mjcf(
     files[name] = ElementTree.tostring(root, encoding="utf-8") if changed else text
 
 
-def _folders(path: Path, main_folder: Path) -> dict[str, str]:
-    """Element -> folder in which its files are, as the compiler elements of a model say."""
-    given: dict[str, str] = {}
-    pending = [path]
-    while pending:
-        for element in ElementTree.fromstring(_read(pending.pop())).iter():
-            if element.tag == "compiler":
-                given |= element.attrib
-            elif element.tag == "include" and "file" in element.attrib:
-                pending.append(main_folder / element.attrib["file"])
-    return {
-        tag: next((given[key] for key in keys if key in given), "")
-        for tag, keys in FOLDER_KEYS.items()
-    }
-
-
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_file(path)
     except OSError as error:
         raise SceneError(f"file {path} cannot be read: {error.strerror}. Put it there.") from None

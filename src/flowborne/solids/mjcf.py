@@ -10,13 +10,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.given_files import read_file
 from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.shapes.shape import Mesh, Shape
+from flowborne.solids.model_files import check_named, parsed
 from flowborne.solids.model_numbers import impossible, misgiven
 from flowborne.solids.model_size import too_large
 from flowborne.solids.own_shapes import Own, add_shapes, own_shape
+from flowborne.solids.quiet import compiled_quietly
 
 Array = NDArray[np.float64]
 
@@ -94,14 +97,14 @@ def bones_of(
         if given is not None:
             geom.density, geom.mass = given, np.nan
     try:
-        mj = spec.compile()
+        mj = compiled_quietly(spec)
     except ValueError as error:
         raise _unreadable(where, error) from error
     _refuse_unsupported(mj, where)
     if slab:
         _set_slab_inertias(spec, mj)
         try:
-            mj = spec.compile()
+            mj = compiled_quietly(spec)
         except ValueError as error:
             raise ValueError(f"{where} cannot be made a slab: {error}.") from error
     return spec, mj
@@ -122,11 +125,16 @@ def _check_xml(source: str | Path, where: str) -> None:
     """MuJoCo reads over what follows the end of a model, and what copies it does not; and it makes
     all that a model asks for."""
     try:
-        model = ElementTree.fromstring(source.read_bytes() if isinstance(source, Path) else source)
+        model = parsed(read_file(source) if isinstance(source, Path) else source)
+        if isinstance(source, Path):
+            check_named(source)
     except ElementTree.ParseError as error:
         raise _unreadable(where, error) from error
     except OSError as error:
-        raise ValueError(f"{where} cannot be read: {error.strerror}. Mend that.") from error
+        which = where if Path(error.filename) == source else f"{where}: {error.filename}"
+        raise ValueError(f"{which} cannot be read: {error.strerror}. Mend that.") from error
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
     large = next(too_large(model), None)
     if large is not None:
         raise ValueError(f"{where}: {large}")
@@ -150,7 +158,7 @@ def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # dense takes room for (nv, nv) arrays
     spec.memory = ARENA + 2 * len(spec.bodies) ** 2  # 4 bytes for each pair that might collide
     try:
-        mj = spec.compile()
+        mj = compiled_quietly(spec)
     except ValueError as error:
         raise ValueError(f"the model with flesh cannot be read: {error}. Mend it there.") from error
     _refuse_unsupported(mj, "the model with flesh")

@@ -49,7 +49,9 @@ def _said(tag: str, name: str, size: int) -> Iterator[str]:
 
 def _copies(element: Element) -> int:
     """How many copies of parts replicates make, those in each other multiplied."""
-    inside = sum(_copies(child) for child in element)
+    inside = 0
+    for child in element:
+        inside += _copies(child)
     return _count(element, "count") * max(inside, 1) if element.tag == "replicate" else inside
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from flowborne.kernels import elastic
 from flowborne.solids.elements import lumped, measures, with_middles
 from flowborne.solids.mjcf import ARENA
+from flowborne.solids.quiet import compiled_quietly
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -142,7 +143,7 @@ def _frames(
     spec: mujoco.MjSpec, name: str, holders: Sequence[str]
 ) -> dict[str, tuple[Array, Array]]:
     """Position and rotation at rest of the bodies that hold flesh."""
-    mj = spec.copy().compile()
+    mj = compiled_quietly(spec.copy())
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     frames = {}
@@ -172,7 +173,7 @@ def _hung(some: Indices, nodes: Array, mass: Array, inertia: Array, axes: str) -
 
 def _load(spec: mujoco.MjSpec, holder: str, offsets: Array, mass: Array, inertia: Array) -> None:
     """Give a bone the mass of the nodes that it holds, at `offsets` (n, 3) in its frame."""
-    mj = spec.copy().compile()
+    mj = compiled_quietly(spec.copy())
     b = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, holder)
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, mj.body_iquat[b])

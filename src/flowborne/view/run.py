@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, Self
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
+from flowborne.given_files import read_json
 from flowborne.io.arrays_file import read_state
 from flowborne.io.history import history_columns, history_rows
 from flowborne.io.run_folder import STATE_NAME, RunFolder, reading
@@ -163,7 +163,7 @@ class Run:
     def _read(cls, folder: RunFolder, states: tuple[Path, ...]) -> Self:
         path = folder.path
         scene = folder.read_scene()
-        model = json.loads(folder.model.read_text(encoding="utf-8"))
+        model = read_json(folder.model)
         carriers = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
         return cls(
             name=scene.get("name", path.name),

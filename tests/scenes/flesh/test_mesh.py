@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -245,3 +246,17 @@ def test_other_files_are_no_mesh_of_flesh(tmp_path: Path) -> None:
     pv.ImageData(dimensions=(2, 2, 2)).to_tetrahedra().save(tmp_path / "other.vtu")
     with pytest.raises(ValueError, match=r"other\.vtu cannot be read as a mesh of flesh"):
         read_mesh(tmp_path / "other.vtu")
+
+
+@pytest.mark.parametrize(("array", "kind"), [("holder", "String"), ("connectivity", "Float64")])
+def test_arrays_of_another_type_end_a_process_and_not_this_one(
+    arm: FleshMesh, array: str, kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "typed.vtu"
+    text = mesh_bytes(arm, "").decode()
+    lied, count = re.subn(rf'type="\w+"(?=[^>]*Name="{array}")', f'type="{kind}"', text)
+    assert count == 1
+    path.write_text(lied)
+    with pytest.raises(ValueError, match=r"typed\.vtu cannot be read as a mesh of flesh \(it "):
+        read_mesh(path)
+    assert capfd.readouterr() == ("", "")

@@ -4,7 +4,8 @@ bones                what the bones fill at rest, as a signed distance
 contour              the closed surface at some distance from them
 surface_file         the user's own closed surface
 symmetry             mirror planes that exchange bones, and what is meshed between them
-mesher, mesh_run     tetrahedra inside a surface, by fTetWild in a process of its own
+mesher               tetrahedra inside a surface, by fTetWild
+mesh_run, apart      the process that meshes and reads meshes, and may die of them
 mesh                 flesh: what of the tetrahedra is elastic, and which points a bone holds
 mesh_file            the .vtu file in which a run keeps its flesh
 grow                 the flesh of a scene's tables, added to its model

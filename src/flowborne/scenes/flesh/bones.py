@@ -19,6 +19,7 @@ from flowborne.solids.mjcf import (
     geom_shape,
     rest_poses,
 )
+from flowborne.solids.quiet import compiled_quietly
 
 Array = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ def bones_of(spec: mujoco.MjSpec, names: Sequence[str]) -> Bones:
 
     raises  ValueError for an unknown body and for one without such a geom
     """
-    mj = spec.copy().compile()
+    mj = compiled_quietly(spec.copy())
     known = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, b) for b in range(mj.nbody)]
     _, _, position, rotation = rest_poses(mj)
     displacing = displacing_geoms(mj)

@@ -22,8 +22,10 @@ from flowborne.scenes.flesh.mesh import (
     surface_mesh,
 )
 from flowborne.scenes.flesh.mesh_file import read_mesh, recipe_of
+from flowborne.scenes.flesh.surface_file import surface_bytes
 from flowborne.scenes.flesh.symmetry import SAME
 from flowborne.scenes.schema_flesh import FleshTable
+from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.tissue import Grown, Law, Tissue, add_flesh
 
 LAWS = {
@@ -61,8 +63,8 @@ def meshed(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> tuple[FleshM
     if table.mesh is not None:
         path = folder / table.mesh
         as_it_is = table.thickness is None and table.surface is None
-        if as_it_is or (path.is_file() and recipe_of(path) == recipe):
-            return _read(path, path.stat().st_mtime_ns if path.is_file() else 0), recipe
+        if as_it_is or (path.exists() and recipe_of(path) == recipe):
+            return _read(path, path.stat().st_mtime_ns if path.exists() else 0), recipe
     if recipe not in _made:
         _made[recipe] = _mesh(spec, table, folder)
     return _made[recipe], recipe
@@ -82,7 +84,7 @@ def _mesh(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
 
 def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
     """What decides a mesh, as JSON: the bones' shapes and places at rest, and how it is made."""
-    mj = spec.copy().compile()
+    mj = compiled_quietly(spec.copy())
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     shapes = hashlib.sha256()
@@ -104,9 +106,7 @@ def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
         "rules": [FIDELITY, THICKNESSES, HELD, JOINT, JOINT_EDGES, ASTRAY, SAME],
     }
     if table.surface is not None:
-        path = folder / table.surface
-        content = path.read_bytes() if path.is_file() else b""
-        recipe["surface"] = hashlib.sha256(content).hexdigest()
+        recipe["surface"] = hashlib.sha256(surface_bytes(folder / table.surface)).hexdigest()
     return json.dumps(recipe)
 
 

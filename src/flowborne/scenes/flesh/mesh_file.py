@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
+from flowborne.given_files import read_file
+from flowborne.io.arrays_file import read_arrays
+from flowborne.scenes.flesh.apart import run_apart
 from flowborne.scenes.flesh.mesh import FleshMesh
+from flowborne.scenes.flesh.mesh_run import READ
 
 HOLDER, BONES, RECIPE = "holder", "bones", "recipe"
 
@@ -43,44 +48,48 @@ def recipe_of(path: Path) -> str:
 
     raises  ValueError for a file that cannot be read
     """
-    fields = _grid(path).field_data
-    return str(fields[RECIPE][0]) if RECIPE in fields else ""
+    found = _contents(path)
+    return str(found[RECIPE]) if RECIPE in found else ""
 
 
 def read_mesh(path: Path) -> FleshMesh:
     """The flesh of such a file. Raises ValueError for another file, or one that is damaged."""
-    grid = _grid(path)
+    found = _contents(path)
     try:
-        bones = [*map(str, json.loads(str(grid.field_data[BONES][0]))), ""]
-        elements, holders = _elements(grid), np.asarray(grid.point_data[HOLDER])
-        points = np.asarray(grid.points, dtype=np.float64)
+        bones = [*map(str, json.loads(str(found[BONES]))), ""]
+        elements, holders = _elements(found), found[HOLDER]
+        points = found["points"].astype(np.float64)
         if elements.min() < 0 or elements.max() >= len(points):
             raise ValueError("its elements have corners that are not there")
         if not np.isfinite(points).all():
             raise ValueError("its points are no finite numbers")
-        if not np.isin(holders, np.arange(-1, len(bones) - 1)).all():
+        known = np.isin(holders, np.arange(-1, len(bones) - 1))
+        if holders.shape != (len(points),) or not known.all():
             raise ValueError("its points are held by bones that it does not name")
         return FleshMesh(points, elements, tuple(bones[int(n)] for n in holders))
-    except (LookupError, TypeError, ValueError) as error:
+    except (LookupError, RecursionError, TypeError, ValueError) as error:
         said = f"it has no {error}" if isinstance(error, KeyError) else error
         raise _no_mesh(path, said) from error
 
 
-def _grid(path: Path) -> pv.UnstructuredGrid:
+def _contents(path: Path) -> dict[str, NDArray[Any]]:
     """What VTK reads of a file. Raises ValueError with the first thing that it stumbles over."""
-    before, said = vtkOutputWindow.GetInstance(), vtkStringOutputWindow()
-    reader = vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(path))
-    vtkOutputWindow.SetInstance(said)
     try:
-        if not path.is_file():
-            raise _no_mesh(path, "there is no such file")
-        reader.Update()
-    finally:
-        vtkOutputWindow.SetInstance(before)
-    if said.GetOutput().strip():
-        raise _no_mesh(path, "it is cut, or no .vtu file")
-    return pv.wrap(reader.GetOutput())
+        return _read(read_file(path))
+    except FileNotFoundError:
+        raise _no_mesh(path, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise _no_mesh(path, error) from error
+
+
+@lru_cache(maxsize=8)
+def _read(content: bytes) -> dict[str, NDArray[Any]]:
+    with TemporaryDirectory(prefix="flowborne-flesh-") as folder:
+        (Path(folder) / "flesh.vtu").write_bytes(content)
+        why = run_apart(folder, "read", "flesh.vtu")
+        if why is not None:
+            raise ValueError(why)
+        return read_arrays(Path(folder) / READ)
 
 
 def _no_mesh(path: Path, why: object) -> ValueError:
@@ -89,10 +98,10 @@ def _no_mesh(path: Path, why: object) -> ValueError:
     )
 
 
-def _elements(grid: pv.UnstructuredGrid) -> NDArray[np.int64]:
+def _elements(found: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
     """(m, 4) the tetrahedra of a file, (m, 3) its triangles when it has none."""
-    cells = grid.cells_dict
-    kind = KINDS[4] if KINDS[4] in cells else KINDS[3]
-    if kind not in cells:
-        raise ValueError("it has neither tetrahedra nor triangles")
-    return np.asarray(cells[kind], dtype=np.int64)
+    for corners in (4, 3):
+        elements = found[f"elements_{corners}"]
+        if len(elements):
+            return elements.astype(np.int64)
+    raise ValueError("it has neither tetrahedra nor triangles")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.jit import numba_thread_count
 from flowborne.scenes.flesh import mesh_run
+from flowborne.scenes.flesh.apart import run_apart
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import oriented
 
@@ -39,16 +38,11 @@ def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Arr
             tolerance=tolerance / np.linalg.norm(np.ptp(points, axis=0)),
             threads=numba_thread_count(),
         )
-        # -P: no module of this folder stands in for one of Python's own
-        command = [sys.executable, "-P", str(Path(mesh_run.__file__).resolve())]
-        run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        made = Path(folder) / mesh_run.TETRAHEDRA
-        if run.returncode or not made.is_file():
-            said = [line.strip() for line in (run.stdout + run.stderr).splitlines() if line.strip()]
-            why = said[-1].rstrip(".") if said else f"it ended with {run.returncode}"
+        why = run_apart(folder, "mesh")
+        if why is not None:
             raise ValueError(
                 f"the flesh cannot be meshed with edges of {size:g} m: {why}. Try another size."
             )
-        with np.load(made) as mesh:
+        with np.load(Path(folder) / mesh_run.TETRAHEDRA) as mesh:
             points, tetrahedra = mesh["points"], mesh["tetrahedra"].astype(np.int64)
     return points, oriented(points, tetrahedra)

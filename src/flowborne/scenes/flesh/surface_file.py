@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.exchange.load import mesh_formats
 
+from flowborne.given_files import read_file
 from flowborne.scenes.flesh.bones import Bones
 from flowborne.scenes.flesh.contour import contour
 from flowborne.scenes.flesh.distance import signed_distance
@@ -27,13 +29,12 @@ def read_surface(path: Path) -> Mesh:
     raises  ValueError when there is no such file, when it has no triangles, and when its
             triangles do not close a surface
     """
-    if not path.is_file():
-        raise ValueError(f"there is no flesh file {path}. Correct its name.")
+    content = surface_bytes(path)
     if path.suffix.lower() not in formats():
         raise ValueError(
             f"flesh file {path} is none of {', '.join(formats())}. Save the surface as one of them."
         )
-    surface = _triangles(path)
+    surface = _triangles(path, content)
     many = _edges(surface, non_manifold_edges=True)
     if many.n_cells:
         raise ValueError(
@@ -50,6 +51,18 @@ def read_surface(path: Path) -> Mesh:
         auto_orient_normals=True, split_vertices=False, point_normals=False
     )
     return np.asarray(surface.points, dtype=np.float64), surface.regular_faces.astype(np.int64)
+
+
+def surface_bytes(path: Path) -> bytes:
+    """Content of a flesh file. Raises ValueError when it cannot be read."""
+    try:
+        return read_file(path)
+    except FileNotFoundError:
+        raise ValueError(f"there is no flesh file {path}. Correct its name.") from None
+    except OSError as error:
+        raise ValueError(
+            f"flesh file {path} cannot be read: {error.strerror}. Save the surface once more."
+        ) from None
 
 
 def formats() -> tuple[str, ...]:
@@ -79,10 +92,11 @@ def place(point: Array) -> str:
     return f"({', '.join(f'{x:.4g}' for x in point)}) m"
 
 
-def _triangles(path: Path) -> pv.PolyData:
+def _triangles(path: Path, content: bytes) -> pv.PolyData:
     """The triangles of a file. Raises ValueError when there are none."""
     try:
-        read = trimesh.load_mesh(path, process=False)
+        kind = path.suffix.lower().removeprefix(".")
+        read = trimesh.load_mesh(BytesIO(content), file_type=kind, process=False)
     except Exception as error:  # its readers raise whatever goes wrong in them
         why = str(error).rstrip(".!")
         raise ValueError(

@@ -1,0 +1,84 @@
+"""Files that a user names: regular ones alone, and only up to a size."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import stat
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+MOST_BYTES = 1 << 28
+"""Bytes of a file that is read whole."""
+
+KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+class FileError(OSError):
+    """A file that is not read, because of what it is; `strerror` says why."""
+
+    def __init__(self, path: Path, why: str, number: int = errno.EINVAL) -> None:
+        super().__init__(number, why, str(path))
+
+    def __str__(self) -> str:
+        return str(self.strerror)
+
+
+def check_file(path: Path, most: int | None = MOST_BYTES) -> None:
+    """Raise OSError unless this is a regular file of at most `most` bytes.
+
+    A pipe or a device may have no end, and waits for one who writes.
+    """
+    _check(path, os.stat(path), most)
+
+
+def read_file(path: Path, most: int | None = MOST_BYTES) -> bytes:
+    """Content of a regular file of at most `most` bytes. Raises OSError for anything else."""
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    try:
+        found = os.fstat(descriptor)
+        _check(path, found, most)
+        with open(descriptor, "rb", closefd=False) as file:
+            return file.read(found.st_size)
+    finally:
+        os.close(descriptor)
+
+
+def read_json(path: Path) -> Any:
+    """What a JSON file holds. Raises OSError as `read_file`, ValueError for what is no JSON."""
+    return _parsed(path, json.loads)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file holds. Raises OSError as `read_file`, ValueError for what is no TOML."""
+    found: dict[str, Any] = _parsed(path, tomllib.loads)
+    return found
+
+
+def _parsed(path: Path, parse: Callable[[str], Any]) -> Any:
+    text = read_file(path).decode("utf-8-sig")
+    try:
+        return parse(text)
+    except RecursionError:
+        raise ValueError(f"{path.name} is nested hundreds deep") from None
+
+
+def _check(path: Path, found: os.stat_result, most: int | None) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        kind = KINDS.get(stat.S_IFMT(found.st_mode), "something else")
+        raise FileError(path, f"it is {kind}, and no file")
+    if most is not None and found.st_size > most:
+        raise FileError(
+            path,
+            f"it has {found.st_size / 2**20:.4g} MB, and {most / 2**20:g} MB are the most",
+            errno.EFBIG,
+        )
