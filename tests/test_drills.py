@@ -189,6 +189,20 @@ def test_ctrl_c_while_starting_writes_nothing_and_says_so(small_scene, tmp_path,
     assert not (tmp_path / "run").exists()
 
 
+def test_ctrl_c_in_a_command_is_one_line(small_scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Simulation, "_start", interrupted)
+    for command, said in (
+        (("run", "--out", "run"), "stopped before anything was written"),
+        (("check",), "interrupted"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            cli.main([*command, str(small_scene)])
+        lines = capsys.readouterr().err.splitlines()
+        assert (end.value.code, lines[-1]) == (130, f"flowborne: {said}")
+        assert not (tmp_path / "run").exists()
+
+
 def test_ctrl_c_while_starting_keeps_an_earlier_run(small_scene, tmp_path, monkeypatch):
     out = tmp_path / "run"
     run(small_scene, out)

@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose
 import flowborne as fb
 from flowborne.scenes.load import check_scene, library
 from flowborne.scenes.plugins import LOADED
+from flowborne.scenes.python_function import WindFunction
 
 PARTS = Path(__file__).parent / "own_parts"
 
@@ -154,6 +155,10 @@ def test_what_is_wrong_is_one_message(scene: Path, before: str, after: str, said
         ("'high'", "objective 'level' gave 'high', which is no number: return one"),
         ("1 / 0", "objective 'level' failed in level.py, line 15 (ZeroDivisionError"),
         ("None", "objective 'level' gave None, which is no number"),
+        (
+            "__import__('sys').exit(0)",
+            "objective 'level' failed in level.py, line 15 (SystemExit: 0)",
+        ),
     ],
 )
 def test_an_objective_that_fails_stops_the_run_with_its_place(
@@ -168,6 +173,37 @@ def test_an_objective_that_fails_stops_the_run_with_its_place(
     assert result.outcome.name == "BLEW_UP"
     assert said in result.message
     assert "more steps" not in result.message
+
+
+@pytest.mark.parametrize("raised", ["SystemExit(0)", "BaseException()", "TypeError()"])
+def test_a_rule_that_ends_the_interpreter_stops_the_run_with_its_place(
+    scene: Path, tmp_path: Path, raised: str
+) -> None:
+    forget("share")
+    path = scene.with_name("share.py")
+    text = path.read_text()
+    path.write_text(text[: text.index("return")] + f"raise {raised}\n")
+    result = fb.run(scene, tmp_path / "run", film=False)
+    forget("share")
+    assert result.outcome.name == "BLEW_UP"
+    assert f"rule Share failed in share.py, line 14 ({raised[:9]}" in result.message
+
+
+@pytest.mark.parametrize("raised", [SystemExit(0), GeneratorExit(), ZeroDivisionError()])
+def test_a_wind_that_ends_the_interpreter_is_a_part_that_failed(raised: BaseException) -> None:
+    def blow(x: object, time: float) -> None:
+        raise raised
+
+    with pytest.raises(fb.PartError, match=r"wind 'blow' failed in test_own_parts\.py"):
+        WindFunction(blow, "blow")(np.zeros((2, 3)), 0.0)
+
+
+def test_ctrl_c_in_a_part_is_no_fault_of_it() -> None:
+    def blow(x: object, time: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        WindFunction(blow, "blow")(np.zeros((2, 3)), 0.0)
 
 
 def test_a_name_of_ours_a_class_without_its_method_and_a_taken_key_are_refused() -> None:

@@ -19,6 +19,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from flowborne.errors import PartError, SceneError
 from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write
@@ -36,8 +37,24 @@ BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREA
 FILE_KEYS = ("clip.file", "earlier.run", "solids.model")
 """Keys of scenes that name files or folders: a path in a command starts from where one is."""
 
+
+class StoppedError(Exception):
+    """Ctrl-C, which typer would end without a message; the text says what is left."""
+
+
+class _Commands(TyperGroup):
+    """The commands; an interruption of one is a StoppedError."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as stop:
+            raise StoppedError(str(stop) or "interrupted") from stop
+
+
 app = typer.Typer(
     name="flowborne",
+    cls=_Commands,
     help="Creatures that answer the fluid around them.",
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -417,6 +434,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (InputError, RunFolderError) as error:
         _complain(str(error))
         code = WRONG
+    except StoppedError as stop:
+        _complain(str(stop))
+        code = INTERRUPTED
     except (KeyboardInterrupt, typer.Abort):
         _complain("interrupted")
         code = INTERRUPTED

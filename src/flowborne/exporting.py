@@ -44,9 +44,6 @@ def export(
     except ValueError as error:
         raise SceneError(f"{path.name}: exporter {error}.") from error
     opened = OpenRun(folder.path)
-    try:
+    passing = OSError, RunFolderError, SceneError
+    with PartError.guarding(f"exporter of '{ending}' files", *passing):
         return exporter.write(opened, path) or Written((path,))
-    except (OSError, RunFolderError, SceneError):
-        raise
-    except Exception as error:
-        raise PartError.failed(f"exporter of '{ending}' files", error) from error

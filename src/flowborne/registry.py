@@ -90,8 +90,11 @@ class Registry(Generic[Part]):
         chosen = self._checked(kind, table, parameters)
         try:
             return part(**given, **chosen)
-        except Exception as error:
-            raise ValueError(f"of kind '{kind}': {error}") from error
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            said = str(error) if isinstance(error, Exception) else type(error).__name__
+            raise ValueError(f"of kind '{kind}': {said}") from error
 
     def check(self, kind: str, parameters: Mapping[str, Any]) -> None:
         """Raise what `make` raises, as far as that is known without what flowborne gives."""

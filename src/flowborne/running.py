@@ -184,7 +184,9 @@ class _Run:
         folder, simulation = self.folder, self.simulation
         try:
             if folder.checkpoint.exists():
-                simulation.restore(*load_checkpoint(folder.checkpoint, simulation.setup))
+                controller, setup = simulation.controller, simulation.setup
+                memory = None if controller is None else controller.memory_shapes(setup.solid.nq)
+                simulation.restore(*load_checkpoint(folder.checkpoint, setup, memory))
             if simulation.frame > self.frames:
                 raise RunFolderError(
                     f"{folder.path} has {simulation.frame} frames already; ask for more of them, "

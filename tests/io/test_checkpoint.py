@@ -4,6 +4,8 @@ import pytest
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
+from flowborne.io import arrays_file
+from flowborne.io.arrays_file import read_arrays
 from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.solids.model import SolidModel
 
@@ -42,6 +44,40 @@ def test_a_world_is_read_back_bit_for_bit(tmp_path, world):
     for name, values in saved.items():
         assert np.array_equal(values, read[name])
         assert not np.shares_memory(values, read[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("solid/q", lambda q: np.zeros(3), r"'solid/q' is \[3\] of float64 in place of \[1\]"),
+        ("solid/v", lambda v: v.astype(complex), r"'solid/v' is \[1\] of complex128 in place"),
+        ("fluid/pressure", lambda p: p.astype(str), "'fluid/pressure' is"),
+        ("fluid/earlier", lambda p: p * np.nan, "'fluid/earlier' has a number that is not finite"),
+        ("fluid/scalar_smoke", lambda p: p[None], "'fluid/scalar_smoke' is"),
+        ("memory/target", lambda q: q[:1], r"'memory/target' is \[1\] of float64 in place of"),
+        ("clock", lambda clock: clock[:2], "'clock' is"),
+        ("frame", lambda frame: frame - 9, "'frame' is no number of frames"),
+        ("frame", lambda frame: frame * np.inf, "'frame' is no number of frames"),
+    ],
+)
+def test_arrays_of_another_shape_or_type_are_refused(tmp_path, world, name, change, said):
+    path = tmp_path / "checkpoint.npz"
+    save_checkpoint(path, world, 5)
+    with np.load(path) as saved:
+        arrays = dict(saved)
+    np.savez(path, **arrays | {name: change(arrays[name])})
+    with pytest.raises(ValueError, match=said):
+        load_checkpoint(path, world.setup, {"target": (2,)})
+
+
+def test_arrays_that_unpack_to_gigabytes_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(arrays_file, "MOST_UNPACKED", 1 << 20)
+    path = tmp_path / "bomb.npz"
+    np.savez(path, q=np.zeros(1 << 18))
+    read_arrays(path)  # as large as its file
+    np.savez_compressed(path, q=np.zeros(1 << 18))
+    with pytest.raises(ValueError, match=r"unpacks to 0.00195 GB, and 0.000977 GB are the most"):
+        read_arrays(path)
 
 
 def test_equal_worlds_give_equal_files(tmp_path, world):

@@ -60,6 +60,24 @@ def test_reopening_refuses_what_it_cannot_go_on_with(tmp_path):
         History.reopen(path, COLUMNS[:2], 1)
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("1,", "frame,angle_hinge_rad,seconds_total\n1,", "row 1: not a number for each column"),
+        ("0.1\n2", "0.1x\n2", "row 1: not a number for each column"),
+        (",0.1\n2", "\n2", "row 1: not a number for each column"),
+        ("2,", "3,", "row 2 is of frame 3"),
+    ],
+)
+def test_rows_that_are_none_are_not_gone_on_with(tmp_path, before, after, said):
+    path = tmp_path / "history.csv"
+    write_rows(path, 2).close()
+    header, rows = path.read_text().split("\n", 1)
+    path.write_text(header + "\n" + rows.replace(before, after, 1))
+    with pytest.raises(ValueError, match=said):
+        History.reopen(path, COLUMNS, 2)
+
+
 def test_a_row_that_does_not_fit_on_the_disc_is_not_there(tmp_path, monkeypatch):
     path = tmp_path / "history.csv"
     history = write_rows(path, 2)

@@ -6,6 +6,7 @@ Paper: sections 2.1 and 4.3 (algorithm).
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
@@ -169,6 +170,20 @@ class Controller:
         memory["schedule"] = np.array([self.every - 1.0, frame_time])
         return self._decision(world, True, evaluations, started)
 
+    def memory_shapes(self, nq: int) -> dict[str, tuple[int, ...]]:
+        """Shapes of its arrays in a world's memory, by name; nq numbers are a pose."""
+        n = self.dofs.size
+        knots = self.hypothesis.knots if isinstance(self.hypothesis, Horizon) else 1
+        return {
+            "target": (nq,),
+            "displacement": (n,),
+            "gradient": (n,),
+            "objective": (1,),
+            "pace": (2, knots * n),
+            "schedule": (2,),
+            "plan": (knots, n),
+        }
+
     def strength_at(self, time: float) -> Array:
         """(n,) the fastest that each controlled dof moves at `time` (s), rad/s or m/s."""
         strength = self._strengths()
@@ -295,11 +310,13 @@ class Controller:
             displacement = np.zeros(size)
             for places, wanted in groups:
                 trials = self.trials(world, step, course, wanted, places, pace)
-                estimate = trials.estimator.estimate(trials)
+                with _guarding("gradient", self.gradient):
+                    estimate = trials.estimator.estimate(trials)
                 slopes = estimate.gradient
                 if iteration == 0:
                     value, gradient[places] = value + estimate.value, slopes
-                pace[places] = self.rule.pace(pace[places], slope[places], slopes)
+                with _guarding("rule", self.rule):
+                    pace[places] = self.rule.pace(pace[places], slope[places], slopes)
                 slope[places] = slopes
                 way = pace[places] * self._step(trials, slopes, limit[places])
                 displacement[places] = trials.within_range(way)
@@ -323,7 +340,8 @@ class Controller:
 
     def _step(self, trials: Trials, gradient: Array, limit: Array) -> Array:
         """(m,) what the rule says. Raises PartError when that is no such displacement."""
-        step = np.asarray(self.rule.step(trials, gradient, limit))
+        with _guarding("rule", self.rule):
+            step = np.asarray(self.rule.step(trials, gradient, limit))
         if step.shape != gradient.shape or not np.isfinite(step).all():
             raise PartError(
                 f"rule {type(self.rule).__name__} gave {step}: return a finite displacement in rad "
@@ -342,3 +360,9 @@ class Controller:
             evaluations,
             perf_counter() - started,
         )
+
+
+def _guarding(kind: str, part: object) -> AbstractContextManager[None]:
+    """Context in which a rule or gradient fails as a part; what trials raise is no fault of it."""
+    name = f"{kind} {type(part).__name__}"
+    return PartError.guarding(name, ArithmeticError, ValueError, MemoryError)

@@ -63,10 +63,8 @@ def name_of(objective: Objective) -> str:
 
 def value_of(objective: Objective, measurement: Measurement) -> float:
     """The objective's number. Raises PartError when it fails, or gives anything else."""
-    try:
+    with PartError.guarding(f"objective '{name_of(objective)}'"):
         value = objective.value(measurement)
-    except Exception as error:
-        raise PartError.failed(f"objective '{name_of(objective)}'", error) from error
     if type(value) is float:
         return value
     if not isinstance(value, SupportsFloat) or np.ndim(value) != 0:

@@ -7,7 +7,9 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
+from typing import IO
 
+from flowborne.given_files import MOST_BYTES, check_file
 from flowborne.io.atomic import write_text
 
 
@@ -38,15 +40,19 @@ class History:
     def reopen(cls, path: Path, columns: Sequence[str], rows: int) -> History:
         """History cut to its first `rows` rows.
 
-        raises  ValueError when its columns are others, or when it has fewer rows
+        raises  ValueError when its columns are others, when it has fewer rows, or one that is no
+                row of numbers or not that of its frame
         """
+        check_file(path, None)
         with open(path, "r+b") as file:
             header = _header(columns).encode()
             if file.read(len(header)) != header:
                 raise ValueError(f"{path} has other columns than this version writes")
             for row in range(rows):
-                if not file.readline().endswith(b"\n"):
+                line = file.readline(MOST_BYTES)
+                if not line.endswith(b"\n"):
                     raise ValueError(f"{path} has {row} rows where the checkpoint has {rows}")
+                _check_row(line, columns, row + 1, path)
             file.truncate(file.tell())
         return cls(path, columns, rows)
 
@@ -88,8 +94,9 @@ class History:
 
 def history_columns(path: Path) -> tuple[str, ...]:
     """Names of the columns of a history. Raises ValueError when it has no header."""
+    check_file(path, None)
     with open(path, encoding="utf-8", newline="") as file:
-        columns = tuple(next(csv.reader(file), ()))
+        columns = _names(_lines(file))
     if not columns:
         raise ValueError(f"{path.name} is empty")
     return columns
@@ -98,15 +105,42 @@ def history_columns(path: Path) -> tuple[str, ...]:
 def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ...]]:
     """The numbers of the named columns, row after row, without holding the whole file.
 
-    raises  ValueError when there is no such column
+    raises  ValueError when there is no such column, or a number is missing or none
     """
+    check_file(path, None)
     with open(path, encoding="utf-8", newline="") as file:
-        names = next(csv.reader(file), [])
+        lines = _lines(file)
+        names = _names(lines)
         places = [names.index(column) for column in columns]
-        for line in file:
+        for line in lines:
             if line.endswith("\n"):
                 cells = line.rstrip("\n").split(",")
+                if len(cells) != len(names):
+                    raise ValueError(f"{path.name} has {len(cells)} numbers in a row")
                 yield tuple(float(cells[place]) for place in places)
+
+
+def _lines(file: IO[str]) -> Iterator[str]:
+    """The lines of a file, none longer than what is read of a file."""
+    return iter(lambda: file.readline(MOST_BYTES), "")
+
+
+def _names(lines: Iterator[str]) -> tuple[str, ...]:
+    """What the first row names; it may go over several lines."""
+    try:
+        return tuple(next(csv.reader(lines), ()))
+    except csv.Error as error:
+        raise ValueError(f"its first row is none ({error})") from error
+
+
+def _check_row(line: bytes, columns: Sequence[str], row: int, path: Path) -> None:
+    """Raise ValueError unless a line is the row with this number, from 1."""
+    try:
+        values = dict(zip(columns, map(float, line.split(b",")), strict=True))
+    except ValueError:
+        raise ValueError(f"{path}, row {row}: not a number for each column") from None
+    if values.get("frame", row) != row:
+        raise ValueError(f"{path}, row {row} is of frame {values['frame']:g}")
 
 
 def _header(columns: Sequence[str]) -> str:

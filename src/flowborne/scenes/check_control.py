@@ -23,9 +23,13 @@ from flowborne.scenes.schema_control import (
     ObjectiveWindDragTable,
     PhaseIntervalsTable,
     PhaseMotionTable,
+    RuleQuasiNewton,
 )
 from flowborne.scenes.wording import suggestion
 from flowborne.solids.model import SolidModel
+
+MOST_STEPS_PER_DECISION = 1_000_000
+"""Hypothetical steps; without a fluid they take a minute, with one hours."""
 
 WHOLE = 1e-3
 """Part by which a number of steps may miss a whole one: times are written with a few digits."""
@@ -49,22 +53,44 @@ def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
         yield from _check_objective(draft, model, index)
     yield from _check_wishes(draft)
     if draft.sound("controller", "time"):
-        yield from _check_horizon(draft)
+        yield from _check_horizon(draft) or _check_work(draft, model)
 
 
-def _check_horizon(draft: Draft) -> Iterator[str]:
+def _check_work(draft: Draft, model: SolidModel) -> list[str]:
+    """A decision comes to its end."""
+    scene, able = draft.scene, draft.scene.controller
+    dofs = sum(len(model.dofs_of(j)) for j in scene.controlled_joints() if j in model.joint_names)
+    steps = able.hypothetical_steps + able.settle_steps
+    if able.knots is not None:
+        dofs *= able.knots
+        steps = able.knots * round(able.steps_between(scene.frame_time))
+    trials = dofs + 1 if able.gradient.kind == "one-sided" else 2 * dofs
+    gradients = able.rule.gradients if isinstance(able.rule, RuleQuasiNewton) else 1
+    asked = able.iterations * gradients * trials * steps
+    if asked <= MOST_STEPS_PER_DECISION:
+        return []
+    return [
+        f"{draft.at('controller')}: a decision takes {asked:.3g} steps ({trials:g} trials of "
+        f"{steps:.3g} steps in each of {able.iterations * gradients} gradients), and "
+        f"{MOST_STEPS_PER_DECISION:,} are the most. Give fewer knots, iterations or steps, or a "
+        "longer hypothetical_time."
+    ]
+
+
+def _check_horizon(draft: Draft) -> list[str]:
     """The steps of a plan come out even with its knots."""
     able, frame_time = draft.scene.controller, draft.scene.frame_time
     if able.knots is None or able.hypothetical_time is None:
-        return
+        return []
     interval, steps = able.every * frame_time, able.steps_between(frame_time)
     if round(steps) < 1 or abs(steps - round(steps)) > WHOLE * steps:
         number = max(round(steps), 1)
-        yield (
+        return [
             f"{draft.at('controller')}: hypothetical_time is {able.hypothetical_time:g} s, and "
             f"there are {interval:.4g} s from decision to decision, which is no whole number of "
             f"steps. Give {interval / number:.4g}, or leave it out to step by frames."
-        )
+        ]
+    return []
 
 
 def _check_wishes(draft: Draft) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import prod
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, model_validator
@@ -9,6 +10,14 @@ from pydantic import Field, Strict, model_validator
 from flowborne.scenes.fields import Number, Positive, Table, Text, Vector
 
 Pixels = Annotated[int, Strict(), Field(ge=64)]
+
+MOST_PIXELS = 1 << 26
+"""Pixels of a picture: 8192 x 8192."""
+
+BYTES_PER_PIXEL = 4
+
+MOST_RATE = 1000.0
+"""Pictures in a second of a film."""
 
 
 class CameraTable(Table):
@@ -57,7 +66,7 @@ class FilmTable(Table):
     bones: bool = False
     plots: bool = True
     size: tuple[Pixels, ...] | None = None
-    frames_per_second: Positive | None = None
+    frames_per_second: Annotated[Positive, Field(le=MOST_RATE)] | None = None
     start: Number | None = None
     stop: Number | None = None
     background: str | None = None
@@ -68,6 +77,12 @@ class FilmTable(Table):
         if self.size is not None and (len(self.size) != 2 or any(n % 2 for n in self.size)):
             raise ValueError(
                 f"has the size {list(self.size)}. Give width and height, even numbers of pixels"
+            )
+        if self.size is not None and prod(self.size) > MOST_PIXELS:
+            raise ValueError(
+                f"has the size {list(self.size)}: a picture of "
+                f"{prod(self.size) * BYTES_PER_PIXEL / 2**30:.3g} GB, and "
+                f"{MOST_PIXELS * BYTES_PER_PIXEL / 2**30:g} GB is the most. Give fewer pixels"
             )
         if self.start is not None and self.stop is not None and self.start >= self.stop:
             raise ValueError(

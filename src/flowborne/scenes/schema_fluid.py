@@ -21,6 +21,9 @@ from flowborne.scenes.fields import (
 
 Side = Literal["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
 
+MOST_BANDS = 1000
+"""Bands of dye through a side."""
+
 FEWEST_CELLS = 4
 """Cells that a domain has at least along each axis."""
 
@@ -298,7 +301,7 @@ class DyeBands(Table):
     kind: Literal["bands"]
     name: Text = "dye"
     side: Side
-    count: Count | None = None
+    count: Annotated[Count, Field(le=MOST_BANDS)] | None = None
     width: Positive | None = None
     bands: tuple[tuple[Number, Number], ...] | None = None
     across: Literal["x", "y", "z"] | None = None

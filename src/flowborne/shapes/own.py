@@ -125,10 +125,8 @@ def named(geometry: OwnGeometry) -> str:
 def own_distance(geometry: OwnGeometry, points: Array) -> Array:
     """(n,) what the geometry says of points (n, 3), m. Raises PartError when it is no distance."""
     what = named(geometry)
-    try:
+    with PartError.guarding(what):
         distance = np.asarray(geometry.distance(points), dtype=np.float64)
-    except Exception as error:
-        raise PartError.failed(what, error) from error
     if distance.shape != (len(points),) or not np.isfinite(distance).all():
         raise PartError(
             f"{what} gave an array of shape {distance.shape}, or numbers that are not finite, for "
@@ -146,7 +144,8 @@ def triangulated(geometry: OwnGeometry) -> Mesh:
     import pyvista as pv  # half a second that other shapes do not need
 
     what = named(geometry)
-    half = np.asarray(geometry.half_extents(), dtype=np.float64)
+    with PartError.guarding(what):
+        half = np.asarray(geometry.half_extents(), dtype=np.float64)
     if half.shape != (3,) or not (np.isfinite(half).all() and half.min() > 0.0):
         raise PartError(f"{what} has the half extents {half}: give three positive ones in m")
     pitch = 2.0 * half.max() / ACROSS

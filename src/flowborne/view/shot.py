@@ -13,6 +13,9 @@ from flowborne.view import style
 
 Place = tuple[float, float, float]
 
+MOST_FRAMES = 1_000_000
+"""Frames of a film."""
+
 
 @dataclass(frozen=True)
 class CameraShot:
@@ -71,7 +74,7 @@ class Shot:
 
         times     (n,) s, of the states
         run_rate  frames per second of the run
-        raises    ValueError when none lies between start and stop
+        raises    ValueError when none lies between start and stop, or more than MOST_FRAMES do
         """
         start = times[0] if self.start is None else self.start
         stop = times[-1] if self.stop is None else self.stop
@@ -86,6 +89,11 @@ class Shot:
             return [int(number) for number in inside]
         first, last = times[inside[0]], times[inside[-1]]
         count = int(np.floor((last - first + slack) * self.frames_per_second)) + 1
+        if count > MOST_FRAMES:
+            raise ValueError(
+                f"the film has {count} frames at {self.frames_per_second:g} a second, and "
+                f"{MOST_FRAMES} are the most; lower its frames_per_second, or give start and stop"
+            )
         wanted = first + np.arange(count) / self.frames_per_second
         # of two as near the earlier one
         nearest = np.abs(times[inside] - (wanted[:, None] - slack)).argmin(axis=1)
