@@ -43,7 +43,9 @@ class PartError(ValueError):
         """
         try:
             yield
-        except (KeyboardInterrupt, PartError, *passing):
+        except (KeyboardInterrupt, PartError):
+            raise
+        except passing:
             raise
         except BaseException as error:
             raise cls.failed(part, error) from error

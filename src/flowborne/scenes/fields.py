@@ -50,8 +50,8 @@ MOST_STEPS = 10_000
 Steps = Annotated[int, Strict(), Field(ge=1, le=MOST_STEPS)]
 StepsOrNone = Annotated[int, Strict(), Field(ge=0, le=MOST_STEPS)]
 
-MOST_NAME, MOST_PATH = 200, 2000
-"""Bytes of a file's name, with room for what is put around it (systems take 255), and of a path."""
+MOST_PATH = 2000
+"""Bytes of a file's name with its folders."""
 
 Text = Annotated[str, Field(min_length=1)]
 
@@ -86,7 +86,7 @@ def _three(values: tuple[float, ...]) -> tuple[float, ...]:
 def possible_name(value: str) -> str:
     """A name that a file can have, as it is. Raises ValueError for any other."""
     lengths = [len(part.encode()) for part in Path(value).parts]
-    if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > MOST_NAME:
+    if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > LONGEST_NAME:
         raise ValueError("is no name that a file can have. Shorten it, without letters of no width")
     return value
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from flowborne.scenes.fields import (
     ByKind,
@@ -301,7 +301,7 @@ class DyeBands(Table):
     kind: Literal["bands"]
     name: Text = "dye"
     side: Side
-    count: Annotated[Count, Field(le=MOST_BANDS)] | None = None
+    count: Annotated[int, Strict(), Field(ge=1, le=MOST_BANDS)] | None = None
     width: Positive | None = None
     bands: tuple[tuple[Number, Number], ...] | None = None
     across: Literal["x", "y", "z"] | None = None

@@ -179,7 +179,7 @@ def explain(error: ErrorDetails, raw: Any, file: str) -> str:
     if kind in BOUNDS:
         bound = context[BOUNDS[kind]]
         remedy = "Give a larger number" if kind.startswith("greater") else "Give a smaller number"
-        return f"{where}: {value!r} {COMPARED[kind]} {bound:g}. {remedy}."
+        return f"{where}: {_shown(value)} {COMPARED[kind]} {bound:g}. {remedy}."
     if kind == "tuple_type" and isinstance(value, dict) and _is_list_of_tables(str(keys[0])):
         return f"scene {file}: [{keys[0]}] may be there several times. Write [[{keys[0]}]]."
     what = WHAT.get(kind, f"is not right ({error['msg'].lower()}). Correct it")

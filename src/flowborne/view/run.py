@@ -260,11 +260,14 @@ def _carried(entry: dict[str, Any]) -> CarriedSkin:
 
 
 def _history(path: Path) -> dict[str, Array]:
-    """The columns that are drawn; those that a run does not have are left out."""
-    columns = [
-        name
-        for name in history_columns(path)
-        if name in ("frame", "time_s") or name.startswith(PLOTTED)
-    ]
+    """The columns that are drawn; those that a run does not have are left out.
+
+    raises  ValueError for a history without its frames and times
+    """
+    always = "frame", "time_s"
+    columns = [n for n in history_columns(path) if n in always or n.startswith(PLOTTED)]
+    for name in always:
+        if name not in columns:
+            raise ValueError(f"{path.name} has no column '{name}'")
     rows = np.array(list(history_rows(path, columns)), float).reshape(-1, len(columns))
     return dict(zip(columns, rows.T, strict=True))

@@ -91,4 +91,7 @@ def read(file: str) -> None:
 
 if __name__ == "__main__":
     end_with_parent()
-    {"mesh": mesh, "read": read}[sys.argv[1]](*sys.argv[2:])
+    if sys.argv[1] == "mesh":
+        mesh()
+    else:
+        read(sys.argv[2])
