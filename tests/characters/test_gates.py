@@ -17,7 +17,7 @@ import flowborne as fb
 from flowborne.characters.division import closed
 from flowborne.characters.gltf_document import inside
 from flowborne.characters.limits import check_frames, check_size, check_work
-from flowborne.characters.rig import Surface
+from flowborne.characters.rig import Surface, own_names
 from flowborne.characters.source import read_source
 from flowborne.errors import SceneError
 
@@ -227,6 +227,11 @@ def test_names_in_a_file_write_nothing_else_into_the_scene(
     assert scene.clip.free == ('a"]_plugins = ["x.py"]__#',)
     long = write(tmp_path / f"{'é' * 120}.glb", *box)
     assert fb.import_character(long, tmp_path / "long").scene.is_file()
+
+
+def test_names_of_joints_are_ones_that_models_and_clips_can_have() -> None:
+    names = own_names(["{a}", "a b ", " ", "world", "x" * 300, "{a}"])
+    assert names == ("_a_", "a b", "joint_2", "world_2", "x" * 100, "_a__2")
 
 
 def usda(tmp_path: Path, pattern: str, new: str) -> Path:

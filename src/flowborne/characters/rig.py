@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from itertools import count
 
@@ -74,14 +75,17 @@ class Action:
 
 
 def own_names(names: list[str]) -> tuple[str, ...]:
-    """Names of joints, each once, also where a file has none or one twice; in one short line."""
-    names = [printable(name)[:LONGEST_NAME] for name in names]
-    found = list[str]()
-    for number, name in enumerate(names):
+    """Names of joints, each once, also where a file has none or one twice; in one short line.
+
+    Braces are BVH's own, and the name of the world is MuJoCo's.
+    """
+    plain = [re.sub(r"[{}]", "_", printable(name))[:LONGEST_NAME].strip() for name in names]
+    found = ["world"]
+    for number, name in enumerate(plain):
         base = name or f"joint_{number}"
         again = (f"{base}_{n}" for n in count(2))
         found.append(base if base not in found else next(n for n in again if n not in found))
-    return tuple(found)
+    return tuple(found[1:])
 
 
 def printable(text: str) -> str:
