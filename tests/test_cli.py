@@ -287,6 +287,7 @@ def cases(monkeypatch):
     """Stand-ins for the validation and the benches; what was asked of them."""
     asked = []
     results = {"K1": Result("K1", "pass", "K1"), "K2": Result("K2", "fail", "K2")}
+    results["B1"] = Result("B1", "coarse", "B1")
 
     def run_all(names, tier=None, on_result=None, report=None):
         asked.append((names, tier))
@@ -311,9 +312,10 @@ def test_validate_prints_rows_and_fails_when_a_case_does(command, cases):
     assert code == 1
     assert out.splitlines()[0] == "PASS  K1  a case  value 1.5  reference 1  tolerance 0.1"
     assert out.splitlines()[1] == "        32: 1.4"
-    code, _, _ = command("validate", "--case", "K1", "--tier", "half-hour")
-    assert code == 0
-    assert cases == [(None, "minute"), (["K1"], "half-hour")]
+    assert out.splitlines()[6].startswith("COARSE  B1  a case")
+    code, _, _ = command("validate", "--case", "K1", "--case", "B1", "--tier", "half-hour")
+    assert code == 0, "a grid too coarse is no failure"
+    assert cases == [(None, "minute"), (["K1", "B1"], "half-hour")]
 
 
 def test_an_unknown_tier_is_refused(command, cases):

@@ -19,10 +19,11 @@ def section() -> str:
     run = ", ".join(f"{tiers.count(tier)} in the tier {tier}" for tier in reversed(Tier))
     counts = verdicts(data)
     said = (
-        f"[The report](docs/validation/index.html) has {len(data)} cases, {run}: "
-        f"{counts['pass']} of {counts['pass'] + counts['fail']} figures pass, and "
-        f"{counts['unconfirmed']} more stand beside values that are not confirmed at their source. "
-        "These do not pass:"
+        f"[The report](docs/validation.md) has {len(data)} cases, {run}: "
+        f"{counts['pass']} of {counts['pass'] + counts['fail'] + counts['coarse']} figures pass, "
+        f"{counts['coarse']} are outside their tolerance on a grid too coarse for it, and "
+        f"{counts['unconfirmed']} more have values that are not confirmed at their source. "
+        "These fail:"
     )
     rows = [
         f"| {name} | {tier} | {finding['quantity']} | {number(finding['value'])} | "

@@ -1,17 +1,35 @@
-"""The committed validation report as tables: the middle of docs/validation.md."""
+"""The committed validation report as Markdown: the parts of docs/validation.md."""
 
 from __future__ import annotations
 
+import subprocess
+from collections import Counter
 from typing import Any
 
-from failing import REPORT
+from failing import REPORT, ROOT
 from failing import number as shown
 from flowborne.validation.reference import entry
-from flowborne.validation.report import failures, read_report, tier_of, verdicts
+from flowborne.validation.report import (
+    code,
+    failures,
+    grid_of,
+    is_finest,
+    read_report,
+    tier_of,
+    verdict_of,
+    verdicts,
+)
+from flowborne.version import __version__
 from markdown_text import plain, table
+from validation_page import DRAG, Picture, pictures
 
-HEAD = ("figure", "flowborne", "reference", "accepted", "")
-VERDICTS = {"pass": "passes", "fail": "**fails**", "unconfirmed": "unconfirmed"}
+HEAD = ("", "figure", "flowborne", "reference", "accepted", "grid")
+VERDICTS = {
+    "pass": "passes",
+    "coarse": "*coarse*",
+    "fail": "**fails**",
+    "unconfirmed": "unconfirmed",
+}
 
 
 def number(value: float | str) -> str:
@@ -25,9 +43,44 @@ def counts() -> str:
     found = verdicts(data)
     return (
         f"{found['pass']} figures of {len(data)} cases pass and {found['fail']} fail; "
-        f"{found['unconfirmed']} more stand beside references that are not confirmed. Each case is "
-        "told in the longest run that the report has of it."
+        f"{found['coarse']} are outside their tolerance on a grid too coarse for it, and "
+        f"{found['unconfirmed']} have references that are not confirmed. Each case is shown in the "
+        "longest run that the report has of it."
     )
+
+
+def made_from() -> str:
+    """Commit that the page is made from, whether it is clean, and versions that were measured."""
+    cases = [tiers[tier_of(tiers)] for tiers in read_report(REPORT).values()]
+    measured = Counter((case["version"], case.get("code", "")) for case in cases)
+    now = sum(count for (_, digest), count in measured.items() if digest == code())
+    runs = "\n".join(
+        f"* {count} cases: version `{version}`" + (f", code `{digest}`" if digest else "")
+        for (version, digest), count in measured.most_common()
+    )
+    return (
+        f"This page was made from {commit()}. Of its {len(cases)} cases {now} were measured with "
+        "exactly this code and the others with earlier code, which each case names. A version that "
+        "ends in `.d` and a date had changes that were not committed; the code is a digest of all "
+        f"files of the package.\n\n{runs}"
+    )
+
+
+def commit() -> str:
+    """The commit of the checkout, and whether there are changes that it does not have."""
+    try:
+        name, date = git("log", "-1", "--format=%h %cs").split()
+        changed = git("status", "--porcelain")
+    except (OSError, subprocess.CalledProcessError):
+        return f"version `{__version__}` without its git history"
+    clean = "**with changes that are not committed**" if changed else "without other changes"
+    return f"commit `{name}` of {date}, {clean}"
+
+
+def git(*arguments: str) -> str:
+    """What git says about this checkout."""
+    asked = ["git", "-C", str(ROOT), *arguments]
+    return subprocess.run(asked, capture_output=True, check=True, text=True).stdout.strip()
 
 
 def failing() -> str:
@@ -43,27 +96,50 @@ def failing() -> str:
         ]
         for name, tier, f in failures(read_report(REPORT))
     ]
-    return table(["case", "tier", *HEAD[:-1]], rows)
+    return table(["case", "tier", *HEAD[1:-1]], rows)
+
+
+def overview() -> str:
+    """A line for each case with its verdict, and the drag of cylinders over all cases."""
+    rows = []
+    data = read_report(REPORT)
+    for name, tiers in data.items():
+        tier = tier_of(tiers)
+        found = [finding["verdict"] for finding in tiers[tier]["findings"]]
+        passed = f"{found.count('pass')} of {len(found)}"
+        title = f"[{name}](#case-{name.lower()}) {plain(entry(name).name)}"
+        rows.append([VERDICTS[verdict_of(tiers)], title, passed, tier])
+    drag = gallery(pictures(data).get(DRAG, []))
+    return table(["", "case", "figures that pass", "tier"], rows) + "\n" + drag
 
 
 def cases() -> str:
-    """A section for each case: where its reference is from, and its figures beside ours."""
+    """A section for each case: where its reference is from, its figures beside ours, its plots."""
     text = []
-    for name, tiers in read_report(REPORT).items():
+    data = read_report(REPORT)
+    plots = pictures(data)
+    for name, tiers in data.items():
         tier, known = tier_of(tiers), entry(name)
         case: dict[str, Any] = tiers[tier]
         rows = [
             [
+                VERDICTS[found["verdict"]],
                 plain(found["quantity"]),
                 number(found["value"]),
                 number(found["reference"]),
                 plain(str(found["tolerance"])),
-                VERDICTS[found["verdict"]],
+                plain(grid_of(found)),
             ]
             for found in case["findings"]
         ]
-        run = f"Tier {tier}: {case['seconds']:g} s on {case['cores']} cores, "
+        finest = "its finest grids" if is_finest(name, tier) else "not its finest grids"
+        run = f"Tier {tier}, {finest}: {case['seconds']:g} s on {case['cores']} cores, "
         run += f"{case['date']}, version {case['version']}."
-        text += [f"## {name}: {plain(known.name)}", f"{plain(known.source)}. {run}"]
-        text += [table(HEAD, rows)]
+        text += [f"(case-{name.lower()})=\n## {name}: {plain(known.name)}"]
+        text += [f"{plain(known.source)}. {run}", table(HEAD, rows), gallery(plots[name])]
     return "\n\n".join(text)
+
+
+def gallery(some: list[Picture]) -> str:
+    """Plots one after the other."""
+    return "\n".join(f"![{plain(p.title)}](validation/{p.file})" for p in some)

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from flowborne.cli import app
-from flowborne.validation import case_ids, report
+from flowborne.validation import case, case_ids, report
 from flowborne.validation.case import THE_RUN, Curve, GridSeries, Plot, Result, Tier, Verdict
 from flowborne.validation.page import PAGE, write_page
 from flowborne.validation.report import (
@@ -19,6 +19,7 @@ from flowborne.validation.report import (
     already_there,
     failures,
     read_report,
+    verdict_of,
     verdicts,
 )
 
@@ -43,7 +44,9 @@ def result(
 ) -> Result:
     """A result that was not measured."""
     lines = [] if series else ["<all the way>"]
-    return Result(name, tier, "", quantity, 1.01, 1.0, "2 %", verdict, lines, 3.0, series, PLOT)
+    finest = tier is case(name).full
+    judged = (1.01, 1.0, "2 %", verdict)
+    return Result(name, tier, "", quantity, *judged, lines, 3.0, finest, series, PLOT)
 
 
 def test_cases_come_one_by_one_in_the_order_of_the_list(tmp_path: Path) -> None:
@@ -68,7 +71,18 @@ def test_a_figure_that_is_not_confirmed_neither_passes_nor_fails(tmp_path: Path)
     add_to_report(tmp_path, [result("B2", "unconfirmed"), result("B2", "pass")], case_ids())
     data = read_report(tmp_path)
     assert not failures(data)
-    assert verdicts(data) == {"pass": 1, "fail": 0, "unconfirmed": 1}
+    assert verdicts(data) == {"pass": 1, "coarse": 0, "fail": 0, "unconfirmed": 1}
+
+
+def test_a_case_has_the_verdict_of_its_finest_grids(tmp_path: Path) -> None:
+    add_to_report(tmp_path, [result("B2", "coarse", SERIES, HALF_HOUR)], case_ids())
+    data = read_report(tmp_path)
+    assert (verdict_of(data["B2"]), failures(data)) == ("coarse", [])
+    figures = [result("B2", verdict, SERIES, ALL) for verdict in ("pass", "unconfirmed")]
+    add_to_report(tmp_path, figures, case_ids())
+    assert verdict_of(read_report(tmp_path)["B2"]) == "pass"
+    add_to_report(tmp_path, [*figures, result("B2", "fail", SERIES, ALL)], case_ids())
+    assert verdict_of(read_report(tmp_path)["B2"]) == "fail"
 
 
 def test_the_page_is_sound_and_says_everything(tmp_path: Path) -> None:
@@ -76,7 +90,10 @@ def test_the_page_is_sound_and_says_everything(tmp_path: Path) -> None:
     add_to_report(tmp_path, [result("B1", "pass", SERIES, ALL)], case_ids())
     write_page(tmp_path)
     text = (tmp_path / PAGE).read_text()
-    assert "2 cases with 2 figures: 1 pass, 1 fail, and 0 stand" in text
+    assert "2 cases with 2 figures: 1 pass, 1 fail, 0 are outside" in text
+    assert "<td>32 cells across D</td>" in text
+    assert "Tier all, its finest grids" in text
+    assert "Tier minute, not its finest grids" in text
     assert "drag &amp; lift" in text
     assert "&lt;all the way&gt;" in text
     pictures = [part.split("</svg>")[0] for part in text.split("<svg")[1:]]

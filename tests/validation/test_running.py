@@ -9,7 +9,7 @@ import pytest
 
 from flowborne.machine import cores
 from flowborne.validation import Tier, case, case_ids
-from flowborne.validation.case import THE_RUN, Case, Finding, Result
+from flowborne.validation.case import THE_RUN, Case, Finding, GridSeries, Result
 from flowborne.validation.page import PAGE
 from flowborne.validation.report import read_report
 from flowborne.validation.running import batches, run_cases
@@ -33,6 +33,39 @@ def test_a_result_says_its_tier() -> None:
     known = Case("B1", measured, quick=HALF_HOUR, full=ALL)
     told = [(r.tier, r.value) for quick in (True, False) for r in known.run(quick)]
     assert told == [(HALF_HOUR, "quick"), (ALL, "full")]
+
+
+@pytest.mark.parametrize(
+    ("grids", "quick", "passed", "series", "verdict"),
+    [
+        (True, True, False, True, "coarse"),
+        (True, True, True, True, "pass"),
+        (True, True, False, False, "fail"),
+        (True, False, False, True, "fail"),
+        (False, True, False, True, "fail"),
+    ],
+    ids=[
+        "outside the tolerance on a grid too coarse",
+        "inside it there",
+        "a figure that holds on every grid",
+        "outside on the finest grids",
+        "a shorter run whose grids can pass",
+    ],
+)
+def test_coarse_is_what_fails_on_grids_too_coarse_for_it(
+    grids: bool, quick: bool, passed: bool, series: bool, verdict: str
+) -> None:
+    errors = GridSeries("cells across D", (4, 8), (1.0, 1.1), (0.3, 0.2)) if series else None
+
+    def found(quick: bool) -> list[Finding]:
+        return [Finding("drag", 1.1, 1.3, "1 %", passed, errors)]
+
+    (result,) = Case("B1", found, coarse=grids).run(quick)
+    assert (result.verdict, result.finest) == (verdict, not quick)
+    assert result.grid == ("8 cells across D" if series else None)
+    row = result.as_dict()
+    assert (row["verdict"], row["grid"], row["finest"]) == (verdict, result.grid, not quick)
+    assert any("by --tier all" in line for line in result.lines) == (verdict == "coarse")
 
 
 def test_every_case_has_two_tiers_the_shorter_run_first() -> None:

@@ -417,4 +417,4 @@ def pushed(grid: Grid, geom: str, direction: Vector) -> float:
     return -float(force @ np.array(direction))
 
 
-CASES = (Case("I1", unbounded_bodies), Case("I2", containers))
+CASES = (Case("I1", unbounded_bodies, coarse=True), Case("I2", containers))

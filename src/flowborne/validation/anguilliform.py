@@ -164,4 +164,4 @@ def swimming(quick: bool) -> list[Finding]:
     ]
 
 
-CASES = (Case("S1", swimming, Tier.HALF_HOUR),)
+CASES = (Case("S1", swimming, Tier.HALF_HOUR, coarse=True),)

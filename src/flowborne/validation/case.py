@@ -16,7 +16,9 @@ from flowborne import Array
 from flowborne.validation.reference import entry
 
 Value = float | str
-Verdict = Literal["pass", "fail", "unconfirmed"]
+Verdict = Literal["pass", "coarse", "fail", "unconfirmed"]
+"""`coarse` is a figure outside its tolerance on a grid too coarse for it: no failure, as its case
+is judged on its finest grids. A figure inside its tolerance passes on any grid."""
 
 THE_RUN = "the run"
 """What a case that broke down is judged by; its figures were not measured."""
@@ -56,6 +58,11 @@ class GridSeries:
         if len(self.cells) < 2 or not min(self.errors) > 0.0:
             return float("nan")
         return float(-np.polyfit(np.log(self.cells), np.log(self.errors), 1)[0])
+
+    @property
+    def finest(self) -> str:
+        """The last of the grids, such as "10 cells across D"."""
+        return f"{self.cells[-1]:g} {self.label}"
 
     @property
     def falls(self) -> bool:
@@ -136,11 +143,16 @@ class Finding:
     plot: Plot | None = None
     confirmed: bool = True
 
-    @property
-    def verdict(self) -> Verdict:
+    def verdict(self, coarse: bool = False) -> Verdict:
+        """How the finding is judged; `coarse` says that the run has grids too coarse for its case.
+
+        Only a figure that was followed over grids can be coarse; all others hold on any grid.
+        """
         if not self.confirmed:
             return "unconfirmed"
-        return "pass" if self.passed else "fail"
+        if self.passed:
+            return "pass"
+        return "coarse" if coarse and self.series is not None else "fail"
 
 
 def near(
@@ -209,6 +221,7 @@ class Result:
     tier      that the run belongs to
     quantity  which of its quantities
     seconds   that the whole case took
+    finest    whether the run is the longest of its case, which has its finest grids
     """
 
     id: str
@@ -221,8 +234,14 @@ class Result:
     verdict: Verdict
     lines: list[str]
     seconds: float
+    finest: bool
     series: GridSeries | None = None
     plot: Plot | None = None
+
+    @property
+    def grid(self) -> str | None:
+        """The grid on which the figure was measured; None if it was not followed over grids."""
+        return None if self.series is None else self.series.finest
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON; a value that is not finite becomes its name."""
@@ -237,6 +256,8 @@ class Result:
             "verdict": self.verdict,
             "lines": self.lines,
             "seconds": self.seconds,
+            "grid": self.grid,
+            "finest": self.finest,
         }
         if self.series is not None:
             row["series"] = self.series.as_dict()
@@ -247,7 +268,7 @@ class Result:
     @classmethod
     def from_dict(cls, row: dict[str, Any]) -> Result:
         """The result that `as_dict` gave."""
-        found = dict(row)
+        found = {name: value for name, value in row.items() if name != "grid"}
         if "series" in found:
             series = {
                 name: found["series"][name] for name in ("label", "cells", "values", "errors")
@@ -267,6 +288,7 @@ class Case:
     measure  runs the case and gives its findings; True asks for coarser grids and shorter runs
     quick    smallest tier that has the shorter run
     full     smallest tier that has the whole one
+    coarse   whether the shorter run's grids are too coarse for the tolerances of the source
     alone    whether it measures seconds, so that no other case may run beside it
     """
 
@@ -274,6 +296,7 @@ class Case:
     measure: Callable[[bool], list[Finding]]
     quick: Tier = Tier.MINUTE
     full: Tier = Tier.ALL
+    coarse: bool = False
     alone: bool = False
 
     @property
@@ -304,7 +327,10 @@ class Case:
         return self._result(Finding(THE_RUN, cause, "ends", "", False), quick, seconds)
 
     def _result(self, finding: Finding, quick: bool, seconds: float) -> Result:
+        verdict = finding.verdict(coarse=quick and self.coarse)
         lines = list(finding.series.lines()) if finding.series is not None else []
+        if verdict == "coarse":
+            lines.append(f"coarse: the case is judged on finer grids, by --tier {self.full.value}")
         return Result(
             self.id,
             self.quick if quick else self.full,
@@ -313,9 +339,10 @@ class Case:
             finding.value,
             finding.reference,
             finding.tolerance,
-            finding.verdict,
+            verdict,
             lines + list(finding.lines),
             seconds,
+            not quick,
             finding.series,
             finding.plot,
         )

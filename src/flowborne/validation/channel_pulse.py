@@ -84,4 +84,4 @@ def course(run: Array, column: int, name: str, time: float, published: float) ->
     return Plot("t (s)", name, curves)
 
 
-CASES = (Case("B3", swelling_inflow, Tier.HALF_HOUR),)
+CASES = (Case("B3", swelling_inflow, Tier.HALF_HOUR, coarse=True),)

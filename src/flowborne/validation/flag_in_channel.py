@@ -323,4 +323,7 @@ def _columns(seen: Sequence[Flutter]) -> tuple[list[Array], list[Array]]:
     return [s.means for s in seen], [s.amplitudes for s in seen]
 
 
-CASES = (Case("D2", rigid_flag, Tier.HALF_HOUR), Case("D3", flag_of_flesh, Tier.HALF_HOUR))
+CASES = (
+    Case("D2", rigid_flag, Tier.HALF_HOUR, coarse=True),
+    Case("D3", flag_of_flesh, Tier.HALF_HOUR, coarse=True),
+)

@@ -144,7 +144,7 @@ def munk_moment(quick: bool) -> list[Finding]:
         errors = [abs(m / exact - 1.0) for m in moments]
         series = GridSeries(label, grids, moments, errors)
         said = f"M over rho U^2 pi (a^2-b^2)/2 at {degrees:g} degrees"
-        findings.append(near(said, moments[-1], exact, relative=0.02, falling=series))
+        findings.append(near(said, moments[-1], exact, relative=0.01, falling=series))
         series = GridSeries(label, grids, forces, forces)
         said = f"force over rho U^2 2a at {degrees:g} degrees"
         findings.append(at_most(said, forces[-1], 0.02, series=series))

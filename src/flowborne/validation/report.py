@@ -20,7 +20,7 @@ import flowborne
 from flowborne import __version__
 from flowborne.exporters import write_atomically
 from flowborne.validation import case as case_of
-from flowborne.validation.case import THE_RUN, Result, Tier
+from flowborne.validation.case import THE_RUN, Result, Tier, Verdict
 
 DATA = "report.json"
 TIERS = tuple(reversed(Tier))
@@ -32,8 +32,11 @@ them, without what all of them share."""
 Data = dict[str, dict[str, Case]]
 """id -> tier -> case, in the order of the reference list."""
 
-SHARED = ("id", "tier", "title", "seconds")
-"""Of a result, what its case says once."""
+SHARED = ("id", "tier", "title", "seconds", "grid", "finest")
+"""Of a result, what its case says once, or its series."""
+
+VERDICTS: tuple[Verdict, ...] = ("fail", "coarse", "pass", "unconfirmed")
+"""From the worst on."""
 
 
 def read_report(folder: Path) -> Data:
@@ -120,13 +123,34 @@ def already_there(folder: Path, tiers: Mapping[str, Tier]) -> dict[str, list[Res
 
 
 def _result(name: str, tier: Tier, seconds: float, row: dict[str, Any]) -> Result:
-    title = f"{case_of(name).title}: {row['quantity']}"
-    return Result.from_dict({**row, "id": name, "tier": tier, "title": title, "seconds": seconds})
+    case = case_of(name)
+    shared = {"id": name, "tier": tier, "title": f"{case.title}: {row['quantity']}"}
+    finest = tier is case.full
+    return Result.from_dict({**row, **shared, "seconds": seconds, "finest": finest})
 
 
 def tier_of(case: dict[str, Case]) -> str:
     """The tier of a case that counts: the largest in which it was run."""
     return next(tier.value for tier in TIERS if tier.value in case)
+
+
+def is_finest(name: str, tier: str) -> bool:
+    """Whether a case has its finest grids in this tier."""
+    return case_of(name).full.value == tier
+
+
+def grid_of(finding: dict[str, Any]) -> str:
+    """The grid on which a figure was measured, such as "10 cells across D"; empty for a figure that
+    was not followed over grids."""
+    series = finding.get("series")
+    return "" if series is None else f"{series['cells'][-1]:g} {series['label']}"
+
+
+def verdict_of(case: dict[str, Case]) -> Verdict:
+    """Of a case, the worst of its figures in the tier that counts: of the run on its finest grids,
+    if the report has that."""
+    found = {finding["verdict"] for finding in case[tier_of(case)]["findings"]}
+    return next(verdict for verdict in VERDICTS if verdict in found)
 
 
 def failures(data: Data) -> list[tuple[str, str, dict[str, Any]]]:
@@ -141,7 +165,7 @@ def failures(data: Data) -> list[tuple[str, str, dict[str, Any]]]:
 
 def verdicts(data: Data) -> dict[str, int]:
     """How many figures have each verdict, each case in the tier that counts."""
-    counts = {"pass": 0, "fail": 0, "unconfirmed": 0}
+    counts: dict[str, int] = dict.fromkeys(VERDICTS, 0)
     for case in data.values():
         for finding in case[tier_of(case)]["findings"]:
             counts[finding["verdict"]] += 1

@@ -109,4 +109,4 @@ def settling_cylinder(quick: bool) -> list[Finding]:
     return findings
 
 
-CASES = (Case("V1", settling_cylinder),)
+CASES = (Case("V1", settling_cylinder, coarse=True),)

@@ -127,4 +127,4 @@ def vortices_break_up(quick: bool) -> list[Finding]:
     ]
 
 
-CASES = (Case("F3", vortices_break_up, Tier.HALF_HOUR),)
+CASES = (Case("F3", vortices_break_up, Tier.HALF_HOUR, coarse=True),)

@@ -16,7 +16,7 @@ INNER, OUTER = 0.5, 1.0
 SPIN = 1.0
 """Omega, rad/s."""
 
-GRIDS = {True: (12, 24), False: (16, 32, 64, 128)}
+GRIDS = {True: (16, 24), False: (16, 32, 64, 128)}
 """Cells across the outer radius, by quick."""
 
 SIDES = 48
