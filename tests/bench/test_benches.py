@@ -52,13 +52,23 @@ def test_workers_are_compared_in_threads_and_in_processes(scene):
     assert judged(result, result.value >= workers.FASTER)
 
 
-def test_chain_of_equal_scenes_costs_a_line(scene):
-    result = chain.straightness([scene, scene], frames=2)
-    assert result.value == pytest.approx(0.0, abs=1e-9)
-    assert result.verdict == "pass"
-    assert len(result.lines) == 3
-    longer = chain.straightness([scene] * 3, frames=2)
-    assert judged(longer, longer.value <= chain.DEVIATION)
+@pytest.mark.parametrize(
+    ("times", "off", "line"),
+    [
+        ([1.0, 3.0, 5.0, 7.0], 0.0, "line -1000.0 ms + 2000.0 ms a joint"),
+        ([1.0, 2.0, 4.0, 8.0], 0.7 / 0.3, "line -2000.0 ms + 2300.0 ms a joint"),
+    ],
+    ids=["a line", "a doubling"],
+)
+def test_chain_is_judged_by_how_far_its_quickest_frames_are_from_a_line(
+    scene, monkeypatch, times, off, line
+):
+    rows = np.array(times)[:, None] + [[0.0, 9.0]]
+    monkeypatch.setattr(chain, "frame_times", lambda simulations, frames: rows)
+    result = chain.straightness([scene] * 4)
+    assert result.value == pytest.approx(off, abs=1e-12)
+    assert judged(result, off <= chain.DEVIATION)
+    assert result.lines[-1] == line
 
 
 def test_speed_is_frames_a_second_over_those_shown():

@@ -124,8 +124,8 @@ def test_a_disc_let_go_in_a_fluid_is_where_it_should_be_to_second_order() -> Non
         return float(-world.solid.q[1])
 
     found = np.array([sunk(steps) for steps in (1, 2, 4)])
-    assert found[0] == pytest.approx(0.5 * 0.2 * 0.2**2 * 1.0 / (2.0 + 1.0712), rel=0.02)
-    assert np.abs(np.diff(found)).max() < 2e-3 * found[0]
+    assert found[0] == pytest.approx(0.5 * 0.2 * 0.2**2 * 1.0 / (2.0 + 1.0712), rel=0.01)
+    assert np.abs(np.diff(found)).max() < 1e-5 * found[0]
 
 
 @dataclass

@@ -18,7 +18,6 @@ from flowborne.kernels.viscosity import TIED, UNKNOWN
 from flowborne.operators import cut_by_bodies, faces_of
 from flowborne.solvers.answers import DenseAnswer
 from flowborne.solvers.conjugate_gradients import spread
-from flowborne.validation.viscous import measured
 from flowborne.validation.worlds import PERIODIC, RING, mjcf
 from flowborne.worlds import make_world
 
@@ -255,8 +254,8 @@ def test_poiseuille_flow_between_plates_pushes_them_with_all_that_drives_it() ->
         inside = case.cut.open[0][5, :, 0] > 0.0
         exact = 0.5 * drive / VISCOSITY * (y - BOTTOM) * (TOP - y)
         errors.append(np.abs(velocity[0][5, :, 0] - exact)[inside].max())
-    assert errors[0] < 0.01 * 0.125 * drive / VISCOSITY * (TOP - BOTTOM) ** 2
-    assert errors[1] < 0.5 * errors[0]
+    assert errors[0] < 0.003 * 0.125 * drive / VISCOSITY * (TOP - BOTTOM) ** 2
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1), errors
 
 
 def test_poiseuille_flow_between_no_slip_sides_is_exact() -> None:
@@ -433,13 +432,3 @@ def test_bodies_answer_friction_as_their_equation_of_motion_says() -> None:
     np.testing.assert_allclose(change, mobility @ impulse, atol=1e-12)
     np.testing.assert_allclose(answer.change(push), change, atol=1e-12)
     assert not DenseAnswer(np.zeros((6, 6)), drag).yields
-
-
-def test_V8_torque_between_cylinders_and_spin_down() -> None:
-    """Steady torque of second order, within 0.3 % at 24 cells across b; rate of a free cylinder
-    within 1 %."""
-    coarse, _ = measured(12)
-    torque, rate = measured(24)
-    assert torque == pytest.approx(1.0, abs=0.003)
-    assert abs(torque - 1.0) < 0.35 * abs(coarse - 1.0)
-    assert rate == pytest.approx(1.0, abs=0.01)

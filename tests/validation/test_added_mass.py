@@ -45,12 +45,13 @@ def test_I1_ellipse_along_both_axes_and_turning() -> None:
         assert finding.passed, f"{finding.quantity}: {finding.value}"
 
 
-def test_I1_added_mass_of_plates_falls_towards_the_exact_one() -> None:
-    across, _, along = case.plates(True)
+def test_I1_added_mass_of_plates_falls_towards_the_exact_one_and_repeats_its_own() -> None:
+    """A plate is a cell thick: 64 cells across it are 3 to 4 % off, where the source asks for 1."""
+    across, turning, along = case.plates(True)
     assert across.series is not None
     assert along.series is not None
     assert across.series.falls
-    assert 0.0 < float(across.value) - 1.0 < 0.05
+    assert [across.value, turning.value] == pytest.approx([1.0389, 1.0331], abs=5e-4)
     assert along.series.falls
     assert float(along.value) < 0.002
 
@@ -58,7 +59,7 @@ def test_I1_added_mass_of_plates_falls_towards_the_exact_one() -> None:
 def test_I1_added_mass_of_a_disc_continued_to_no_thickness() -> None:
     raw, limit = case.disc(True)
     assert limit.passed, f"{limit.quantity}: {limit.value}"
-    assert 1.0 < float(raw.value) < 1.08
+    assert raw.value == pytest.approx(1.0442, abs=5e-4)
 
 
 def test_continuation_to_no_thickness_finds_the_limit() -> None:

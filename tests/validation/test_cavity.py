@@ -39,7 +39,7 @@ def test_F2_vortex(found):
     assert found["y of the vortex, Re 100"].verdict == "pass"
     psi = found["psi of the vortex, Re 100"]
     assert psi.series.order > 1.8, psi.lines
-    assert psi.series.errors[-1] < 0.02 * abs(psi.reference), psi.lines
+    assert psi.verdict == "pass", psi.lines
 
 
 def turning(x, y, z):

@@ -25,8 +25,10 @@ def test_S3_the_largest_quasi_steady_forces_are_those_in_the_middle_of_a_stroke(
     assert largest_quasi_steady() == pytest.approx((1.2 * pressure, 1.4 * pressure), rel=1e-6)
 
 
-def test_S3_lift_in_the_first_quarter():
+def test_S3_repeats_its_own_lift_in_the_first_quarter_on_ten_cells():
     run = flap(10, 6, 0.25)
     published = np.array(reference("S3", LIFT))
-    assert apart(run[:, 0], run[:, 1], published[published[:, 0] < 0.25]) < 0.25
+    assert apart(run[:, 0], run[:, 1], published[published[:, 0] < 0.25]) == pytest.approx(
+        0.169, rel=0.01
+    )
     assert (run[:, 2] > 0.0).all()

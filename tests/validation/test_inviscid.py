@@ -19,9 +19,9 @@ def test_I6_moment_converges_to_munk_and_force_to_none() -> None:
     runs = [case.held_ellipse(n, np.radians(30.0)) for n in (32, 64, 128)]
     errors = [abs(moment / np.sin(np.radians(60.0)) - 1.0) for moment, _ in runs]
     order = -np.polyfit(np.log([32, 64, 128]), np.log(errors), 1)[0]
-    assert order > 0.75, f"order {order:.2f}, errors {errors}"
-    assert errors[-1] < 0.04
-    assert runs[-1][1] < 0.02
+    assert order == pytest.approx(2.0, abs=0.2), f"order {order:.2f}, errors {errors}"
+    assert errors[-1] < 0.01
+    assert runs[-1][1] < 0.006
 
 
 @pytest.mark.parametrize("ratio", [2.0, 0.5])
@@ -41,5 +41,5 @@ def test_I9_a_free_body_never_gains_energy_and_loses_less_on_a_finer_grid() -> N
     coarse, fine = case.turning(8), case.turning(16)
     for energies in (coarse, fine):
         assert (np.diff(energies) < 0.0).all()
-    assert 1.0 - coarse[-1] < 0.07
-    assert 1.0 - fine[-1] < 0.03
+    assert 1.0 - coarse[-1] < 0.06
+    assert 1.0 - fine[-1] < 0.02

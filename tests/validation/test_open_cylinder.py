@@ -28,13 +28,14 @@ class Turning:
         return along * np.sin(theta), along * np.cos(theta), 0.0 * along
 
 
-def test_B4_drag_on_four_cells_across_D():
+def test_B4_repeats_its_own_drag_and_bubble_on_four_cells_across_D():
+    """After ten times D/U; the drag is within the list's 1.48 to 1.62, the bubble still grows."""
     world = open_water(4, 1.0 / 40.0)
     set_velocity(world, STREAM)
     drag, lift = UNBOUNDED.coefficients(advance(world, 0.25, 40))
-    assert drag == pytest.approx(1.54, rel=0.05)
+    assert drag == pytest.approx(1.588, rel=2e-3)
     assert abs(lift) < 0.01 * drag
-    assert bubble(world) > 0.5
+    assert bubble(world) == pytest.approx(1.3625, rel=0.01)
 
 
 def test_B4_figures_of_known_flows():

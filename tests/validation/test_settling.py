@@ -9,12 +9,13 @@ from flowborne.validation.settling import DENSITY, GRAVITY, OILS, quarter
 from flowborne.worlds import advance
 
 
-def test_V2_spheres_settle_near_their_speed():
+def test_V2_largest_velocities_are_measured_ones_and_the_curves_those_of_six_cells():
+    """Largest velocities to the 3 % of the source. Six cells across a sphere are too few for the
+    5 % that it asks of the curve: what they give is repeated."""
     findings = case("V2").run(quick=True)
-    for peak, curve in (findings[:2], findings[2:]):
-        assert peak.series.falls, peak.lines
-        assert peak.series.errors[-1] < 0.12, peak.lines
-        assert curve.value < 0.15, curve.lines
+    assert [result.verdict for result in findings] == ["pass", "coarse", "pass", "coarse"]
+    curves = [result.value for result in findings[1::2]]
+    assert curves == pytest.approx([0.12843, 0.081829], rel=0.01)
 
 
 @pytest.mark.parametrize("oil", OILS, ids=lambda oil: oil.name)
@@ -23,4 +24,4 @@ def test_V2_without_friction_a_sphere_starts_with_its_added_mass(oil):
     world = quarter(replace(oil, viscosity=0.0), 4)
     advance(world, 1e-4)
     free = (DENSITY - oil.density) * GRAVITY / (DENSITY + 0.5 * oil.density)
-    assert -world.solid.v[0] / 1e-4 == pytest.approx(free, rel=0.015)
+    assert -world.solid.v[0] / 1e-4 == pytest.approx(free, rel=0.01)

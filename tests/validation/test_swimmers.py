@@ -11,6 +11,6 @@ def test_S5_what_the_creature_gains_the_fluid_loses() -> None:
     assert change < 1e-8
 
 
-def test_S5_a_scallop_hardly_moves() -> None:
-    """On a coarse grid; the case itself goes to finer ones and asks for 1e-3."""
-    assert swimmers.scallop(48, 48, 1) < 0.02
+def test_S5_a_scallop_drifts_by_less_than_a_thousandth_in_its_first_cycle() -> None:
+    """To the tolerance of the source; the case itself goes on to a second cycle and finer grids."""
+    assert swimmers.scallop(48, 48, 1) < 1e-3
