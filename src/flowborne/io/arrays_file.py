@@ -38,7 +38,11 @@ def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDA
                 raise ValueError(
                     f"it unpacks to {asked / 2**30:.3g} GB, and {most / 2**30:.3g} GB are the most"
                 )
-            return {name: archive[name] for name in names or archive.files}
+            found = {name: archive[name] for name in names or archive.files}
+            for name, values in found.items():
+                if not isinstance(values, np.ndarray):  # NumPy gives the bytes of any other member
+                    raise ValueError(f"its '{name}' is no array")
+            return found
         except Exception as error:  # NumPy, zip and zlib raise whatever they stumble over
             raise ValueError(f"{path} is cut or no archive of arrays ({_said(error)})") from error
 
