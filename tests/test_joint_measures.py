@@ -35,7 +35,7 @@ BALL = mjcf(
 def frame_of(world: fb.World, dt: float, steps: int) -> fb.FrameReport:
     """What a frame of so many steps does, without a controller."""
     taken = tuple(fb.step(world, dt) for _ in range(steps))
-    return fb.FrameReport(1, world.time, taken, np.nan, {}, np.nan, NOTHING, NOTHING, False, {})
+    return fb.FrameReport(1, world.time, taken, np.nan, {}, NOTHING, NOTHING, False, {})
 
 
 def energy(world: fb.World, dt: float) -> float:

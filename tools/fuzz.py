@@ -136,7 +136,7 @@ def judged(scene: Path) -> Outcome:
     detail = "\n".join(ran.lines)
     if ran.code == 2:
         return Outcome("check accepted what run refuses", len(ran.messages), detail)
-    wrong = fault(ran, (0, 1))
+    wrong = fault(ran, (0, 1, 3))
     if not wrong and ran.code == 0 and not finite(out / "history.csv"):
         wrong = "numbers that are not finite"
     return Outcome(wrong or (STOPPED if ran.code else RAN), len(ran.messages), detail)
@@ -157,7 +157,7 @@ def judged_folder(seed: str, folder: Path) -> Outcome:
         ("export", out, "--out", folder / "table.csv"),
     ):
         said = command(*arguments)
-        wrong = fault(said, (0, 2))
+        wrong = fault(said, (0, 2, 3))
         detail = f"{torn_file.name}: {arguments[0]}\n" + "\n".join(said.lines)
         if wrong:
             return Outcome(wrong, len(said.messages), detail)

@@ -1,12 +1,11 @@
-"""Force, torque, velocity and place of single bodies, for the history, all at the frame's end."""
+"""Place and velocity of single bodies at a frame's end, force and torque as means over it."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.named import BodyState, Named
-from flowborne.coupling.report import StepReport
+from flowborne.coupling.named import BodyState, Named, Report
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
@@ -17,8 +16,10 @@ UNITS = {
     "rotation": "rad/s",
     "force": "N",
     "torque": "Nm",
+    "added_mass_force": "N",
+    "added_mass_torque": "Nm",
 }
-"""Quantity -> its unit; a torque is about the centre of mass."""
+"""Quantity -> its unit; a torque is about the centre of mass, an added-mass one is a part of it."""
 
 
 class BodyMeasures:
@@ -36,9 +37,9 @@ class BodyMeasures:
             for axis in "xyz"
         )
 
-    def values(self, q: Array, report: StepReport | None) -> dict[str, float]:
-        """column -> number, at positions q (nq,) which the step of `report` led to; nan where only
-        a step can tell."""
+    def values(self, q: Array, report: Report | None) -> dict[str, float]:
+        """column -> number, at positions q (nq,) to which `report` led; nan where only a step can
+        tell."""
         named = Named(self._model, q, report)
         numbers = [x for name in self._names for x in _numbers(named.body(name))]
         return dict(zip(self.columns, numbers, strict=True))
@@ -46,6 +47,7 @@ class BodyMeasures:
 
 def _numbers(body: BodyState) -> list[float]:
     """Every quantity of UNITS, in its order."""
-    parts = (body.centre, body.velocity, body.angular_velocity, body.force, body.torque)
+    state = (body.centre, body.velocity, body.angular_velocity)
+    parts = (*state, body.force, body.torque, body.added_mass_force, body.added_mass_torque)
     found: list[float] = np.concatenate(parts).tolist()
     return found

@@ -1,8 +1,8 @@
 """The command `flowborne`.
 
 Whatever is wrong with the input is one message on stderr and exit code 2; a run that blew up or
-could not be written ends with 1, one that was interrupted with 130, and `check --strict` with 3
-where there are warnings.
+could not be written ends with 1, one that was interrupted with 130. A run that is complete but not
+to be trusted, and `check --strict` where there are warnings, end with 3.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def run(
             raise typer.Exit(INTERRUPTED) from stopped
     if result.outcome is not RunOutcome.DONE:
         _complain(result.message)
-        raise typer.Exit(FAILED)
+        raise typer.Exit(WARNED if result.outcome is RunOutcome.DOUBTFUL else FAILED)
     print(_told(result))
 
 
@@ -514,6 +514,8 @@ def _told(result: RunResult) -> str:
     lines = [result.message]
     for column, value in summary["final_mean"].items():
         lines.append(f"  {column}: {value:.4f} (mean of the last frames)")
+    if summary["final_objective"] is not None:
+        lines.append(f"  objective: {summary['final_objective']:.4g} (mean of the last decisions)")
     if summary["converged_frame"] is not None:
         lines.append(f"  converged at frame {summary['converged_frame']}")
     pace = f"  {summary['seconds_per_frame']:.3g} s per frame"

@@ -100,11 +100,9 @@ class JointMeasures:
 
 def drive_means(report: FrameReport) -> tuple[Array, Array]:
     """(nv,) generalised force (N or N m) and power (W) of the drives, means over a frame."""
-    dt = np.array([step.dt for step in report.steps])
-    share = dt / dt.sum()
-    force = np.array([step.actuator for step in report.steps])
-    velocity = np.array([step.velocity for step in report.steps])
-    return share @ force, share @ (force * velocity)
+    return report.mean(lambda step: step.actuator), report.mean(
+        lambda step: step.actuator * step.velocity
+    )
 
 
 def _components(model: SolidModel, joint: str) -> dict[str, int]:

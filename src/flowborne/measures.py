@@ -31,17 +31,21 @@ LISTED = 3
 class Measures:
     """Which numbers there are for a scene, and what they are now.
 
-    Columns carry their unit at the end of their name. Forces are of the last step of a frame, the
-    impulses of all its steps; convergence is that of its worst step.
+    Columns carry their unit at the end of their name. Positions and velocities hold at the frame's
+    end. Forces and torques are means over the frame: the impulse of all its steps over its time;
+    with one step a frame they hold at its end too, with n steps (n - 1) / 2 steps earlier.
+    Convergence is that of the worst step.
 
       frame, time_s
       angle_<joint>_rad … power_<joint>_W       joints and their drives; see `joint_measures`
-      objective, objective_<term>               the controller's, weighted sum and unweighted terms
-      tried_objective                           the sum as the last decision's trials found it, at
-                                                rest in scenes whose trials remove velocities,
-                                                and with knots as the mean over the plan
+      objective                                 of the last decision, as its trials evaluate it; see
+                                                `Decision`
+      measured_<term>                           each term without its weight, in the last step
       drag_N, lift_N                            force of fluid and winds on all bodies along and
-                                                across the stream (a quarter turn to its left)
+                                                across the stream (a quarter turn to its left),
+                                                without the added-mass part
+      added_mass_drag_N, added_mass_lift_N      with which the fluid resists the bodies'
+                                                acceleration; both together are the whole force
       effort                                    |drive force| dt over the controlled dofs, N m s
       work_J                                    that the drives did in the frame
       flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
@@ -84,7 +88,6 @@ class Measures:
         self._joints = JointMeasures(setup, dofs, joints)
         self.controlled = list(self._joints.places)
         self._terms = [] if controller is None else _terms(controller)
-        self._tried = controller is not None and controller.tries_otherwise
         self.columns = self._columns()
 
     def values(self, world: World, frame: int, report: FrameReport | None) -> dict[str, float]:
@@ -93,7 +96,7 @@ class Measures:
         values |= {"frame": frame, "time_s": world.time}
         values |= self._joints.values(world.solid.q, world.time, report)
         values |= self._poses(world.solid.q) | self._flesh(world.solid.q)
-        values |= self._named.values(world.solid.q, None if report is None else report.step)
+        values |= self._named.values(world.solid.q, report)
         if report is not None:
             values |= self._of_frame(report)
         return values
@@ -117,9 +120,8 @@ class Measures:
 
     def _columns(self) -> tuple[str, ...]:
         names = ["frame", "time_s", *self._joints.columns]
-        names += ["objective", *(f"objective_{term}" for term in self._terms)]
-        names += ["tried_objective"] if self._tried else []
-        names += ["drag_N", "lift_N", "effort", "work_J"]
+        names += ["objective", *(f"measured_{term}" for term in self._terms)]
+        names += ["drag_N", "lift_N", "added_mass_drag_N", "added_mass_lift_N", "effort", "work_J"]
         if self._model.flesh is not None:
             names += ["flesh_least_detF", "flesh_inside_out"]
         for body in self._model.body_names[1:]:
@@ -135,10 +137,11 @@ class Measures:
     def _of_frame(self, report: FrameReport) -> dict[str, float]:
         steps, last = report.steps, report.step
         values: dict[str, float] = {"objective": report.objective}
-        values |= {"tried_objective": report.tried} if self._tried else {}
-        values |= {f"objective_{term}": report.terms[term] for term in self._terms}
-        force = last.fluid_wrench()[1:, :3].sum(axis=0)
-        values |= {"drag_N": float(force @ self._along), "lift_N": float(force @ self._across)}
+        values |= {f"measured_{term}": report.terms[term] for term in self._terms}
+        added = report.central_added_mass()[1:, :3].sum(axis=0)
+        for kind, force in (("", report.drag()[1:].sum(axis=0)), ("added_mass_", added)):
+            values[f"{kind}drag_N"] = float(force @ self._along)
+            values[f"{kind}lift_N"] = float(force @ self._across)
         values |= {"effort": self._effort(last), "work_J": sum(step.work for step in steps)}
         impulses = {"solid": last.momentum.solid, "fluid": last.momentum.fluid}
         for part in IMPULSES:

@@ -18,6 +18,7 @@ from flowborne.errors import PartError, SceneError, WorkerError
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.io.arrays_file import check_states
 from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
+from flowborne.io.doubts import doubts_of
 from flowborne.io.history import History
 from flowborne.io.recorder import Recorder, write_model
 from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, check_space
@@ -41,6 +42,7 @@ class RunOutcome(Enum):
     """How a run ended, as a sentence."""
 
     DONE = "the run is complete"
+    DOUBTFUL = "the run is complete, and its numbers are in doubt"
     BLEW_UP = "the simulation blew up"
     NOT_WRITTEN = "the run could not be written any further"
     INTERRUPTED = "the run was interrupted"
@@ -230,7 +232,10 @@ class _Run:
             return RunOutcome.NOT_WRITTEN, self._not_written(error)
         if simulation.frame < self.frames:
             return RunOutcome.INTERRUPTED, f"stopped after frame {simulation.frame}; {self._how()}"
-        return RunOutcome.DONE, f"{simulation.frame} frames are in {self.folder.path}"
+        message, doubts = f"{simulation.frame} frames are in {self.folder.path}", self._doubts()
+        if not doubts:
+            return RunOutcome.DONE, message
+        return RunOutcome.DOUBTFUL, f"{message}, but not to be trusted: {'. '.join(doubts)}"
 
     def finish(self, outcome: RunOutcome, message: str, *, film: bool) -> RunResult:
         """Write the summary and the film, and say what came of the run."""
@@ -238,17 +243,18 @@ class _Run:
         self.history.close()
         folder = self.folder
         exported: list[str] = []
-        if outcome is RunOutcome.DONE:
+        whole = outcome in (RunOutcome.DONE, RunOutcome.DOUBTFUL)
+        if whole:
             exported, failed = self._export()
             message += failed
         summary = self._summary(outcome, message)
         summary["model_files"] += exported
         try:
             folder.write_summary(summary)
-            if film and outcome in (RunOutcome.DONE, RunOutcome.BLEW_UP):
+            if film and (whole or outcome is RunOutcome.BLEW_UP):
                 message += self._draw()
         except OSError as error:
-            if outcome is RunOutcome.DONE:
+            if whole:
                 outcome, message = RunOutcome.NOT_WRITTEN, self._not_written(error)
         result = RunResult(folder.path, outcome, message, self.simulation.frame, summary)
         if outcome is RunOutcome.INTERRUPTED or self._signals.asked:
@@ -319,7 +325,7 @@ class _Run:
         length = self.history.length
         self.history.append(values | seconds)
         try:
-            self.recorder.write(report.frame, simulation.world, report.step)
+            self.recorder.write(report.frame, simulation.world, report.drag())
         except BaseException:
             self.history.drop_last(length)
             raise
@@ -350,6 +356,7 @@ class _Run:
             "scene": simulation.scene.name,
             "outcome": outcome.name.lower(),
             "message": message,
+            "doubts": self._doubts(),
             **summarise(self.folder.history, strength),
             "cells": cells,
             "warnings": self.warnings,
@@ -379,6 +386,11 @@ class _Run:
             f"({error.strerror or error}); what was written before is kept; make room, then "
             f"{self._how()}"
         )
+
+    def _doubts(self) -> list[str]:
+        """Reasons not to trust the frames so far, those of earlier runs in the folder included."""
+        setup = self.simulation.setup
+        return doubts_of(self.folder.history, setup.solid.body_names[1:], setup.fluid)
 
     def _rows(self) -> int:
         """Frames that are in the history."""

@@ -168,7 +168,7 @@ class Simulation:
         return report
 
     def body(self, name: str) -> BodyState:
-        """Pose, velocity and force of a body now, in SI units; see `BodyState`.
+        """Pose and velocity of a body now and the frame's mean force, in SI units; see `BodyState`.
 
         raises  ValueError for an unknown name
         """
@@ -182,7 +182,7 @@ class Simulation:
         return self._named().joint(name)
 
     def _named(self) -> Named:
-        return Named.after(self.world, None if self.report is None else self.report.step)
+        return Named.after(self.world, self.report)
 
     def measure(self) -> dict[str, float]:
         """What the history says of the present state, by the history's column names.
@@ -233,15 +233,15 @@ class Simulation:
         end = world.time + self.frame_time
         seconds = dict.fromkeys(PARTS, 0.0)
         nothing = np.zeros(0)
-        gradient, targets, terms, decided = nothing, nothing, {"objective": np.nan}, False
-        tried = np.nan
+        gradient, targets, objective, decided = nothing, nothing, np.nan, False
+        terms: dict[str, float] = {}
         reports = []
         number = 1
         try:
             if controller is not None:
                 decision = controller.decide(world, self.frame_time, self._step)
                 gradient, decided = decision.gradient, decision.decided
-                tried = decision.objective
+                objective = decision.objective
                 seconds["control"] = perf_counter() - started
             for number in range(1, self.steps_per_frame + 1):
                 command = None if controller is None else controller.command(world, end, dt)
@@ -261,9 +261,8 @@ class Simulation:
             frame=frame,
             time=world.time,
             steps=tuple(reports),
-            objective=terms["objective"],
-            terms={name: value for name, value in terms.items() if name != "objective"},
-            tried=tried,
+            objective=objective,
+            terms=terms,
             gradient=gradient,
             targets=targets,
             decided=decided,

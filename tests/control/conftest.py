@@ -54,10 +54,9 @@ def move_only(world: World, dt: float, command: JointCommand | None = None) -> S
     state.v[:] = np.where(command.prescribed, command.final_velocity, state.v)
     world.time += dt
     world.steps += 1
-    none = np.zeros((model.nbody, 6))
-    return StepReport(
-        dt, Outcome.DONE, world.solid.v, np.zeros(model.nv), none, none, none, none, none
-    )
+    none = [np.zeros((model.nbody, 6))] * 6
+    centre = np.zeros((model.nbody, 3))
+    return StepReport(dt, Outcome.DONE, world.solid.v, np.zeros(model.nv), *none, centre)
 
 
 @pytest.fixture

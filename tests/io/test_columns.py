@@ -27,7 +27,7 @@ COLUMNS = {
     "head_rotation_z_rad/s": 14.0,
     "momentum_solid_y_Ns": 15.0,
     "divergence_1/s": 16.0,
-    "objective_drag": 17.0,
+    "measured_drag": 17.0,
 }
 
 
@@ -52,7 +52,7 @@ def test_columns_go_to_their_joint_body_and_axis() -> None:
         "body_angular_velocity": (("body", "axis"), "rad/s", [1, 2]),
         "momentum_solid": (("axis",), "N s", [1]),
         "divergence": ((), "1/s", []),
-        "objective_drag": ((), "", []),
+        "measured_drag": ((), "", []),
     }
     finite = [float(np.nansum(array.values)) for array in found.values()]
     assert_array_equal(finite, [2, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 15, 16, 17])

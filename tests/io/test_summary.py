@@ -1,3 +1,5 @@
+import math
+
 import pytest
 
 from flowborne.io.history import History
@@ -6,12 +8,12 @@ from flowborne.io.summary import converged_frame, final_frames, final_means, sum
 ANGLE = "angle_hinge_rad"
 
 
-def history_of(path, angles):
-    columns = ("frame", "time_s", ANGLE, "target_hinge_rad", "seconds_total", "seconds_solids")
+def history_of(path, angles, objective=math.nan):
+    columns = ("frame", "time_s", ANGLE, "objective", "seconds_total", "seconds_solids")
     history = History.create(path, columns)
     for frame, angle in enumerate(angles, start=1):
         seconds = 9.0 if frame == 1 else 0.5
-        row = (frame, frame / 24, angle, angle, seconds, seconds / 2)
+        row = (frame, frame / 24, angle, objective, seconds, seconds / 2)
         history.append(dict(zip(columns, row, strict=True)))
     history.close()
     return path
@@ -40,13 +42,14 @@ def test_convergence_is_the_first_frame_after_which_a_joint_stays_near_its_mean(
 
 
 def test_a_summary_tells_where_the_time_went_without_the_first_frame(tmp_path):
-    path = history_of(tmp_path / "history.csv", [0.25] * 5)
+    path = history_of(tmp_path / "history.csv", [0.25] * 5, objective=2.5)
     summary = summarise(path, {ANGLE: 0.1})
     assert summary["frames"] == 5
     assert summary["seconds_first_frame"] == 9.0
     assert summary["seconds_per_frame"] == 0.5
     assert summary["seconds_by_part"] == {"solids": 5.5}
     assert summary["final"] == summary["final_mean"] == {ANGLE: 0.25}
+    assert summary["final_objective"] == 2.5
     assert summary["time_s"] == 5 / 24
 
 
@@ -55,3 +58,4 @@ def test_a_run_without_frames_or_controlled_joints_has_a_summary(tmp_path):
     assert (empty["frames"], empty["converged_frame"], empty["final"]) == (0, None, {})
     free = summarise(history_of(tmp_path / "free.csv", [0.1, 0.2]), {})
     assert (free["converged_frame"], free["final"]) == (None, {ANGLE: 0.2})
+    assert free["final_objective"] is None

@@ -43,7 +43,10 @@ class Decision:
     """What the controller decided at the start of a frame.
 
     decided       False in frames between decisions; the numbers are then those of the last one
-    objective     in the present pose, as the gradient's trials estimate it; 0 when no term is on
+    objective     weighted sum in the pose from which the decision set out, as its trials evaluate
+                  it: the mean of all of them for central differences, the trial without a
+                  displacement for one-sided ones; with a horizon the mean over the plan; where
+                  joints have different objectives, the sum of theirs. 0 when no term is on
     gradient      (n,) in the present pose, per rad or m
     displacement  (n,) from the pose at the decision to the target, rad or m
     target        (nq,) pose whose controlled entries are the target
@@ -140,12 +143,6 @@ class Controller:
                 "both must be at least 1"
             )
 
-    @property
-    def tries_otherwise(self) -> bool:
-        """Whether trials read the objective in another motion than that of a real step."""
-        how = self.hypothesis
-        return isinstance(how, Horizon) or how.velocities == "removed"
-
     def decide(self, world: World, frame_time: float, step: Step) -> Decision:
         """Choose the target for the coming frames; call at the start of every frame.
 
@@ -220,9 +217,8 @@ class Controller:
         return approach(world, self.dofs, self.servo, target, remaining, dt)
 
     def measure(self, world: World, report: StepReport) -> dict[str, float]:
-        """After a real step: the weighted sum as "objective", then every term's own value."""
-        measurement = Measurement(world, report)
-        return {"objective": self.objective.value(measurement)} | self.objective.values(measurement)
+        """Every term's own value after a real step."""
+        return self.objective.values(Measurement(world, report))
 
     def trials(
         self,

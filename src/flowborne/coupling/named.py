@@ -1,23 +1,45 @@
 """Bodies and joints of a world by their names, each with everything that is known of it.
 
-All of it holds at one instant, that of the positions. The force is that of the step which ended
-there and changes the velocity from half a step before to half a step after; the velocity is the
-mean of both. Read half a step off, a force in phase with an acceleration seems to damp.
+Positions and velocities hold at one instant. The force of the step that ended there changes the
+velocity from half a step before to half a step after, so it holds at that instant too; the velocity
+is the mean of both. Read half a step off, a force in phase with an acceleration seems to damp.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import World
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
+
+
+class Report(Protocol):
+    """What a step, or a frame, says of bodies and joints; see `StepReport`."""
+
+    @property
+    def velocity(self) -> Array:
+        """(nv,) at its end."""
+        ...
+
+    @property
+    def actuator(self) -> Array:
+        """(nv,)"""
+        ...
+
+    def central_wrench(self) -> Array:
+        """(nbody, 6) of fluid and winds, about the bodies' centres of mass."""
+        ...
+
+    def central_added_mass(self) -> Array:
+        """(nbody, 6) the part of it that resists the bodies' acceleration."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +53,9 @@ class BodyState:
     angular_velocity  (3,) rad/s
     force             (3,) of fluid and winds, N (N/m in a slab)
     torque            (3,) of the same about its centre of mass, N m
+    added_mass_force  (3,) the part of `force` with which the fluid resists acceleration.
+                      The rest acts on bodies that keep their velocities. nan in trials
+    added_mass_torque (3,) the same part of `torque`
     """
 
     position: Array
@@ -40,20 +65,22 @@ class BodyState:
     angular_velocity: Array
     force: Array
     torque: Array
+    added_mass_force: Array
+    added_mass_torque: Array
 
     @classmethod
-    def of(cls, pose: Kinematics, body: int, report: StepReport | None) -> BodyState:
+    def of(cls, pose: Kinematics, body: int, report: Report | None) -> BodyState:
         """The body of this number in a pose to which the step of `report` led."""
         position, rotation = pose.body_position[body], pose.body_rotation[body]
         centre = pose.mass_centre[body]
         if report is None:
             nothing = np.full(3, np.nan)
-            return cls(position, rotation, centre, nothing, nothing, nothing, nothing)
+            return cls(position, rotation, centre, *[nothing] * 6)
         twist = pose.twist_jacobian[body] @ report.velocity
         velocity = twist[:3] + np.cross(twist[3:], centre)
-        force, torque = np.split(report.fluid_wrench()[body], 2)
-        torque = torque - np.cross(centre, force)
-        return cls(position, rotation, centre, velocity, twist[3:], force, torque)
+        force, torque = np.split(report.central_wrench()[body], 2)
+        added = np.split(report.central_added_mass()[body], 2)
+        return cls(position, rotation, centre, velocity, twist[3:], force, torque, *added)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,12 +105,12 @@ class Named:
     report  of the step that led there; None before the first
     """
 
-    def __init__(self, model: SolidModel, q: Array, report: StepReport | None) -> None:
+    def __init__(self, model: SolidModel, q: Array, report: Report | None) -> None:
         self._model, self._q, self._report = model, q, report
         self._pose: Kinematics | None = None
 
     @classmethod
-    def after(cls, world: World, report: StepReport | None) -> Named:
+    def after(cls, world: World, report: Report | None) -> Named:
         """Those of a world after the step of `report`."""
         return cls(world.setup.solid, world.solid.q, report)
 

@@ -68,6 +68,12 @@ class StepReport:
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
     wind_wrench      (nbody, 6) the same of the simple winds
     jet_wrench       (nbody, 6) the same of the reaction of what mouths expel
+    added_mass_wrench
+                     (nbody, 6) part of `pressure_wrench` with which the fluid resists the change of
+                     the bodies' velocities (see `solve.added_mass_impulse`); nan where the setup
+                     does not split forces, as in trials
+    centre           (nbody, 3) centres of mass at the end of the step, m; 0 where neither a fluid
+                     nor a wind acts
     iterations       of the pressure solves
     residual         true relative residual of the last of them
     divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
@@ -93,6 +99,8 @@ class StepReport:
     buoyancy_wrench: Array
     wind_wrench: Array
     jet_wrench: Array
+    added_mass_wrench: Array
+    centre: Array
     iterations: int = 0
     residual: float = 0.0
     divergence: float = 0.0
@@ -110,3 +118,17 @@ class StepReport:
         """(nbody, 6) everything that the fluid and the winds do to each body."""
         stresses = self.pressure_wrench + self.viscous_wrench + self.buoyancy_wrench
         return stresses + self.jet_wrench + self.wind_wrench
+
+    def central_wrench(self) -> Array:
+        """(nbody, 6) `fluid_wrench` about each body's centre of mass."""
+        return about(self.fluid_wrench(), self.centre)
+
+    def central_added_mass(self) -> Array:
+        """(nbody, 6) `added_mass_wrench` about each body's centre of mass."""
+        return about(self.added_mass_wrench, self.centre)
+
+
+def about(wrench: Array, points: Array) -> Array:
+    """(n, 6) wrenches about the world origin as wrenches about points (n, 3)."""
+    force, torque = wrench[:, :3], wrench[:, 3:]
+    return np.concatenate([force, torque - np.cross(points, force)], axis=1)

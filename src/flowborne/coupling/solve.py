@@ -41,7 +41,7 @@ from flowborne.kernels.outflow import outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.mobility import Mobility
-from flowborne.solvers.pressure import NO_REACTION, LowRankTerm, PressureSystem
+from flowborne.solvers.pressure import NO_REACTION, NO_TERM, LowRankTerm, PressureSystem
 
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
@@ -51,6 +51,9 @@ FIRST_TOLERANCE = 1e-3
 
 TIGHTENING = 1e-3
 """Tolerance of a solve over that of the one before: what a correction changes shrinks as fast."""
+
+SPLIT_TOLERANCE = 1e-5
+"""Relative residual of the added-mass part of the pressure. Both parts add up whatever it is."""
 
 PROBES = 4
 """Fields of random signs by which the yielding of flesh is estimated."""
@@ -89,6 +92,8 @@ class Solved:
     driven            the bodies' system in its last form
     v, actuator       (nv,) velocity and forces of the drives
     viscous_impulse   (k,) as in `Projected`
+    added_mass        (k,) part of the pressure's impulse, see `added_mass_impulse`; nan where the
+                      setup does not split forces
     before_pressure   Faces, m/s; None without a fluid
     projected         None without a fluid
     outcome           DONE, or which solve missed its tolerance, or that contacts, limits or
@@ -100,6 +105,7 @@ class Solved:
     v: Array
     actuator: Array
     viscous_impulse: Array
+    added_mass: Array
     before_pressure: Faces | None
     projected: Projected | None
     outcome: Outcome
@@ -137,7 +143,8 @@ def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
         tried, driven = driven, changed
     left = unsettled(tried, changed, tried.velocity)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
-    return Solved(driven, driven.velocity, actuator, np.zeros(size), None, None, outcome, left)
+    nothing = np.zeros(size)
+    return Solved(driven, driven.velocity, actuator, nothing, nothing, None, None, outcome, left)
 
 
 def solve_together(
@@ -224,7 +231,28 @@ def solve_together(
         outcome = Outcome.VISCOSITY_NOT_CONVERGED
     if not solution.converged:
         outcome = Outcome.PRESSURE_NOT_CONVERGED
-    return Solved(driven, v, actuator, viscous, smooth, projected, outcome, left)
+    change = boundary_velocity(pose, v - driven.system.v)
+    added = np.full(change.size, np.nan)
+    if world.setup.splits:
+        added = added_mass_impulse(matrix, cut, change)
+    timer.lap("projection")
+    return Solved(driven, v, actuator, viscous, added, smooth, projected, outcome, left)
+
+
+def added_mass_impulse(matrix: PressureSystem, cut: Geometry, change: Array) -> Array:
+    """(k,) impulse of the fluid on bodies whose motion (k,) changes by `change` in a step.
+
+        -J^T K^-1 J (v+ - v)
+
+    The pressure's impulse less this one is what it would give bodies that kept their velocities:
+    with them fixed, K p^ = -(D u* + J v+), which is linear in v+.
+    """
+    rhs = np.zeros(matrix.shape)
+    add_flux(rhs, cut, -change)
+    if not rhs.any():
+        return np.zeros(change.size)
+    solution = matrix.solve(rhs, None, NO_TERM, SPLIT_TOLERANCE)
+    return pressure_push(cut, solution.pressure, change.size)
 
 
 def correct_under(

@@ -63,7 +63,7 @@ def step(world: World, dt: float, command: JointCommand | None = None) -> StepRe
 def step_bodies(world: World, dt: float, command: JointCommand, timer: Timer) -> StepReport:
     """A step without a fluid: simple winds, gravity, joints and contact."""
     model, before = world.setup.solid, move_positions(world, command, dt)
-    wind, force = np.zeros((model.nbody, 6)), np.zeros(model.nv)
+    wind, force, pose = np.zeros((model.nbody, 6)), np.zeros(model.nv), None
     if world.setup.winds:
         pose = kinematics(model, world.solid.q)
         wind = winds_on(world, pose)
@@ -74,7 +74,7 @@ def step_bodies(world: World, dt: float, command: JointCommand, timer: Timer) ->
     advance_clock(world, dt)
     timer.lap("solids")
     none = np.zeros(wind.shape)
-    return report(world, None, solved, none.ravel(), wind, none, Momentum(), dt, timer)
+    return report(world, pose, solved, none.ravel(), wind, none, Momentum(), dt, timer)
 
 
 def step_together(world: World, dt: float, command: JointCommand, timer: Timer) -> StepReport:
@@ -346,6 +346,8 @@ def broken_off(world: World, outcome: Outcome, dt: float, timer: Timer) -> StepR
         buoyancy_wrench=wrench,
         wind_wrench=wrench,
         jet_wrench=wrench,
+        added_mass_wrench=wrench,
+        centre=wrench[:, :3],
         seconds=timer.seconds,
     )
 
@@ -361,7 +363,7 @@ def report(
     dt: float,
     timer: Timer,
 ) -> StepReport:
-    """What the step did; its pose is needed where there is a fluid."""
+    """What the step did; its pose is needed where a fluid or a wind acts."""
     projected, flesh = solved.projected, world.setup.solid.flesh
     balance.solid = halfway_momentum(world.setup.solid, world.solid, dt)[0]
     finite = bool(np.isfinite(solved.v).all())
@@ -378,6 +380,8 @@ def report(
         buoyancy_wrench=np.zeros(wind.shape),
         wind_wrench=wind,
         jet_wrench=reaction,
+        added_mass_wrench=np.zeros(wind.shape),
+        centre=np.zeros((len(wind), 3)) if pose is None else pose.mass_centre,
         momentum=balance,
         work=dt * float(solved.actuator @ halfway),
         contacts=solved.driven.system.contacts,
@@ -391,6 +395,7 @@ def report(
         done.pressure_wrench = on_bodies(pose, carried, projected.impulse / dt)
         done.viscous_wrench = on_bodies(pose, carried, solved.viscous_impulse / dt)
         done.buoyancy_wrench = on_bodies(pose, carried, buoyancy)
+        done.added_mass_wrench = on_bodies(pose, carried, solved.added_mass / dt)
         done.iterations, done.residual = projected.iterations, projected.residual
         done.divergence, done.fastest = projected.divergence, projected.fastest
     return done

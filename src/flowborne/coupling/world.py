@@ -61,6 +61,7 @@ class Setup:
     winds    simple winds (paper eq. 2, or a uniform force)
     mouths   patches of skin through which fluid is expelled; a fluid that feels the bodies is there
     trial    whether steps are hypothetical, and may be longer than those of the world itself
+    splits   whether steps report the added-mass part of the fluid's force, which costs a solve
     """
 
     solid: SolidModel
@@ -69,14 +70,16 @@ class Setup:
     winds: tuple[Wind, ...] = ()
     mouths: tuple[Mouth, ...] = ()
     trial: bool = False
+    splits: bool = False
 
     @cached_property
     def hypothetical(self) -> Setup:
         """The same for hypothetical steps: their pressure is solved as far as a gradient needs."""
         if self.fluid is None:
-            return replace(self, trial=True)
+            return replace(self, trial=True, splits=False)
         tolerance = max(self.fluid.tolerance, HYPOTHETICAL)
-        return self.but(fluid=replace(self.fluid, tolerance=tolerance), trial=True)
+        fluid = replace(self.fluid, tolerance=tolerance)
+        return self.but(fluid=fluid, trial=True, splits=False)
 
     @cached_property
     def rehearsed(self) -> Setup:

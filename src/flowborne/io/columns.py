@@ -70,7 +70,7 @@ class _Column(NamedTuple):
 
 def unit_of(column: str) -> str:
     """Unit of a column of the history; "1" where it has none, "" where an objective decides."""
-    if column.startswith(("objective", "tried_objective")):
+    if column.startswith(("objective", "measured_")):
         return ""
     if column == "effort":
         return "N m s"

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.io.atomic import sync_files, write_atomically, write_json
 from flowborne.io.run_folder import RunFolder
@@ -34,7 +33,8 @@ class Recorder:
       time                                       s
       q (nq,), v (nv,)                           generalised coordinates
       geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
-      fluid_force (nb, 3)                        N, what the fluid and the winds do to each body
+      fluid_force (nb, 3)                        N, what fluid and winds do to each body: mean over
+                                                 the frame, without the added-mass part
       fluid_centre (nb, 3)                       m, where to draw it: the centroid of the body and
                                                  the flesh that it carries
       flesh_vertices (k, 3)                      m, the vertices of flesh that lie on its skin
@@ -51,12 +51,13 @@ class Recorder:
         self.folder = folder
         self._written: list[Path] = []
 
-    def write(self, frame: int, world: World, report: StepReport | None) -> None:
-        """Write the state after `frame` frames; `report` is of the last step, None at the start.
+    def write(self, frame: int, world: World, force: Array | None) -> None:
+        """Write the state after `frame` frames.
 
+        force   (nb, 3) N, to draw; None at the start
         raises  OSError when the disc refuses; nothing is then left of the file
         """
-        arrays = self.arrays(world, report)
+        arrays = self.arrays(world, force)
         path = self.folder.state(frame)
         write_atomically(path, lambda file: np.savez(file, **arrays), durable=False)  # type: ignore[arg-type]
         self._written.append(path)
@@ -80,7 +81,7 @@ class Recorder:
             members += len(kept) + 2
         return 4 * numbers + BYTES_PER_MEMBER * members
 
-    def arrays(self, world: World, report: StepReport | None) -> dict[str, NDArray[Any]]:
+    def arrays(self, world: World, force: Array | None) -> dict[str, NDArray[Any]]:
         """What is kept of `world`."""
         solid = world.setup.solid
         pose = kinematics(solid, world.solid.q)
@@ -92,12 +93,10 @@ class Recorder:
             "body_position": pose.body_position,
             "body_rotation": pose.body_rotation,
             "fluid_centre": centres(solid, pose),
-            "fluid_force": np.zeros_like(pose.centroid),
+            "fluid_force": np.zeros_like(pose.centroid) if force is None else force,
         }
         if solid.flesh is not None:
             kept["flesh_vertices"] = pose.vertices[on_skin(solid.flesh)]
-        if report is not None:
-            kept["fluid_force"] = report.fluid_wrench()[:, :3]
         if world.fluid is not None and world.setup.fluid is not None:
             named = world.fluid.arrays()
             axes = [f"velocity_{'xyz'[axis]}" for axis in world.setup.fluid.grid.axes]

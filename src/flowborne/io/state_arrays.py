@@ -34,7 +34,11 @@ QUANTITIES = {
     "body_position": Quantity(("body", "axis"), "m", "origin of each body's frame"),
     "body_rotation": Quantity(("body", "row", "column"), "1", "body's frame to the world's"),
     "fluid_centre": Quantity(("body", "axis"), "m", "centroid of a body and its flesh"),
-    "fluid_force": Quantity(("body", "axis"), "N", "force of fluid and winds on a body"),
+    "fluid_force": Quantity(
+        ("body", "axis"),
+        "N",
+        "force of fluid and winds on a body, mean over the frame without the added-mass part",
+    ),
     "flesh_vertices": Quantity(("vertex", "axis"), "m", "vertices on the skin of flesh"),
     "velocity_x": Quantity(("x_face", "y", "z"), "m/s", "velocity on the faces across x"),
     "velocity_y": Quantity(("x", "y_face", "z"), "m/s", "velocity on the faces across y"),

@@ -60,7 +60,7 @@ def converged_frame(path: Path, means: dict[str, float], within: dict[str, float
 
 
 def summarise(path: Path, within: dict[str, float]) -> dict[str, Any]:
-    """Final angles, convergence and timing of a history.
+    """Final angles and objective, convergence and timing of a history.
 
     within  column of each controlled joint -> length of a strength step, rad or m
     """
@@ -68,6 +68,7 @@ def summarise(path: Path, within: dict[str, float]) -> dict[str, Any]:
     frames = sum(1 for _ in history_rows(path, ["frame"]))
     positions = [c for c in columns if c.startswith(("angle_", "position_"))]
     controlled = final_means(path, [c for c in positions if c in within], frames)
+    objective = final_means(path, ["objective"], frames).get("objective", np.nan)
     spent = [c for c in columns if c.startswith("seconds_")]
     totals = dict.fromkeys(spent, 0.0)
     for row in history_rows(path, spent):
@@ -81,6 +82,7 @@ def summarise(path: Path, within: dict[str, float]) -> dict[str, Any]:
         "time_s": last[0][0] if last else 0.0,
         "final": dict(zip(positions, last[0][1:], strict=True)) if last else {},
         "final_mean": controlled,
+        "final_objective": objective if np.isfinite(objective) else None,
         "converged_frame": converged_frame(path, controlled, within),
         "seconds_first_frame": first,
         "seconds_per_frame": (whole - first) / (frames - 1) if frames > 1 else whole,

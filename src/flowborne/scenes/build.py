@@ -51,7 +51,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     model = load_model(scene) if scene.has_bodies else SolidModel.empty()
     motions = trajectories_of(scene, model, posed(scene, model).q)
     fluid = fluid_of(scene)
-    setup = Setup(model, fluid, motions, winds_of(scene), mouths_of(scene, model))
+    setup = Setup(model, fluid, motions, winds_of(scene), mouths_of(scene, model), splits=True)
     world = World.at_rest(setup)
     world.solid = initial_state(scene, model)
     if world.fluid is not None:

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 State = dict[str, NDArray[Any]]
 """Arrays of one file of states/, by name."""
 
-PLOTTED = ("objective", "tried_objective", "angle_", "position_")
+PLOTTED = ("objective", "measured_", "angle_", "position_")
 """Beginnings of the columns of the history that are read besides frame and time."""
 
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 MOST_CURVES = 6
 
-EFFORT = "objective_effort_"
+EFFORT = "measured_effort_"
 """Beginning of the columns with the effort of named joints."""
 
 
@@ -43,19 +43,14 @@ def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
 
 
 def objective_curve(run: Run) -> Array | None:
-    """The objective in every frame, as trials found it where theirs is another motion; None where
-    there is none.
-
-    Of a creature that moves it holds what the motion itself drags, which nobody asked for where it
-    is sought at rest.
-    """
-    values = run.history.get("tried_objective", run.history.get("objective"))
+    """The objective of the last decision in every frame; None where there is none."""
+    values = run.history.get("objective")
     return None if values is None or not np.isfinite(values).any() else values
 
 
 def _terms(run: Run) -> list[str]:
     """Columns of the terms of the objective."""
-    return [column for column in run.history if column.startswith("objective_")]
+    return [column for column in run.history if column.startswith("measured_")]
 
 
 def effort_curves(run: Run) -> dict[str, Array]:
@@ -78,9 +73,8 @@ def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
     strips: list[tuple[str, dict[str, Array]]] = []
     objective = objective_curve(run)
     if objective is not None:
-        terms = [column.removeprefix("objective_").replace("_", " ") for column in _terms(run)]
+        terms = [column.removeprefix("measured_").replace("_", " ") for column in _terms(run)]
         title = f"objective: {terms[0]}" if len(terms) == 1 else "objective"
-        title += " as tried" if "tried_objective" in run.history else ""
         strips.append((title, {"": objective}))
     efforts = effort_curves(run)
     if efforts:
