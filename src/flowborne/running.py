@@ -29,6 +29,7 @@ from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.warn import warnings_of
+from flowborne.scenes.settling import can_settle
 from flowborne.simulation import BlowUpError, Simulation
 
 if TYPE_CHECKING:
@@ -351,13 +352,14 @@ class _Run:
         simulation = self.simulation
         world = simulation.world
         strength = simulation.measures.strength_steps(simulation.frame_time)
+        every = simulation.scene.controller.every if can_settle(simulation.scene) else None
         cells = None if world.setup.fluid is None else prod(world.setup.fluid.grid.shape)
         return {
             "scene": simulation.scene.name,
             "outcome": outcome.name.lower(),
             "message": message,
             "doubts": self._doubts(),
-            **summarise(self.folder.history, strength),
+            **summarise(self.folder.history, strength, every),
             "cells": cells,
             "warnings": self.warnings,
             "notes": list(notes_of(simulation.scene, world.setup.solid)),

@@ -35,13 +35,16 @@ def final_means(path: Path, columns: list[str], frames: int) -> dict[str, float]
     return dict(zip(columns, np.mean(last, axis=0).tolist(), strict=True)) if last else {}
 
 
-def converged_frame(path: Path, means: dict[str, float], within: dict[str, float]) -> int | None:
+def converged_frame(
+    path: Path, means: dict[str, float], within: dict[str, float], least: int
+) -> int | None:
     """The first frame after which every joint stays within one strength step of its final mean.
 
     path    of the history
     means   column -> final mean
     within  column -> length of a strength step, rad or m
-    returns None when there is no such joint, or when one is away in the very last frame
+    least   frames, this one included, over which they have to stay
+    returns None when there is no such joint, and when one was away in the last `least` frames
     source  design page, section 8
     """
     columns = list(means)
@@ -51,24 +54,32 @@ def converged_frame(path: Path, means: dict[str, float], within: dict[str, float
     # one part in 1e9 more: a joint that is exactly a step away counts as within
     radius = np.array([within[column] for column in columns]) * (1.0 + 1e-9)
     converged: int | None = None
+    frame = 0.0
     for frame, *positions in history_rows(path, ["frame", *columns]):
         if np.all(np.abs(np.array(positions) - target) <= radius):
             converged = int(frame) if converged is None else converged
         else:
             converged = None
-    return converged
+    stayed = converged is not None and frame - converged + 1 >= least
+    return converged if stayed else None
 
 
-def summarise(path: Path, within: dict[str, float]) -> dict[str, Any]:
+def summarise(path: Path, within: dict[str, float], every: int | None) -> dict[str, Any]:
     """Final angles and objective, convergence and timing of a history.
 
     within  column of each controlled joint -> length of a strength step, rad or m
+    every   frames from decision to decision; None where the joints cannot come to rest
     """
     columns = history_columns(path)
     frames = sum(1 for _ in history_rows(path, ["frame"]))
     positions = [c for c in columns if c.startswith(("angle_", "position_"))]
     controlled = final_means(path, [c for c in positions if c in within], frames)
     objective = final_means(path, ["objective"], frames).get("objective", np.nan)
+    converged = None
+    if every is not None:
+        # the frames of the final mean and as many before them, and enough decisions
+        least = max(2 * final_frames(frames), FINAL_FRAMES * every)
+        converged = converged_frame(path, controlled, within, least)
     spent = [c for c in columns if c.startswith("seconds_")]
     totals = dict.fromkeys(spent, 0.0)
     for row in history_rows(path, spent):
@@ -83,7 +94,7 @@ def summarise(path: Path, within: dict[str, float]) -> dict[str, Any]:
         "final": dict(zip(positions, last[0][1:], strict=True)) if last else {},
         "final_mean": controlled,
         "final_objective": objective if np.isfinite(objective) else None,
-        "converged_frame": converged_frame(path, controlled, within),
+        "converged_frame": converged,
         "seconds_first_frame": first,
         "seconds_per_frame": (whole - first) / (frames - 1) if frames > 1 else whole,
         "seconds_by_part": {c.removeprefix("seconds_"): s for c, s in totals.items()},
