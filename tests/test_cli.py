@@ -45,10 +45,10 @@ def test_a_film_tells_how_far_it_is(command, small_scene):
     options = ("--frames", 2, "--workers", 1, "--out", "run")
     _, _, err = command("run", small_scene, *options)
     assert "drawing the film …  frame 3/3" in err
-    code, out, err = command("film", "run", "--set", "size=[160, 96]", "--out", "shot.mp4")
+    code, out, err = command("film", "run", "--set", "size=[160, 96]", "--out", "films/shot.mp4")
     assert code == 0
     assert "drawing the film …  frame 3/3" in err
-    assert "drawn: shot.mp4" in out
+    assert "drawn: films/shot.mp4" in out
 
 
 def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp_path):

@@ -69,7 +69,7 @@ def write_shot(
     """Draw a run into a file of one's own; what was written, for people.
 
     path    film.mp4, film.webp, an image that moves, or frames.png for an image sequence
-            frames_0000.png, frames_0001.png, ...
+            frames_0000.png, frames_0001.png, ...; its folder is made when there is none
     raises  as `make_preview`; ValueError when the name ends in something else, too
     """
     if path.suffix.lower() not in ENDINGS:
@@ -78,6 +78,7 @@ def write_shot(
             f"{', '.join(ENDINGS)}"
         )
     run = Run.read(folder)
+    path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix.lower() in CODING:
         write_film(run, path, progress, shot)
         return str(path)
