@@ -9,6 +9,7 @@ import numpy as np
 from flowborne.scenes.bodies import SLIDE, joint_kind
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
+from flowborne.scenes.human.clip_skeleton import lost_bones
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
 from flowborne.solids.model import SolidModel
@@ -16,6 +17,7 @@ from flowborne.solids.model import SolidModel
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Sentences for people, without a full stop."""
+    yield from _lost_bones(scene)
     yield from _standing_still(scene)
     yield from _wide_probes(scene, model)
 
@@ -37,6 +39,21 @@ def _standing_still(scene: Scene) -> Iterator[str]:
         yield (
             f"[clip]: {table.file} goes on for {left:.3g} s of the run's {run:.3g} s, and stands "
             "still from there; loop = true lets it begin again, and fewer frames end with it"
+        )
+
+
+def _lost_bones(scene: Scene) -> Iterator[str]:
+    """Joints of a clip that lie on each other."""
+    capture = capture_of(scene)
+    if scene.human is None or scene.clip is None or scene.clip.file is None or capture is None:
+        return
+    lost = lost_bones(capture.clip, capture.mapping)
+    if lost:
+        names = ", ".join(f"'{capture.mapping[joint]}'" for joint in lost)
+        yield (
+            f"[clip]: {scene.clip.file} has no bone between {names} and the joint above, as BVH "
+            "files of the CMU database; bones of usual length are put in, so that head and "
+            "shoulders are where anatomy has them, higher than in the file"
         )
 
 

@@ -9,9 +9,10 @@ from flowborne.errors import SceneError
 from flowborne.io.bvh import read_bvh
 from flowborne.io.clip import Clip
 from flowborne.scenes.human.body import human_mjcf
-from flowborne.scenes.human.clip_skeleton import NAMES, skeleton_of
+from flowborne.scenes.human.clip_skeleton import NAMES, lost_bones, skeleton_of
 from flowborne.scenes.human.skeleton import PARENTS, TIPS, Skeleton
 from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.scenes.mapping import mapping_of
 from flowborne.solids.model import SolidModel
 
 MOCAP = Path(__file__).parents[4] / "shared" / "mocap"
@@ -126,9 +127,15 @@ def test_lost_thorax_bone_is_put_in():
     lost = Clip(
         clip.names, clip.parents, offsets, clip.ends, 0.01, clip.rotations, np.zeros((1, 3))
     )
+    assert lost_bones(clip, mapping) == []
+    assert sorted(lost_bones(lost, mapping)) == sorted(starts)
     found = skeleton_of(lost, mapping)
-    for joint in starts:
-        assert distance(found, "thorax", joint) == pytest.approx(0.117, rel=1e-3)
+    assert distance(found, "thorax", "lower_neck") == pytest.approx(
+        distance(wanted, "thorax", "lower_neck"), rel=1e-9
+    )
+    for end in ("head_top", "left_shoulder", "right_shoulder"):
+        heights = [s[end][2] - s["thorax"][2] for s in (found, wanted)]
+        assert heights[0] == pytest.approx(heights[1], abs=0.01)
     np.testing.assert_allclose(
         found["left_shoulder"] - found["left_clavicle"],
         wanted["left_shoulder"] - wanted["left_clavicle"],
@@ -169,6 +176,20 @@ def test_joints_at_one_place_are_told():
     )
     with pytest.raises(SceneError, match="at one place"):
         skeleton_of(flat, mapping)
+
+
+@pytest.mark.skipif(not MOCAP.is_dir(), reason="no motion capture beside the repository")
+@pytest.mark.parametrize("name", ["02_01.bvh", "131_01.bvh"])
+def test_shoulders_of_cmu_clips_are_below_the_jaw(name):
+    """As far below the crown as those of the standard skeleton, though the files lack the bone."""
+    clip = read_bvh(MOCAP / name, 0.056444, skip=1)
+    mapping = mapping_of(clip, {})
+    assert set(lost_bones(clip, mapping)) == {"lower_neck", "left_clavicle", "right_clavicle"}
+    found, standard = skeleton_of(clip, mapping), standard_skeleton()
+    legs = [distance(s, "left_hip", "left_knee") for s in (found, standard)]
+    for side in ("left", "right"):
+        low, usual = (s["head_top"][2] - s[f"{side}_shoulder"][2] for s in (found, standard))
+        assert low / usual == pytest.approx(legs[0] / legs[1], abs=0.1)
 
 
 @pytest.mark.skipif(not MOCAP.is_dir(), reason="no motion capture beside the repository")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,9 +19,18 @@ NAMES = tuple(joint for _, joint, _ in BODIES)
 TINY = 1e-6
 """Of a bone's standard length: what is shorter is no bone."""
 
-THORAX = 0.117 / 0.242
-"""Of the standard thorax, the bone that BVH files of the CMU database lack: neck and collar bones
-start together at its end (117 mm in the ASF file of subject 02, which still has it)."""
+ENDS = {
+    "lower_neck": "head_top",
+    "left_clavicle": "left_shoulder",
+    "right_clavicle": "right_shoulder",
+}
+"""Joint on the thorax -> what has its standard height above that where the bone between is lost:
+BVH files of the CMU database start neck and collar bones on the thorax itself, with a neck that is
+longer than a neck and shoulders that are higher than their start. At the length that the ASF file
+of subject 02 has for all three (117 mm) shoulders would be 96 mm too near to the head."""
+
+SHORTEST = 0.1
+"""Of the standard thorax, the least length of such a bone."""
 
 
 def skeleton_of(clip: Clip, mapping: Mapping[str, str]) -> Skeleton:
@@ -29,9 +38,11 @@ def skeleton_of(clip: Clip, mapping: Mapping[str, str]) -> Skeleton:
 
     mapping  joint of the model -> joint of the clip; the root must be among them
     returns  joints that are mapped are where the clip has them. Where one lies on its mapped
-             parent, other than the root, the file lacks the bone between: it is put in, and all
-             beyond moves with it. A joint that is not mapped is placed by the standard skeleton:
-             between its neighbours, or beyond the last of them in the direction of its bone.
+             parent, other than the root, the file lacks the bone between: it is put in (neck and
+             collar bones: such that head and shoulders are as high as the standard skeleton's
+             above the thorax), and all beyond moves with it. A joint that is not mapped is placed
+             by the standard skeleton: between its neighbours, or beyond the last of them in the
+             direction of its bone.
              Head and toes end at the clip's end sites; a hand points to the farthest of them and
              has the forearm's proportion, as clips end hands anywhere between wrist and fingertip
     raises   SceneError for unknown joints, when the root or every other joint is missing, and when
@@ -41,7 +52,7 @@ def skeleton_of(clip: Clip, mapping: Mapping[str, str]) -> Skeleton:
     standard = standard_skeleton()
     found = _found(clip, mapping)
     scale = _scale(found, standard)
-    _insert_lost_bones(found, standard, scale)
+    _insert_lost_bones(found, standard, scale, _lost(found, standard, scale))
     for name in (*NAMES, *TIPS):
         if name not in found:
             found[name] = _filled(name, found, standard, scale)
@@ -128,19 +139,50 @@ def _above(name: str, found: Mapping[str, Array]) -> str:
     return above
 
 
-def _insert_lost_bones(found: dict[str, Array], standard: Skeleton, scale: float) -> None:
+def _insert_lost_bones(
+    found: dict[str, Array], standard: Skeleton, scale: float, lost: Sequence[str]
+) -> None:
+    for joint in lost:
+        above = PARENTS[joint]
+        bone = scale * (standard[joint] - standard[above])
+        if above == "thorax":
+            bone = _thoracic_bone(found, standard, scale, joint)
+        for name in found:
+            if name == joint or joint in _ancestors(name):
+                found[name] = found[name] + bone
+
+
+def _thoracic_bone(
+    found: Mapping[str, Array], standard: Skeleton, scale: float, joint: str
+) -> Array:
+    """From the thorax to a joint on it, along the standard thorax: with what the clip has beyond,
+    the end is as high as that of the standard skeleton; at least SHORTEST of the whole."""
+    whole = scale * (standard["lower_neck"] - standard["thorax"])
+    end = ENDS[joint]
+    if end not in found:
+        return whole
+    beyond = found[end] - found[joint]
+    rise = (scale * (standard[end] - standard["thorax"]) - beyond) @ whole / (whole @ whole)
+    return np.asarray(np.clip(rise, SHORTEST, 1.0) * whole)
+
+
+def lost_bones(clip: Clip, mapping: Mapping[str, str]) -> list[str]:
+    """Joints of the human that lie on their parent, other than the root, in a clip: its file lacks
+    the bones between."""
+    found, standard = _found(clip, mapping), standard_skeleton()
+    return _lost(found, standard, _scale(found, standard))
+
+
+def _lost(found: Mapping[str, Array], standard: Skeleton, scale: float) -> list[str]:
+    joints = []
     for joint in NAMES[1:]:
         above = PARENTS[joint]
         if joint not in found or above not in found or above == "root":
             continue
-        bone = scale * (standard[joint] - standard[above])
-        if above == "thorax":
-            bone = THORAX * scale * (standard["lower_neck"] - standard["thorax"])
-        if np.linalg.norm(found[joint] - found[above]) > TINY * np.linalg.norm(bone):
-            continue
-        for name in found:
-            if name == joint or joint in _ancestors(name):
-                found[name] = found[name] + bone
+        length = scale * float(np.linalg.norm(standard[joint] - standard[above]))
+        if np.linalg.norm(found[joint] - found[above]) <= TINY * length:
+            joints.append(joint)
+    return joints
 
 
 def _ancestors(name: str) -> list[str]:
