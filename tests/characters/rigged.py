@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 NAMES = ("handle", "trunk", "tail", "tail_tip")
@@ -21,6 +23,9 @@ JOINT = 0.8
 """m from the nose to where trunk and tail are even."""
 
 RATE, FRAMES = 24.0, 13
+
+COLOUR = (0.2, 0.05, 0.6)
+"""Of the box, as light."""
 
 
 def box() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -61,8 +66,13 @@ def clip() -> tuple[np.ndarray, dict[str, Rotation], np.ndarray]:
     return times, {"trunk": turn[1] * sway, "tail": turn[2] * swing}, moved
 
 
-def write_glb(path: Path, *, skin: bool = True, closed: bool = True, clips: int = 1) -> None:
-    """The box in centimetres under a node that is turned and scales, at rest in another pose."""
+def write_glb(
+    path: Path, *, skin: bool = True, closed: bool = True, clips: int = 1, texture: bool = False
+) -> None:
+    """The box in centimetres under a node that is turned and scales, at rest in another pose.
+
+    texture  of its left half white, of the right half black
+    """
     import pygltflib as gl
 
     blob, gltf = bytearray(), gl.GLTF2(scene=0, scenes=[gl.Scene(nodes=[0])])
@@ -112,6 +122,21 @@ def write_glb(path: Path, *, skin: bool = True, closed: bool = True, clips: int 
         ),
         indices=add(faces[: None if closed else -2].astype(np.uint16).ravel(), "SCALAR"),
     )
+    base = gl.PbrMetallicRoughness(baseColorFactor=[*COLOUR, 1.0])
+    gltf.materials.append(gl.Material(pbrMetallicRoughness=base))
+    part.material = 0
+    if texture:
+        halves = BytesIO()
+        Image.fromarray(np.array([[255, 0]], np.uint8)).save(halves, "png")
+        places = np.c_[0.9 * vertices[:, 0] / WIDTH + 0.5, 0.0 * vertices[:, 0]].astype(np.float32)
+        part.attributes.TEXCOORD_0 = add(places, "VEC2")
+        gltf.bufferViews.append(
+            gl.BufferView(buffer=0, byteOffset=len(blob), byteLength=len(halves.getvalue()))
+        )
+        blob.extend(halves.getvalue())
+        gltf.images.append(gl.Image(bufferView=len(gltf.bufferViews) - 1, mimeType="image/png"))
+        gltf.textures.append(gl.Texture(source=0))
+        base.baseColorTexture = gl.TextureInfo(index=0)
     gltf.meshes.append(gl.Mesh(name="box", primitives=[part]))
     gltf.nodes.append(gl.Node(name="box", mesh=0, skin=0 if skin else None))
     gltf.scenes[0].nodes.append(5)
@@ -187,6 +212,7 @@ def write_usd(path: Path) -> None:
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy((100.0 * vertices).astype("f")))
     mesh.CreateFaceVertexCountsAttr([3] * len(faces))
     mesh.CreateFaceVertexIndicesAttr(faces.ravel().tolist())
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(*COLOUR)])
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateJointsAttr([paths[2], paths[1]])
     count = len(vertices)

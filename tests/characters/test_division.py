@@ -18,6 +18,8 @@ from flowborne.solids.mjcf import is_closed
 
 from . import rigged
 
+GREY = np.full((len(rigged.box()[1]), 3), 0.5)
+
 CREATURES = Path(__file__).parents[3] / "shared" / "creatures"
 
 
@@ -42,12 +44,12 @@ def volumes(surface: Surface, skeleton: Rig) -> dict[int, float]:
 def test_pieces_end_where_the_weights_are_even() -> None:
     """The handle goes with the trunk and the tip with the tail."""
     vertices, faces, weights = rigged.box()
-    division = divided(rig(), Surface(vertices, faces, weights / 0.8), "box.glb")
+    division = divided(rig(), Surface(vertices, faces, weights / 0.8, GREY), "box.glb")
     section = rigged.WIDTH * rigged.HEIGHT
     assert division.owners.tolist() == [0, 0, 2, 2]
     assert division.leader == 1
     assert division.volume == pytest.approx(section * rigged.LENGTH, rel=1e-9)
-    found = volumes(Surface(vertices, faces, weights / 0.8), rig())
+    found = volumes(Surface(vertices, faces, weights / 0.8, GREY), rig())
     assert found[0] == pytest.approx(section * rigged.JOINT, rel=1e-5)
     assert found[2] == pytest.approx(section * (rigged.LENGTH - rigged.JOINT), rel=1e-5)
     low = division.pieces[2][0][:, 2].max()
@@ -64,7 +66,7 @@ def test_pieces_fill_the_whole_whatever_the_weights(seed: int) -> None:
     weights = random.random((len(vertices), 6)) ** 8 * (random.random((len(vertices), 6)) < 0.6)
     weights[:, 0] += 1e-3
     weights /= weights.sum(axis=1, keepdims=True)
-    found = volumes(Surface(vertices, faces, weights), rig(parents))
+    found = volumes(Surface(vertices, faces, weights, GREY), rig(parents))
     whole = rigged.WIDTH * rigged.HEIGHT * rigged.LENGTH
     assert sum(found.values()) == pytest.approx(whole, rel=100 * SAME)
 
@@ -72,7 +74,7 @@ def test_pieces_fill_the_whole_whatever_the_weights(seed: int) -> None:
 def test_surface_with_a_hole_is_refused() -> None:
     vertices, faces, weights = rigged.box()
     with pytest.raises(SceneError, match=r"box\.glb: .* not watertight: 4 edges .* Fill Holes"):
-        divided(rig(), Surface(vertices, faces[2:], weights / 0.8), "box.glb")
+        divided(rig(), Surface(vertices, faces[2:], weights / 0.8, GREY[2:]), "box.glb")
 
 
 @pytest.mark.skipif(not CREATURES.is_dir(), reason="the creatures are beside the project")

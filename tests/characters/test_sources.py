@@ -10,8 +10,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from flowborne.characters.colours import MOST, few_colours
 from flowborne.characters.rig import Z_UP
 from flowborne.characters.source import Source, clip_number, read_source
+from flowborne.colours import to_srgb
 from flowborne.errors import SceneError
 
 from . import rigged
@@ -41,6 +43,29 @@ def test_surface_is_in_metres_and_its_weights_sum_to_one(source: Source) -> None
     assert_allclose(surface.vertices, vertices @ Z_UP.T, atol=1e-6)
     assert_allclose(surface.faces, faces)
     assert_allclose(surface.weights, weights / 0.8, atol=1e-6)
+
+
+def test_surface_has_the_colour_of_the_file(source: Source) -> None:
+    surface = source.surface
+    assert surface is not None
+    assert_allclose(surface.colours, np.tile(to_srgb(rigged.COLOUR), (len(surface.faces), 1)))
+
+
+def test_a_texture_has_its_colour_on_each_face(tmp_path: Path) -> None:
+    """Left faces are of the plain colour, right ones black, and each colour is a skin."""
+    rigged.write_glb(tmp_path / "box.glb", texture=True)
+    surface = read_source(tmp_path / "box.glb").surface
+    assert surface is not None
+    middle = surface.vertices[surface.faces][..., 0].mean(axis=1)
+    plain, black = surface.colours[middle < -0.1], surface.colours[middle > 0.1]
+    assert_allclose(plain, np.tile(to_srgb(rigged.COLOUR), (len(plain), 1)), atol=1e-6)
+    assert_allclose(black, 0.0)
+    few, which = few_colours(surface.colours)
+    assert len(few) == 2
+    assert_allclose(few[which], surface.colours, atol=0.5 / 255.0)
+    many, which = few_colours(np.random.default_rng(1).random((500, 3)))
+    assert len(many) <= MOST
+    assert which.max() < len(many)
 
 
 def test_clip_has_the_rotations_of_the_file(source: Source) -> None:

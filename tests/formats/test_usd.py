@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 import flowborne as fb
+from flowborne.colours import to_linear
 from flowborne.formats.creature import Creature
 
 pytest.importorskip("pxr")
@@ -101,7 +102,7 @@ def test_surfaces_go_with_their_bodies(name: str, stages: Stages) -> None:
 @pytest.mark.parametrize("name", RUNS)
 def test_surfaces_have_the_models_colours(name: str, stages: Stages) -> None:
     creature, stage = stages[name]
-    colours = {surface.name: surface.rgba[:3] for surface in creature.surfaces}
+    colours = {surface.name: to_linear(surface.rgba[:3]) for surface in creature.surfaces}
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Mesh) and prim.GetDisplayName() in colours:
             material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()

@@ -94,7 +94,8 @@ def closed(surface: Surface, name: str) -> Surface:
     np.add.at(weights, welded, surface.weights)
     weights /= weights.sum(axis=1, keepdims=True)
     faces = welded[surface.faces]
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    kept = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    faces = faces[kept]
     rims = _rims(faces)
     if len(rims):
         x, y, z = surface.vertices[first][rims[0]].mean(axis=0)
@@ -103,7 +104,7 @@ def closed(surface: Surface, name: str) -> Surface:
             f"alone, one of them at ({x:.4g}, {y:.4g}, {z:.4g}) m. Close the holes (in Blender: "
             "Mesh, Clean Up, Fill Holes), or leave out meshes that have no inside."
         )
-    return Surface(surface.vertices[first], faces, weights)
+    return Surface(surface.vertices[first], faces, weights, surface.colours[kept])
 
 
 def _merged(rig: Rig, parts: Array) -> tuple[Integers, int]:

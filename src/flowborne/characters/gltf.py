@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from flowborne.characters.gltf_accessors import Accessors
+from flowborne.characters.gltf_colours import Colours
 from flowborne.characters.gltf_document import Node, Primitive, Skin, read_document
 from flowborne.characters.gltf_gate import WIDTH, check_document, joint_sets
 from flowborne.characters.limits import check_size, check_surface
@@ -53,6 +54,7 @@ class GltfSource:
             )
         self._arrays = Accessors(path.name, self._gltf, buffers)
         check_document(path.name, self._gltf, self._arrays)
+        self._colours = Colours(path.name, self._gltf, self._arrays, buffers)
         self._parents = [-1] * len(self._gltf.nodes)
         for number, node in enumerate(self._gltf.nodes):
             for child in node.children:
@@ -93,7 +95,7 @@ class GltfSource:
     @np.errstate(all="ignore")
     def surface(self) -> Surface | None:
         """All skinned meshes as one; None when there is none."""
-        vertices, faces, weights, count = [], [], [], 0
+        vertices, faces, weights, colours, count = [], [], [], [], 0
         number = {node: joint for joint, node in enumerate(self._joints)}
         carried = [n for n in self._gltf.nodes if n.mesh is not None and n.skin is not None]
         check_size(len(self._joints), sum(self._points(node) for node in carried), self._name)
@@ -114,11 +116,17 @@ class GltfSource:
                 vertices.append(points @ inner[:3, :3].T + inner[:3, 3])
                 faces.append(triangles + count)
                 weights.append(self._weights(part, own, len(points)))
+                colours.append(self._colours.of(part, triangles, len(points)))
                 count += len(points)
         if not vertices:
             return None
         check_surface(np.concatenate(vertices), self._name)
-        return Surface(np.concatenate(vertices), np.concatenate(faces), np.concatenate(weights))
+        return Surface(
+            np.concatenate(vertices),
+            np.concatenate(faces),
+            np.concatenate(weights),
+            np.concatenate(colours),
+        )
 
     def _points(self, node: Node) -> int:
         """Number of vertices of a node's mesh."""

@@ -97,7 +97,31 @@ class Node(_Table):
 class Primitive(_Table):
     attributes: dict[str, Index]
     indices: Index | None = None
+    material: Index | None = None
     mode: Index = 4
+
+
+class TextureInfo(_Table):
+    index: Index
+    tex_coord: Index = 0
+
+
+class BaseColour(_Table):
+    base_color_factor: Four = [1.0, 1.0, 1.0, 1.0]
+    base_color_texture: TextureInfo | None = None
+
+
+class Material(_Table):
+    pbr_metallic_roughness: BaseColour = BaseColour()
+
+
+class Texture(_Table):
+    source: Index | None = None
+
+
+class Image(_Table):
+    buffer_view: Index | None = None
+    uri: str | None = None
 
 
 class Mesh(_Table):
@@ -141,6 +165,9 @@ class Document(_Table):
     accessors: list[Accessor] = []
     nodes: list[Node] = []
     meshes: list[Mesh] = []
+    materials: list[Material] = []
+    textures: list[Texture] = []
+    images: list[Image] = []
     skins: list[Skin] = []
     animations: list[Animation] = []
 

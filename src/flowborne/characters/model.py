@@ -1,4 +1,4 @@
-"""The bodies of a character as MJCF, with its surface as a skin for viewers and exporters."""
+"""The bodies of a character as MJCF, with its surface as skins for viewers and exporters."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from flowborne.characters.colours import few_colours
 from flowborne.characters.division import Division
 from flowborne.characters.rig import Array, Rig, Surface
 from flowborne.shapes.shape import Mesh
@@ -53,7 +54,7 @@ def model_files(
             ElementTree.SubElement(assets, "mesh", name=own, file=file, inertia="exact")
             ElementTree.SubElement(body, "geom", name=own, mesh=own)
     files[f"{name}.xml"] = _text(root)
-    files[f"{name}-skin.xml"] = _text(_skin(name, rig, surface))
+    files[f"{name}-skin.xml"] = _text(_skins(name, rig, surface))
     return files
 
 
@@ -67,18 +68,29 @@ def _place(rig: Rig, joint: int) -> dict[str, str]:
     return {"pos": _numbers(position), "quat": _numbers(turn)}
 
 
-def _skin(name: str, rig: Rig, surface: Surface) -> Element:
-    """The whole surface, carried by the bodies."""
+def _skins(name: str, rig: Rig, surface: Surface) -> Element:
+    """The whole surface, carried by the bodies: a skin for each of its colours."""
     root = ElementTree.Element("mujoco")
-    skin = ElementTree.SubElement(
-        ElementTree.SubElement(root, "deformable"),
-        "skin",
-        name=name,
-        vertex=_numbers(surface.vertices),
-        face=" ".join(map(str, surface.faces.ravel().tolist())),
-    )
-    least = np.sort(surface.weights, axis=1)[:, -INFLUENCES:].min(axis=1)
-    carried = (surface.weights >= least[:, None]) & (surface.weights > 0.0)
+    deformable = ElementTree.SubElement(root, "deformable")
+    colours, which = few_colours(surface.colours)
+    for number, colour in enumerate(colours):
+        used, faces = np.unique(surface.faces[which == number], return_inverse=True)
+        skin = ElementTree.SubElement(
+            deformable,
+            "skin",
+            name=name if number == 0 else f"{name}-{number + 1}",
+            vertex=_numbers(surface.vertices[used]),
+            face=" ".join(map(str, faces.ravel().tolist())),
+            rgba=f"{_numbers(colour)} 1",
+        )
+        _carry(skin, rig, surface.weights[used])
+    return root
+
+
+def _carry(skin: Element, rig: Rig, weights: Array) -> None:
+    """Bones of a skin, which carry its vertices with shares `weights` (k, n)."""
+    least = np.sort(weights, axis=1)[:, -INFLUENCES:].min(axis=1)
+    carried = (weights >= least[:, None]) & (weights > 0.0)
     turns = Rotation.from_matrix(rig.rotation).as_quat(scalar_first=True)
     for joint in np.flatnonzero(carried.any(axis=0)):
         vertices = np.flatnonzero(carried[:, joint])
@@ -89,9 +101,8 @@ def _skin(name: str, rig: Rig, surface: Surface) -> Element:
             bindpos=_numbers(rig.position[joint]),
             bindquat=_numbers(turns[joint]),
             vertid=" ".join(map(str, vertices.tolist())),
-            vertweight=_numbers(surface.weights[vertices, joint]),
+            vertweight=_numbers(weights[vertices, joint]),
         )
-    return root
 
 
 def _obj(mesh: Mesh) -> bytes:

@@ -53,11 +53,13 @@ class Surface:
     vertices  (k, 3) m
     faces     (m, 3) outward
     weights   (k, n) share of each joint, together 1
+    colours   (m, 3) sRGB values from 0 to 1 of the faces
     """
 
     vertices: Array
     faces: Integers
     weights: Array
+    colours: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdSkel
+from pxr import Usd, UsdGeom, UsdShade, UsdSkel
 
+from flowborne.characters.colours import PLAIN
 from flowborne.characters.limits import check_size, check_surface
 from flowborne.characters.rig import (
     Z_UP,
@@ -34,6 +35,7 @@ from flowborne.characters.usd_gate import (
     points_of,
     reading_usd,
 )
+from flowborne.colours import to_srgb
 from flowborne.errors import SceneError
 
 EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
@@ -113,7 +115,7 @@ class UsdSource:
         return Rig(names, one_tree(parents), *placed(bind, f"{self._name}, joints at rest"))
 
     def _surface(self) -> Surface | None:
-        vertices, faces, weights, count = [], [], [], 0
+        vertices, faces, weights, colours, count = [], [], [], [], 0
         into = self._to_world(self._skeleton.GetPrim())
         for binding in self._bound:
             if binding.GetSkeleton().GetPrim() != self._skeleton.GetPrim():
@@ -131,11 +133,17 @@ class UsdSource:
                 mirrored = (np.linalg.det(own[:3, :3]) < 0.0) != turned
                 faces.append(_triangles(mesh, len(points), mirrored, where) + count)
                 weights.append(self._weights(target, len(points)))
+                colours.append(np.tile(_colour(mesh), (len(faces[-1]), 1)))
                 count += len(points)
         if not vertices:
             return None
         check_surface(np.concatenate(vertices), self._name)
-        return Surface(np.concatenate(vertices), np.concatenate(faces), np.concatenate(weights))
+        return Surface(
+            np.concatenate(vertices),
+            np.concatenate(faces),
+            np.concatenate(weights),
+            np.concatenate(colours),
+        )
 
     def _action(self, clip: int) -> Action:
         query = self._cache.GetAnimQuery(self._animations[clip])
@@ -200,6 +208,20 @@ class UsdSource:
 def _matrices(transforms: Any) -> Array:
     """(n, 4, 4) USD's transforms, which multiply rows, as ones that multiply columns."""
     return np.array([np.array(transform) for transform in transforms]).swapaxes(1, 2)
+
+
+def _colour(mesh: UsdGeom.Mesh) -> Array:
+    """(3,) sRGB colour of a mesh: the plain one of the material that is bound to it, or else the
+    mean of its displayColor."""
+    material, _ = UsdShade.MaterialBindingAPI(mesh.GetPrim()).ComputeBoundMaterial()
+    shader = material.ComputeSurfaceSource()[0] if material else None
+    plain = shader.GetInput("diffuseColor") if shader else None
+    if plain and not plain.HasConnectedSource() and plain.Get() is not None:
+        return to_srgb(plain.Get())
+    shown = mesh.GetDisplayColorAttr().Get()
+    if not shown:
+        return np.full(3, PLAIN)
+    return to_srgb(np.array(shown, float).mean(axis=0))
 
 
 def _triangles(mesh: UsdGeom.Mesh, points: int, mirrored: bool, where: str) -> Integers:

@@ -11,6 +11,7 @@ import pygltflib as gl
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flowborne.colours import to_linear
 from flowborne.formats.creature import SKIN_COLOUR, Array, Bound, Creature, Integers, Skin, Surface
 from flowborne.formats.morphs import MorphedSkin, strongest
 from flowborne.quaternions import continuous
@@ -135,7 +136,9 @@ class _File:
         """A node with a mesh of triangles; number of the node, and the mesh."""
         gltf = self._gltf
         colour = gl.PbrMetallicRoughness(
-            baseColorFactor=rgba.tolist(), metallicFactor=0.0, roughnessFactor=0.8
+            baseColorFactor=[*to_linear(rgba[:3]).tolist(), float(rgba[3])],
+            metallicFactor=0.0,
+            roughnessFactor=0.8,
         )
         blend = "BLEND" if rgba[3] < 1.0 else "OPAQUE"
         gltf.materials.append(

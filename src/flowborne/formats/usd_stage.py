@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, UsdVol, Vt
 from scipy.spatial.transform import Rotation
 
+from flowborne.colours import to_linear
 from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Surface
 from flowborne.formats.morphs import strongest
 from flowborne.io.open_run import OpenRun
@@ -265,7 +266,7 @@ def _mesh(
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray([3] * len(faces)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.astype(np.int32).ravel()))
-    mesh.CreateDisplayColorAttr(_vectors(rgba[None, :3]))
+    mesh.CreateDisplayColorAttr(_vectors(to_linear(rgba[None, :3])))
     mesh.CreateDisplayOpacityAttr([float(rgba[3])])
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(_material(stage, rgba))
     return mesh
@@ -273,7 +274,7 @@ def _mesh(
 
 def _material(stage: Usd.Stage, rgba: Array) -> UsdShade.Material:
     """The plain surface of a colour, made when it is first asked for."""
-    red, green, blue, opacity = (float(part) for part in rgba)
+    red, green, blue = to_linear(rgba[:3]).tolist()
     name = "colour_" + "".join(f"{round(255.0 * float(part)):02x}" for part in rgba)
     path = _scope(stage, "Materials").AppendChild(name)
     if stage.GetPrimAtPath(path):
@@ -282,7 +283,7 @@ def _material(stage: Usd.Stage, rgba: Array) -> UsdShade.Material:
     shader = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
     shader.CreateIdAttr("UsdPreviewSurface")
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(red, green, blue))
-    shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(opacity)
+    shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(float(rgba[3]))
     shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(ROUGH)
     surface = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
     material.CreateSurfaceOutput().ConnectToSource(surface)
