@@ -10,17 +10,11 @@ import numpy as np
 import pytest
 
 from flowborne.view import style
-from flowborne.view.fields import (
-    FieldDye,
-    FieldVorticity,
-    field_of,
-    full_strength,
-    over,
-    vorticity,
-)
+from flowborne.view.fields import FieldDye, FieldVorticity, field_of, over
 from flowborne.view.layout import Box
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
+from flowborne.view.values import full_strength, turning, vorticity
 
 Write = Callable[..., Path]
 Pixels = np.ndarray
@@ -63,7 +57,10 @@ def test_the_map_shows_every_cell_where_it_is(write_run: Write, wanted: str) -> 
     run = Run.read(write_run(field=wanted))
     picture, field = Picture(run), field_of(run, run.shot)
     assert isinstance(field, FieldDye if wanted == "dye" else FieldVorticity)
-    expected = over(field.image(run.state(6)), style.WATER).astype(int)
+    fine = over(field.image(run.state(6)), style.WATER).astype(int)
+    parts = fine.shape[0] // 96
+    middle = slice(parts // 2 - 1, parts // 2 + 1)
+    expected = fine.reshape(96, parts, 96, parts, 3)[:, middle, :, middle].mean(axis=(1, 3))
     found = at_cells(picture, cut_out(picture.draw(6), picture.layout.map))
     free = np.ones(found.shape[:2], bool)
     free[35:75, 20:70] = False  # the bodies and the arrow
@@ -224,6 +221,38 @@ def test_a_state_with_numbers_lost_is_still_drawn(write_run: Write) -> None:
         scene.write_text(f'name = "lost"\n[film]\nfield = "{wanted}"\n')
         picture = Picture(Run.read(folder))
         assert not like(cut_out(picture.draw(6), picture.layout.map), style.FORCE).any()
+
+
+def test_strong_vorticity_keeps_the_colour_of_its_sense(write_run: Write) -> None:
+    """At both ends of the scale one of red and blue is far above the other, and none is white."""
+    table = FieldVorticity(Run.read(write_run()), style.WATER).table.astype(int)
+    for rows, first, last in ((table[: len(table) // 3], 2, 0), (table[-len(table) // 3 :], 0, 2)):
+        assert (rows[:, first] - rows[:, last]).min() > 60
+    strong = table[[0, -1], :3].max(axis=1) - table[[0, -1], :3].min(axis=1)
+    assert strong.min() > 120
+
+
+def test_a_scale_of_vorticity_does_not_depend_on_the_still_water_around() -> None:
+    wake = np.array([5.0, -4.0, 3.0, -2.0, 1.0])
+    assert turning([wake, np.zeros(20)]) == turning([wake, np.zeros(20_000)]) == 4.0
+    assert turning([np.array([np.nan])]) == 1.0
+
+
+def test_faces_of_cut_cells_carry_no_vorticity(write_run: Write) -> None:
+    """Whatever velocity they have; what is around a body is continued up to its edge."""
+    run = Run.read(write_run())
+    assert run.grid is not None
+    state = dict(run.state(3))
+    cut = state["open"] < 1.0
+    wild = {name: values.copy() for name, values in state.items()}
+    for axis, name in enumerate(("velocity_x", "velocity_y")):
+        for side in (slice(None, -1), slice(1, None)):
+            part = (slice(None),) * axis + (side,)
+            wild[name][part][cut] = 1e3
+    found, expected = vorticity(wild, run.grid), vorticity(state, run.grid)
+    np.testing.assert_allclose(found, expected)
+    edge = cut & (state["open"] > 0.0)
+    assert np.count_nonzero(found[edge[:, :, 0]]) == edge.sum()
 
 
 def test_vorticity_of_a_rigid_rotation_is_twice_its_rate(write_run: Write) -> None:

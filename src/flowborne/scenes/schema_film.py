@@ -55,6 +55,8 @@ class FilmTable(Table):
     field              what is seen of the fluid
     bones              see through flesh, to the bones in it
     plots              title, legend and curves around the map; without them it is the whole picture
+    scale_bar          a bar of a round length, in the legend or, without it, on the picture itself;
+                       never on a transparent one
     size               (width, height) in pixels, both even; what fits when absent
     frames_per_second  of the film, which keeps the run's time; the run's own when absent
     start, stop        s of the run; all of it when absent
@@ -65,6 +67,7 @@ class FilmTable(Table):
     field: Literal["dye", "vorticity", "speed", "pressure", "none"] = "vorticity"
     bones: bool = False
     plots: bool = True
+    scale_bar: bool = True
     size: tuple[Pixels, ...] | None = None
     frames_per_second: Annotated[Positive, Field(le=MOST_RATE)] | None = None
     start: Number | None = None

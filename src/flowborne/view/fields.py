@@ -1,4 +1,4 @@
-"""What is seen of the fluid of a slab as a small image, a pixel per cell."""
+"""What is seen of the fluid of a slab, as an image of its cells."""
 
 from __future__ import annotations
 
@@ -9,10 +9,21 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
+from flowborne.view.values import (
+    filled,
+    full_strength,
+    in_fluid,
+    levels,
+    pressure,
+    refined,
+    robust,
+    speed,
+    turning,
+    vorticity,
+)
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -21,14 +32,8 @@ Scale = tuple[Array, float, float, str]
 SAMPLES = 24
 """Frames from which the scale of a film is taken."""
 
-ROBUST = 98.5
-"""Percentile of a quantity's size at which its colours are strongest."""
-
 HIGHEST = 99.8
-"""The same of speed and pressure, which are high in small places."""
-
-STRONG = 75.0
-"""Percentile of a dye's values above half the largest at which it has its full colour."""
+"""Percentile of speed and pressure at which their colours end: they are high in small places."""
 
 
 class Field(Protocol):
@@ -42,7 +47,8 @@ class Field(Protocol):
     scale: Scale | None
 
     def image(self, state: State) -> Pixels:
-        """(ny, nx, 4) colours and opacities of the cells, lowest row first."""
+        """(k ny, k nx, 4) colours and opacities of the cells, or of k by k parts of each, lowest
+        row first."""
         ...
 
 
@@ -101,13 +107,14 @@ class FieldDye:
         self.scale: Scale | None = None
 
     def image(self, state: State) -> Pixels:
-        open_cells = state["open"][:, :, 0]
-        colour: Array = np.zeros((*open_cells.T.shape, 3))
-        weight: Array = np.zeros((*open_cells.T.shape, 1))
-        clear: Array = np.ones_like(weight)
-        for dye, (full, name) in self._dyes.items():
-            strength = filled(state[dye][:, :, 0] / full, open_cells).T[..., None]
-            strength = np.clip(strength, 0.0, 1.0)
+        known = in_fluid(state)[:, :, 0]
+        strengths = [
+            np.clip(refined(filled(state[dye][:, :, 0] / full, known).T), 0.0, 1.0)[..., None]
+            for dye, (full, _) in self._dyes.items()
+        ]
+        weight: Array = np.zeros_like(strengths[0])
+        colour, clear = np.repeat(weight, 3, axis=-1), np.ones_like(weight)
+        for strength, (_, name) in zip(strengths, self._dyes.values(), strict=True):
             light = 0.25 * strength**3
             colour += strength * (style.rgb(name) * (1.0 - light) + light)
             weight += strength
@@ -127,9 +134,8 @@ class FieldVorticity:
         if run.grid is None:
             raise ValueError("a run without fluid has no vorticity")
         self.grid = run.grid
-        sizes = [np.abs(vorticity(state, run.grid)).ravel() for state in run.sampled(SAMPLES)]
-        self.limit = robust(sizes)
-        self.table = _fading(255)
+        self.limit = turning([vorticity(state, run.grid) for state in run.sampled(SAMPLES)])
+        self.table = _fading(1023)
         self.legend: Sequence[tuple[str, str]] = ()
         self.scale: Scale | None = (
             over(self.table, background) / 255.0,
@@ -139,7 +145,8 @@ class FieldVorticity:
         )
 
     def image(self, state: State) -> Pixels:
-        return self.table[levels(vorticity(state, self.grid).T / self.limit, len(self.table))]
+        share = refined(vorticity(state, self.grid).T / self.limit)
+        return self.table[levels(share, len(self.table))]
 
 
 class FieldNumber:
@@ -150,7 +157,7 @@ class FieldNumber:
 
     def __init__(self, run: Run, shown: Shown) -> None:
         self._shown, self.values = shown, shown.values
-        seen = [np.abs(shown.values(state))[_fluid(state)] for state in run.sampled(SAMPLES)]
+        seen = [np.abs(shown.values(state))[in_fluid(state)] for state in run.sampled(SAMPLES)]
         self.limit = robust(seen, HIGHEST)
         self.table = shown.table(255)
         low = -self.limit if shown.signed else 0.0
@@ -158,8 +165,8 @@ class FieldNumber:
         self.scale: Scale | None = (self.table / 255.0, low, self.limit, shown.name)
 
     def image(self, state: State) -> Pixels:
-        values = filled(self.values(state)[:, :, 0], state["open"][:, :, 0])
-        return opaque(self.colours(values.T))
+        values = filled(self.values(state)[:, :, 0], in_fluid(state)[:, :, 0])
+        return opaque(self.colours(refined(values.T)))
 
     def colours(self, values: Array) -> Pixels:
         """(..., 3) colours of values in the quantity's unit."""
@@ -183,41 +190,6 @@ class Shown:
     table: Callable[[int], Pixels]
 
 
-def speed(state: State) -> Array:
-    """(nx, ny, nz) size of the velocity in the cells, m/s."""
-    parts = [
-        0.5 * (np.delete(faces, 0, axis) + np.delete(faces, -1, axis))
-        for axis, faces in enumerate(state.get(f"velocity_{name}") for name in "xyz")
-        if faces is not None
-    ]
-    return np.asarray(np.sqrt(sum(part.astype(float) ** 2 for part in parts)))
-
-
-def pressure(state: State) -> Array:
-    """(nx, ny, nz) pressure in the cells about its mean in the fluid, Pa."""
-    values = state["pressure"].astype(float)
-    known = values[_fluid(state)]
-    return np.asarray(values - (known[np.isfinite(known)].mean() if known.size else 0.0))
-
-
-def _fluid(state: State) -> NDArray[np.bool_]:
-    """(nx, ny, nz) cells that are mostly open."""
-    return np.asarray(state["open"] > 0.5)
-
-
-def robust(values: Sequence[Array], percentile: float = ROBUST) -> float:
-    """Size at which colours are strongest: that of all but the largest of the values' sizes."""
-    sizes = np.abs(np.concatenate([one.ravel() for one in values]))
-    sizes = sizes[np.isfinite(sizes)]
-    return max(float(np.percentile(sizes, percentile)), 1e-12) if sizes.size else 1.0
-
-
-def levels(share: Array, count: int) -> NDArray[np.intp]:
-    """Rows of a table of `count` colours for shares of the limit from -1 to 1."""
-    half = 0.5 * (count - 1)
-    return np.rint(half + half * np.clip(np.nan_to_num(share), -1.0, 1.0)).astype(np.intp)
-
-
 def opaque(colours: Pixels) -> Pixels:
     """(..., 4) colours (..., 3) that hide what is behind."""
     return np.concatenate([colours, np.full((*colours.shape[:-1], 1), 255, np.uint8)], axis=-1)
@@ -229,49 +201,6 @@ def over(image: Pixels, background: str) -> Pixels:
     return np.rint(image[..., :3] * share + 255.0 * style.rgb(background) * (1.0 - share)).astype(
         np.uint8
     )
-
-
-def full_strength(frames: Sequence[NDArray[np.floating]]) -> float:
-    """Value at which a dye has its full colour: that of most of what is strong, not the largest,
-    which is one of the swings that advection makes beside an edge."""
-    values = np.concatenate([frame.ravel() for frame in frames])
-    values = values[np.isfinite(values)]
-    strong = values[values > 0.5 * values.max(initial=0.0)]
-    return max(float(np.percentile(strong, STRONG)), 1e-12) if strong.size else 1.0
-
-
-def vorticity(state: State, grid: Grid) -> Array:
-    """(nx, ny) vorticity about z at the cell centres, 1/s; closed cells continue their neighbours.
-
-    The corners' values dv/dx - du/dy are averaged; the outermost corners take those next to them.
-    """
-    u, v = state["velocity_x"][:, :, 0], state["velocity_y"][:, :, 0]
-    corners = (np.diff(v[:, 1:-1], axis=0) - np.diff(u[1:-1], axis=1)) / grid.spacing
-    padded = np.pad(corners.astype(float), 1, mode="edge")
-    cells = 0.25 * (padded[1:, 1:] + padded[1:, :-1] + padded[:-1, 1:] + padded[:-1, :-1])
-    return filled(cells, state["open"][:, :, 0])
-
-
-def filled(values: NDArray[np.floating], open_cells: NDArray[np.floating]) -> Array:
-    """`values` (nx, ny) with mostly closed cells and NaNs replaced by the mean of their neighbours.
-
-    Two layers are filled, so that interpolation beside a body's edge sees no jump; beyond them
-    stands 0.
-    """
-    known = np.isfinite(values) & (open_cells > 0.5)
-    result = np.where(known, values, 0.0).astype(float)
-    for _ in range(2):
-        total, count = _around(result), _around(known.astype(float))
-        reached = ~known & (count > 0.0)
-        result[reached] = total[reached] / count[reached]
-        known |= reached
-    return result
-
-
-def _around(values: Array) -> Array:
-    """Sum over the four neighbours of each cell."""
-    padded = np.pad(values, 1)
-    return np.asarray(padded[2:, 1:-1] + padded[:-2, 1:-1] + padded[1:-1, 2:] + padded[1:-1, :-2])
 
 
 def _fading(count: int) -> Pixels:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
@@ -17,6 +17,7 @@ from flowborne.view.arrows import arrow
 from flowborne.view.fields import field_of, over
 from flowborne.view.forces import SHAFT, Forces
 from flowborne.view.map_image import MapImage
+from flowborne.view.marks import crosses, goes_along
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
@@ -45,7 +46,8 @@ class MapSlab:
         x0, x1, y0, y1 = self.views[0]
         self.width = float(x1 - x0)
         self.aspect = float((y1 - y0) / (x1 - x0))
-        self.forces = Forces(run, min(x1 - x0, y1 - y0))
+        self._side = float(min(x1 - x0, y1 - y0))
+        self.forces = Forces(run, self._side)
         self.legend = () if self._field is None else self._field.legend
         self.scale = None if self._field is None else self._field.scale
 
@@ -63,6 +65,11 @@ class MapSlab:
         elif self.run.wind.any():
             axes.add_collection(self._wind)
             moving.append(self._wind)
+        self._marks: LineCollection | None = None
+        if goes_along(self.views, self._side) and not self._shot.transparent:
+            self._marks = LineCollection([], colors=style.MOTES, linewidths=1.0, animated=True)
+            axes.add_collection(self._marks)
+            moving.append(self._marks)
         bodies = [self.run.geoms[n].body for n in self._shown]
         colours = [style.body_colour(body, self.run.accented) for body in bodies]
         edged: dict[str, Any] = {"edgecolors": style.EDGE, "linewidths": 1.1, "joinstyle": "round"}
@@ -90,6 +97,11 @@ class MapSlab:
         elif self.run.wind.any():
             corner, wind = self.views[0, [0, 2]], self.run.wind.sum(axis=0)[:2]
             self._wind.set_verts(wind_arrows(self.views[number], corner, wind))
+        if self._marks is not None:
+            x0, x1, y0, y1 = self.views[number]
+            self._marks.set_segments(
+                list(crosses(np.array([x0, y0]), np.array([x1, y1]), self._side))
+            )
         outlines = self._outlines.placed(state)
         self._bodies.set_verts([outlines[n] for n in self._shown])
         loops = flesh_loops(self.run, state)

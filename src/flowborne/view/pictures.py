@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
@@ -31,6 +32,12 @@ Array = NDArray[np.float64]
 
 FIGURE_SPACE = "\u2007"
 """As wide as a digit, so that words stand still while their numbers change."""
+
+LONGEST_BAR = 120.0
+"""Length of a scale bar at most, pixels."""
+
+PLAIN_SIDE = 600.0
+"""Smaller side in pixels of a map from which on what is written on it grows with it."""
 
 NAMED = 3
 """Joints whose positions are written beside the time."""
@@ -98,6 +105,8 @@ class Picture:
         axes.spines[:].set_visible(False)
         self._moving = list(self.map.draw_on(axes, self.layout.map.width))
         self._clock: Text | None = None
+        if shot.scale_bar and not shot.plots and not shot.transparent:
+            self._moving += self._bar_on_map(self.layout.axes(figure, self.layout.map))
         if self.layout.legend is not None:
             self._draw_legend(self.layout.axes(figure, self.layout.legend), self.layout.legend)
             self._clock = self._draw_header()
@@ -162,8 +171,12 @@ class Picture:
         width, height = box.width, box.height
         axes.set(xlim=(0, width), ylim=(0, height))
         axes.axis("off")
-        middle = 0.5 * height
-        place = self._length_bar(axes, middle)
+        middle, place = 0.5 * height, 0.0
+        if self.shot.scale_bar:
+            length, pixels = self._bar(LONGEST_BAR)
+            for x, y, across, high in _bar_parts(0.0, middle, pixels, 1.0):
+                axes.add_patch(Rectangle((x, y), across, high, color=style.MUTED, lw=0))
+            place = _write(axes, pixels + 8, middle, f"{length:g} m")
         if self.map.forces.large > 0.0:
             place = self._force_key(axes, place, middle)
         for name, colour in self.map.legend:
@@ -182,12 +195,41 @@ class Picture:
             _write(axes, right + 8, middle, _signed(high))
             _write(axes, left - 8, middle, f"{name}   {_signed(low)}", "right")
 
-    def _length_bar(self, axes: Axes, middle: float) -> float:
-        """Draw a bar of a round length; the place behind it."""
-        length = round_number(120.0 * self._metres)
-        pixels = length / self._metres
-        axes.add_patch(Rectangle((0, middle - 1.5), pixels, 3, color=style.MUTED, lw=0))
-        return _write(axes, pixels + 8, middle, f"{length:g} m")
+    def _bar(self, most: float) -> tuple[float, float]:
+        """Length of a bar in m, a round number, and in pixels of the layout, at most `most`."""
+        length = round_number(most * self._metres)
+        return length, length / self._metres
+
+    def _bar_on_map(self, axes: Axes) -> list[Artist]:
+        """A bar of a round length in the lower left corner of a map that is all of the picture, in
+        `axes` over it."""
+        box = self.layout.map
+        axes.set(xlim=(0, box.width), ylim=(0, box.height))
+        axes.axis("off")
+        size = max(1.0, min(box.width, box.height) / PLAIN_SIDE)
+        length, pixels = self._bar(min(LONGEST_BAR * size, 0.25 * box.width))
+        edge = [withStroke(linewidth=2.4 * size, foreground=style.EDGE, alpha=0.6)]
+        left = bottom = 22.0 * size
+        artists: list[Artist] = [
+            axes.add_patch(
+                Rectangle((x, y), across, high, color=style.TEXT, lw=0, path_effects=edge)
+            )
+            for x, y, across, high in _bar_parts(left, bottom, pixels, size)
+        ]
+        artists.append(
+            axes.text(
+                left + pixels + 9.0 * size,
+                bottom,
+                f"{length:g} m",
+                color=style.TEXT,
+                fontsize=9.0 * size,
+                va="center_baseline",
+                path_effects=edge,
+            )
+        )
+        for artist in artists:
+            artist.set_animated(True)
+        return artists
 
     def _force_key(self, axes: Axes, place: float, middle: float) -> float:
         """Draw the arrow of a round force; the place behind it."""
@@ -209,6 +251,15 @@ class Picture:
             number = f"{values[row]:+{digits + 5}.{digits}f}".replace(" ", FIGURE_SPACE)
             words.append(f"{name} {number.replace('-', '−')}{unit}")
         return (4 * FIGURE_SPACE).join([*words, f"t = {time:.2f} s"])
+
+
+def _bar_parts(
+    left: float, middle: float, pixels: float, size: float
+) -> list[tuple[float, float, float, float]]:
+    """(left, bottom, width, height) of a bar and of the ticks at its ends."""
+    thin, tick = 2.0 * size, 9.0 * size
+    ends = [(x, middle - 0.5 * tick, thin, tick) for x in (left, left + pixels - thin)]
+    return [(left, middle - 0.5 * thin, pixels, thin), *ends]
 
 
 def _signed(value: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -128,6 +128,7 @@ class Run:
     states             files of states/, in order
     flesh              what is drawn of flesh; None without
     carried            the model's skins, in a room
+    sources            (n, 2, 3) m, lower and upper corners of sources of dye
     """
 
     name: str
@@ -145,6 +146,7 @@ class Run:
     states: tuple[Path, ...]
     flesh: Flesh | None = None
     carried: tuple[CarriedSkin, ...] = ()
+    sources: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -181,6 +183,7 @@ class Run:
             states=states,
             flesh=_flesh(model.get("flesh")),
             carried=tuple(_carried(entry) for entry in model.get("skins", ())),
+            sources=_sources(scene),
         )
 
     @property
@@ -257,6 +260,12 @@ def _carried(entry: dict[str, Any]) -> CarriedSkin:
         np.asarray(entry["body_rotation"], float),
         np.asarray(entry["rgba"][:3], float),
     )
+
+
+def _sources(scene: dict[str, Any]) -> Array:
+    """Of a scene in space."""
+    boxes = [(t["lower"], t["upper"]) for t in scene.get("sources", ()) if t.get("dye")]
+    return np.array([box for box in boxes if len(box[0]) == 3], float).reshape(-1, 2, 3)
 
 
 def _history(path: Path) -> dict[str, Array]:

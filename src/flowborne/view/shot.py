@@ -38,6 +38,7 @@ class Shot:
     field: Literal["dye", "vorticity", "speed", "pressure", "none"] = "vorticity"
     bones: bool = False
     plots: bool = True
+    scale_bar: bool = True
     size: tuple[int, int] | None = None
     frames_per_second: float | None = None
     start: float | None = None

@@ -20,6 +20,7 @@ EDGE = "#05090f"
 FORCE = "#6dffb0"
 FLOOR = "#16273b"
 SQUARES = "#2c425b"
+MOTES = "#5f7d9c"
 
 SEEN_THROUGH = 0.42
 """Opacity of flesh that shows its bones."""
@@ -27,10 +28,10 @@ SEEN_THROUGH = 0.42
 DYES = ("#2fd3ee", "#ff72b6", "#b9f24d", "#a992ff")
 CURVES = ("#ffb81f", "#5cc8ff", "#ff72b6", "#b9f24d", "#a992ff", "#ff8a5c")
 
-SPIN_LEFT = ("#ffe3d8", "#ff5648", "#7e2231")
+SPIN_LEFT = ("#ffb26b", "#ff4f42", "#7e2231")
 """Colours of strong, middling and weak vorticity that turns counter-clockwise."""
 
-SPIN_RIGHT = ("#d9f0ff", "#2f9dff", "#15457f")
+SPIN_RIGHT = ("#74ecff", "#2f8fff", "#15457f")
 """The same for clockwise."""
 
 SPEED = ("#0b1420", "#233a7a", "#6d3fa5", "#c94f7c", "#f7a14a", "#fff3b0")

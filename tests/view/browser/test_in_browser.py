@@ -117,6 +117,10 @@ def test_first_picture_and_three_moments(browser: Any, run: Path, tmp_path: Path
     times = flowborne.open_run(run).times
     with served(run) as address:
         page, seconds = opened(browser, address)
+        assert page.title() == f"{run.name} – flowborne"
+        label = page.locator('xpath=//label[text()="time (s)"]')
+        colour = label.evaluate("one => getComputedStyle(one).color")
+        assert colour == f"rgb({', '.join(str(round(255 * x)) for x in style.rgb(style.MUTED))})"
         print(f"{run.name}: first picture after {seconds:.2f} s")
         moments = []
         for n, share in enumerate((0.25, 0.5, 1.0)):

@@ -15,13 +15,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flowborne.cli import main
+from flowborne.colours import to_linear
 from flowborne.errors import SceneError
 from flowborne.io.cell_fields import cell_velocity
 from flowborne.io.run_folder import RunFolder, RunFolderError
 from flowborne.scenes.schema_film import FilmTable
+from flowborne.view import style
 from flowborne.view.browser.camera_keys import camera_text
+from flowborne.view.browser.curves import room_for
 from flowborne.view.browser.growing import GrowingRun
 from flowborne.view.browser.layer import velocity_arrows
+from flowborne.view.browser.page import CSS
 from flowborne.view.browser.viewer import Viewer, open_viewer
 from flowborne.view.browser.viewpoint import FilmView, Viewpoint
 from flowborne.view.outlines import Outlines
@@ -67,6 +71,27 @@ def distance_to_block(state: dict[str, np.ndarray], points: np.ndarray) -> np.nd
     """(n,) m, of points in the plane from the outline of the block of 1 m x 0.18 m."""
     local = (points - state["geom_position"][1]) @ state["geom_rotation"][1]
     return np.asarray(np.maximum(np.abs(local[:, 0]) - 0.5, np.abs(local[:, 1]) - 0.09))
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of "#rrggbb", as WCAG 2.2 has it."""
+    return float(to_linear(style.rgb(colour)) @ [0.2126, 0.7152, 0.0722])
+
+
+def test_words_stand_out_from_their_ground() -> None:
+    """WCAG 2.2, 1.4.3: 4.5:1, on the panel of viser and on what films are drawn on."""
+    assert style.MUTED in CSS
+    for ground in ("#242424", style.WATER, style.PAPER):
+        for words in (style.MUTED, style.TEXT):
+            assert (luminance(words) + 0.05) / (luminance(ground) + 0.05) > 4.5
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "longest"),
+    [(-263_900.0, 100_000.0, "-263,900"), (-1.2e-4, 3e-5, "-0.00012"), (0.0, 0.0, "0.000")],
+)
+def test_numbers_at_an_axis_have_room(low: float, high: float, longest: str) -> None:
+    assert room_for(low, high) >= 6.0 * len(longest) + 14
 
 
 def test_bodies_are_where_the_run_has_them(viewer: Viewer) -> None:

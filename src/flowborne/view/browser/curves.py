@@ -21,6 +21,12 @@ Array = NDArray[np.float64]
 SAMPLES = 400
 """Times of a curve that are sent at most: about a pixel each."""
 
+CHARACTER, BESIDE = 6.6, 16
+"""Pixels of a character of a number at an axis, and of what is beside numbers."""
+
+LEAST_ROOM = 58
+"""Pixels for numbers at an axis at least: plots one below the other begin at the same place."""
+
 HEIGHT = 150
 """Of a plot, pixels."""
 
@@ -50,7 +56,8 @@ class Curves:
                 self._data(values, 0.0),
                 _series(len(curves)),
                 scales={"x": {"time": False}, "y": {"range": robust_limits(values)}},
-                axes=(_axis(34, "time (s)"), _axis(58)),
+                axes=(_axis(34, "time (s)"), _axis(room_for(*robust_limits(values)))),
+                padding=(8, 16, 0, 0),
                 legend={"show": False},
                 height=HEIGHT,
             )
@@ -91,6 +98,14 @@ def _series(count: int) -> tuple[Any, ...]:
 
 def _colour(curve: int) -> str:
     return style.CURVES[curve % len(style.CURVES)]
+
+
+def room_for(low: float, high: float) -> int:
+    """Pixels for the numbers of an axis from `low` to `high`, of which there are at most eight."""
+    step = (high - low) / 8.0
+    digits = max(0, -int(np.floor(np.log10(step)))) if step > 0.0 else 3
+    longest = max(len(f"{end:,.{digits}f}") for end in (low, high))
+    return max(LEAST_ROOM, round(CHARACTER * longest) + BESIDE)
 
 
 def _axis(size: int, label: str | None = None) -> Any:

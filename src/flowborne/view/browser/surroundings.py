@@ -11,6 +11,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.arrows import round_number
 from flowborne.view.browser.viewpoint import FilmView
+from flowborne.view.marks import crosses, goes_along, motes
 from flowborne.view.run import Run
 from flowborne.view.space.arrows import arrow_mesh
 from flowborne.view.space.ground import SQUARE, stands
@@ -18,6 +19,9 @@ from flowborne.view.space.lighting import LIGHTS
 
 if TYPE_CHECKING:
     from viser import SceneApi
+
+MOTES = 20_000
+"""Points in a cube around the domain."""
 
 BRIGHT = 3.0
 """Strength of a light in a browser over that in a film: there it is divided by pi."""
@@ -43,6 +47,8 @@ def surround(scene: SceneApi, run: Run, view: FilmView) -> None:
         _lay_ground(scene, view)
     if run.grid is not None and not run.slab:
         _draw_edges(scene, run.grid)
+    if run.grid is not None and not ground and goes_along(view.path, view.side):
+        _mark(scene, run.grid, view, run.slab)
     if run.grid is None and run.wind.any():
         _blow(scene, run, view)
 
@@ -79,6 +85,32 @@ def _lay_ground(scene: SceneApi, view: FilmView) -> None:
         plane_color=style.rgb(style.FLOOR),
         plane_opacity=0.0,
         position=(0.0, 0.0, -1e-3 * view.side),
+    )
+
+
+def _mark(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
+    """What stands still in the water, where the view goes along with the bodies."""
+    low, high = np.array(grid.origin), np.array(grid.upper)
+    if slab:
+        strokes = crosses(low[:2], high[:2], view.side)
+        above = 1e-3 * view.side
+        scene.add_line_segments(
+            "/run/marks",
+            np.pad(strokes, ((0, 0), (0, 0), (0, 1)), constant_values=above).astype(np.float32),
+            style.rgb(style.MOTES),
+            thickness=1.0,
+            thickness_units="screen",
+        )
+        return
+    reach = 0.5 * float((high - low).max())
+    middle = 0.5 * (low + high)
+    points = motes(MOTES, middle, reach)
+    inside = points[((points > low) & (points < high)).all(axis=1)]
+    scene.add_point_cloud(
+        "/run/marks",
+        inside.astype(np.float32),
+        style.rgb(style.MOTES),
+        point_size=0.004 * view.side,
     )
 
 

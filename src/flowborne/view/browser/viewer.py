@@ -19,6 +19,7 @@ from flowborne.view.browser.fluid import Fluid
 from flowborne.view.browser.growing import GrowingRun
 from flowborne.view.browser.legend import legend_html
 from flowborne.view.browser.origins import only_own_requests
+from flowborne.view.browser.page import dress
 from flowborne.view.browser.panel import Panel
 from flowborne.view.browser.settings import Settings
 from flowborne.view.browser.solids import Bodies, Pushes, SkinMesh
@@ -78,6 +79,7 @@ class Viewer:
         server = self.server
         server.scene.reset()
         server.gui.reset()
+        dress(server, run.name)
         self.run, self._view = run, FilmView.of(run)
         self.timeline = Timeline(run.times)
         first, side = self._view.first, self._view.side

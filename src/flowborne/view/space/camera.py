@@ -84,6 +84,7 @@ def camera_of(run: Run, shot: Shot, aspect: float | None = None) -> Camera:
     """The camera of a run; what it sees has the same size in all frames unless it stands still.
 
     The domain of a fluid is seen whole where the bodies fill much of it, and where there are none.
+    Sources of dye nearby are seen as well, where dye is.
 
     aspect  height over width that the map must have, if any
     raises  ValueError when it follows a body that is not there
@@ -95,6 +96,8 @@ def camera_of(run: Run, shot: Shot, aspect: float | None = None) -> Camera:
         filled = FILLED_BY_FLUID
         if radius > 0.0 and np.linalg.norm(high - low) > 2.0 * WHOLE * radius:
             seen = ROOM * seen
+            if shot.field == "dye":
+                seen = np.concatenate([seen, _sources(run, path, WHOLE * radius)], axis=1)
         else:
             if shot.camera.target is None:
                 path = np.broadcast_to(0.5 * (low + high), path.shape)
@@ -103,6 +106,15 @@ def camera_of(run: Run, shot: Shot, aspect: float | None = None) -> Camera:
     elif shot.camera.follow != "bodies":
         seen = ROOM * seen
     return _placed(path, seen, shot.camera, run.times, filled, aspect)
+
+
+def _sources(run: Run, path: Array, far: float) -> Array:
+    """(frames, n, 3) m, from the path, the corners of sources of dye that are never farther than
+    `far` m from it: what they give off is to be seen as well."""
+    corners = [list(product(*box.T)) for box in run.sources]
+    around = np.array(corners, float).reshape(-1, 1, 8, 3) - path[:, None]
+    near = around[np.linalg.norm(around, axis=-1).max(axis=(1, 2), initial=0.0) <= far]
+    return np.asarray(np.moveaxis(near, 0, 1).reshape(len(path), -1, 3))
 
 
 def _placed(

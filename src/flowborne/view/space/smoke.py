@@ -19,12 +19,13 @@ Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
 THICK = 0.016
-"""Depth of full smoke that lets through a third of the light, in sides of the domain."""
+"""Depth of full smoke that lets through a third of the light, in heights of the picture, or in
+sides of a smaller domain."""
 
 CELLS = 0.8
 """The same in cells at least: what is thinner has steps in it."""
 
-FAINT, FULL = 0.06, 0.75
+FAINT, FULL = 0.06, 0.5
 """Densities below which smoke is not seen, and from which on it is full."""
 
 FINE = 1_500_000
@@ -34,9 +35,10 @@ FINE = 1_500_000
 class Smoke:
     """A cloud in a plotter."""
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, dye: SeenDye) -> None:
+    def __init__(self, plotter: pv.Plotter, grid: Grid, dye: SeenDye, height: float) -> None:
+        """`height`: m, of what is seen."""
         self._grid, self._dye = grid, dye
-        self._depth = max(THICK * max(grid.shape), CELLS)
+        self._depth = max(THICK * min(max(grid.shape), height / grid.spacing), CELLS)
         self._mapper = vtkGPUVolumeRayCastMapper()
         self._mapper.SetAutoAdjustSampleDistances(False)
         self._mapper.SetUseJittering(True)

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.forces import SHAFT, Forces
+from flowborne.view.marks import goes_along
 from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows
 from flowborne.view.space.camera import Camera
 from flowborne.view.space.ground import Ground, stands
 from flowborne.view.space.lighting import KEY, LIGHTS
+from flowborne.view.space.motes import Motes
 from flowborne.view.space.outside import Outside, pushes
 from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
 from flowborne.view.space.shapes import LIT, colour_of, mesh_of
@@ -65,10 +67,12 @@ class Stage:
         ]
         self._outside = Outside(run.geoms, meshes, run.skins)
         self._arrows = Arrows(plotter, max(len(run.bodies), 1), style.FORCE, 0.35)
-        self._ground = self._wind = None
+        self._ground = self._wind = self._motes = None
         if stands(run):
             behind = None if shot.transparent else shot.colour
             self._ground = Ground(plotter, camera.height, np.array(KEY), behind)
+        elif goes_along(camera.focus, camera.height) and not shot.transparent:
+            self._motes = Motes(plotter, camera.height, run.grid)
         self._edges: list[tuple[Array, pv.Actor]] = []
         if run.grid is not None:
             self._edges = _edges(plotter, run.grid)
@@ -76,7 +80,7 @@ class Stage:
             self._wind = WindArrows(plotter, run, camera, 0.0 if self._ground else -np.inf)
         self._fluid: Smoke | Vortices | Slice | None = None
         if run.grid is not None and isinstance(seen, SeenDye):
-            self._fluid = Smoke(plotter, run.grid, seen)
+            self._fluid = Smoke(plotter, run.grid, seen, camera.height)
         elif run.grid is not None and isinstance(seen, SeenVortices):
             self._fluid = Vortices(plotter, run.grid, seen)
         elif run.grid is not None and isinstance(seen, SeenSlice):
@@ -93,6 +97,8 @@ class Stage:
         )
         if self._ground is not None:
             self._ground.show(focus, self._placed(centres, turns), corners)
+        if self._motes is not None:
+            self._motes.show(focus, toward)
         if self._wind is not None:
             self._wind.show(number, float(state["time"]))
         if isinstance(self._fluid, Slice):
