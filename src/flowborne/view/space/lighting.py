@@ -20,7 +20,7 @@ LIGHTS = (
 )
 """Direction, strength and colour of the lights: from above the camera, its right, and behind."""
 
-AMBIENT = 0.5
+AMBIENT = 0.6
 """Light that comes from everywhere, shadow or not."""
 
 BRIGHT = 1.35
