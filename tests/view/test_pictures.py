@@ -59,7 +59,7 @@ def test_the_map_shows_every_cell_where_it_is(write_run: Write, wanted: str) -> 
     assert isinstance(field, FieldDye if wanted == "dye" else FieldVorticity)
     fine = over(field.image(run.state(6)), style.WATER).astype(int)
     parts = fine.shape[0] // 96
-    middle = slice(parts // 2 - 1, parts // 2 + 1)
+    middle = slice((parts - 1) // 2, parts // 2 + 1)
     expected = fine.reshape(96, parts, 96, parts, 3)[:, middle, :, middle].mean(axis=(1, 3))
     found = at_cells(picture, cut_out(picture.draw(6), picture.layout.map))
     free = np.ones(found.shape[:2], bool)

@@ -109,7 +109,7 @@ class FieldDye:
     def image(self, state: State) -> Pixels:
         known = in_fluid(state)[:, :, 0]
         strengths = [
-            np.clip(refined(filled(state[dye][:, :, 0] / full, known).T), 0.0, 1.0)[..., None]
+            np.clip(filled(state[dye][:, :, 0] / full, known).T, 0.0, 1.0)[..., None]
             for dye, (full, _) in self._dyes.items()
         ]
         weight: Array = np.zeros_like(strengths[0])

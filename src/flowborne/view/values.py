@@ -25,11 +25,12 @@ TURNING = 0.4
 UNCUT = 0.999
 """Open part of a cell from which on no body cuts it."""
 
-FINE = 512
+FINE = 256
 """Points along the longer side of a field that values are refined to at least."""
 
-FILLED = 4
-"""Layers of cells into a body that continue the fluid."""
+FILLED, FILLED_SLOPES = 2, 4
+"""Layers of cells into a body that continue the fluid: of its values, and of their differences,
+which cut cells do not have."""
 
 
 def speed(state: State) -> Array:
@@ -68,7 +69,7 @@ def vorticity(state: State, grid: Grid) -> Array:
     counted &= whole[1:, 1:] & whole[1:, :-1] & whole[:-1, 1:] & whole[:-1, :-1]
     padded = np.pad(np.where(counted, corners, 0.0).astype(float), 1, mode="edge")
     count = _corners(np.pad(counted.astype(float), 1, mode="edge"))
-    return filled(_corners(padded) / np.maximum(count, 1.0), count > 0.0)
+    return filled(_corners(padded) / np.maximum(count, 1.0), count > 0.0, FILLED_SLOPES)
 
 
 def _corners(values: Array) -> Array:
@@ -76,14 +77,14 @@ def _corners(values: Array) -> Array:
     return np.asarray(values[1:, 1:] + values[1:, :-1] + values[:-1, 1:] + values[:-1, :-1])
 
 
-def filled(values: NDArray[np.floating], known: NDArray[np.bool_]) -> Array:
+def filled(values: NDArray[np.floating], known: NDArray[np.bool_], layers: int = FILLED) -> Array:
     """`values` (nx, ny) with those not known, and NaNs, replaced by the mean of their neighbours.
 
-    FILLED layers are, so that interpolation at a body's edge finds no jump; beyond them stands 0.
+    `layers` of cells are, so that interpolation at a body's edge finds no jump; beyond them stands 0.
     """
     known = np.isfinite(values) & known
     result = np.where(known, values, 0.0).astype(float)
-    for _ in range(FILLED):
+    for _ in range(layers):
         total, count = _around(result), _around(known.astype(float))
         reached = ~known & (count > 0.0)
         result[reached] = total[reached] / count[reached]
