@@ -80,7 +80,7 @@ def _corners(values: Array) -> Array:
 def filled(values: NDArray[np.floating], known: NDArray[np.bool_], layers: int = FILLED) -> Array:
     """`values` (nx, ny) with those not known, and NaNs, replaced by the mean of their neighbours.
 
-    `layers` of cells are, so that interpolation at a body's edge finds no jump; beyond them stands 0.
+    `layers` of cells are, so that interpolation at a body's edge finds no jump; beyond them is 0.
     """
     known = np.isfinite(values) & known
     result = np.where(known, values, 0.0).astype(float)
