@@ -28,8 +28,8 @@ from flowborne.progress import RunProgress, Stage
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
-from flowborne.scenes.warn import warnings_of
 from flowborne.scenes.settling import can_settle
+from flowborne.scenes.warn import warnings_of
 from flowborne.simulation import BlowUpError, Simulation
 
 if TYPE_CHECKING:
