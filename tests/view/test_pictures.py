@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -265,3 +266,17 @@ def test_vorticity_of_a_rigid_rotation_is_twice_its_rate(write_run: Write) -> No
     np.testing.assert_allclose(
         vorticity(state, run.grid)[state["open"][:, :, 0] > 0.5], 3.0, rtol=1e-9
     )
+
+
+def test_a_bare_picture_has_a_bar_of_the_length_that_it_says(write_run: Write) -> None:
+    run = Run.read(write_run())
+    bare = replace(run.shot, plots=False, size=(480, 480))
+    with_bar = Picture(run, shot=bare).draw(2)[:, :, :3].astype(int)
+    without = Picture(run, shot=replace(bare, scale_bar=False)).draw(2)[:, :, :3].astype(int)
+    rows, columns = np.nonzero(like(with_bar, style.TEXT, 4) & ~like(without, style.TEXT, 4))
+    low = rows > 480 * 0.9
+    row = np.bincount(rows[low]).argmax()
+    bar = columns[rows == row]
+    longest = max(np.split(bar, np.flatnonzero(np.diff(bar) > 1) + 1), key=len)
+    # 1 m of the 4 m across
+    assert len(longest) == pytest.approx(120, abs=3)

@@ -13,7 +13,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from numpy.typing import NDArray
@@ -174,8 +174,8 @@ class Picture:
         middle, place = 0.5 * height, 0.0
         if self.shot.scale_bar:
             length, pixels = self._bar(LONGEST_BAR)
-            for x, y, across, high in _bar_parts(0.0, middle, pixels, 1.0):
-                axes.add_patch(Rectangle((x, y), across, high, color=style.MUTED, lw=0))
+            bar = _bar_outline(0.0, middle, pixels, 1.0)
+            axes.add_patch(Polygon(bar, color=style.MUTED, lw=0))
             place = _write(axes, pixels + 8, middle, f"{length:g} m")
         if self.map.forces.large > 0.0:
             place = self._force_key(axes, place, middle)
@@ -210,12 +210,10 @@ class Picture:
         length, pixels = self._bar(min(LONGEST_BAR * size, 0.25 * box.width))
         edge = [withStroke(linewidth=2.4 * size, foreground=style.EDGE, alpha=0.6)]
         left = bottom = 22.0 * size
-        artists: list[Artist] = [
-            axes.add_patch(
-                Rectangle((x, y), across, high, color=style.TEXT, lw=0, path_effects=edge)
-            )
-            for x, y, across, high in _bar_parts(left, bottom, pixels, size)
-        ]
+        bar = Polygon(
+            _bar_outline(left, bottom, pixels, size), color=style.TEXT, lw=0, path_effects=edge
+        )
+        artists: list[Artist] = [axes.add_patch(bar)]
         artists.append(
             axes.text(
                 left + pixels + 9.0 * size,
@@ -253,13 +251,14 @@ class Picture:
         return (4 * FIGURE_SPACE).join([*words, f"t = {time:.2f} s"])
 
 
-def _bar_parts(
-    left: float, middle: float, pixels: float, size: float
-) -> list[tuple[float, float, float, float]]:
-    """(left, bottom, width, height) of a bar and of the ticks at its ends."""
-    thin, tick = 2.0 * size, 9.0 * size
-    ends = [(x, middle - 0.5 * tick, thin, tick) for x in (left, left + pixels - thin)]
-    return [(left, middle - 0.5 * thin, pixels, thin), *ends]
+def _bar_outline(left: float, middle: float, pixels: float, size: float) -> Array:
+    """(12, 2) outline of a bar with ticks at its ends."""
+    thin, tick, right = 1.0 * size, 4.5 * size, left + pixels
+    inner, outer = (left + 2.0 * size, right - 2.0 * size), (left, right)
+    x = [outer[0], inner[0], inner[0], inner[1], inner[1], outer[1]]
+    y = [tick, tick, thin, thin, tick, tick]
+    upper = np.column_stack([x, y])
+    return np.concatenate([upper, upper[::-1] * [1.0, -1.0]]) + np.array([0.0, middle])
 
 
 def _signed(value: float) -> str:

@@ -169,3 +169,17 @@ def test_outermost_places_reach_as_far_as_the_geometry(
     places = shape_of(kind, np.array(size), None).outermost()
     np.testing.assert_allclose(places.max(axis=0), reach)
     np.testing.assert_allclose(places.min(axis=0), -np.array(reach))
+
+
+def test_a_source_of_dye_nearby_is_seen_where_dye_is(run_of: Make) -> None:
+    """Below the body, in a lake of which all else is left out; not one that is far away."""
+    centres = np.zeros((9, 1, 3))
+    lake = Grid((80, 80, 80), 0.2, (-8.0, -8.0, -8.0))
+    near, far = [[-0.3, -0.3, -0.5], [0.3, 0.3, -0.4]], [[3.0, 3.0, -6.0], [4.0, 4.0, -5.0]]
+    ball = ("sphere", (0.5, 0.0, 0.0))
+    run = run_of([ball], centres, grid=lake, sources=np.array([near, far]))
+    still, dyed = (camera_of(run, Shot(field=field)) for field in ("speed", "dye"))
+    corners = np.array(np.meshgrid(*zip(*near, strict=True))).reshape(3, -1).T
+    inside = dyed.project(0, corners)
+    assert 0.0 < inside.min() < inside.max() < 1.0
+    assert dyed.height < 2.0 * still.height
