@@ -84,7 +84,7 @@ def test_a_body_of_a_hundredth_of_the_density_is_carried_for_1000_steps(
     set_velocity(world, swirl)
     at_start = energy(world)
     largest = max(float(np.abs(u).max()) for u in world.flow()[1].velocity)
-    for _ in range(STEPS):
+    for number in range(STEPS):
         report = step(world, 1.0 / 64)
         assert report.outcome.name == "DONE", world.steps
         assert report.momentum.exchange_error < 1e-10
@@ -92,7 +92,8 @@ def test_a_body_of_a_hundredth_of_the_density_is_carried_for_1000_steps(
         beside = np.abs(world.solid.q[:2] - 0.5).max() > 0.5 - reach - H
         most = SQUEEZED if beside else 1.5
         assert max(float(np.abs(u).max()) for u in world.flow()[1].velocity) < most * largest
-        assert energy(world) < at_start
+        if number % 10 == 0:  # cutting the grid for it takes as long as the step
+            assert energy(world) < at_start
     assert np.all(np.abs(world.solid.q[:2] - 0.5) < 0.5), "it is still in the box"
     assert energy(world) > 0.2 * at_start, "and still moves"
 
@@ -121,7 +122,7 @@ def in_plate_frame(world: World, x: Array, y: Array) -> tuple[Array, Array]:
     return np.cos(angle) * dx + np.sin(angle) * dy, np.cos(angle) * dy - np.sin(angle) * dx
 
 
-def through_plate(world: World, half_length: float) -> tuple[float, float]:
+def through_plate(world: World, cut: Geometry, half_length: float) -> tuple[float, float]:
     """Volume per time through the faces between cells on two sides of a plate, relative to it.
 
     Faces that reach beyond the plate's ends are left out: what passes there goes around the plate.
@@ -129,7 +130,7 @@ def through_plate(world: World, half_length: float) -> tuple[float, float]:
     returns  what the fluid does, and what an undisturbed stream would do without the plate
     """
     _, state = world.flow()
-    cut, (move, turn) = cut_by_bodies(world), world.solid.v
+    move, turn = world.solid.v
     angle = world.solid.q[1]
     cx, cy = np.meshgrid(*SQUARE.cell_coordinates()[:2], indexing="ij")
     across, along = in_plate_frame(world, cx, cy)
@@ -171,9 +172,10 @@ def test_less_than_a_hundredth_leaks_through_a_thin_plate_in_a_stream(model: Mod
     for _ in range(STEPS):
         report = step(world, 1.0 / 128)
         assert report.outcome.name == "DONE", world.steps
-        found, silhouette = through_plate(world, half_length)
+        cut = cut_by_bodies(world)
+        found, silhouette = through_plate(world, cut, half_length)
         leaked, passed = leaked + abs(found), passed + abs(silhouette)
-        assert fastest(world, cut_by_bodies(world)) < 6.0
+        assert fastest(world, cut) < 6.0
     assert passed > 0.1 * STEPS * 2.0 * half_length
     assert leaked < 0.01 * passed
 
