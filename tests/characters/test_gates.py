@@ -329,6 +329,7 @@ def test_a_density_that_no_body_has_is_refused(tmp_path: Path, density: float) -
 def test_a_stray_point_that_makes_all_others_one_is_refused() -> None:
     points = np.random.default_rng(0).random((2000, 3))
     points[0] = 1e9
-    surface = Surface(points, np.arange(1998).reshape(-1, 3), np.ones((2000, 1)))
+    faces = np.arange(1998).reshape(-1, 3)
+    surface = Surface(points, faces, np.ones((2000, 1)), np.zeros((666, 3)))
     with pytest.raises(SceneError, match=r"points within 100 m .*Look for stray points"):
         closed(surface, "cat.glb")

@@ -16,7 +16,7 @@ metres."""
 ARM = 0.06
 """Half length of a cross, in distances between them."""
 
-MOVED = 0.1
+MOVED = 0.06
 """Way of the camera from which on there are marks, in smaller sides of what is seen."""
 
 

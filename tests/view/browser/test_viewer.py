@@ -8,6 +8,7 @@ import socket
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from flowborne.view.browser.curves import room_for
 from flowborne.view.browser.growing import GrowingRun
 from flowborne.view.browser.layer import velocity_arrows
 from flowborne.view.browser.page import CSS
+from flowborne.view.browser.surroundings import surround
 from flowborne.view.browser.viewer import Viewer, open_viewer
 from flowborne.view.browser.viewpoint import FilmView, Viewpoint
 from flowborne.view.outlines import Outlines
@@ -92,6 +94,20 @@ def test_words_stand_out_from_their_ground() -> None:
 )
 def test_numbers_at_an_axis_have_room(low: float, high: float, longest: str) -> None:
     assert room_for(low, high) >= 6.0 * len(longest) + 14
+
+
+@pytest.mark.parametrize("slab", [True, False])
+def test_marks_stand_in_the_water_where_the_view_goes_along(viewer: Viewer, slab: bool) -> None:
+    scene, run, view = viewer.server.scene, replace(viewer.run, slab=slab), viewer._view
+    assert run.grid is not None
+    for path, there in ((view.path, False), (np.outer(np.arange(13.0), [1.0, 0.0, 0.0]), True)):
+        surround(scene, run, replace(view, path=path))
+        assert ("/run/marks" in scene._handle_from_node_name) == there
+    handle = scene._handle_from_node_name["/run/marks"]
+    places = np.asarray(handle.points).reshape(-1, 3)[:, :2]
+    low, high = np.array(run.grid.origin[:2]), np.array(run.grid.upper[:2])
+    assert len(places) > 50
+    assert ((places > low - 0.1) & (places < high + 0.1)).all()
 
 
 def test_bodies_are_where_the_run_has_them(viewer: Viewer) -> None:
