@@ -11,22 +11,20 @@ import json
 import os
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from flowborne.console import complain, result_printer, run_lines, sentence_of
 from flowborne.errors import PartError, SceneError
 from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write
 from flowborne.version import __version__
-
-if TYPE_CHECKING:
-    from flowborne.running import RunResult
 
 FAILED, WRONG, WARNED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes besides 0."""
@@ -150,9 +148,9 @@ def run(
             progress.say(f"flowborne: {stopped}")
             raise typer.Exit(INTERRUPTED) from stopped
     if result.outcome is not RunOutcome.DONE:
-        _complain(result.message)
+        complain(result.message)
         raise typer.Exit(WARNED if result.outcome is RunOutcome.DOUBTFUL else FAILED)
-    print(_told(result))
+    print(run_lines(result))
 
 
 @app.command()
@@ -350,7 +348,7 @@ def validate(
 
     ids = _known(case or [], case_ids(), "case", "--case")
     (wanted,) = _known([tier], tuple(Tier), "tier", "--tier")
-    show = None if as_json else _result_printer("id", "reference", "tolerance")
+    show = None if as_json else result_printer("id", "reference", "tolerance")
     if report is not None:
         _make_folder(report)
     try:
@@ -361,7 +359,7 @@ def validate(
         raise cannot_write(report or Path(), error) from error
     except KeyboardInterrupt as stopped:
         kept = "" if report is None else f"; {report} has what is done, the same command goes on"
-        _complain(f"interrupted{kept}")
+        complain(f"interrupted{kept}")
         raise typer.Exit(INTERRUPTED) from stopped
     _report(results, as_json)
 
@@ -377,7 +375,7 @@ def bench(
     from flowborne.bench import bench_names, run_benches
 
     chosen = _known(names or [], bench_names(), "bench", "NAME")
-    show = None if as_json else _result_printer("name", "target")
+    show = None if as_json else result_printer("name", "target")
     _report(run_benches(chosen or None, on_result=show), as_json)
 
 
@@ -397,7 +395,7 @@ def figures(
     try:
         make_figures(out, chosen or None)
     except (ArithmeticError, BlowUpError, OSError, ValueError) as error:
-        _complain(str(error))
+        complain(str(error))
         raise typer.Exit(FAILED) from error
     print(f"written: {', '.join(str(path) for path in sorted(out.glob('figure-*')))}")
 
@@ -425,20 +423,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)
     except UsageError as error:
-        _complain(f"{_sentence(error)}; see flowborne --help")
+        complain(f"{sentence_of(error)}; see flowborne --help")
         code = WRONG
     except SceneError as error:
         for problem in error.problems:
-            _complain(problem)
+            complain(problem)
         code = WRONG
     except (InputError, RunFolderError) as error:
-        _complain(str(error))
+        complain(str(error))
         code = WRONG
     except StoppedError as stop:
-        _complain(str(stop))
+        complain(str(stop))
         code = INTERRUPTED
     except (KeyboardInterrupt, typer.Abort):
-        _complain("interrupted")
+        complain("interrupted")
         code = INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -483,56 +481,9 @@ def _known(asked: list[str], known: Sequence[str], kind: str, option: str) -> li
     return asked
 
 
-def _result_printer(name: str, *columns: str) -> Callable[[Any], None]:
-    """Function that prints a result of a validation or a bench as it comes."""
-
-    def show(result: Any) -> None:
-        shown = "  ".join(f"{c} {_number(getattr(result, c))}" for c in ("value", *columns))
-        print(f"{result.verdict.upper():<4}  {getattr(result, name)}  {result.title}  {shown}")
-        for line in result.lines:
-            print(f"        {line}")
-        sys.stdout.flush()
-
-    return show
-
-
-def _number(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 def _report(results: Sequence[Any], as_json: bool) -> None:
     """Print all results as JSON when asked to; leave with 1 when one has failed."""
     if as_json:
         print(json.dumps([result.as_dict() for result in results], indent=2))
     if any(result.verdict == "fail" for result in results):
         raise typer.Exit(FAILED)
-
-
-def _told(result: RunResult) -> str:
-    """A finished run in a few lines."""
-    summary = result.summary
-    lines = [result.message]
-    for column, value in summary["final_mean"].items():
-        lines.append(f"  {column}: {value:.4f} (mean of the last frames)")
-    if summary["final_objective"] is not None:
-        lines.append(f"  objective: {summary['final_objective']:.4g} (mean of the last decisions)")
-    if summary["converged_frame"] is not None:
-        lines.append(f"  converged at frame {summary['converged_frame']}")
-    pace = f"  {summary['seconds_per_frame']:.3g} s per frame"
-    if summary["bytes_per_cell"] is not None:
-        pace += f", {summary['bytes_per_cell']:.0f} bytes per cell"
-    if summary["peak_memory_bytes"] is not None:
-        pace += f", {summary['peak_memory_bytes'] / 1e6:.0f} MB at most"
-    return "\n".join([*lines, pace])
-
-
-def _sentence(error: Exception) -> str:
-    """What typer says, in one line without its full stop."""
-    text = error.format_message() if hasattr(error, "format_message") else str(error)
-    return " ".join(text.split()).rstrip(".")
-
-
-def _complain(message: str) -> None:
-    """Say what is wrong in one line, whatever letters the input has put into it."""
-    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
-    print(f"flowborne: {line}", file=sys.stderr)

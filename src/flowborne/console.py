@@ -1,0 +1,57 @@
+"""What commands print: results and complaints."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from flowborne.running import RunResult
+
+
+def result_printer(name: str, *columns: str) -> Callable[[Any], None]:
+    """Function that prints a result of a validation or a bench as it comes."""
+
+    def show(result: Any) -> None:
+        shown = "  ".join(f"{c} {_number(getattr(result, c))}" for c in ("value", *columns))
+        print(f"{result.verdict.upper():<4}  {getattr(result, name)}  {result.title}  {shown}")
+        for line in result.lines:
+            print(f"        {line}")
+        sys.stdout.flush()
+
+    return show
+
+
+def _number(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def run_lines(result: RunResult) -> str:
+    """A finished run in a few lines."""
+    summary = result.summary
+    lines = [result.message]
+    for column, value in summary["final_mean"].items():
+        lines.append(f"  {column}: {value:.4f} (mean of the last frames)")
+    if summary["final_objective"] is not None:
+        lines.append(f"  objective: {summary['final_objective']:.4g} (mean of the last decisions)")
+    if summary["converged_frame"] is not None:
+        lines.append(f"  converged at frame {summary['converged_frame']}")
+    pace = f"  {summary['seconds_per_frame']:.3g} s per frame"
+    if summary["bytes_per_cell"] is not None:
+        pace += f", {summary['bytes_per_cell']:.0f} bytes per cell"
+    if summary["peak_memory_bytes"] is not None:
+        pace += f", {summary['peak_memory_bytes'] / 1e6:.0f} MB at most"
+    return "\n".join([*lines, pace])
+
+
+def sentence_of(error: Exception) -> str:
+    """What typer says, in one line without its full stop."""
+    text = error.format_message() if hasattr(error, "format_message") else str(error)
+    return " ".join(text.split()).rstrip(".")
+
+
+def complain(message: str) -> None:
+    """Say what is wrong in one line, whatever letters the input has put into it."""
+    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
+    print(f"flowborne: {line}", file=sys.stderr)
