@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 import sys
@@ -206,6 +207,14 @@ def test_a_buffer_is_read_from_the_files_own_folder_only(tmp_path: Path, uri: st
     (folder / "box.gltf").write_text(json.dumps(document))
     with pytest.raises(SceneError, match=r"box\.gltf, buffers\[0\] names .* not in the folder"):
         read_source(folder / "box.gltf")
+
+
+def test_a_buffer_without_an_end_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    document = {"buffers": [{"byteLength": 6, "uri": "pipe"}]}
+    (tmp_path / "box.gltf").write_text(json.dumps(document))
+    with pytest.raises(SceneError, match=r"buffers\[0\], 'pipe', cannot be read \(it is a pipe"):
+        read_source(tmp_path / "box.gltf")
 
 
 def test_deeply_nested_json_is_refused(tmp_path: Path) -> None:

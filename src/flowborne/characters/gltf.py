@@ -16,7 +16,7 @@ from flowborne.characters.gltf_accessors import Accessors
 from flowborne.characters.gltf_colours import Colours
 from flowborne.characters.gltf_document import Node, Primitive, Skin, read_document
 from flowborne.characters.gltf_gate import WIDTH, check_document, joint_sets
-from flowborne.characters.limits import check_size, check_surface
+from flowborne.characters.limits import check_size
 from flowborne.characters.rig import (
     Z_UP,
     Action,
@@ -25,6 +25,7 @@ from flowborne.characters.rig import (
     Rig,
     Surface,
     frame_times,
+    joined,
     one_tree,
     own_names,
     placed,
@@ -95,7 +96,7 @@ class GltfSource:
     @np.errstate(all="ignore")
     def surface(self) -> Surface | None:
         """All skinned meshes as one; None when there is none."""
-        vertices, faces, weights, colours, count = [], [], [], [], 0
+        found = []
         number = {node: joint for joint, node in enumerate(self._joints)}
         carried = [n for n in self._gltf.nodes if n.mesh is not None and n.skin is not None]
         check_size(len(self._joints), sum(self._points(node) for node in carried), self._name)
@@ -113,20 +114,11 @@ class GltfSource:
                 triangles = corners.reshape(-1, 3)
                 if np.linalg.det(inner[:3, :3]) < 0.0:
                     triangles = triangles[:, ::-1]
-                vertices.append(points @ inner[:3, :3].T + inner[:3, 3])
-                faces.append(triangles + count)
-                weights.append(self._weights(part, own, len(points)))
-                colours.append(self._colours.of(part, triangles, len(points)))
-                count += len(points)
-        if not vertices:
-            return None
-        check_surface(np.concatenate(vertices), self._name)
-        return Surface(
-            np.concatenate(vertices),
-            np.concatenate(faces),
-            np.concatenate(weights),
-            np.concatenate(colours),
-        )
+                vertices = points @ inner[:3, :3].T + inner[:3, 3]
+                weights = self._weights(part, own, len(points))
+                colours = self._colours.of(part, triangles, len(points))
+                found.append(Surface(vertices, triangles, weights, colours))
+        return joined(found, self._name)
 
     def _points(self, node: Node) -> int:
         """Number of vertices of a node's mesh."""

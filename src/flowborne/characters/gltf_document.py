@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, mode
 from pydantic.alias_generators import to_camel
 
 from flowborne.errors import SceneError
+from flowborne.given_files import check_file
 
 LARGEST_FILE = 1 << 30
 """Bytes of a file, and of all its buffers together."""
@@ -202,6 +203,7 @@ def read_document(path: Path) -> tuple[Document, list[memoryview]]:
 def _bounded(path: Path, shown: str) -> bytes:
     """The bytes of a file; raises SceneError when there are too many, or none can be read."""
     try:
+        check_file(path, None)
         with open(path, "rb") as file:
             data = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.characters.limits import LONGEST_NAME, check_frames, check_poses
+from flowborne.characters.limits import LONGEST_NAME, check_frames, check_poses, check_surface
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -74,6 +75,22 @@ class Action:
     frame_time: float
     position: Array
     rotation: Array
+
+
+def joined(parts: Sequence[Surface], where: str) -> Surface | None:
+    """Several surfaces as one; None for no parts. Raises SceneError as `check_surface`."""
+    if not parts:
+        return None
+    counts = [len(part.vertices) for part in parts]
+    starts = np.cumsum(counts) - counts
+    vertices = np.concatenate([part.vertices for part in parts])
+    check_surface(vertices, where)
+    return Surface(
+        vertices,
+        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.weights for part in parts]),
+        np.concatenate([part.colours for part in parts]),
+    )
 
 
 def own_names(names: list[str]) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdShade, UsdSkel
 
 from flowborne.characters.colours import PLAIN
-from flowborne.characters.limits import check_size, check_surface
+from flowborne.characters.limits import check_size
 from flowborne.characters.rig import (
     Z_UP,
     Action,
@@ -22,6 +22,7 @@ from flowborne.characters.rig import (
     Rig,
     Surface,
     frame_times,
+    joined,
     one_tree,
     own_names,
     placed,
@@ -115,7 +116,7 @@ class UsdSource:
         return Rig(names, one_tree(parents), *placed(bind, f"{self._name}, joints at rest"))
 
     def _surface(self) -> Surface | None:
-        vertices, faces, weights, colours, count = [], [], [], [], 0
+        found, count = [], 0
         into = self._to_world(self._skeleton.GetPrim())
         for binding in self._bound:
             if binding.GetSkeleton().GetPrim() != self._skeleton.GetPrim():
@@ -126,24 +127,17 @@ class UsdSource:
                     continue
                 where = f"{self._name}, {mesh.GetPath()}"
                 points = points_of(mesh, where)
-                check_size(len(self._query.GetJointOrder()), count + len(points), self._name)
+                count += len(points)
+                check_size(len(self._query.GetJointOrder()), count, self._name)
                 own = into @ _matrices([target.GetGeomBindTransform()])[0]
-                vertices.append(points @ own[:3, :3].T + own[:3, 3])
+                vertices = points @ own[:3, :3].T + own[:3, 3]
                 turned = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
                 mirrored = (np.linalg.det(own[:3, :3]) < 0.0) != turned
-                faces.append(_triangles(mesh, len(points), mirrored, where) + count)
-                weights.append(self._weights(target, len(points)))
-                colours.append(np.tile(_colour(mesh), (len(faces[-1]), 1)))
-                count += len(points)
-        if not vertices:
-            return None
-        check_surface(np.concatenate(vertices), self._name)
-        return Surface(
-            np.concatenate(vertices),
-            np.concatenate(faces),
-            np.concatenate(weights),
-            np.concatenate(colours),
-        )
+                faces = _triangles(mesh, len(points), mirrored, where)
+                weights = self._weights(target, len(points))
+                colours = np.tile(_colour(mesh), (len(faces), 1))
+                found.append(Surface(vertices, faces, weights, colours))
+        return joined(found, self._name)
 
     def _action(self, clip: int) -> Action:
         query = self._cache.GetAnimQuery(self._animations[clip])
