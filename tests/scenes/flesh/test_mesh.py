@@ -14,6 +14,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from flowborne.scenes.flesh import mesh_run
+from flowborne.scenes.flesh.apart import run_apart
 from flowborne.scenes.flesh.bones import bones_of
 from flowborne.scenes.flesh.mesh import (
     FIDELITY,
@@ -260,3 +261,12 @@ def test_arrays_of_another_type_end_a_process_and_not_this_one(
     with pytest.raises(ValueError, match=r"typed\.vtu cannot be read as a mesh of flesh \(it "):
         read_mesh(path)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_process_that_ends_well_and_leaves_no_file_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "ends.py"
+    script.write_text("")
+    monkeypatch.setattr(mesh_run, "__file__", str(script))
+    assert run_apart(str(tmp_path), mesh_run.TETRAHEDRA, "mesh") == "it ended with 0"

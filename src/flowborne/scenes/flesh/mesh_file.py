@@ -86,7 +86,7 @@ def _contents(path: Path) -> dict[str, NDArray[Any]]:
 def _read(content: bytes) -> dict[str, NDArray[Any]]:
     with TemporaryDirectory(prefix="flowborne-flesh-") as folder:
         (Path(folder) / "flesh.vtu").write_bytes(content)
-        why = run_apart(folder, "read", "flesh.vtu")
+        why = run_apart(folder, READ, "read", "flesh.vtu")
         if why is not None:
             raise ValueError(why)
         return read_arrays(Path(folder) / READ)

@@ -38,7 +38,7 @@ def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Arr
             tolerance=tolerance / np.linalg.norm(np.ptp(points, axis=0)),
             threads=numba_thread_count(),
         )
-        why = run_apart(folder, "mesh")
+        why = run_apart(folder, mesh_run.TETRAHEDRA, "mesh")
         if why is not None:
             raise ValueError(
                 f"the flesh cannot be meshed with edges of {size:g} m: {why}. Try another size."
