@@ -167,7 +167,7 @@ def error_bar(
     returns      the number on the finest grid with the shortest step, and its bar
     raises       ValueError when there are not at least two grids or two numbers of steps, or they
                  do not grow, for an unknown column, and a number that is not finite; SceneError
-                 when the scene is wrong, or one of its runs does not come to its end;
+                 when the scene is wrong, or one of its runs ends as anything but `done`;
                  RunFolderError when `out` has such runs already
     """
     for name, given in (("resolutions", resolutions), ("steps", steps)):

@@ -71,7 +71,8 @@ class JointMeasures:
         )
 
     def values(self, q: Array, time: float, report: FrameReport | None) -> dict[str, float]:
-        """column -> number after the frame of `report`; nan where only a frame can tell.
+        """column -> number after the frame of `report`; before the first frame, targets of
+        the controller, forces and powers are nan.
 
         q     (nq,) positions
         time  s

@@ -67,7 +67,7 @@ class Seen:
 def seen_bodies(setup: Setup) -> list[Seen]:
     """Every body and flesh that the fluid sees, of each the thinnest part and the longest tips.
 
-    None without a fluid, or with one that does not feel the bodies.
+    None without a fluid, or with a one-way one.
     """
     if setup.fluid is None or setup.fluid.one_way:
         return []

@@ -101,7 +101,7 @@ class OutputTable(Table):
     checkpoint_every  frames between checkpoints
     bodies            whose centre of mass, velocity, and force and torque of the fluid the history
                       holds
-    joints            with torque or force, power and target of whose drives the history holds: true
+    joints            torque or force, power and target of their drives are in the history: true
                       for all driven joints, false for none, or names
     exports           files for other programs, written at the end: names, or tables with file
     """

@@ -31,8 +31,8 @@ GRAM_PER_CM3 = 1000.0
 def implausible_density(scene: Scene, setup: Setup) -> Iterator[str]:
     """Bodies far lighter or far heavier than the fluid in their place.
 
-    Those that flesh covers have the flesh's density. Of a fluid that does not feel the bodies
-    nothing is said.
+    Those that flesh covers have the flesh's density. There are no warnings with a
+    one-way fluid, on which bodies have no effect.
     """
     if setup.fluid is None or setup.fluid.one_way:
         return

@@ -51,7 +51,7 @@ def thin_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def _size(body: Seen, h: float) -> str:
-    """How thick a body is, in cells of h m, and how thick the fluid takes it for."""
+    """How thick a body is, in cells of h m, and its thickness on the grid."""
     cells = f"{body.thickness / h:.2g}"
     said = f"{body.name} is {body.thickness:.3g} m thick, {cells} cell{'s' * (cells != '1')}"
     if not body.tight or not 0.0 < body.thickness < body.seen * (1.0 - 1e-9):
