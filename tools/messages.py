@@ -27,6 +27,9 @@ PLY = (
     "0 0 0\n1 0 0\n0 1 0\n3 0 1 200\n"
 )
 
+ACCEPTED = "none: it is accepted"
+"""In place of a message. `check` and `run` may still warn that the scene is implausible."""
+
 Mistake = tuple[str, str, Files, tuple[str, ...]]
 """What somebody did, the base it was done to, the files that changed, and the last command."""
 
@@ -244,12 +247,13 @@ def rows() -> Iterator[tuple[str, Said]]:
 
 def table() -> str:
     """The rows in Markdown."""
-    lines = ["| what was done | what is said |", "| --- | --- |"]
+    lines = ["| mistake | message |", "| --- | --- |"]
     for what, said in rows():
-        told = " ".join(line.removeprefix("flowborne: ") for line in said.messages)
-        told = told or ("nothing: it is run" if said.code == 0 else "NOTHING")
-        cell = told.replace("|", "\\|").replace("<", "\\<").replace("*", "\\*").replace("_", "\\_")
-        lines.append(f"| {what} | {cell} |")
+        message = " ".join(line.removeprefix("flowborne: ") for line in said.messages)
+        message = message or (ACCEPTED if said.code == 0 else "NONE")
+        for letter in "|<*_":
+            message = message.replace(letter, f"\\{letter}")
+        lines.append(f"| {what} | {message} |")
     return "\n".join(lines) + "\n"
 
 
