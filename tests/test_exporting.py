@@ -106,7 +106,15 @@ def test_ones_own_takes_the_place_of_ours(water: Path, tmp_path: Path) -> None:
         def write(self, run: fb.OpenRun, path: Path) -> None:
             path.write_text(run.name)
 
+    @fb.exporters.register(".odd")
+    @dataclass(frozen=True)
+    class Odd:
+        def write(self, run: fb.OpenRun, path: Path) -> float:
+            return 3.0
+
     try:
+        with pytest.raises(fb.PartError, match=r"exporter of '\.odd' files gave 3\.0: return no"):
+            fb.export(water, tmp_path / "x.odd")
         sys.modules.pop(OURS, None)
         fb.export(water, tmp_path / "ours.parquet")  # of the module that has our .csv, too
         fb.export(water, tmp_path / "own.csv")
@@ -114,5 +122,6 @@ def test_ones_own_takes_the_place_of_ours(water: Path, tmp_path: Path) -> None:
     finally:
         sys.modules.pop(OURS, None)
         EXPORTERS._kinds.pop(".csv")
+        EXPORTERS._kinds.pop(".odd")
         EXPORTERS._kinds.pop(".parquet", None)
     assert can_write(".csv")

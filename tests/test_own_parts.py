@@ -188,6 +188,55 @@ def test_a_rule_that_ends_the_interpreter_stops_the_run_with_its_place(
     assert f"rule Share failed in share.py, line 14 ({raised[:9]}" in result.message
 
 
+class Odd:
+    """A rule and a gradient that give what they are made with."""
+
+    def __init__(self, given: object) -> None:
+        self.given = given
+
+    def pace(self, pace: object, before: object, gradient: object) -> object:
+        return self.given
+
+    def step(self, poses: object, gradient: object, limit: object) -> object:
+        return self.given
+
+    def of(self, places: object, pace: object) -> Odd:
+        return self
+
+    def estimate(self, poses: object) -> object:
+        return self.given
+
+
+@pytest.mark.parametrize("given", [None, "x", 1j, [0.5, 0.5], [float("nan")], [[-1.0]], 10**400])
+@pytest.mark.parametrize("kind", ["rule", "gradient"])
+def test_what_a_rule_or_gradient_gives_is_looked_at(scene: Path, kind: str, given: object) -> None:
+    world = fb.Simulation(scene.with_name("sound.toml")).world
+    controller = fb.Controller(
+        np.array([0]),
+        fb.objectives.ObjectiveSum.of(fb.objectives.ObjectiveCallable(lambda m: 0.0, name="none")),
+        fb.Hypothesis(0.04),
+        strength=1.0,
+        executor=fb.executors.Serial(),
+        **{kind: Odd(given)},
+    )
+    with pytest.raises(fb.PartError, match=rf"{kind} Odd gave .*: return .* for each of 1 dofs"):
+        controller.decide(world, 0.1, fb.step)
+
+
+def test_an_error_that_cannot_say_what_it_is_is_named() -> None:
+    class MuteError(Exception):
+        def __str__(self) -> str:
+            raise ValueError
+
+    def blow(x: object, time: float) -> None:
+        raise MuteError
+
+    with pytest.raises(
+        fb.PartError, match=r"wind 'blow' failed in .* \(MuteError\): mend it there"
+    ):
+        WindFunction(blow, "blow")(np.zeros((2, 3)), 0.0)
+
+
 @pytest.mark.parametrize("raised", [SystemExit(0), GeneratorExit(), ZeroDivisionError()])
 def test_a_wind_that_ends_the_interpreter_is_a_part_that_failed(raised: BaseException) -> None:
     def blow(x: object, time: float) -> None:

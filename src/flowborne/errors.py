@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -58,5 +58,12 @@ class PartError(ValueError):
         at = next((c for c in reversed(calls) if not c.filename.startswith(ours)), calls[-1])
         return cls(
             f"{part} failed in {Path(at.filename).name}, line {at.lineno} "
-            f"({type(error).__name__}: {error}): mend it there"
+            f"({said_by(error)}): mend it there"
         )
+
+
+def said_by(error: BaseException) -> str:
+    """Type and text of an error of a part of the user's own, whose text may fail as well."""
+    with suppress(Exception):
+        return f"{type(error).__name__}: {error}"
+    return type(error).__name__

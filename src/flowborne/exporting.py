@@ -45,5 +45,9 @@ def export(
         raise SceneError(f"{path.name}: exporter {error}.") from error
     opened = OpenRun(folder.path)
     passing = OSError, RunFolderError, SceneError
-    with PartError.guarding(f"exporter of '{ending}' files", *passing):
-        return exporter.write(opened, path) or Written((path,))
+    part = f"exporter of '{ending}' files"
+    with PartError.guarding(part, *passing):
+        written = exporter.write(opened, path)
+    if not isinstance(written, Written | None):
+        raise PartError(f"{part} gave {written!r:.100}: return nothing, or what was Written")
+    return Written((path,)) if written is None else written

@@ -306,13 +306,10 @@ class Controller:
             displacement = np.zeros(size)
             for places, wanted in groups:
                 trials = self.trials(world, step, course, wanted, places, pace)
-                with _guarding("gradient", self.gradient):
-                    estimate = trials.estimator.estimate(trials)
-                slopes = estimate.gradient
+                estimate, slopes = self._estimate(trials)
                 if iteration == 0:
-                    value, gradient[places] = value + estimate.value, slopes
-                with _guarding("rule", self.rule):
-                    pace[places] = self.rule.pace(pace[places], slope[places], slopes)
+                    value, gradient[places] = value + estimate, slopes
+                pace[places] = self._pace(pace[places], slope[places], slopes)
                 slope[places] = slopes
                 way = pace[places] * self._step(trials, slopes, limit[places])
                 displacement[places] = trials.within_range(way)
@@ -334,16 +331,32 @@ class Controller:
             if isinstance(self.hypothesis, Horizon) or wanted.active(world.time)
         ]
 
+    def _estimate(self, trials: Trials) -> tuple[float, Array]:
+        """Objective, and its gradient (m,). Raises PartError when the estimate is no such pair."""
+        with _guarding("gradient", self.gradient):
+            estimate = trials.estimator.estimate(trials)
+        value = getattr(estimate, "value", estimate)
+        gradient = getattr(estimate, "gradient", estimate)
+        asked = "an Estimate of numbers, whose gradient has one"
+        (number,) = _numbers("gradient", self.gradient, [value], asked, (1,))
+        return float(number), _numbers("gradient", self.gradient, gradient, asked, (trials.count,))
+
+    def _pace(self, pace: Array, before: Array, gradient: Array) -> Array:
+        """(m,) the part of strength that the rule uses. Raises PartError when it is none."""
+        with _guarding("rule", self.rule):
+            given = self.rule.pace(pace, before, gradient)
+        asked = "a pace above 0 and at most 1"
+        found = _numbers("rule", self.rule, given, asked, gradient.shape)
+        if not ((found > 0.0) & (found <= 1.0)).all():
+            raise _wrong("rule", self.rule, given, asked, gradient.shape)
+        return found
+
     def _step(self, trials: Trials, gradient: Array, limit: Array) -> Array:
         """(m,) what the rule says. Raises PartError when that is no such displacement."""
         with _guarding("rule", self.rule):
-            step = np.asarray(self.rule.step(trials, gradient, limit))
-        if step.shape != gradient.shape or not np.isfinite(step).all():
-            raise PartError(
-                f"rule {type(self.rule).__name__} gave {step}: return a finite displacement in rad "
-                f"or m for each of {gradient.size} dofs"
-            )
-        return step
+            given = self.rule.step(trials, gradient, limit)
+        asked = "a finite displacement in rad or m"
+        return _numbers("rule", self.rule, given, asked, gradient.shape)
 
     def _decision(self, world: World, decided: bool, evaluations: int, started: float) -> Decision:
         memory = world.memory
@@ -356,6 +369,28 @@ class Controller:
             evaluations,
             perf_counter() - started,
         )
+
+
+def _numbers(kind: str, part: object, given: object, asked: str, shape: tuple[int, ...]) -> Array:
+    """What a rule or gradient gave, as finite numbers of this shape.
+
+    raises  PartError when it is nothing of the kind
+    """
+    try:
+        found = np.asarray(given, dtype=np.float64)
+    except (ArithmeticError, TypeError, ValueError):
+        raise _wrong(kind, part, given, asked, shape) from None
+    if found.shape != shape or not np.isfinite(found).all():
+        raise _wrong(kind, part, given, asked, shape)
+    return found
+
+
+def _wrong(kind: str, part: object, given: object, asked: str, shape: tuple[int, ...]) -> PartError:
+    """The error to raise when a rule or gradient gave something else than was asked of it."""
+    return PartError(
+        f"{kind} {type(part).__name__} gave {given!r:.100}: return {asked} for each of "
+        f"{shape[0]} dofs"
+    )
 
 
 def _guarding(kind: str, part: object) -> AbstractContextManager[None]:
