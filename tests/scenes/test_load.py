@@ -66,6 +66,7 @@ def test_overrides_change_any_value(write: Write) -> None:
         ("fluid.density", "heavy", "[fluid] density: 'heavy' is not a number"),
         ("fluid.density", "-1", "[fluid] density: -1 is not greater than 0"),
         ("fluid..density", "1", "'fluid..density' is no key"),
+        ("a" + 2000 * ".a", "1", "its arrays or tables are nested more than 30 deep"),
     ],
 )
 def test_bad_overrides_are_told(write: Write, key: str, text: str, message: str) -> None:
@@ -177,7 +178,8 @@ def test_meshes_and_includes_travel_with_the_scene(write: Write, tmp_path: Path)
     ("text", "said"),
     [
         ("frames = " + 5000 * "9", "there is a number of thousands of digits in it. Shorten it."),
-        ("a = " + 3000 * "[" + 3000 * "]", "its arrays or tables are nested hundreds deep."),
+        ("a = " + 3000 * "[" + 3000 * "]", "its arrays or tables are nested more than 30 deep."),
+        ("[" + 2000 * "a." + "a]", "its arrays or tables are nested more than 30 deep."),
     ],
 )
 def test_what_toml_allows_and_no_scene_needs_is_one_message(

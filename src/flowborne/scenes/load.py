@@ -58,6 +58,10 @@ BUILT_IN = (
 )
 
 
+DEEPEST = 30
+"""Most tables and arrays in each other of a scene."""
+
+
 def library() -> Path:
     """The folder of the built-in scenes."""
     return Path(str(resources.files("flowborne.scenes") / "library"))
@@ -91,7 +95,9 @@ def read_scene(path: Path) -> Scene:
     raises  RunFolderError when its file alone has anything wrong
     """
     with reading(path.parent):
-        draft, problems = _understood(_read(path), path)
+        raw = _read(path)
+        _check_depth(raw, path)
+        draft, problems = _understood(raw, path)
         if draft is None or problems:
             raise SceneError(problems)
         return draft.scene
@@ -110,6 +116,7 @@ def _examine(
         raw = _read(path)
         for key, text in (overrides or {}).items():
             override(raw, key, text)
+        _check_depth(raw, path)
     except SceneError as error:
         return None, error.problems
     if not trust and (named := python_of(raw)):
@@ -189,9 +196,26 @@ def _read(path: Path) -> dict[str, Any]:
             f"scene {path.name}: there is a number of thousands of digits in it. Shorten it."
         ) from None
     except RecursionError:
-        raise SceneError(
-            f"scene {path.name}: its arrays or tables are nested hundreds deep. Flatten them."
-        ) from None
+        raise _too_deep(path) from None
+
+
+def _check_depth(raw: dict[str, Any], path: Path) -> None:
+    """Raise SceneError when a scene as read is nested deeper than any scene is."""
+    level: list[Any] = [raw]
+    for _ in range(DEEPEST):
+        inner = [
+            value for one in level for value in (one.values() if isinstance(one, dict) else one)
+        ]
+        level = [value for value in inner if isinstance(value, dict | list)]
+    if level:
+        raise _too_deep(path)
+
+
+def _too_deep(path: Path) -> SceneError:
+    return SceneError(
+        f"scene {path.name}: its arrays or tables are nested more than {DEEPEST} deep. "
+        "Flatten them."
+    )
 
 
 def override(raw: dict[str, Any], key: str, text: str) -> None:
