@@ -96,6 +96,14 @@ def test_blocks_and_plates_have_no_tips(size: tuple[float, ...]) -> None:
     assert tips_of(trimesh.creation.box(size), 1.0) < 0.75
 
 
+@pytest.mark.parametrize("length", [1e6, 1e145])
+def test_a_sliver_without_end_is_not_cut_into_pieces_without_end(length: float) -> None:
+    corners = np.array([[0, 0, 0], [length, 0, 0], [length, 0.1, 0], [0, 0.1, 0]])
+    points = np.concatenate([corners, corners + np.array([0.0, 0.0, 0.1])])
+    skin = np.array([[n, (n + 1) % 4, (n + 1) % 4 + 4] for n in range(4)])
+    assert np.isfinite(thin_parts(points, skin, 0.05))
+
+
 @pytest.mark.parametrize("thick", [0.9, 0.3, 0.03, 0.001])
 def test_what_is_thin_everywhere_has_no_tips(thick: float) -> None:
     assert tips_of(trimesh.creation.box((30.0, 30.0, thick)), 1.0) == 0.0

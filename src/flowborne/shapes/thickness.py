@@ -60,6 +60,7 @@ def thin_parts(vertices: Array, triangles: Indices, width: float) -> float:
     area = 0.5 * float(np.linalg.norm(outward(corners), axis=1).sum())
     edge = max(0.5 * width, 2.0 * np.sqrt(area / MOST_FACETS))
     facets = divided(corners, edge)
+    edge = max(edge, float(side_lengths(facets).max()))
     fits = np.all([ball_fits(facets, vertices, triangles, part * width) for part in BALLS], axis=0)
     if not fits.any():
         return 0.0
@@ -86,11 +87,14 @@ def ball_fits(
 
 
 def divided(facets: Array, longest: float) -> Array:
-    """(n, 3, 3) triangles (k, 3, 3), their longest sides halved until none is above `longest` m."""
+    """(n, 3, 3) triangles (k, 3, 3), their longest sides halved until none is above `longest` m.
+
+    Four times `MOST_FACETS` at once, as slivers come to, are not divided further.
+    """
     done = []
     while len(facets):
-        side = np.linalg.norm(np.roll(facets, -1, axis=1) - facets, axis=2)
-        long = side.max(axis=1) > longest
+        side = side_lengths(facets)
+        long = (side.max(axis=1) > longest) & (len(facets) <= 4.0 * MOST_FACETS)
         done.append(facets[~long])
         first = side[long].argmax(axis=1)[:, None] + np.arange(3)
         a, b, c = np.moveaxis(np.take_along_axis(facets[long], first[:, :, None] % 3, 1), 1, 0)
@@ -98,6 +102,11 @@ def divided(facets: Array, longest: float) -> Array:
         halves = np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
         facets = np.concatenate(halves)
     return np.concatenate(done)
+
+
+def side_lengths(facets: Array) -> Array:
+    """(k, 3) lengths of the sides of triangles (k, 3, 3), m."""
+    return np.asarray(np.linalg.norm(np.roll(facets, -1, axis=1) - facets, axis=2))
 
 
 def sides(vertices: Array, triangles: Indices) -> Indices:
