@@ -67,6 +67,8 @@ def test_reopening_refuses_what_it_cannot_go_on_with(tmp_path):
         ("0.1\n2", "0.1x\n2", "row 1: not a number for each column"),
         (",0.1\n2", "\n2", "row 1: not a number for each column"),
         ("2,", "3,", "row 2 is of frame 3"),
+        ("0.1\n2", "inf\n2", "row 1: a number is not finite"),
+        ("0.1\n2", "nan\n2", "row 2: a number is not finite"),
     ],
 )
 def test_rows_that_are_none_are_not_gone_on_with(tmp_path, before, after, said):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from io import StringIO
@@ -41,18 +42,23 @@ class History:
         """History cut to its first `rows` rows.
 
         raises  ValueError when its columns are others, when it has fewer rows, or one that is no
-                row of numbers or not that of its frame
+                row of finite numbers (nan in a column of nan alone) or not that of its frame
         """
         check_file(path, None)
         with open(path, "r+b") as file:
             header = _header(columns).encode()
             if file.read(len(header)) != header:
                 raise ValueError(f"{path} has other columns than this version writes")
+            absent: set[str] = set()
             for row in range(rows):
                 line = file.readline(MOST_BYTES)
                 if not line.endswith(b"\n"):
                     raise ValueError(f"{path} has {row} rows where the checkpoint has {rows}")
-                _check_row(line, columns, row + 1, path)
+                values = _row(line, columns, row + 1, path)
+                now = {name for name, value in values.items() if math.isnan(value)}
+                if math.inf in map(abs, values.values()) or (row and now != absent):
+                    raise ValueError(f"{path}, row {row + 1}: a number is not finite")
+                absent = now
             file.truncate(file.tell())
         return cls(path, columns, rows)
 
@@ -133,14 +139,15 @@ def _names(lines: Iterator[str]) -> tuple[str, ...]:
         raise ValueError(f"its first row is none ({error})") from error
 
 
-def _check_row(line: bytes, columns: Sequence[str], row: int, path: Path) -> None:
-    """Raise ValueError unless a line is the row with this number, from 1."""
+def _row(line: bytes, columns: Sequence[str], row: int, path: Path) -> dict[str, float]:
+    """The numbers of a line by column. Raises ValueError unless it is row number `row`, from 1."""
     try:
         values = dict(zip(columns, map(float, line.split(b",")), strict=True))
     except ValueError:
         raise ValueError(f"{path}, row {row}: not a number for each column") from None
     if values.get("frame", row) != row:
         raise ValueError(f"{path}, row {row} is of frame {values['frame']:g}")
+    return values
 
 
 def _header(columns: Sequence[str]) -> str:
