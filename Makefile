@@ -38,7 +38,7 @@ exporters: $(VENV)/installed-test
 	$(BIN)/python tools/exporters.py
 
 fuzz: $(VENV)/installed-test
-	$(BIN)/python tools/fuzz.py
+	$(BIN)/python tools/fuzz.py --seed "$(SEED)"
 
 messages: $(VENV)/installed-test
 	$(BIN)/python tools/messages.py

@@ -1,5 +1,7 @@
 """The attack of `make fuzz` with the first of its inputs, and what a stranger's scene may do."""
 
+import os
+import random
 import sys
 from pathlib import Path
 
@@ -9,18 +11,53 @@ import flowborne as fb
 from flowborne import cli
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.save import scene_files
-from fuzz import SEED, WELL, attack, command
+from fuzz import COUNTS, attack, run_folder
 from fuzz_bases import bases
-from fuzz_inputs import SECRET
+from fuzz_changes import SECRET
+from fuzz_judge import WELL, command, fault, surroundings_kept
 
-INPUTS = 120
+INPUTS = {"scenes": 60, "parts": 20}
 
 
 @pytest.mark.parametrize("part", range(4))
-def test_broken_inputs_run_or_are_refused_in_one_message(part):
-    for number in range(part, INPUTS, 4):
-        kind, outcome = attack(number, SEED)
+@pytest.mark.parametrize("campaign", INPUTS)
+def test_broken_inputs_run_or_are_refused_in_one_message(campaign, part):
+    for number in range(part, INPUTS[campaign], 4):
+        kind, outcome = attack(campaign, number, "tests")
         assert outcome.verdict in WELL, (number, kind, outcome)
+
+
+def test_the_same_seed_breaks_the_same():
+    for makers, _ in COUNTS.values():
+        for make, _ in makers.values():
+            one, again, other = (make(random.Random(seed)) for seed in ("a", "a", "b"))
+            assert one == again
+            assert one != other or make is run_folder
+
+
+def test_what_a_library_writes_on_stderr_is_no_message_of_ours(monkeypatch):
+    def fail(arguments):
+        os.write(2, b"error of a library\n")
+        print("flowborne: nothing is there", file=sys.stderr)
+        sys.exit(2)
+
+    monkeypatch.setattr(cli, "main", fail)
+    said = command("check")
+    assert said.lines == ["error of a library", "flowborne: nothing is there"]
+    assert fault(said, (2,)) == "no message of flowborne's"
+
+
+def test_a_file_that_changes_beside_a_folder_is_noticed(tmp_path):
+    folder, canary = tmp_path / "a" / "b" / "input", tmp_path / "a" / "b" / "canary"
+    folder.mkdir(parents=True)
+    canary.write_text("alive")
+    for change in (canary.unlink, (tmp_path / "a" / "new").mkdir, lambda: canary.write_text("x")):
+        with surroundings_kept(folder) as changed:
+            change()
+        assert len(changed) == 1
+    with surroundings_kept(folder) as changed:
+        (folder / "new").mkdir()
+    assert changed == []
 
 
 def written(folder: Path, base: str, **changed: bytes) -> Path:
@@ -78,6 +115,23 @@ def test_letters_that_steer_a_terminal_are_written_out(capsys):
     said = capsys.readouterr().err
     assert said.startswith("flowborne: there is no scene file no\\x1b[2J\\n\\u202ething.toml")
     assert said.count("\n") == 1
+
+
+def test_a_long_message_is_shortened_in_its_middle(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["check", "eel", f"--set=a..b={'x' * 9999}"])
+    said = capsys.readouterr().err
+    assert said.startswith("flowborne: ")
+    assert " ... " in said
+    assert len(said) < 1100
+
+
+def test_mouths_beside_a_broken_domain_are_not_looked_for_in_its_cells(tmp_path):
+    text = bases()["swim"]["scene.toml"].replace(b"resolution = 16", b"resolution = -0.5")
+    said = command("check", written(tmp_path, "swim", **{"scene.toml": text}))
+    assert said.code == 2
+    assert len(said.messages) == 1
+    assert "resolution" in said.messages[0]
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import io
+import os
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
+from typing import NamedTuple
 
 import trimesh
 
@@ -13,9 +17,37 @@ from flowborne.io.bvh import write_clip
 from flowborne.scenes.human.gait import gait_clip
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import library
+from fuzz_changes import OUTSIDE
 
 Files = dict[str, bytes]
 """Name -> content of the files in a folder; the scene is scene.toml."""
+
+
+class Broken(NamedTuple):
+    """A broken input.
+
+    files     of its folder
+    settings  --set of each command, without the option itself
+    links     name -> where a link of this name points to; "" makes a FIFO
+    """
+
+    files: Files
+    settings: tuple[str, ...] = ()
+    links: Mapping[str, str] = MappingProxyType({})
+
+    def write(self, folder: Path, outside: Path) -> None:
+        """Write it into a folder; `outside` is the path that OUTSIDE stands for."""
+        for name, content in self.files.items():
+            place = folder / name
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(content.replace(OUTSIDE.encode(), str(outside).encode()))
+        for name, target in self.links.items():
+            (folder / name).unlink(missing_ok=True)
+            if target:
+                (folder / name).symlink_to(target.replace(OUTSIDE, str(outside)))
+            else:
+                os.mkfifo(folder / name)
+
 
 FISH = Path(__file__).parents[1] / "tests" / "formats"
 
@@ -127,6 +159,65 @@ rule = { kind = "resilient", least = 0.125 }
 field = "dye"
 """
 
+SWIM = """
+dimensions = 2
+[constants]
+period = 0.5
+[time]
+frames_per_second = 24.0
+frames = 3
+[domain]
+lower = [-1.5, -2.0]
+upper = [2.5, 2.0]
+resolution = 16
+[fluid]
+density = 1000.0
+[boundaries]
+x_min = "no-slip"
+x_max = "open"
+[solids]
+model = "model.xml"
+density = 800.0
+[[mouths]]
+body = "block"
+position = [0.0, 0.3, 0.0]
+direction = [0.0, 1.0, 0.0]
+radius = 0.2
+volume_rate = 0.1
+factor = "-sin(2*pi*min(t % period, 0.25))"
+dye = { ink = 1.0 }
+[[control]]
+joints = ["hinge"]
+strength = 60.0
+torque_limit = 1000.0
+in_phases = [{ strength = 75.0, phases = { kind = "intervals", intervals = [[0.0, 0.1]] } }]
+[[objectives]]
+kind = "pressure-lift"
+goal = "most"
+direction = [0.0, 1.0, 0.0]
+bodies = ["block"]
+phases = { kind = "intervals", intervals = [[0.0, 0.25]], period = 0.5 }
+[[objectives]]
+kind = "effort"
+weight = 0.1
+[controller]
+knots = 2
+gradient = "one-sided"
+rule = { kind = "fixed" }
+every = 2
+servo = { kind = "pd", frequency = 4.0 }
+[output]
+bodies = ["block"]
+exports = ["table.csv"]
+[film]
+field = "speed"
+size = [128, 128]
+frames_per_second = 24.0
+start = 0.0
+stop = 0.1
+camera = { azimuth = 30.0, lens = 40.0, distance = 10.0 }
+"""
+
 WALK = """
 gravity = [0.0, 0.0, -9.81]
 [time]
@@ -209,6 +300,7 @@ def bases() -> dict[str, Files]:
     found = {
         "pendulum": {"scene.toml": PENDULUM.encode(), "model.xml": ARM.encode()},
         "slab": {"scene.toml": SLAB.encode(), "model.xml": block},
+        "swim": {"scene.toml": SWIM.encode(), "model.xml": block},
         "walk": {"scene.toml": WALK.encode(), "walk.bvh": _walk()},
         "keyframes": {
             "scene.toml": KEYFRAMES.encode(),

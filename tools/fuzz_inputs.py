@@ -1,45 +1,34 @@
-"""Broken inputs: a sound scene, model, clip, mesh, table or run folder, changed at random."""
+"""Broken scenes: values and text of a sound scene and of its model, clip, table and meshes."""
 
 from __future__ import annotations
 
 import random
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Iterator
+from functools import cache
 from typing import Any
 from xml.etree import ElementTree
 
 import tomli_w
 
-from fuzz_bases import Files, bases
-
-SECRET = b"xyzzy-plugh-2718"
-"""Stands in files that are not what they should be; no message may repeat it."""
-
-NASTY: tuple[Any, ...] = (
-    *(0, 1, -1, 2, 3, 7, 1e-300, 1e300, -1e300, 0.5, -0.5, 100.0, 10**6, -(10**9), 10**18),
-    *(
-        float("nan"),
-        float("inf"),
-        float("-inf"),
-        True,
-        False,
-        "",
-        "x",
-        "hinge",
-        "nan",
-        "summary.json",
-    ),
-    *("history.csv", "../../../etc/passwd", "a" * 300, "é\u202e", "a,b", "a\nb", "\x7f", "none"),
-    *([], [0.0], [1.0, 2.0], [1.0, 2.0, 3.0], [[1.0]], ["x"], {}, {"x": 1}, {"kind": "x"}, [{}]),
+from flowborne.scenes.schema import Scene
+from fuzz_bases import Broken, Files, bases
+from fuzz_changes import (
+    LONG,
+    NASTY,
+    OUTSIDE,
+    SECRET,
+    TEXTS,
+    change,
+    numbers,
+    places,
+    resize,
+    resized,
+    torn,
+    words,
 )
-"""Values in place of others."""
-
-TEXTS = (
-    *("nan", "inf", "-1", "0", "1e300", "", "x", "1 2", "1 2 3", "1 2 3 4", "nan nan nan"),
-    *("true", "-1 -1 -1", "1e-300", "999999999", "a,b", "../../../etc/passwd", "0 0 0", "\u202e"),
-)
-"""Texts of attributes in place of others."""
+from scene_keys import hints_of, said, tables_in
 
 ELEMENTS = (
     '<joint name="more" axis="0 0 0"/>',
@@ -62,34 +51,176 @@ ELEMENTS = (
     '<joint joint1="hinge" joint2="hinge" polycoef="nan 1 0 0 0"/>',
 )
 
-Make = Callable[[random.Random], tuple[str, Files]]
+SETTINGS = (
+    *("abc", "", "=", "nan", "inf", "-inf", "1e400", "-1", "0", "0.0", "true", "[", "{", "'", '"'),
+    *(
+        "9223372036854775807",
+        "9223372036854775808",
+        "1" * 30,
+        "1" * 5000,
+        "0x10",
+        "[1, 2",
+        "[[[1]]]",
+    ),
+    *(
+        "1979-05-27",
+        "1e-320",
+        "{ x = 1 }",
+        "[[" * 2000,
+        "a\nb",
+        "\u202e",
+        "\0",
+        LONG,
+        "1_000",
+        "[]",
+    ),
+)
+"""Texts after --set KEY=."""
+
+KEYS = (
+    "",
+    ".",
+    "a..b",
+    "control.99.strength",
+    "control.x",
+    "name.x",
+    "__class__",
+    LONG,
+    "x" + ".x" * 2000,
+)
+"""Keys after --set that no scene has."""
+
+NAMES = (
+    *(f"{OUTSIDE}/x", f"{OUTSIDE}", "../x", "../../x", "..", ".", "/", "", " ", "x/../../y", "a/b"),
+    *(
+        LONG,
+        "é" * 200,
+        "a\0b",
+        "a\nb",
+        "~/x",
+        "~",
+        "con",
+        "-x",
+        "--help",
+        "\u202e",
+        ".hidden",
+        "a\\..\\b",
+    ),
+)
+"""Names of scenes."""
+
+VTK = (
+    *(
+        "Float64",
+        "Float32",
+        "Int64",
+        "Int32",
+        "Int8",
+        "UInt8",
+        "UInt64",
+        "String",
+        "Bit",
+        "x",
+        "",
+        "0",
+    ),
+    *(
+        "1",
+        "-1",
+        "3",
+        "9",
+        "1000000000000",
+        "ascii",
+        "binary",
+        "appended",
+        "raw",
+        "base64",
+        "UInt32",
+    ),
+    *(
+        "BigEndian",
+        "vtkLZ4DataCompressor",
+        "holder",
+        "bones",
+        "connectivity",
+        "offsets",
+        "types",
+        "recipe",
+    ),
+)
+"""Texts of attributes of a .vtu file."""
 
 
-def scene_value(rng: random.Random) -> tuple[str, Files]:
-    """A value of the scene is another one, is gone, or has company."""
-    name, files = _base(rng)
+def scene_value(rng: random.Random) -> Broken:
+    """Values of the scene are others, are gone, or have company."""
+    files = _base(rng)
     raw = tomllib.loads(files["scene.toml"].decode())
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
-        _change(rng, raw)
-    return name, files | {"scene.toml": tomli_w.dumps(raw).encode()}
+        change(rng, raw)
+    return _scene(files, raw)
 
 
-def scene_text(rng: random.Random) -> tuple[str, Files]:
+def scene_size(rng: random.Random) -> Broken:
+    """Numbers of the scene, and of keys that it lacks, are tiny or huge."""
+    files = _base(rng)
+    raw = tomllib.loads(files["scene.toml"].decode())
+    for _ in range(rng.choice((1, 1, 2))):
+        if rng.random() < 0.5:
+            resize(rng, raw)
+        else:
+            path, kind = rng.choice(_numeric_keys())
+            _put(rng, raw, path, _number(rng, kind))
+    return _scene(files, raw)
+
+
+def scene_text(rng: random.Random) -> Broken:
     """The scene's text is cut, torn, or doubled."""
-    name, files = _base(rng)
-    return name, files | {"scene.toml": _torn(rng, files["scene.toml"])}
+    files = _base(rng)
+    return Broken(files | {"scene.toml": torn(rng, files["scene.toml"])})
 
 
-def model_value(rng: random.Random) -> tuple[str, Files]:
+def scene_name(rng: random.Random) -> Broken:
+    """The scene has a name that leads elsewhere, or that no file can have."""
+    files = _base(rng)
+    raw = tomllib.loads(files["scene.toml"].decode())
+    if rng.random() < 0.7:
+        raw["name"] = rng.choice(NAMES)
+    else:
+        found = [(t, k) for t, k in places(raw) if isinstance(t[k], str)]
+        table, key = rng.choice(found)
+        table[key] = rng.choice(NAMES)
+    return _scene(files, raw)
+
+
+def setting(rng: random.Random) -> Broken:
+    """Values given by --set are no values, too large, or of keys that are none."""
+    files = _base(rng)
+    raw = tomllib.loads(files["scene.toml"].decode())
+    own = [".".join(map(str, path)) for path in _paths(raw)]
+    settings = []
+    for _ in range(rng.choice((1, 1, 2))):
+        key = rng.choice(
+            (rng.choice(own), ".".join(rng.choice(_numeric_keys())[0]), rng.choice(KEYS))
+        )
+        text = (
+            rng.choice(SETTINGS)
+            if rng.random() < 0.7
+            else f"{resized(rng, rng.choice((1, 1.0))):g}"
+        )
+        settings.append(f"{key}={text}".replace("\0", "\x7f"))
+    return Broken(files, tuple(settings))
+
+
+def model_value(rng: random.Random) -> Broken:
     """Attributes and elements of the model are others, are gone, or have company."""
-    name, files = _base(rng, having=".xml")
+    files = _base(rng, having=".xml")
     file = _ending(files, ".xml")
     root = ElementTree.fromstring(files[file])
     for _ in range(rng.choice((1, 1, 2))):
-        places = [(parent, child) for parent in root.iter() for child in parent]
-        if not places:
+        found = [(parent, child) for parent in root.iter() for child in parent]
+        if not found:
             break
-        parent, child = rng.choice(places)
+        parent, child = rng.choice(found)
         kind = rng.randrange(5)
         if kind <= 1 and child.attrib:
             child.attrib[rng.choice(list(child.attrib))] = rng.choice(TEXTS)
@@ -101,166 +232,124 @@ def model_value(rng: random.Random) -> tuple[str, Files]:
             parent.remove(child)
         else:
             child.append(ElementTree.fromstring(rng.choice(ELEMENTS)))
-    return name, files | {file: ElementTree.tostring(root)}
+    return Broken(files | {file: ElementTree.tostring(root)})
 
 
-def model_text(rng: random.Random) -> tuple[str, Files]:
-    """The model's text is cut, torn, or doubled."""
-    name, files = _base(rng, having=".xml")
+def model_text(rng: random.Random) -> Broken:
+    """The model's text is torn, or a number in it is of another size."""
+    files = _base(rng, having=".xml")
     file = _ending(files, ".xml")
-    return name, files | {file: _torn(rng, files[file])}
+    return Broken(files | {file: rng.choice((torn, numbers))(rng, files[file])})
 
 
-def clip_text(rng: random.Random) -> tuple[str, Files]:
-    """Words of the clip are others, or its text is torn."""
+def clip_text(rng: random.Random) -> Broken:
+    """Words or numbers of the clip are others, or its text is torn."""
     files = bases()["walk"]
-    text = files["walk.bvh"]
-    return "walk", files | {
-        "walk.bvh": _words(rng, text) if rng.random() < 0.7 else _torn(rng, text)
-    }
+    changed = rng.choice((words, words, numbers, torn))(rng, files["walk.bvh"])
+    return Broken(files | {"walk.bvh": changed})
 
 
-def table_text(rng: random.Random) -> tuple[str, Files]:
-    """Words of the table of keyframes are others, or its text is torn."""
+def table_text(rng: random.Random) -> Broken:
+    """Words or numbers of the table of keyframes are others, or its text is torn."""
     files = bases()["keyframes"]
-    text = files["keys.csv"]
-    changed = _words(rng, text) if rng.random() < 0.5 else _torn(rng, text)
-    return "keyframes", files | {"keys.csv": changed}
+    return Broken(files | {"keys.csv": rng.choice((words, numbers, torn))(rng, files["keys.csv"])})
 
 
-def mesh_bytes(rng: random.Random) -> tuple[str, Files]:
+def mesh_bytes(rng: random.Random) -> Broken:
     """Bytes of a mesh are others."""
     name = rng.choice(("hull-obj", "hull-stl"))
     files = bases()[name]
     file = f"hull.{name[-3:]}"
-    text = files[file]
-    changed = _words(rng, text) if name == "hull-obj" and rng.random() < 0.5 else _torn(rng, text)
-    return name, files | {file: changed}
+    how = rng.choice((words, numbers, torn, torn)) if name == "hull-obj" else torn
+    return Broken(files | {file: how(rng, files[file])})
 
 
-def surface_bytes(rng: random.Random) -> tuple[str, Files]:
-    """Bytes of the surface in which flesh grows are others."""
+def surface_bytes(rng: random.Random) -> Broken:
+    """Bytes of the surface in which flesh grows are others, or a number of its head."""
     files = bases()["skinned"]
-    return "skinned", files | {"skin.ply": _torn(rng, files["skin.ply"])}
+    head, mark, body = files["skin.ply"].partition(b"end_header")
+    if rng.random() < 0.4:
+        return Broken(files | {"skin.ply": rng.choice((words, numbers))(rng, head) + mark + body})
+    return Broken(files | {"skin.ply": torn(rng, files["skin.ply"])})
 
 
-def flesh_bytes(rng: random.Random) -> tuple[str, Files]:
-    """Bytes of the mesh of flesh are others."""
+def flesh_bytes(rng: random.Random) -> Broken:
+    """Bytes, words, types and counts of the mesh of flesh are others."""
     files = bases()["fish"]
-    text = files["fish.vtu"]
-    return "fish", files | {
-        "fish.vtu": _words(rng, text) if rng.random() < 0.5 else _torn(rng, text)
-    }
+    how = rng.choice((words, torn, _retyped, _retyped, _retyped))
+    return Broken(files | {"fish.vtu": how(rng, files["fish.vtu"])})
 
 
-def stranger(rng: random.Random) -> tuple[str, Files]:
+def stranger(rng: random.Random) -> Broken:
     """A file is one of another kind, whose content is nobody's business."""
-    name, files = _base(rng)
+    files = _base(rng)
     file = rng.choice(list(files))
     secret = rng.choice(
         (b"", b"root:x:0:0:", b"\x89PNG\r\n", b"PK\x03\x04", b"ply\n", b"<", b"solid ")
     )
-    return name, files | {file: secret + SECRET + b" " + SECRET + b"\n" + SECRET}
+    return Broken(files | {file: secret + SECRET + b" " + SECRET + b"\n" + SECRET})
 
 
-MAKERS: dict[str, tuple[Make, int]] = {
-    "scene's values": (scene_value, 40),
-    "scene's text": (scene_text, 12),
-    "model's values": (model_value, 16),
-    "model's text": (model_text, 6),
-    "clip": (clip_text, 10),
-    "table": (table_text, 5),
-    "mesh": (mesh_bytes, 5),
-    "surface of flesh": (surface_bytes, 2),
-    "mesh of flesh": (flesh_bytes, 2),
-    "another kind of file": (stranger, 2),
-}
-"""What is broken -> how, and how often in a hundred."""
-
-
-def make(seed: str) -> tuple[str, str, Files]:
-    """What is broken, the base it was made of, and its files; the same for the same seed."""
-    rng = random.Random(seed)
-    kinds = list(MAKERS)
-    kind = rng.choices(kinds, [MAKERS[k][1] for k in kinds])[0]
-    base, files = MAKERS[kind][0](rng)
-    return kind, base, files
-
-
-def torn(rng: random.Random, content: bytes) -> bytes:
-    """The content with bytes lost, changed, doubled or zeroed."""
-    return _torn(rng, content)
-
-
-def _base(rng: random.Random, having: str = "") -> tuple[str, Files]:
-    """A base, the quick ones more often."""
-    often = {"pendulum": 6, "slab": 6, "walk": 3, "keyframes": 2, "fish": 1}
-    names = [n for n, files in bases().items() if n in often and _has(files, having)]
-    name = rng.choices(names, [often[n] for n in names])[0]
-    return name, dict(bases()[name])
-
-
-def _has(files: Files, ending: str) -> bool:
-    return any(name.endswith(ending) for name in files)
+def _base(rng: random.Random, having: str = "") -> Files:
+    """The files of a base, the quick ones more often."""
+    often = {"pendulum": 6, "slab": 4, "swim": 3, "walk": 3, "keyframes": 2, "fish": 1}
+    names = [n for n in often if any(name.endswith(having) for name in bases()[n])]
+    return dict(bases()[rng.choices(names, [often[n] for n in names])[0]])
 
 
 def _ending(files: Files, ending: str) -> str:
     return next(name for name in files if name.endswith(ending))
 
 
-def _change(rng: random.Random, raw: dict[str, Any]) -> None:
-    """Change one place in nested tables."""
-    places: list[tuple[Any, Any]] = []
-    pending: list[Any] = [raw]
-    while pending:
-        table = pending.pop()
-        keys = list(table) if isinstance(table, dict) else list(range(len(table)))
-        for key in keys:
-            places.append((table, key))
-            if isinstance(table[key], dict | list):
-                pending.append(table[key])
-    table, key = rng.choice(places)
-    kind = rng.randrange(6)
-    if kind == 0:
-        del table[key]
-    elif kind == 1 and isinstance(table, dict):
-        table[rng.choice(("x", "kind", "file", "joint", "parameters"))] = rng.choice(NASTY)
-    elif kind == 1:
-        table.append(table[key])
-    elif kind == 2 and isinstance(table[key], int | float) and not isinstance(table[key], bool):
-        table[key] *= rng.choice((-1, 0, 1e3, 1e-3, 1e9, 1e-9))
-    else:
-        table[key] = rng.choice(NASTY)
+def _scene(files: Files, raw: dict[str, Any]) -> Broken:
+    return Broken(files | {"scene.toml": tomli_w.dumps(raw).encode("utf-8", "replace")})
 
 
-def _words(rng: random.Random, text: bytes) -> bytes:
-    """Some words or numbers of a text are others."""
-    words = re.split(rb"(\s+|[,<>\"=])", text)
-    for _ in range(rng.choice((1, 1, 2, 5))):
-        place = rng.randrange(len(words))
-        words[place] = rng.choice(
-            (*TEXTS, "-5", "3.7", "1e9", "}", "{", "Xrotation", "\0")
-        ).encode()
-    return b"".join(words)
+def _paths(raw: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The ways to all values in nested tables and lists."""
+    for key in raw if isinstance(raw, dict) else range(len(raw)):
+        yield (*at, key)
+        if isinstance(raw[key], dict | list):
+            yield from _paths(raw[key], (*at, key))
 
 
-def _torn(rng: random.Random, content: bytes) -> bytes:
-    if not content:
-        return content
-    start = rng.randrange(len(content))
-    stop = min(len(content), start + rng.choice((1, 2, 8, 64, 10**9)))
-    kind = rng.randrange(6)
-    if kind == 0:
-        return content[:start]
-    if kind == 1:
-        return content[:start] + content[stop:]
-    if kind == 2:
-        return content[:stop] + content[start:]
-    if kind == 3:
-        return content[:start] + b"\0" * (stop - start) + content[stop:]
-    if kind == 4:
-        return content[:start] + rng.randbytes(min(stop - start, 64)) + content[stop:]
-    lines = content.splitlines(keepends=True)
-    one, other = rng.randrange(len(lines)), rng.randrange(len(lines))
-    lines[one], lines[other] = lines[other], lines[one]
-    return b"".join(lines)
+@cache
+def _numeric_keys() -> list[tuple[tuple[str, ...], str]]:
+    """The ways to all keys of scenes that are numbers or made of them, and what they are."""
+
+    def walk(model: Any, at: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], str]]:
+        for name, hint in hints_of(model).items():
+            inner = list(dict.fromkeys(tables_in(hint)))
+            for one in inner:
+                yield from walk(one, (*at, name))
+            if not inner and ("number" in (kind := said(hint)) or "[x, y" in kind):
+                yield (*at, name), kind
+
+    return list(dict.fromkeys(walk(Scene, ())))
+
+
+def _number(rng: random.Random, kind: str) -> Any:
+    """A value for a key of this kind."""
+    one = resized(rng, 1 if kind.startswith("whole") else 1.0)
+    if "[" in kind or kind.startswith("list"):
+        return [one, *([resized(rng)] * rng.randrange(4))]
+    return one if rng.random() < 0.9 else rng.choice(NASTY)
+
+
+def _put(rng: random.Random, raw: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
+    """Set a value in nested tables; of a list of tables in one of them."""
+    table: Any = raw
+    for key in path[:-1]:
+        if not isinstance(table.get(key), dict | list):
+            table[key] = {}
+        table = table[key]
+        if isinstance(table, list):
+            tables = [one for one in table if isinstance(one, dict)]
+            table = rng.choice(tables) if tables else {}
+    table[path[-1]] = value
+
+
+def _retyped(rng: random.Random, text: bytes) -> bytes:
+    """An attribute of an XML file of VTK is another one."""
+    one = rng.choice(list(re.finditer(rb'="([^"]*)"', text)))
+    return text[: one.start(1)] + rng.choice(VTK).encode() + text[one.end(1) :]

@@ -11,8 +11,8 @@ import numpy as np
 import pyvista as pv
 
 from flowborne.io.run_folder import RunFolder
-from fuzz import Said, command
 from fuzz_bases import ARM, KEYFRAMES, Files, bases
+from fuzz_judge import Said, command
 from marked import with_part
 
 PAGE = Path(__file__).parents[1] / "docs" / "attack.md"

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from flowborne.running import RunResult
 
 
+LONGEST = 1000
+"""Letters of a message, of which more are left out in its middle."""
+
+
 def result_printer(name: str, *columns: str) -> Callable[[Any], None]:
     """Function that prints a result of a validation or a bench as it comes."""
 
@@ -52,6 +56,8 @@ def sentence_of(error: Exception) -> str:
 
 
 def complain(message: str) -> None:
-    """Say what is wrong in one line, whatever letters the input has put into it."""
+    """Say what is wrong in one line that can be read, whatever the input has put into it."""
     line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
+    if len(line) > LONGEST:
+        line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
     print(f"flowborne: {line}", file=sys.stderr)

@@ -39,7 +39,7 @@ def check_mouths(draft: Draft, model: SolidModel) -> Iterator[str]:
 def check_mouth_cells(draft: Draft, model: SolidModel) -> Iterator[str]:
     """Every mouth must cover cells of the grid at the start; for a scene with no other fault."""
     scene = draft.scene
-    if not scene.mouths:
+    if not scene.mouths or draft.broken:
         return
     world = World.at_rest(Setup(model, fluid_of(scene)))
     world.solid = initial_state(scene, model)
