@@ -91,6 +91,17 @@ def test_parts_work_from_a_scene_file(scene: Path, tmp_path: Path) -> None:
     assert np.loadtxt(tmp_path / "run" / "block.track").shape == (3, 3)
 
 
+def test_parts_are_found_where_python_looks_in_the_working_folder(
+    scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in an interactive session in the scene's folder, where sys.path begins with ''."""
+    for name in ("level", "share", "track"):
+        forget(name)
+    monkeypatch.chdir(scene.parent)
+    monkeypatch.syspath_prepend("")
+    assert check_scene(scene.name) == []
+
+
 def test_the_run_folder_stands_on_its_own(scene: Path, tmp_path: Path) -> None:
     fb.run(scene, tmp_path / "run", film=False)
     assert {"level.py", "share.py", "track.py"} <= {p.name for p in (tmp_path / "run").iterdir()}

@@ -48,7 +48,7 @@ from marked import with_part
 PAGE = Path(__file__).parents[1] / "docs" / "attack.md"
 KEPT = Path(__file__).parents[1] / "build" / "fuzz"
 
-SECONDS = 120.0
+SECONDS = 300.0
 """Longest that an input may take."""
 
 MEMORY = 8 << 30

@@ -54,7 +54,8 @@ def _load(path: Path) -> None:
             )
         return
     folder = str(path.parent.resolve())
-    elsewhere = [place for place in sys.path if place not in (*_FOLDERS, folder)]
+    own = {*_FOLDERS, folder}
+    elsewhere = [place for place in sys.path if str(Path(place).resolve()) not in own]
     taken = name in sys.modules or name in sys.stdlib_module_names
     if taken or PathFinder.find_spec(name, elsewhere) is not None:
         raise SceneError(
