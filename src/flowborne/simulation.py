@@ -253,6 +253,9 @@ class Simulation:
                 terms, targets = controller.measure(world, reports[-1]), controller.targets(world)
         except (ArithmeticError, ValueError) as error:
             raise BlowUpError(frame, number, str(error)) from error
+        except MemoryError as error:
+            cause = f"the memory is full ({error})" if str(error) else "the memory is full"
+            raise BlowUpError(frame, number, cause) from error
         for report in reports:
             for part, spent in report.seconds.items():
                 seconds[part] = seconds.get(part, 0.0) + spent
