@@ -26,14 +26,14 @@ FORMAL_ORDER = 2.0
 LEAST_ORDER, MOST_ORDER = 0.5, 2.0
 """Bounds of the order in the bar: a higher one, by chance, would make it too short."""
 
-SAFE, CAUTIOUS = 1.25, 3.0
-"""Factors of safety where the order seen is that of the scheme, and where it is not."""
+SAFETY_FACTOR, CAUTIOUS_FACTOR = 1.25, 3.0
+"""Factors of safety where the observed order is that of the scheme, and where it is not."""
 
-NEAR = 0.1
-"""Part of the scheme's order by which the order seen may differ from it in the former case."""
+ORDER_TOLERANCE = 0.1
+"""Part of the scheme's order by which the observed one may differ from it in the former case."""
 
-STEEPEST = 30.0
-"""Largest order that is looked for."""
+LARGEST_ORDER = 30.0
+"""Upper bound in the search for the order."""
 
 
 Convergence = Literal["monotone", "equal", "none", "unknown"]
@@ -51,7 +51,7 @@ class Refinement:
     resolutions   from coarse to fine: cells, or steps per frame
     values        one each
     convergence   of the last three: "monotone", "equal", "none" or "unknown"
-    order         p as seen; nan unless they approach a value from one side
+    order         observed p; nan unless they approach a value from one side
     extrapolated  value at h = 0 of Richardson's extrapolation with that p; nan where there is none,
                   or one below 0.5, with which next to nothing is known of it
     uncertainty   half width of the bar around the finest value, never negative
@@ -88,14 +88,14 @@ class Refinement:
         if apart == 0.0:
             convergence, extrapolated = "equal", float(f[-1])
         elif len(f) == 2:
-            convergence, bar = "unknown", CAUTIOUS * _remaining(f, h, FORMAL_ORDER)
+            convergence, bar = "unknown", CAUTIOUS_FACTOR * _remaining(f, h, FORMAL_ORDER)
         elif not math.isnan(order := order_of(h, f)):
             convergence = "monotone"
             if order >= LEAST_ORDER:
                 extrapolated = float(f[-1] + np.sign(f[-1] - f[-2]) * _remaining(f, h, order))
-            near = abs(order - FORMAL_ORDER) <= NEAR * FORMAL_ORDER
+            near = abs(order - FORMAL_ORDER) <= ORDER_TOLERANCE * FORMAL_ORDER
             bounded = min(max(order, LEAST_ORDER), MOST_ORDER)
-            bar = (SAFE if near else CAUTIOUS) * _remaining(f, h, bounded)
+            bar = (SAFETY_FACTOR if near else CAUTIOUS_FACTOR) * _remaining(f, h, bounded)
         spread = float(np.ptp(np.array(values, float)))
         return cls(
             tuple(map(float, resolutions)),
@@ -215,14 +215,16 @@ def order_of(spacings: Array, values: Array) -> float:
     first, second = np.log(spacings[:2] / spacings[1:])
 
     def excess(p: float) -> float:
-        """Logarithm of the ratio of differences that an order makes, over that which is seen."""
+        """Logarithm of the ratio of differences that an order makes, over the observed one."""
         made = p * second + math.log(np.expm1(p * first) / np.expm1(p * second))
         return float(made - math.log(before / last))
 
     least = 1e-6
     if excess(least) >= 0.0:
         return math.nan
-    return STEEPEST if excess(STEEPEST) <= 0.0 else float(brentq(excess, least, STEEPEST))
+    if excess(LARGEST_ORDER) <= 0.0:
+        return LARGEST_ORDER
+    return float(brentq(excess, least, LARGEST_ORDER))
 
 
 def _remaining(values: Array, spacings: Array, order: float) -> float:

@@ -10,7 +10,7 @@ from flowborne.characters.rig import Array, Integers
 PLAIN = 0.5
 """Red, green and blue of a surface whose file gives it no colour."""
 
-MOST = 8
+MOST_COLOURS = 8
 """Colours of a surface at most."""
 
 
@@ -28,11 +28,13 @@ def texture_at(image: Image.Image, places: Array) -> Array:
 
 
 def few_colours(colours: Array) -> tuple[Array, Integers]:
-    """At most MOST colours (n, 3), and which of them (m,) stands for each of `colours` (m, 3)."""
+    """MOST_COLOURS colours (n, 3) or fewer, and which of them (m,) stands for each of (m, 3)."""
     bytes_of = np.rint(255.0 * np.clip(np.nan_to_num(colours), 0.0, 1.0)).astype(np.uint8)
     found, which = np.unique(bytes_of, axis=0, return_inverse=True)
-    if len(found) > MOST:
-        reduced = Image.fromarray(bytes_of[None]).quantize(MOST, Image.Quantize.MEDIANCUT, MOST)
+    if len(found) > MOST_COLOURS:
+        reduced = Image.fromarray(bytes_of[None]).quantize(
+            MOST_COLOURS, Image.Quantize.MEDIANCUT, MOST_COLOURS
+        )
         palette = np.array(reduced.getpalette(), np.uint8).reshape(-1, 3)
         used, which = np.unique(np.asarray(reduced)[0], return_inverse=True)
         found = palette[used]

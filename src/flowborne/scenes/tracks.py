@@ -13,8 +13,8 @@ from flowborne.scenes.formula import Formula
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-LOOKED_AT = 200
-"""Times of a run at which the speed of a motion is looked at."""
+SPEED_SAMPLES = 200
+"""Times of a run at which the speed of a motion is evaluated."""
 
 
 @dataclass

@@ -14,7 +14,7 @@ from flowborne.scenes.build_control import input_motions
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import ObjectiveInputMotionTable
 from flowborne.scenes.schema_drives import ServoPD
-from flowborne.scenes.tracks import LOOKED_AT
+from flowborne.scenes.tracks import SPEED_SAMPLES
 from flowborne.scenes.wording import and_more, rounded_up
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -66,7 +66,7 @@ def too_slow(scene: Scene, setup: Setup) -> Iterator[str]:
     share = 1.0
     if isinstance(able.servo, ServoPD):
         share = min(1.0, np.pi * able.servo.frequency * time)
-    times = np.linspace(0.0, scene.time.frames * scene.frame_time, LOOKED_AT)
+    times = np.linspace(0.0, scene.time.frames * scene.frame_time, SPEED_SAMPLES)
     for number, motion in input_motions(scene, model).items():
         table = scene.objectives[number]
         assert isinstance(table, ObjectiveInputMotionTable)

@@ -17,7 +17,7 @@ from flowborne.scenes.bodies import initial_state, joint_unit
 from flowborne.scenes.fields import MOST_STEPS
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import InflowSide
-from flowborne.scenes.tracks import LOOKED_AT
+from flowborne.scenes.tracks import SPEED_SAMPLES
 from flowborne.scenes.warn_drives import driven_dofs
 from flowborne.solids.outline import Outline
 
@@ -37,7 +37,7 @@ AFTER_CELLS = 1.0
 
 
 FASTEST_TIMES = 20
-"""Times of the LOOKED_AT of a run for which all bodies are placed, at some ms each with flesh."""
+"""Of the SPEED_SAMPLES times those at which all bodies are placed, some ms each with flesh."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def _fastest_times(scene: Scene, setup: Setup, dt: float) -> list[float]:
     """The FASTEST_TIMES steps of the run, s, in whose middle the prescribed motions are fastest."""
     if not setup.motions:
         return []
-    times = np.linspace(0.0, scene.time.frames * scene.frame_time - dt, LOOKED_AT)
+    times = np.linspace(0.0, scene.time.frames * scene.frame_time - dt, SPEED_SAMPLES)
     rates = [
         np.linalg.norm([np.linalg.norm(m.velocity(float(time) + 0.5 * dt)) for m in setup.motions])
         for time in times
@@ -192,6 +192,6 @@ def _jet(mouth: Mouth, scene: Scene) -> float:
     area = 2.0 * mouth.radius if scene.is_slab else math.pi * mouth.radius**2
     factor = 0.0
     with suppress(ArithmeticError):
-        for time in np.linspace(0.0, scene.time.frames * scene.frame_time, LOOKED_AT):
+        for time in np.linspace(0.0, scene.time.frames * scene.frame_time, SPEED_SAMPLES):
             factor = max(factor, abs(mouth.strength.at(float(time))))
     return factor * abs(mouth.volume_rate) / area if area > 0.0 else math.inf

@@ -21,11 +21,11 @@ Array = NDArray[np.float64]
 SAMPLES = 400
 """Times of a curve that are sent at most: about a pixel each."""
 
-CHARACTER, BESIDE = 6.6, 16
-"""Pixels of a character of a number at an axis, and of what is beside numbers."""
+CHARACTER_WIDTH, AXIS_MARGIN = 6.6, 16
+"""Pixels of a character of a number at an axis, and of all else between numbers and plot."""
 
-LEAST_ROOM = 58
-"""Pixels for numbers at an axis at least: plots one below the other begin at the same place."""
+LEAST_AXIS_WIDTH = 58
+"""Pixels for numbers at an axis at least: plots one below the other begin at the same x."""
 
 HEIGHT = 150
 """Of a plot, pixels."""
@@ -105,7 +105,7 @@ def room_for(low: float, high: float) -> int:
     step = (high - low) / 8.0
     digits = max(0, -int(np.floor(np.log10(step)))) if step > 0.0 else 3
     longest = max(len(f"{end:,.{digits}f}") for end in (low, high))
-    return max(LEAST_ROOM, round(CHARACTER * longest) + BESIDE)
+    return max(LEAST_AXIS_WIDTH, round(CHARACTER_WIDTH * longest) + AXIS_MARGIN)
 
 
 def _axis(size: int, label: str | None = None) -> Any:
