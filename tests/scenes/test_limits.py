@@ -102,6 +102,13 @@ def test_files_of_a_model_that_are_none(
     assert f"given.stl cannot be read: it is a {kind}, and no file. Mend that." in problem
 
 
+@pytest.mark.parametrize("kind", ["pipe", "folder"])
+def test_a_model_that_is_no_file(write: Write, kind: str, tmp_path: Path) -> None:
+    (os.mkfifo if kind == "pipe" else os.mkdir)(tmp_path / "given.xml")
+    (problem,) = check_scene(write({'"squid.xml"': '"given.xml"'}))
+    assert f"given.xml cannot be read: it is a {kind}, and no file. Mend that." in problem
+
+
 def test_a_model_that_includes_itself_comes_to_an_end(write: Write) -> None:
     include = '<include file="squid.xml"/><worldbody>'
     (problem,) = check_scene(write(model=MODEL.replace("<worldbody>", include, 1)))

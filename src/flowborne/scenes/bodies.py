@@ -62,7 +62,7 @@ def load_model(scene: Scene) -> SolidModel:
     path = scene.model_path
     assert path is not None
     assert scene.solids is not None
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(f"there is no model file {path}. Correct solids.model.")
     try:
         if scene.flesh:
