@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flowborne.io.run_folder import RunFolderError
 from flowborne.view import drawing
 from flowborne.view.drawing import drawn_frames
 from flowborne.view.film import make_preview, write_film, write_shot
@@ -78,6 +79,17 @@ def test_a_folder_without_frames_says_so(write_run: Write) -> None:
         path.unlink()
     with pytest.raises(ValueError, match="has no frame to draw; let the run go on with --resume"):
         make_preview(folder)
+
+
+def test_a_body_that_the_run_does_not_have_is_named(write_run: Write) -> None:
+    folder = write_run(frames=1)
+    model = json.loads((folder / "model.json").read_text())
+    for table, key, value in ((model["geoms"][0], "body", 42502), (model["joint_bodies"], 0, -1)):
+        sound, table[key] = table[key], value
+        (folder / "model.json").write_text(json.dumps(model))
+        with pytest.raises(RunFolderError, match=f"model.json has body {value}, and 2 in all"):
+            Run.read(folder)
+        table[key] = sound
 
 
 def test_a_wide_and_a_high_run_have_even_sides(write_run: Write) -> None:

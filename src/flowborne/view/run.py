@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.given_files import read_json
@@ -167,6 +168,12 @@ class Run:
         scene = folder.read_scene()
         model = read_json(folder.model)
         carriers = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
+        geoms = tuple(_geom(entry) for entry in model["geoms"])
+        flesh = _flesh(model.get("flesh"))
+        carried = tuple(_carried(entry) for entry in model.get("skins", ()))
+        carrying = [*carriers.values(), *(geom.body for geom in geoms)]
+        carrying += [body for skin in carried for body in skin.bodies]
+        _check_numbers([*carrying, *(flesh.bodies if flesh else ())], model["bodies"], "body")
         return cls(
             name=scene.get("name", path.name),
             bodies=tuple(model["bodies"]),
@@ -175,14 +182,14 @@ class Run:
             grid=_grid(model["grid"]),
             slab=bool(model["slab"]),
             gravity=np.asarray(scene.get("gravity", (0.0, 0.0, 0.0)), float),
-            geoms=tuple(_geom(entry) for entry in model["geoms"]),
+            geoms=geoms,
             frames_per_second=float(model["frames_per_second"]),
             wind=np.asarray(model["wind"], float).reshape(-1, 3),
             shot=Shot.of(scene.get("film", {})),
             history=_history(folder.history),
             states=states,
-            flesh=_flesh(model.get("flesh")),
-            carried=tuple(_carried(entry) for entry in model.get("skins", ())),
+            flesh=flesh,
+            carried=carried,
             sources=_sources(scene),
         )
 
@@ -234,10 +241,19 @@ def _grid(entry: dict[str, Any] | None) -> Grid | None:
     return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
 
 
+def _check_numbers(numbers: ArrayLike, of: Sized, what: str) -> None:
+    """Raise ValueError unless all of them count what is there, from 0."""
+    found = np.asarray(numbers, np.int64).ravel()
+    wrong = found[(found < 0) | (found >= len(of))]
+    if wrong.size:
+        raise ValueError(f"model.json has {what} {wrong[0]}, and {len(of)} in all")
+
+
 def _geom(entry: dict[str, Any]) -> Geom:
     mesh = None
     if entry["type"] == "mesh":
         mesh = (np.asarray(entry["vertices"], float), np.asarray(entry["faces"], np.int64))
+        _check_numbers(mesh[1], mesh[0], "vertex")
     size, rgba = np.asarray(entry["size"], float), np.asarray(entry["rgba"], float)
     covered = bool(entry.get("covered", False))
     shape = shape_of(entry["type"], size, mesh)
@@ -251,6 +267,7 @@ def _flesh(entry: dict[str, Any] | None) -> Flesh | None:
 
 
 def _carried(entry: dict[str, Any]) -> CarriedSkin:
+    _check_numbers(entry["triangles"], entry["vertices"], "vertex")
     return CarriedSkin(
         np.asarray(entry["vertices"], float),
         np.asarray(entry["triangles"], np.int64),
