@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 import flowborne as fb
 from flowborne.bodies import SolidState, kinetic_energy, potential_energy
 from flowborne.joint_measures import JointMeasures
+from flowborne.measures import Measures
 from flowborne.motions import TrajectorySinusoid
 from flowborne.scenes.build import build
 from flowborne.validation.worlds import mjcf
@@ -104,6 +105,16 @@ def test_a_ball_joint_has_three_torques() -> None:
     assert list(row) == list(measures.columns)
     assert_allclose([row[f"torque_shoulder_{a}_Nm"] for a in "xyz"], [0.0, -29.43, 0.0], atol=1e-9)
     assert row["power_shoulder_W"] == 0.0
+
+
+def test_two_joints_with_the_same_column_are_refused() -> None:
+    """The torque of a ball joint about x, and that of a hinge with '_x' behind its name."""
+    arm = (
+        '<body name="arm"><joint name="shoulder_x"/><geom type="sphere" size="0.1"/></body></body>'
+    )
+    world = make_world(BALL.replace("</body>", arm, 1), slab=False)
+    with pytest.raises(fb.SceneError, match="two columns 'torque_shoulder_x_Nm'"):
+        Measures(world.setup, None, None, (), ("shoulder", "shoulder_x"))
 
 
 def test_joints_are_chosen_as_the_scene_says() -> None:

@@ -44,7 +44,7 @@ class JointMeasures:
         self.places: dict[str, int] = {}
         self._decided: dict[str, int] = {}
         self._prescribed: dict[str, int] = {}
-        self._force: dict[str, int] = {}
+        self._force: list[tuple[str, int]] = []
         self._power: dict[str, Integers] = {}
         for name in _joints(self._model):
             dofs = self._model.dofs_of(name)
@@ -60,13 +60,13 @@ class JointMeasures:
                 elif named and prescribed[dofs[0]]:
                     self._prescribed[target] = self.positions[position]
             if named:
-                self._force |= _components(self._model, name)
+                self._force += _components(self._model, name)
                 self._power[f"power_{name}_W"] = dofs
         self.columns = (
             *self.positions,
             *self._decided,
             *self._prescribed,
-            *self._force,
+            *(column for column, _ in self._force),
             *self._power,
         )
 
@@ -87,7 +87,7 @@ class JointMeasures:
         values |= {column: float(report.targets[n]) for column, n in self._decided.items()}
         if self._power:
             force, power = drive_means(report)
-            values |= {column: float(force[dof]) for column, dof in self._force.items()}
+            values |= {column: float(force[dof]) for column, dof in self._force}
             values |= {column: float(power[dofs].sum()) for column, dofs in self._power.items()}
         return values
 
@@ -106,17 +106,17 @@ def drive_means(report: FrameReport) -> tuple[Array, Array]:
     )
 
 
-def _components(model: SolidModel, joint: str) -> dict[str, int]:
-    """Column of each component of a joint's drive -> its dof; none that a slab locks."""
+def _components(model: SolidModel, joint: str) -> list[tuple[str, int]]:
+    """Column and dof of each component of a joint's drive; none that a slab locks."""
     dofs, kind = model.dofs_of(joint), _kind(model, joint)
     if kind in POSITION:
         column = f"torque_{joint}_Nm" if kind == HINGE else f"force_{joint}_N"
-        return {column: int(dofs[0])}
+        return [(column, int(dofs[0]))]
     columns = [f"torque_{joint}_{axis}_Nm" for axis in "xyz"]
     if len(dofs) > len(columns):
         columns = [f"force_{joint}_{axis}_N" for axis in "xyz"] + columns
     found = zip(columns, dofs.tolist(), strict=True)
-    return {column: dof for column, dof in found if not model.locked[dof]}
+    return [(column, dof) for column, dof in found if not model.locked[dof]]
 
 
 def _joints(model: SolidModel) -> list[str]:

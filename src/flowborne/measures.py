@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from flowborne.body_measures import BodyMeasures
 from flowborne.control.objectives import name_of
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
+from flowborne.errors import SceneError
 from flowborne.frame_report import FrameReport
 from flowborne.joint_measures import JointMeasures
 from flowborne.solids.dynamics import kinematics
@@ -89,6 +91,7 @@ class Measures:
         self.controlled = list(self._joints.places)
         self._terms = [] if controller is None else _terms(controller)
         self.columns = self._columns()
+        _check_distinct(self.columns)
 
     def values(self, world: World, frame: int, report: FrameReport | None) -> dict[str, float]:
         """column -> number, in the order of `columns`; nan where only a step can tell."""
@@ -187,6 +190,16 @@ class Measures:
             for axis, x in zip("wxyz", quaternion(poses.body_rotation[body]), strict=True):
                 values[f"{name}_q{axis}"] = float(x)
         return values
+
+
+def _check_distinct(columns: Sequence[str]) -> None:
+    """Raise SceneError where two joints or bodies would have the same column."""
+    twice = [column for column, count in Counter(columns).items() if count > 1]
+    if twice:
+        raise SceneError(
+            f"the history would have two columns '{twice[0]}', because the name of one joint or "
+            "body is that of another with '_x' or a quantity behind it. Rename one in the model."
+        )
 
 
 def quaternion(rotation: Array) -> Array:
