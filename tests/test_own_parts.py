@@ -53,14 +53,16 @@ exports = [{ file = "block.track", body = "block", every = 2 }]
 
 
 @pytest.fixture
-def scene(tmp_path: Path) -> Path:
-    """The scene in a folder with its model and its parts."""
+def scene(tmp_path: Path) -> Iterator[Path]:
+    """The scene in a folder with its model and its parts, forgotten afterwards."""
     for path in (*PARTS.glob("*.py"), library() / "block.xml"):
         shutil.copy(path, tmp_path)
     file = tmp_path / "own.toml"
     file.write_text(SCENE)
     file.with_name("sound.toml").write_text(SCENE)
-    return file
+    yield file
+    for path in PARTS.glob("*.py"):
+        forget(path.stem)
 
 
 def forget(name: str) -> None:
