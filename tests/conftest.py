@@ -67,8 +67,21 @@ FIRST = "coupling/test_flux_form.py"
 """What compiles nearly all of a step in a fluid. While one process does that, another one takes
 what needs little of it, and neither compiles what the other does."""
 
-DRY = ("characters", "clips", "io", "shapes", "solids", "view")
-"""Folders whose tests need little of a fluid."""
+DRY = (
+    "characters",
+    "solids",
+    "io",
+    "scenes/human",
+    "scenes/test_load.py",
+    "scenes/test_capture.py",
+    "scenes/test_clip_motion.py",
+    "scenes/test_check.py",
+    "scenes/test_human_scenes.py",
+    "validation/test_human.py",
+    "shapes",
+    "view",
+)
+"""Folders and files whose tests need little of a fluid, those that need none first."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -76,9 +89,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = Counter(item.path for item in items)
 
     def order(item: pytest.Item) -> tuple[int, int, str]:
-        path = item.path.relative_to(TESTS)
-        late = 0 if path.as_posix() == FIRST else 1 if path.parts[0] in DRY else 2
-        return late, -tests[item.path], path.as_posix()
+        path = item.path.relative_to(TESTS).as_posix()
+        dry = (n for n, start in enumerate(DRY) if path.startswith(start))
+        place = -1 if path == FIRST else next(dry, len(DRY))
+        return place, -tests[item.path], path
 
     items.sort(key=order)
 

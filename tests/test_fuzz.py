@@ -17,7 +17,7 @@ from fuzz_bases import bases
 from fuzz_changes import SECRET
 from fuzz_judge import WELL, command, fault, surroundings_kept
 
-INPUTS = {"scenes": 60, "parts": 20}
+INPUTS = {"scenes": 40, "parts": 12}
 
 
 @pytest.mark.parametrize("part", range(4))
