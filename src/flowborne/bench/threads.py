@@ -11,7 +11,8 @@ from flowborne.bench.result import Result, verdict
 from flowborne.machine import cores, kernel_threads
 
 NAME = "threads"
-SCENE, RESOLUTION = "swimmer-jet-only", 96
+SCENE, RESOLUTION = "swimmer-jet-only", 120
+"""192,000 cells: every array of the grid is LARGE (see `kernels.jit`), so that threads start."""
 
 FRAMES = 4
 """Frames on each number of threads: kernels compare their serial and parallel versions in the first
