@@ -147,7 +147,7 @@ class ShapeMesh(Shape):
 
     def thickened(self, half: float) -> Shape:
         """Each thin side moves outward, by moving its corners along the normals of thin sides."""
-        offset = np.maximum(half - 0.5 * way_inward(self.vertices, self.faces, 2.0 * half), 0.0)
+        offset = np.maximum(half - 0.5 * way_inward(self.vertices, self.faces), 0.0)
         if not offset.any():
             return self
         return ShapeMesh(self.vertices + offsets(self.vertices, self.faces, offset), self.faces)

@@ -35,11 +35,7 @@ def thinnest(vertices: Array, triangles: Indices, slab: bool) -> float:
     area = np.linalg.norm(normal, axis=1)
     if slab:
         area[across(normal)] = 0.0
-    longest = float(np.ptp(vertices, axis=0).max())
-    for halvings in range(5, -2, -1):
-        way = way_inward(vertices, triangles, longest / 2.0**halvings)
-        if area[np.isfinite(way)].sum() >= RIMS * area.sum():
-            break
+    way = way_inward(vertices, triangles)
     order = np.argsort(way)
     part = np.cumsum(area[order]) / area.sum()
     return float(way[order][np.searchsorted(part, RIMS)])
