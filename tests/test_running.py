@@ -12,6 +12,7 @@ from collections import namedtuple
 import numpy as np
 import pytest
 import threadpoolctl
+from numba.core.errors import TypingError
 
 import flowborne
 from flowborne import running
@@ -219,10 +220,11 @@ def test_a_signal_between_a_frame_and_its_record_loses_nothing(small_scene, tmp_
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_a_signal_that_a_kernel_turns_into_a_system_error_ends_the_run_well(
-    small_scene, tmp_path, monkeypatch, reference
+@pytest.mark.parametrize("made", [SystemError, TypingError])
+def test_a_signal_that_numba_turns_into_an_error_ends_the_run_well(
+    small_scene, tmp_path, monkeypatch, reference, made
 ):
-    """As Numba's wrapper does when a handler raises in it."""
+    """As its wrapper does when a handler raises in it, and its compiler."""
     advance = Simulation.advance_frame
 
     def interrupted(simulation):
@@ -231,7 +233,7 @@ def test_a_signal_that_a_kernel_turns_into_a_system_error_ends_the_run_well(
                 os.kill(os.getpid(), signal.SIGINT)
                 time.sleep(1)
             except KeyboardInterrupt as stop:
-                raise SystemError("returned a result with an exception set") from stop
+                raise made("of an interrupt") from stop
         return advance(simulation)
 
     with monkeypatch.context() as patch:

@@ -467,8 +467,9 @@ class _Signals:
         self._safe = True
         try:
             yield
-        except SystemError as error:
-            # an interrupt becomes a SystemError while a kernel hands back its result
+        except Exception as error:
+            # what an interrupt becomes within a library: a SystemError while a kernel hands back
+            # its result, a TypingError while Numba compiles it
             if not self.asked:
                 raise
             raise KeyboardInterrupt from error
