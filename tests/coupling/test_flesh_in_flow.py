@@ -54,9 +54,11 @@ LEG = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbod
 <geom type="capsule" fromto=".02 0 0 .14 0 0" size=".03"/></body></body></worldbody></mujoco>"""
 
 
-def leg(young: float = 2e4, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SolidModel:
-    """Two bones with a joint, inside one bar of flesh."""
-    points, elements = bar_mesh((8, 3, 3), (0.48, 0.18, 0.18))
+def leg(
+    young: float = 2e4, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), length: float = 0.48
+) -> SolidModel:
+    """Two bones with a joint, inside one bar of flesh; or partly, where that is shorter (m)."""
+    points, elements = bar_mesh((8, 3, 3), (length, 0.18, 0.18))
     points[:, 0] -= 0.24
     inner = (np.abs(points[:, 1]) < 0.05) & (np.abs(points[:, 2]) < 0.05)
     holders = [

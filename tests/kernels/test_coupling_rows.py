@@ -7,10 +7,13 @@ import pytest
 
 from flowborne.kernels.body_velocity import add_body_velocity, body_velocity_reference
 from flowborne.kernels.coupling_rows import (
+    COVERED,
+    ENCLOSED,
+    OPEN,
     flesh_rows,
     flesh_rows_reference,
-    has_open_face,
-    has_open_face_reference,
+    kinds_of_cells,
+    kinds_of_cells_reference,
     list_cells,
     list_cells_reference,
 )
@@ -22,31 +25,34 @@ WALLS = [np.zeros((3, 2), np.int64), np.array([[1, 0], [0, 1], [1, 1]])]
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("walls", WALLS)
-def test_has_open_face(shape: tuple[int, int, int], walls: np.ndarray) -> None:
-    made = cut(shape)
-    expected = has_open_face_reference(made.opened, walls)
-    found = [has_open_face(*cell, *made.opened, walls) for cell in np.ndindex(shape)]
-    assert not expected.all()
-    np.testing.assert_array_equal(np.reshape(found, shape), expected)
+def test_kinds_of_cells(shape: tuple[int, int, int], walls: np.ndarray) -> None:
+    random = np.random.default_rng(3)
+    opened = [random.random(face_shape(shape, d)) for d in range(3)]
+    for fraction in opened:
+        fraction[random.random(fraction.shape) < 0.7] = 0.0
+    expected = kinds_of_cells_reference(tuple(opened), walls)
+    assert set(np.unique(expected)) == (
+        {OPEN, COVERED, ENCLOSED} if walls.any() else {OPEN, COVERED}
+    )
+    np.testing.assert_array_equal(kinds_of_cells(*opened, walls), expected)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("walls", WALLS)
-def test_list_cells(shape: tuple[int, int, int], walls: np.ndarray) -> None:
+@pytest.mark.parametrize("wanted", [OPEN, COVERED])
+def test_list_cells(shape: tuple[int, int, int], wanted: int) -> None:
     made, random = cut(shape), np.random.default_rng(4)
     inside = made.box[:, 1] - made.box[:, 0] - 1
     share = [random.random(inside + (np.arange(3) == d)) for d in range(3)]
     for values in share:
         values[random.random(values.shape) < 0.7] = 0.0
-    expected = list_cells_reference(
-        share, made.opened, walls, made.box, 5, ORIGIN, H, 0.3, made.flat
-    )
-    given = *share, *made.opened, walls, made.box, 5, ORIGIN, H, 0.3, made.flat
+    kind = random.choice(np.array([OPEN, COVERED, ENCLOSED], np.int8), shape)
+    given = kind, wanted, made.box, 5, ORIGIN, H, 0.3, made.flat
+    expected = list_cells_reference(share, *given)
     none, nothing = np.zeros(0, np.int64), np.zeros(0)
-    count = list_cells(*given, 0, none, none, nothing)
+    count = list_cells(*share, *given, 0, none, none, nothing)
     assert 0 < count == expected[0].size < inside.prod()
     found = np.empty(count, np.int64), np.empty(6 * count, np.int64), np.empty(6 * count)
-    assert list_cells(*given, 0, *found) == count
+    assert list_cells(*share, *given, 0, *found) == count
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-14)
 
@@ -60,16 +66,16 @@ def parts(shape: tuple[int, int, int], count: int = 40) -> tuple[np.ndarray, np.
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("walls", WALLS)
-def test_flesh_rows(shape: tuple[int, int, int], walls: np.ndarray) -> None:
-    made, random = cut(shape), np.random.default_rng(6)
+def test_flesh_rows(shape: tuple[int, int, int]) -> None:
+    random = np.random.default_rng(6)
     axis, at = parts(shape)
     corner, weight = random.integers(0, 9, (axis.size, 3)), random.random((axis.size, 3))
     given = axis, at, random.random(axis.size), corner, weight, 12, 0.3
-    found = flesh_rows(*given, *made.opened, walls)
-    expected = flesh_rows_reference(*given, made.opened, walls)
-    assert 0 < expected[0].size < 2 * axis.size
-    for one, other in zip(found, expected, strict=True):
+    listed = random.random(shape) < 0.5
+    part, found = flesh_rows(*given, listed)
+    expected_part, expected = flesh_rows_reference(*given, listed)
+    assert 0 < part.size < 2 * axis.size
+    for one, other in zip((part, *found), (expected_part, *expected), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-14)
 
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.coupling.flesh import Skins, face_centres, skin_at, skins_on
+from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import side_codes
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Integers, Rows
 from flowborne.kernels.closed_fractions import add_closed, count_beside, list_closed, share_closed
-from flowborne.kernels.coupling_rows import flesh_rows, list_cells
+from flowborne.kernels.coupling_rows import COVERED, OPEN, flesh_rows, kinds_of_cells, list_cells
 from flowborne.kernels.node_distance import (
     BAND,
     NEAR,
@@ -52,8 +53,9 @@ class Geometry:
     corner     (nf, 3) vertices that move the last nf of them, closed by flesh,
     weight     (nf, 3) and how much each does
     cells      (m,) flat index of cells beside closed parts, one row per cell and body; of flesh,
-               one per cell and face
-    owner      (m,) the body
+               one per cell and face; then one per cell that lends its pressure to covered ones,
+               see `overlaps`
+    owner      (m,) the body; -1 of the last ones, whose area is 0
     area       (m, 3) area vector of the row's closed parts, m^2: force of unit pressure
     row_start  (m+1,) where the row's entries begin
     columns    entries of the motion: 6 body + component, then 3 vertex + component
@@ -178,7 +180,7 @@ def geometry(
     """
     nx, ny, nz = grid.shape
     shape, flat = np.array(grid.shape), grid.is_slab
-    h, area, origin = grid.spacing, grid.face_area, np.array(grid.origin)
+    h, area = grid.spacing, grid.face_area
     walls = (side_codes(boundaries) == CLOSED).astype(np.int64)
     distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
     nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
@@ -193,7 +195,7 @@ def geometry(
         for d in grid.axes:
             add_closed(total[d], curved, box, d)
         pieces.append((body, box, curved))
-    parts, rows, shared = 0, 0, []
+    parts, shared = 0, []
     of_all = allow_for_curvature(distance, h)
     for _, box, curved in pieces:
         inside = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
@@ -203,57 +205,46 @@ def geometry(
                 share[d], opened[d], total[d], of_all, beside, curved, box, d, walls[d]
             )
         shared.append(share)
-    rigid = [n for n, (body, _, _) in enumerate(pieces) if body < first_skin]
-    none, empty = np.zeros(0, np.int64), np.zeros(0)
-    for n in rigid:
-        body, box, _ = pieces[n]
-        rows = list_cells(
-            *shared[n], ox, oy, oz, walls, box, body, origin, h, area, flat, rows, none, none, empty
-        )
     axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
-    closed = np.empty(parts)
-    cells, columns = np.empty(rows, np.int64), np.empty(6 * rows, np.int64)
-    values = np.empty(6 * rows)
-    at = row = 0
+    closed, at = np.empty(parts), 0
     for (body, box, _), share in zip(pieces, shared, strict=True):
         for d in grid.axes:
             counts = np.array(grid.face_shape(d))
             at = list_closed(share[d], box, d, body, counts, at, axis, face, part_body, closed)
-        if rows and body < first_skin:
-            row = list_cells(
-                *share, ox, oy, oz, walls, box, body, origin, h, area, flat, row, cells, columns,
-                values,
-            )  # fmt: skip
+    kind = kinds_of_cells(ox, oy, oz, walls)
+    bones = [
+        (body, box, share)
+        for (body, box, _), share in zip(pieces, shared, strict=True)
+        if body < first_skin
+    ]
+    rows = bone_rows(bones, kind, OPEN, grid)
+    common = bone_rows(bones, kind, COVERED, grid)
     if flat:
         oz[:] = 0.0
     volume = np.empty(grid.shape)
     open_parts(volume, of_all, ox, oy, oz)
     volume *= grid.cell_volume
-    row_start = 6 * np.arange(cells.size + 1, dtype=np.int64)
-    owner, force = columns[::6] // 6, values.reshape(-1, 6)[:, :3]
+    owner, force = rows[2][::6] // 6, rows[3].reshape(-1, 6)[:, :3]
     first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else axis.size
     corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
     if first < axis.size:
         place, index = face_centres(axis[first:], face[first:], grid)
         corner, weight = skin_at(skins, place, grid)
-        part, *more = flesh_rows(
-            axis[first:],
-            index,
-            closed[first:],
-            corner,
-            weight,
-            6 * first_skin,
-            area,
-            *opened,
-            walls,
-        )
-        more_cells, more_start, more_columns, more_values = more
-        across = (more_columns[::3] - 6 * first_skin) % 3
-        more_force = more_values.reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
-        cells, owner = np.append(cells, more_cells), np.append(owner, part_body[first:][part])
-        force = np.concatenate([force, more_force])
-        row_start = np.append(row_start, row_start[-1] + more_start[1:])
-        columns, values = np.append(columns, more_columns), np.append(values, more_values)
+        skin = axis[first:], index, closed[first:], corner, weight, 6 * first_skin, area
+        part, of_skin = flesh_rows(*skin, kind == OPEN)
+        across = (of_skin[2][::3] - 6 * first_skin) % 3
+        push = of_skin[3].reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
+        owner = np.append(owner, part_body[first:][part])
+        force = np.concatenate([force, push])
+        rows = joined(rows, of_skin)
+        beside_bones = np.zeros(grid.shape, bool)
+        beside_bones.flat[common[0]] = True
+        common = joined(common, flesh_rows(*skin, beside_bones)[1])
+    if common[0].size:
+        lent = handed_on(common, kind, 6 * first_skin + skins.vertices.size)
+        owner = np.append(owner, np.full(lent[0].size, -1))
+        force = np.concatenate([force, np.zeros((lent[0].size, 3))])
+        rows = joined(rows, lent)
     return Geometry(
         distance,
         of_all,
@@ -266,13 +257,45 @@ def geometry(
         closed,
         corner,
         weight,
-        cells,
+        rows[0],
         owner,
         force,
-        row_start,
-        columns,
-        values,
+        *rows[1:],
         skins,
+    )
+
+
+def bone_rows(
+    bones: list[tuple[int, Integers, list[Array]]], kind: Integers, wanted: int, grid: Grid
+) -> Rows:
+    """Rows of J of bones in cells of one kind.
+
+    bones  number of each, (3, 2) ranges of nodes around it, and what it closes of the faces there
+    """
+    origin, none, counts = np.array(grid.origin), np.zeros(0, np.int64), [0]
+    given = [
+        (*share, kind, wanted, box, body, origin, grid.spacing, grid.face_area, grid.is_slab)
+        for body, box, share in bones
+    ]
+    for bone in given:
+        counts.append(list_cells(*bone, counts[-1], none, none, np.zeros(0)))
+    rows = counts[-1]
+    cells, columns = np.empty(rows, np.int64), np.empty(6 * rows, np.int64)
+    values = np.empty(6 * rows)
+    for bone, at in zip(given, counts[:-1], strict=True):
+        if rows:
+            list_cells(*bone, at, cells, columns, values)
+    return cells, 6 * np.arange(rows + 1, dtype=np.int64), columns, values
+
+
+def joined(rows: Rows, more: Rows) -> Rows:
+    """Rows of J and more of them."""
+    cells, start, columns, values = more
+    return (
+        np.append(rows[0], cells),
+        np.append(rows[1], rows[1][-1] + start[1:]),
+        np.append(rows[2], columns),
+        np.append(rows[3], values),
     )
 
 

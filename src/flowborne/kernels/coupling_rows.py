@@ -6,37 +6,55 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers
+from flowborne.kernels.arrays import Array, Faces, Integers, Rows
+
+Kinds = NDArray[np.int8]
+OPEN, COVERED, ENCLOSED = 1, 2, 0
+"""Kinds of cells: with a face that is not wholly closed; with all faces closed by bodies; closed in
+by bodies and solid sides of the domain."""
 
 
 @njit(nogil=True, cache=True)
-def has_open_face(i: int, j: int, k: int, ox: Array, oy: Array, oz: Array, walls: Integers) -> bool:
-    """Whether cell (i, j, k) has a face that is not wholly closed, and not on a solid side.
+def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
+    """(nx, ny, nz) OPEN, COVERED or ENCLOSED.
 
     walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
     """
-    cell = i, j, k
-    for axis in range(2 if ox.shape[2] == 1 else 3):
-        opened = ox if axis == 0 else (oy if axis == 1 else oz)
-        last = opened.shape[axis] - 2
-        x, y, z = i + int(axis == 0), j + int(axis == 1), k + int(axis == 2)
-        if opened[i, j, k] > 0.0 and not (cell[axis] == 0 and walls[axis, 0]):
-            return True
-        if opened[x, y, z] > 0.0 and not (cell[axis] == last and walls[axis, 1]):
-            return True
-    return False
+    n = oy.shape[0], ox.shape[1], ox.shape[2]
+    kind = np.empty(n, np.int8)
+    for i in range(n[0]):
+        for j in range(n[1]):
+            for k in range(n[2]):
+                cell = i, j, k
+                found = COVERED
+                for axis in range(2 if n[2] == 1 else 3):
+                    opened = ox if axis == 0 else (oy if axis == 1 else oz)
+                    x, y, z = i + int(axis == 0), j + int(axis == 1), k + int(axis == 2)
+                    low_side = cell[axis] == 0 and walls[axis, 0] == 1
+                    high_side = cell[axis] == n[axis] - 1 and walls[axis, 1] == 1
+                    low, high = opened[i, j, k] > 0.0, opened[x, y, z] > 0.0
+                    if (low and not low_side) or (high and not high_side):
+                        found = OPEN
+                        break
+                    if low_side or high_side:
+                        found = ENCLOSED
+                kind[i, j, k] = found
+    return kind
 
 
-def has_open_face_reference(opened: Faces, walls: Integers) -> NDArray[np.bool_]:
-    """(nx, ny, nz) `has_open_face` of all cells in NumPy."""
+def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
+    """`kinds_of_cells` in NumPy."""
     slab = opened[0].shape[2] == 1
-    found = np.zeros((opened[1].shape[0], *opened[0].shape[1:]), bool)
+    shape = opened[1].shape[0], *opened[0].shape[1:]
+    kind, beside = np.full(shape, COVERED, np.int8), np.zeros(shape, bool)
     for axis in range(2 if slab else 3):
-        passes = np.moveaxis(opened[axis] > 0.0, axis, 0)
-        passes[0] &= not walls[axis, 0]
-        passes[-1] &= not walls[axis, 1]
-        found |= np.moveaxis(passes[:-1] | passes[1:], 0, axis)
-    return found
+        passes, layers = np.moveaxis(opened[axis] > 0.0, axis, 0), np.moveaxis(kind, axis, 0)
+        for end in (0, -1):
+            if walls[axis, end]:
+                passes[end], layers[end] = False, ENCLOSED
+        beside |= np.moveaxis(passes[:-1] | passes[1:], 0, axis)
+    kind[beside] = OPEN
+    return kind
 
 
 @njit(nogil=True, cache=True)
@@ -48,28 +66,22 @@ def cell_wrench(
     sx: Array,
     sy: Array,
     sz: Array,
-    ox: Array,
-    oy: Array,
-    oz: Array,
-    walls: Integers,
     box: Integers,
     origin: Array,
     h: float,
     area: float,
     flat: bool,
-) -> int:
-    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given.
-
-    Gives 0 when the cell is wholly closed or touches no closed part, else 1.
-    """
+) -> bool:
+    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given, and whether the
+    cell touches a closed part."""
     a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
     x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
     z = 0.0 if flat else origin[2] + h * (k + 0.5)
     touched = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
     if not flat:
         touched += sz[a, b, c] + sz[a, b, c + 1]
-    if touched == 0.0 or not has_open_face(i, j, k, ox, oy, oz, walls):
-        return 0
+    if touched == 0.0:
+        return False
     wrench[:] = 0.0
     for side in range(2):
         sign = 2.0 * side - 1.0
@@ -86,7 +98,7 @@ def cell_wrench(
             wrench[2] += f
             wrench[3] += y * f
             wrench[4] -= x * f
-    return 1
+    return True
 
 
 @njit(nogil=True, cache=True)
@@ -94,10 +106,8 @@ def list_cells(
     sx: Array,
     sy: Array,
     sz: Array,
-    ox: Array,
-    oy: Array,
-    oz: Array,
-    walls: Integers,
+    kind: Kinds,
+    wanted: int,
     box: Integers,
     body: int,
     origin: Array,
@@ -109,19 +119,21 @@ def list_cells(
     columns: Integers,
     values: Array,
 ) -> int:
-    """Write the coupling rows of one body from row `at` on; gives the next one.
+    """Write the coupling rows of one body in cells of one kind from row `at` on; gives the next.
 
-    With `cells` of length 0 it only counts.
+    With `cells` of length 0 it only counts. COVERED cells in which the body closes as much on
+    either side have none.
     """
     wrench = np.empty(6)
-    n = ox.shape
+    n = kind.shape
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
             for k in range(box[2, 0], box[2, 1] - 1):
-                found = cell_wrench(
-                    wrench, i, j, k, sx, sy, sz, ox, oy, oz, walls, box, origin, h, area, flat
-                )
-                if found:
+                if kind[i, j, k] != wanted:
+                    continue
+                if cell_wrench(wrench, i, j, k, sx, sy, sz, box, origin, h, area, flat):
+                    if wanted == COVERED and not wrench[:3].any():
+                        continue
                     if cells.size:
                         cells[at] = (i * n[1] + j) * n[2] + k
                         for m in range(6):
@@ -133,8 +145,8 @@ def list_cells(
 
 def list_cells_reference(
     share: Faces,
-    opened: Faces,
-    walls: Integers,
+    kind: Kinds,
+    wanted: int,
     box: Integers,
     body: int,
     origin: Array,
@@ -144,19 +156,19 @@ def list_cells_reference(
 ) -> tuple[Integers, Integers, Array]:
     """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
     inside = tuple(slice(low, high - 1) for low, high in box)
-    found = has_open_face_reference(opened, walls)[inside]
+    found = kind[inside] == wanted
     force, touched = np.zeros((*found.shape, 3)), np.zeros(found.shape, bool)
     for axis in range(2 if flat else 3):
         ends = np.moveaxis(share[axis], axis, 0)
         force[..., axis] = np.moveaxis(area * (ends[1:] - ends[:-1]), 0, axis)
         touched |= np.moveaxis(ends[1:] + ends[:-1] > 0.0, 0, axis)
-    place = np.stack(np.nonzero(found & touched), axis=1) + box[:, 0]
+    found &= touched & (force.any(axis=3) if wanted == COVERED else True)
+    place = np.stack(np.nonzero(found), axis=1) + box[:, 0]
     centre = origin + h * (place + 0.5)
     if flat:
         centre[:, 2] = 0.0
-    force = force[found & touched]
-    values = np.concatenate([force, np.cross(centre, force)], axis=1)
-    cells = np.ravel_multi_index(tuple(place.T), (opened[1].shape[0], *opened[0].shape[1:]))
+    values = np.concatenate([force[found], np.cross(centre, force[found])], axis=1)
+    cells = np.ravel_multi_index(tuple(place.T), kind.shape)
     return cells, np.tile(6 * body + np.arange(6), cells.size), values.ravel()
 
 
@@ -169,22 +181,18 @@ def flesh_rows(
     weight: Array,
     first_column: int,
     area: float,
-    ox: Array,
-    oy: Array,
-    oz: Array,
-    walls: Integers,
-) -> tuple[Integers, Integers, Integers, Integers, Array]:
-    """Coupling rows of the cells beside closed parts of faces: one row per part and open cell.
+    listed: NDArray[np.bool_],
+) -> tuple[Integers, Rows]:
+    """Coupling rows of the cells beside closed parts of faces: one row per part and listed cell.
 
     axis, at        (n,), (n, 3) faces
     closed          (n,) part of each that flesh closes
     corner, weight  (n, 3) vertices that move it
     first_column    of the vertices' velocities
-    walls           (3, 2) as in `has_open_face`
-    returns         number of the part of each row; cells, row_start, columns, values as in
-                    `Geometry`
+    listed          (nx, ny, nz) whether a cell has rows
+    returns         number of the part of each row, and the rows
     """
-    shape = (oy.shape[0], ox.shape[1], ox.shape[2])
+    shape = listed.shape
     part, cells = np.empty(2 * axis.size, np.int64), np.empty(2 * axis.size, np.int64)
     columns = np.empty(6 * axis.size, np.int64)
     values = np.empty(6 * axis.size)
@@ -196,7 +204,7 @@ def flesh_rows(
             cell[axis[n]] -= 1 - side
             if cell[axis[n]] < 0 or cell[axis[n]] >= shape[axis[n]]:
                 continue
-            if not has_open_face(cell[0], cell[1], cell[2], ox, oy, oz, walls):
+            if not listed[cell[0], cell[1], cell[2]]:
                 continue
             part[rows] = n
             cells[rows] = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
@@ -205,7 +213,7 @@ def flesh_rows(
                 values[3 * rows + c] = (1.0 - 2.0 * side) * area * closed[n] * weight[n, c]
             rows += 1
     start = 3 * np.arange(rows + 1)
-    return part[:rows], cells[:rows], start, columns[: 3 * rows], values[: 3 * rows]
+    return part[:rows], (cells[:rows], start, columns[: 3 * rows], values[: 3 * rows])
 
 
 def flesh_rows_reference(
@@ -216,17 +224,16 @@ def flesh_rows_reference(
     weight: Array,
     first_column: int,
     area: float,
-    opened: Faces,
-    walls: Integers,
-) -> tuple[Integers, Integers, Integers, Integers, Array]:
+    listed: NDArray[np.bool_],
+) -> tuple[Integers, Rows]:
     """`flesh_rows` in NumPy."""
-    shape = np.array([opened[1].shape[0], *opened[0].shape[1:]])
+    shape = np.array(listed.shape)
     part, side = np.divmod(np.arange(2 * axis.size), 2)
     cell = at[part] - (1 - side)[:, None] * np.eye(3, dtype=np.int64)[axis[part]]
     inside = np.all((cell >= 0) & (cell < shape), axis=1)
-    inside[inside] = has_open_face_reference(opened, walls)[tuple(cell[inside].T)]
+    inside[inside] = listed[tuple(cell[inside].T)]
     part, side, cell = part[inside], side[inside], cell[inside]
     columns = first_column + 3 * corner[part] + axis[part][:, None]
     values = ((1.0 - 2.0 * side) * area * closed[part])[:, None] * weight[part]
     cells = np.ravel_multi_index(tuple(cell.T), tuple(shape))
-    return part, cells, 3 * np.arange(part.size + 1), columns.ravel(), values.ravel()
+    return part, (cells, 3 * np.arange(part.size + 1), columns.ravel(), values.ravel())
