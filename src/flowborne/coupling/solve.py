@@ -113,10 +113,13 @@ class Solved:
 
 
 def correct(driven: Driven, v: Array, actuator: Array, limit: Array) -> Driven | None:
-    """The bodies' system with the contacts and drives that the solution implies; None if it has
-    them."""
-    later = driven.updated(v)
-    return within_limits(later or driven, limit, v, actuator) or later
+    """The bodies' system with the drives that the solution implies, or where it has them with the
+    contacts and forces of Coriolis; None if it has all of them.
+
+    A drive that gives way has another velocity than the solution's, so what follows from velocities
+    comes after.
+    """
+    return within_limits(driven, limit, v, actuator) or driven.updated(v)
 
 
 def unsettled(driven: Driven, changed: Driven | None, v: Array) -> Integers:

@@ -263,7 +263,9 @@ def equations_under(
 ) -> Driven:
     """As `equations`, under a generalised force (nv,)."""
     told, goal = command.prescribed, command.final_velocity
-    return drive(world.setup.solid, world.solid, force, dt, before, told, goal)
+    return drive(
+        world.setup.solid, world.solid, force, dt, before, told, goal, command.torque_limit
+    )
 
 
 def buoyant_push(model: SolidModel, pose: Kinematics, density: float) -> Array:

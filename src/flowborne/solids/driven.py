@@ -135,17 +135,20 @@ def drive(
     before: SolidState | None,
     prescribed: Mask,
     hold: Array,
+    limit: Array,
 ) -> Driven:
     """The bodies at `state` under generalised forces (nv,), with dofs (nv,) that end the step with
     velocities `hold` (nv,).
 
     before  state before the positions moved; see `assemble`
+    limit   (nv,) largest |generalised force| of each drive, inf for none; one that has a limit may
+            not reach `hold`, and the first forces of Coriolis are not made for it
     raises  ValueError when the free dofs' matrix is not positive definite
     """
     if model.flesh is not None:
         flesh = assemble_flesh(model, state, applied, dt, before)
         return prescribe_flesh(flesh, prescribed, hold)
-    guess = np.where(prescribed, hold, state.v)
+    guess = np.where(prescribed & np.isinf(limit), hold, state.v)
     return prescribe(assemble(model, state, applied, dt, before, guess), prescribed, hold)
 
 
@@ -154,9 +157,11 @@ def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) 
 
     A drive either keeps its dof at `hold` with a force within its limit, or pushes with all that
     it has towards a velocity that the dof does not reach: one that needs more is released, one
-    whose dof runs past `hold` takes it up again. Together it is a linear complementarity problem
-    of a positive definite matrix; changing one drive at a time, the first, ends for certain
-    (Murty 1974), and all at once ends sooner as a rule.
+    whose dof runs past `hold` takes it up again. All that are released first push from the velocity
+    before the step towards `hold`: what each needs alone, when the others reach theirs, says little
+    of the way. Together it is a linear complementarity problem of a positive definite matrix;
+    changing one drive at a time, the first, ends for certain (Murty 1974), and all at once ends
+    sooner as a rule.
 
     limit     (nv,) largest |generalised force| of each drive, inf for none
     v_plus    (nv,) velocity of the solution
@@ -174,5 +179,7 @@ def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) 
         wrong = wrong[:1]
     prescribed, limited, push = driven.prescribed.copy(), driven.limited.copy(), driven.push.copy()
     prescribed[wrong], limited[wrong] = past[wrong], over[wrong]
-    push[wrong] = np.where(over[wrong], np.sign(actuator[wrong]) * limit[wrong], 0.0)
+    ahead = driven.hold - driven.system.v
+    way = np.where((ahead == 0.0) | (driven.turns > 0), actuator, ahead)
+    push[wrong] = np.where(over[wrong], np.sign(way[wrong]) * limit[wrong], 0.0)
     return driven.redriven(prescribed, limited, push)
