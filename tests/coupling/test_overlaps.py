@@ -16,7 +16,7 @@ from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.fluid.grid import Array, Grid
-from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, OPEN
+from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 from flowborne.validation.worlds import mjcf
@@ -72,7 +72,8 @@ def test_an_even_pressure_does_no_work_where_flesh_and_bones_overlap() -> None:
 
 def test_covered_cells_take_the_mean_of_those_nearer_to_the_fluid() -> None:
     kind = np.full((5, 4, 1), COVERED, np.int8)
-    kind[0], kind[:, 3], kind[4, 0] = OPEN, ENCLOSED, OPEN
+    kind[0], kind[:, 3], kind[4, 0] = WIDE, ENCLOSED, WIDE
+    kind[1, 0] = NARROW
     rows = np.array([4, 8]), np.array([0, 2, 3]), np.array([7, 1, 7]), np.array([1.0, 2.0, 3.0])
     cells, start, columns, values = handed_on(rows, kind, 9)
     # (1, 0) has the pressure of (0, 0); (2, 0) half that and half that of (1, 0)'s like, (3, 0)

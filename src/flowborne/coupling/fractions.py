@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.coupling.flesh import Skins, face_centres, skin_at, skins_on
 from flowborne.coupling.overlaps import handed_on
@@ -15,7 +16,7 @@ from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import side_codes
 from flowborne.kernels.arrays import Integers, Rows
 from flowborne.kernels.closed_fractions import add_closed, count_beside, list_closed, share_closed
-from flowborne.kernels.coupling_rows import COVERED, OPEN, flesh_rows, kinds_of_cells, list_cells
+from flowborne.kernels.coupling_rows import COVERED, NARROW, flesh_rows, kinds_of_cells, list_cells
 from flowborne.kernels.node_distance import (
     BAND,
     NEAR,
@@ -217,8 +218,8 @@ def geometry(
         for (body, box, _), share in zip(pieces, shared, strict=True)
         if body < first_skin
     ]
-    rows = bone_rows(bones, kind, OPEN, grid)
-    common = bone_rows(bones, kind, COVERED, grid)
+    rows = bone_rows(bones, kind >= NARROW, grid)
+    common = bone_rows(bones, kind == COVERED, grid)
     if flat:
         oz[:] = 0.0
     volume = np.empty(grid.shape)
@@ -231,7 +232,7 @@ def geometry(
         place, index = face_centres(axis[first:], face[first:], grid)
         corner, weight = skin_at(skins, place, grid)
         skin = axis[first:], index, closed[first:], corner, weight, 6 * first_skin, area
-        part, of_skin = flesh_rows(*skin, kind == OPEN)
+        part, of_skin = flesh_rows(*skin, kind >= NARROW)
         across = (of_skin[2][::3] - 6 * first_skin) % 3
         push = of_skin[3].reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
         owner = np.append(owner, part_body[first:][part])
@@ -266,15 +267,16 @@ def geometry(
 
 
 def bone_rows(
-    bones: list[tuple[int, Integers, list[Array]]], kind: Integers, wanted: int, grid: Grid
+    bones: list[tuple[int, Integers, list[Array]]], listed: NDArray[np.bool_], grid: Grid
 ) -> Rows:
-    """Rows of J of bones in cells of one kind.
+    """Rows of J of bones in listed cells.
 
-    bones  number of each, (3, 2) ranges of nodes around it, and what it closes of the faces there
+    bones   number of each, (3, 2) ranges of nodes around it, and what it closes of the faces there
+    listed  (nx, ny, nz)
     """
     origin, none, counts = np.array(grid.origin), np.zeros(0, np.int64), [0]
     given = [
-        (*share, kind, wanted, box, body, origin, grid.spacing, grid.face_area, grid.is_slab)
+        (*share, listed, box, body, origin, grid.spacing, grid.face_area, grid.is_slab)
         for body, box, share in bones
     ]
     for bone in given:

@@ -8,9 +8,10 @@ would turn the joint between both bodies: T^T J^T 1 is 0.05 to 0.2 h^2 per radia
 eel, and in a domain without an open side, whose fluid keeps its volume, that holds the joint fast.
 
 So the pressure of a covered cell is that of the fluid around: the mean of those neighbours that are
-one cell nearer to it, and thus a weighted mean p = E p of cells with an open face, with E 1 = 1.
-The rows of J become those of E^T J. Both bodies are pushed with opposite forces at the same
-place, which changes no momentum.
+one cell nearer to it, and thus a weighted mean p = E p of open cells, with E 1 = 1. The rows of J
+become those of E^T J. Both bodies are pushed with opposite forces at the same place, which changes
+no momentum. The cells that lend their pressure have a face that is open by half at least: what they
+make room for leaves them through it, and would be shot out of a crack.
 
 Bodies that overlap displace the volume of their union, and a bend may change their common volume.
 Round ends about a hinge keep it. Otherwise the fluid does not feel the change as pressure; the
@@ -22,15 +23,15 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Integers, Rows
-from flowborne.kernels.coupling_rows import COVERED, OPEN, Kinds
+from flowborne.kernels.coupling_rows import COVERED, NARROW, WIDE, Kinds
 
 
 def handed_on(rows: Rows, kind: Kinds, columns: int) -> Rows:
-    """E^T J: the rows of COVERED cells as rows of OPEN ones, one for each cell.
+    """E^T J: the rows of COVERED cells as rows of WIDE ones, one for each cell.
 
     kind     (nx, ny, nz) of the cells, see `kinds_of_cells`
     columns  k of J
-    Cells from which no way leads through covered ones to an open one have no rows.
+    Cells from which no way leads through covered and narrow ones to a wide one have no rows.
     """
     padded = np.pad(kind, 1)
     strides = np.array(padded.strides) // padded.itemsize
@@ -59,15 +60,15 @@ def handed_on(rows: Rows, kind: Kinds, columns: int) -> Rows:
 
 
 def layers(kind: Kinds, sources: Integers, steps: Integers) -> Integers:
-    """(n,) how many steps from cell to covered cell lead to an OPEN one, as far as the sources are
-    deep; -1 for cells beyond them and those that no way leads out of.
+    """(n,) how many steps from cell to cell, none of which is ENCLOSED, lead to a WIDE one, as far
+    as the sources are deep; -1 for cells beyond them and those that no way leads out of.
 
     kind     (n,) of all cells, with a rim of others
     sources  (m,) COVERED cells
     steps    (6,) from the index of a cell to those of its neighbours
     """
-    layer = np.where(kind == OPEN, 0, -1)
-    left = np.flatnonzero(kind == COVERED)
+    layer = np.where(kind == WIDE, 0, -1)
+    left = np.flatnonzero((kind == COVERED) | (kind == NARROW))
     depth = 0
     while (layer[sources] < 0).any():
         reached = (layer[left[:, None] + steps] == depth).any(axis=1)

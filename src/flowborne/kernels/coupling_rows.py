@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from flowborne.kernels.arrays import Array, Faces, Integers, Rows
 
 Kinds = NDArray[np.int8]
-OPEN, COVERED, ENCLOSED = 1, 2, 0
-"""Kinds of cells: with a face that is not wholly closed; with all faces closed by bodies; closed in
-by bodies and solid sides of the domain."""
+ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
+"""Kinds of cells: closed in by bodies and solid sides of the domain; all faces closed by bodies; an
+open face, but none by half; a face open by half or more."""
 
 
 @njit(nogil=True, cache=True)
 def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
-    """(nx, ny, nz) OPEN, COVERED or ENCLOSED.
+    """(nx, ny, nz) kind of each cell.
 
     walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
     """
@@ -25,20 +25,22 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
     for i in range(n[0]):
         for j in range(n[1]):
             for k in range(n[2]):
-                cell = i, j, k
-                found = COVERED
+                cell, widest, at_side = (i, j, k), 0.0, False
                 for axis in range(2 if n[2] == 1 else 3):
                     opened = ox if axis == 0 else (oy if axis == 1 else oz)
                     x, y, z = i + int(axis == 0), j + int(axis == 1), k + int(axis == 2)
-                    low_side = cell[axis] == 0 and walls[axis, 0] == 1
-                    high_side = cell[axis] == n[axis] - 1 and walls[axis, 1] == 1
-                    low, high = opened[i, j, k] > 0.0, opened[x, y, z] > 0.0
-                    if (low and not low_side) or (high and not high_side):
-                        found = OPEN
-                        break
-                    if low_side or high_side:
-                        found = ENCLOSED
-                kind[i, j, k] = found
+                    if cell[axis] == 0 and walls[axis, 0] == 1:
+                        at_side = True
+                    else:
+                        widest = max(widest, opened[i, j, k])
+                    if cell[axis] == n[axis] - 1 and walls[axis, 1] == 1:
+                        at_side = True
+                    else:
+                        widest = max(widest, opened[x, y, z])
+                if widest > 0.0:
+                    kind[i, j, k] = WIDE if widest >= 0.5 else NARROW
+                else:
+                    kind[i, j, k] = ENCLOSED if at_side else COVERED
     return kind
 
 
@@ -46,14 +48,16 @@ def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
     """`kinds_of_cells` in NumPy."""
     slab = opened[0].shape[2] == 1
     shape = opened[1].shape[0], *opened[0].shape[1:]
-    kind, beside = np.full(shape, COVERED, np.int8), np.zeros(shape, bool)
+    kind, widest = np.full(shape, COVERED, np.int8), np.zeros(shape)
     for axis in range(2 if slab else 3):
-        passes, layers = np.moveaxis(opened[axis] > 0.0, axis, 0), np.moveaxis(kind, axis, 0)
+        passes, layers = np.moveaxis(opened[axis].copy(), axis, 0), np.moveaxis(kind, axis, 0)
         for end in (0, -1):
             if walls[axis, end]:
-                passes[end], layers[end] = False, ENCLOSED
-        beside |= np.moveaxis(passes[:-1] | passes[1:], 0, axis)
-    kind[beside] = OPEN
+                passes[end], layers[end] = 0.0, ENCLOSED
+        wider = np.moveaxis(np.maximum(passes[:-1], passes[1:]), 0, axis)
+        widest = np.maximum(widest, wider)
+    kind[widest > 0.0] = NARROW
+    kind[widest >= 0.5] = WIDE
     return kind
 
 
@@ -71,17 +75,11 @@ def cell_wrench(
     h: float,
     area: float,
     flat: bool,
-) -> bool:
-    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given, and whether the
-    cell touches a closed part."""
+) -> None:
+    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given."""
     a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
     x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
     z = 0.0 if flat else origin[2] + h * (k + 0.5)
-    touched = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
-    if not flat:
-        touched += sz[a, b, c] + sz[a, b, c + 1]
-    if touched == 0.0:
-        return False
     wrench[:] = 0.0
     for side in range(2):
         sign = 2.0 * side - 1.0
@@ -98,7 +96,6 @@ def cell_wrench(
             wrench[2] += f
             wrench[3] += y * f
             wrench[4] -= x * f
-    return True
 
 
 @njit(nogil=True, cache=True)
@@ -106,8 +103,7 @@ def list_cells(
     sx: Array,
     sy: Array,
     sz: Array,
-    kind: Kinds,
-    wanted: int,
+    listed: NDArray[np.bool_],
     box: Integers,
     body: int,
     origin: Array,
@@ -119,21 +115,20 @@ def list_cells(
     columns: Integers,
     values: Array,
 ) -> int:
-    """Write the coupling rows of one body in cells of one kind from row `at` on; gives the next.
+    """Write the coupling rows of one body in listed cells from row `at` on; gives the next one.
 
-    With `cells` of length 0 it only counts. COVERED cells in which the body closes as much on
-    either side have none.
+    With `cells` of length 0 it only counts. Where the body closes as much on either side of a cell
+    it has no row.
     """
     wrench = np.empty(6)
-    n = kind.shape
+    n = listed.shape
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
             for k in range(box[2, 0], box[2, 1] - 1):
-                if kind[i, j, k] != wanted:
+                if not listed[i, j, k]:
                     continue
-                if cell_wrench(wrench, i, j, k, sx, sy, sz, box, origin, h, area, flat):
-                    if wanted == COVERED and not wrench[:3].any():
-                        continue
+                cell_wrench(wrench, i, j, k, sx, sy, sz, box, origin, h, area, flat)
+                if wrench.any():
                     if cells.size:
                         cells[at] = (i * n[1] + j) * n[2] + k
                         for m in range(6):
@@ -145,8 +140,7 @@ def list_cells(
 
 def list_cells_reference(
     share: Faces,
-    kind: Kinds,
-    wanted: int,
+    listed: NDArray[np.bool_],
     box: Integers,
     body: int,
     origin: Array,
@@ -156,19 +150,18 @@ def list_cells_reference(
 ) -> tuple[Integers, Integers, Array]:
     """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
     inside = tuple(slice(low, high - 1) for low, high in box)
-    found = kind[inside] == wanted
-    force, touched = np.zeros((*found.shape, 3)), np.zeros(found.shape, bool)
+    found = listed[inside]
+    force = np.zeros((*found.shape, 3))
     for axis in range(2 if flat else 3):
         ends = np.moveaxis(share[axis], axis, 0)
         force[..., axis] = np.moveaxis(area * (ends[1:] - ends[:-1]), 0, axis)
-        touched |= np.moveaxis(ends[1:] + ends[:-1] > 0.0, 0, axis)
-    found &= touched & (force.any(axis=3) if wanted == COVERED else True)
+    found = found & force.any(axis=3)
     place = np.stack(np.nonzero(found), axis=1) + box[:, 0]
     centre = origin + h * (place + 0.5)
     if flat:
         centre[:, 2] = 0.0
     values = np.concatenate([force[found], np.cross(centre, force[found])], axis=1)
-    cells = np.ravel_multi_index(tuple(place.T), kind.shape)
+    cells = np.ravel_multi_index(tuple(place.T), listed.shape)
     return cells, np.tile(6 * body + np.arange(6), cells.size), values.ravel()
 
 
