@@ -15,6 +15,7 @@ from flowborne.coupling.operators import generalised, pressure_push
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.fluid.boundary import Boundaries, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 from flowborne.simulation import Simulation
@@ -55,6 +56,15 @@ def test_an_even_pressure_does_no_work(grid: Grid, geom: str) -> None:
     found: list[bool] = []
     at_any_angle()
     assert any(found)
+
+
+def test_beside_an_open_side_covered_cells_have_no_pressure() -> None:
+    world = make_world(LINKS.format(CAPSULE), GRIDS[0], boundaries=Boundaries(x_max=BoundaryOpen()))
+    world.solid.q[2:] = 0.3, 1.0, -1.0
+    assert (cut_by_bodies(world).owner >= 0).all()
+    push = even_push(world)
+    assert np.abs(push[:2]).max() < 1e-13
+    assert np.abs(push[3:]).min() > 1e-5
 
 
 def test_an_even_pressure_does_no_work_where_flesh_and_bones_overlap() -> None:

@@ -196,30 +196,28 @@ def geometry(
         for d in grid.axes:
             add_closed(total[d], curved, box, d)
         pieces.append((body, box, curved))
-    parts, shared = 0, []
+    parts, shares = 0, []
     of_all = allow_for_curvature(distance, h)
-    for _, box, curved in pieces:
+    for body, box, curved in pieces:
         inside = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
         share = [np.zeros(inside + (np.arange(3) == d)) for d in range(3)]
         for d in grid.axes:
             parts += share_closed(
                 share[d], opened[d], total[d], of_all, beside, curved, box, d, walls[d]
             )
-        shared.append(share)
+        shares.append((body, box, share))
     axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
     closed, at = np.empty(parts), 0
-    for (body, box, _), share in zip(pieces, shared, strict=True):
+    for body, box, share in shares:
         for d in grid.axes:
             counts = np.array(grid.face_shape(d))
             at = list_closed(share[d], box, d, body, counts, at, axis, face, part_body, closed)
     kind = kinds_of_cells(ox, oy, oz, walls)
-    bones = [
-        (body, box, share)
-        for (body, box, _), share in zip(pieces, shared, strict=True)
-        if body < first_skin
-    ]
-    rows = bone_rows(bones, kind >= NARROW, grid)
-    common = bone_rows(bones, kind == COVERED, grid)
+    open_cells, covered = kind >= NARROW, kind == COVERED
+    if boundaries.has_open_side(grid):
+        covered[:] = False
+    bones = [share for share in shares if share[0] < first_skin]
+    rows, common = bone_rows(bones, open_cells, grid), bone_rows(bones, covered, grid)
     if flat:
         oz[:] = 0.0
     volume = np.empty(grid.shape)
@@ -232,7 +230,7 @@ def geometry(
         place, index = face_centres(axis[first:], face[first:], grid)
         corner, weight = skin_at(skins, place, grid)
         skin = axis[first:], index, closed[first:], corner, weight, 6 * first_skin, area
-        part, of_skin = flesh_rows(*skin, kind >= NARROW)
+        part, of_skin = flesh_rows(*skin, open_cells)
         across = (of_skin[2][::3] - 6 * first_skin) % 3
         push = of_skin[3].reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
         owner = np.append(owner, part_body[first:][part])

@@ -57,7 +57,7 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     mass = face_masses(volumes, fluid.density)
     start = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + cut.skins.vertices.size
-    plain = fluid.advection == "semi-lagrangian" or has_open_side(fluid)
+    plain = fluid.advection == "semi-lagrangian" or fluid.boundaries.has_open_side(fluid.grid)
     if plain or moved_since(world):
         return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
     pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
@@ -82,11 +82,6 @@ def likely(earlier: float) -> float:
     what it had. A sudden impulse, or one that has just ended, is not taken for what goes on.
     """
     return max(0.0, min(1.0, 2.0 - earlier, 2.0 * earlier))
-
-
-def has_open_side(fluid: Fluid) -> bool:
-    sides = (side for axis in fluid.grid.axes for side in fluid.boundaries.pair(axis))
-    return any(side.kind == "open" for side in sides)
 
 
 def driving(pressure: Array, fluid: Fluid) -> Array:

@@ -3,14 +3,16 @@
 A uniform pressure does no work on a body with a closed surface: the area vectors of its closed
 parts, each counted in the cells on both sides of its face, add up to nothing, and so do their
 moments. Inside an overlap two bodies share the faces in amounts that change from face to face, but
-there is no pressure in a cell without an open face. Were its rows of J left out, a uniform pressure
-would turn the joint between both bodies: T^T J^T 1 is 0.05 to 0.2 h^2 per radian at a hinge of the
-eel, and in a domain without an open side, whose fluid keeps its volume, that holds the joint fast.
+there is no pressure in a cell without an open face. With its rows of J left out, a uniform pressure
+turns the joint between both bodies: T^T J^T 1 is 0.05 to 0.2 h^2 per radian at a hinge of the eel.
+Beside an open side the pressure has no uniform part that a bend could raise, and they are left out,
+as in the paper: covered surfaces feel nothing. In a domain without one the fluid keeps its volume,
+and that would hold the joint fast.
 
-So the pressure of a covered cell is that of the fluid around: the mean of those neighbours that are
-one cell nearer to it, and thus a weighted mean p = E p of open cells, with E 1 = 1. The rows of J
-become those of E^T J. Both bodies are pushed with opposite forces at the same place, which changes
-no momentum. The cells that lend their pressure have a face that is open by half at least: what they
+There the pressure of a covered cell is that of the fluid around: the mean of those neighbours that
+are one cell nearer to it, and thus a weighted mean p = E p of open cells, with E 1 = 1. The rows of
+J become those of E^T J. Both bodies are pushed with opposite forces at one place, which changes no
+momentum. The cells that lend their pressure have a face that is open by half at least: what they
 make room for leaves them through it, and would be shot out of a crack.
 
 Bodies that overlap displace the volume of their union, and a bend may change their common volume.

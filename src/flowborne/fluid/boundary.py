@@ -133,6 +133,9 @@ class Boundaries:
         x, y, z = (low.kind == "periodic" for low, _ in self._pairs)
         return x, y, z
 
+    def has_open_side(self, grid: Grid) -> bool:
+        return any(side.kind == "open" for axis in grid.axes for side in self.pair(axis))
+
     def check(self, grid: Grid) -> None:
         """Raise ValueError when a slab's z sides are not closed."""
         if grid.is_slab and any(side.kind != "closed" for side in self.pair(2)):
