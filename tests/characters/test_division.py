@@ -14,7 +14,7 @@ from flowborne.characters.rig import Rig, Surface
 from flowborne.characters.source import read_source
 from flowborne.errors import SceneError
 from flowborne.shapes.mesh import ShapeMesh
-from flowborne.solids.mjcf import is_closed
+from flowborne.solids.geoms import is_closed
 
 from . import rigged
 

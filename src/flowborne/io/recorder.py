@@ -15,7 +15,7 @@ from flowborne.io.run_folder import RunFolder
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
-from flowborne.solids.mjcf import rest_poses
+from flowborne.solids.geoms import rest_poses
 from flowborne.solids.model import SolidModel
 from flowborne.solids.skins import clad_bodies, skins_of
 

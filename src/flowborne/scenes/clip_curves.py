@@ -19,7 +19,7 @@ from flowborne.errors import SceneError
 from flowborne.io.clip import Clip
 from flowborne.quaternions import continuous, inverse, product, turned, twist
 from flowborne.scenes.wording import suggestion
-from flowborne.solids import mjcf
+from flowborne.solids import geoms
 from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ def curves_of(
     followed = _sorted(model, mapping, joints)
     bodies = _mapped_bodies(model, clip, mapping)
     places, rotations = clip.places()
-    rest = Rotation.from_matrix(mjcf.rest_poses(model.mj)[1]).as_quat(scalar_first=True)
+    rest = Rotation.from_matrix(geoms.rest_poses(model.mj)[1]).as_quat(scalar_first=True)
     quaternions, positions, angles = [], [], []
     for joint in followed:
         kind, body = int(model.mj.jnt_type[joint]), int(model.mj.jnt_bodyid[joint])

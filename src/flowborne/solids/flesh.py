@@ -21,7 +21,7 @@ from scipy.sparse.linalg import spsolve
 from flowborne.shapes.thickness import thinnest
 from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import EDGES, measures, parts
-from flowborne.solids.mjcf import rest_poses
+from flowborne.solids.geoms import rest_poses
 from flowborne.solids.scratch import Compiled, Scratch, scratch
 from flowborne.solids.tissue import Grown
 from flowborne.solids.twists import cross, twists_about_origin

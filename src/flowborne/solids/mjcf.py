@@ -11,39 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.given_files import read_file
-from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
-from flowborne.shapes.shape import Mesh, Shape
+from flowborne.solids.geoms import (
+    CONTACT_ONLY,
+    HIDDEN_GROUP,
+    displacing_geoms,
+    element_name,
+    geom_shape,
+    is_closed,
+    kind_of,
+    mesh_of,
+    rest_poses,
+)
 from flowborne.solids.model_files import check_named, parsed
 from flowborne.solids.model_numbers import impossible, misgiven
 from flowborne.solids.model_size import too_large
-from flowborne.solids.own_shapes import Own, add_shapes, own_shape
+from flowborne.solids.own_shapes import add_shapes
 from flowborne.solids.quiet import compiled_quietly
 
 Array = NDArray[np.float64]
 
-HIDDEN_GROUP = 3
-"""Geometries in this group and above collide but displace no fluid (MuJoCo's convention)."""
-
-KINDS = {
-    mujoco.mjtGeom.mjGEOM_PLANE: "plane",
-    mujoco.mjtGeom.mjGEOM_HFIELD: "hfield",
-    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
-    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
-    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-    mujoco.mjtGeom.mjGEOM_BOX: "box",
-    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
-    mujoco.mjtGeom.mjGEOM_SDF: "sdf",
-}
 ARENA = 1 << 26
 """Bytes of MuJoCo's working memory beside that for pairs of bodies: it would take memory quadratic
 in the number of dofs."""
-
-CONTACT_ONLY = ("plane", "hfield")
-
-NONE: Own = {}
 
 
 def compiled(
@@ -207,71 +198,6 @@ def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
                 f"{where}: the mesh of geom '{name}' is not a closed surface with outward faces. "
                 f"Close it, or put the geom into group {HIDDEN_GROUP} or above."
             )
-
-
-def kind_of(mj: mujoco.MjModel, geom: int) -> str:
-    """Type of a geometry as MJCF spells it."""
-    return KINDS[mujoco.mjtGeom(int(mj.geom_type[geom]))]
-
-
-def displacing_geoms(mj: mujoco.MjModel) -> list[int]:
-    """MuJoCo ids of the geometries that displace fluid: no planes, no hfields, no group >= 3."""
-    return [
-        g
-        for g in range(mj.ngeom)
-        if mj.geom_group[g] < HIDDEN_GROUP and kind_of(mj, g) not in CONTACT_ONLY
-    ]
-
-
-def element_name(mj: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
-    """Name in the MJCF, or the kind and number of a nameless element."""
-    name = mujoco.mj_id2name(mj, kind, index)
-    return str(name) if name else f"{kind.name.removeprefix('mjOBJ_').lower()}{index}"
-
-
-def mesh_of(mj: mujoco.MjModel, geom: int) -> Mesh | None:
-    """Vertices in the geometry's frame and faces of a mesh geometry; None for the others."""
-    if kind_of(mj, geom) != "mesh":
-        return None
-    m = mj.geom_dataid[geom]
-    vertex, face = mj.mesh_vertadr[m], mj.mesh_faceadr[m]
-    vertices = mj.mesh_vert[vertex : vertex + mj.mesh_vertnum[m]]
-    faces = mj.mesh_face[face : face + mj.mesh_facenum[m]]
-    return vertices.astype(np.float64), faces.astype(np.int64)
-
-
-def geom_shape(mj: mujoco.MjModel, geom: int, own: Own = NONE) -> Shape:
-    """A geometry that displaces fluid, in its own frame; `own` are those of the user's own."""
-    mesh = mesh_of(mj, geom)
-    if mesh is not None:
-        number = int(mj.geom_dataid[geom])
-        geometry = own.get(element_name(mj, mujoco.mjtObj.mjOBJ_MESH, number))
-        if geometry is not None:
-            return own_shape(mj, number, geometry, mesh)
-    return shape_of(kind_of(mj, geom), mj.geom_size[geom], mesh)
-
-
-def is_closed(mesh: Mesh) -> bool:
-    """Whether every edge is used once in each direction and the enclosed volume is positive."""
-    vertices, faces = mesh
-    welded = np.unique(vertices, axis=0, return_inverse=True)[1].ravel()[faces]
-    edges = np.concatenate([welded[:, [0, 1]], welded[:, [1, 2]], welded[:, [2, 0]]])
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    forward = np.sort(edges[:, 0] * len(vertices) + edges[:, 1])
-    backward = np.sort(edges[:, 1] * len(vertices) + edges[:, 0])
-    return bool(np.array_equal(forward, backward) and np.linalg.det(vertices[faces]).sum() > 0.0)
-
-
-def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:
-    """World poses at rest: body positions and rotations, geometry positions and rotations."""
-    data = mujoco.MjData(mj)
-    mujoco.mj_kinematics(mj, data)
-    return (
-        data.xpos.copy(),
-        data.xmat.reshape(-1, 3, 3).copy(),
-        data.geom_xpos.copy(),
-        data.geom_xmat.reshape(-1, 3, 3).copy(),
-    )
 
 
 def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> Section:

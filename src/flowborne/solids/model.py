@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
-from flowborne.solids import displaced, mjcf
+from flowborne.solids import displaced, geoms, mjcf
 from flowborne.solids.covered import covered
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.own_shapes import own_by_mesh
@@ -237,14 +237,14 @@ class SolidModel:
 
     def rest_pose(self, geom: int) -> tuple[Array, float]:
         """A geometry at rest: (3, 3) its frame to the world's, and the height of its centre, m."""
-        _, _, position, rotation = mjcf.rest_poses(self.mj)
+        _, _, position, rotation = geoms.rest_poses(self.mj)
         g = int(self.geom_id[geom])
         return rotation[g], float(position[g, 2])
 
     def section_of(self, geom: int) -> Section:
         """Cross-section of a slab's geometry, in the geometry's frame."""
         g = int(self.geom_id[geom])
-        _, _, position, rotation = mjcf.rest_poses(self.mj)
+        _, _, position, rotation = geoms.rest_poses(self.mj)
         return mjcf.slab_section(self.mj, g, position[g], rotation[g])
 
     def _set_dofs(self) -> None:
@@ -278,12 +278,12 @@ class SolidModel:
 
     def _set_geoms(self) -> None:
         mj = self.mj
-        chosen = mjcf.displacing_geoms(mj)
+        chosen = geoms.displacing_geoms(mj)
         self.geom_id: NDArray[np.int64] = np.array(chosen, dtype=np.int64)
         self.ngeom = len(chosen)
         names = _names(mj, mujoco.mjtObj.mjOBJ_GEOM, mj.ngeom)
         self.geom_names = tuple(names[g] for g in chosen)
-        self.geom_shape = tuple(mjcf.geom_shape(mj, g, self._own) for g in chosen)
+        self.geom_shape = tuple(geoms.geom_shape(mj, g, self._own) for g in chosen)
         self.geom_size: Array = np.array(mj.geom_size[self.geom_id])
         self.geom_body: NDArray[np.int64] = mj.geom_bodyid[self.geom_id].astype(np.int64)
         self.geom_offset: Array = np.array(mj.geom_pos[self.geom_id])
@@ -291,7 +291,7 @@ class SolidModel:
         self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
         self.geom_covered: NDArray[np.bool_] = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
-            _, _, position, rotation = mjcf.rest_poses(mj)
+            _, _, position, rotation = geoms.rest_poses(mj)
             places = [
                 position[g] + shape.landmarks() @ rotation[g].T
                 for shape, g in zip(self.geom_shape, self.geom_id, strict=True)
@@ -301,7 +301,7 @@ class SolidModel:
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
         self.centroid: Array = np.zeros((self.nbody, 3))
-        body_position, body_rotation, position, rotation = mjcf.rest_poses(self.mj)
+        body_position, body_rotation, position, rotation = geoms.rest_poses(self.mj)
         for body in range(self.nbody):
             solids = [
                 self._solid(int(g), position[self.geom_id[g]], rotation[self.geom_id[g]])
@@ -333,13 +333,13 @@ def _bones(mj: mujoco.MjModel, grown: Sequence[Grown]) -> int:
     bones = int(flesh[0]) if flesh.size else int(mj.nbody)
     if flesh.size and flesh.size != mj.nbody - bones:
         later = next(b for b in range(bones, mj.nbody) if b not in flesh)
-        name = mjcf.element_name(mj, mujoco.mjtObj.mjOBJ_BODY, later)
+        name = geoms.element_name(mj, mujoco.mjtObj.mjOBJ_BODY, later)
         raise ValueError(f"body '{name}' comes after nodes of flesh. Put all flesh after it.")
     return bones
 
 
 def _names(mj: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ...]:
-    return tuple(mjcf.element_name(mj, kind, i) for i in range(count))
+    return tuple(geoms.element_name(mj, kind, i) for i in range(count))
 
 
 def _number(numbers: Mapping[str, int], name: str, what: str) -> int:

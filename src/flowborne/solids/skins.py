@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flowborne.solids.mjcf import element_name, rest_poses
+from flowborne.solids.geoms import element_name, rest_poses
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

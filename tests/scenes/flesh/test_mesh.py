@@ -28,7 +28,7 @@ from flowborne.scenes.flesh.mesh import (
 from flowborne.scenes.flesh.mesh_file import mesh_bytes, read_mesh, recipe_of
 from flowborne.solids.elements import measures, with_middles
 from flowborne.solids.flesh import outer_surface
-from flowborne.solids.mjcf import is_closed
+from flowborne.solids.geoms import is_closed
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import Tissue, add_flesh
 

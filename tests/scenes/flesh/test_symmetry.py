@@ -21,7 +21,7 @@ from flowborne.shapes.shape import Mesh
 from flowborne.simulation import Simulation
 from flowborne.solids.elements import measures
 from flowborne.solids.flesh import outer_surface
-from flowborne.solids.mjcf import is_closed
+from flowborne.solids.geoms import is_closed
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import Tissue, add_flesh
 from flowborne.validation.flyer import held

@@ -13,7 +13,7 @@ from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.scenes.wording import suggestion
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh, Shape
-from flowborne.solids.mjcf import (
+from flowborne.solids.geoms import (
     displacing_geoms,
     element_name,
     geom_shape,
