@@ -188,7 +188,7 @@ def test_bad_text_and_unknown_names_are_refused() -> None:
 
 
 def test_contact_geoms_displace_nothing() -> None:
-    model = one_body('<geom size="1" group="3"/><geom size=".5"/>')
+    model = one_body('<geom size=".6" group="3"/><geom size=".5"/>')
     assert model.ngeom == 1
     assert model.volume[1] == pytest.approx(np.pi / 6, rel=1e-12)
 

@@ -22,6 +22,7 @@ from flowborne.scenes.schema_solids import (
     MotionFormulaTable,
     MotionSinusoidTable,
     MotionTable,
+    SolidsTable,
 )
 from flowborne.scenes.tracks import (
     Curve,
@@ -31,6 +32,7 @@ from flowborne.scenes.tracks import (
     TrajectorySinusoid,
 )
 from flowborne.solids import mjcf
+from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
@@ -82,9 +84,15 @@ def load_model(scene: Scene) -> SolidModel:
             densities=scene.solids.densities,
             shapes=placed_shapes(scene),
             floating=scene.solids.floating,
+            displace=displace_of(scene.solids),
         )
     except ValueError as error:
         raise SceneError(_sentence(str(error))) from None
+
+
+def displace_of(solids: SolidsTable) -> Displace:
+    table = solids.displace
+    return Displace(table.groups, table.classes, table.names, table.without)
 
 
 def bones_of(scene: Scene) -> mujoco.MjSpec:
@@ -93,7 +101,8 @@ def bones_of(scene: Scene) -> mujoco.MjSpec:
     assert scene.solids is not None
     assert scene.model_path is not None
     solids = scene.solids
-    given = solids.density, solids.densities, placed_shapes(scene), solids.floating
+    chosen = displace_of(solids)
+    given = solids.density, solids.densities, placed_shapes(scene), solids.floating, chosen
     spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given)
     return spec
 

@@ -29,6 +29,24 @@ from flowborne.scenes.schema_fluid import check_table
 from flowborne.shapes.own import SHAPES
 
 
+class DisplaceTable(Table):
+    """[solids.displace]: the geoms that displace fluid, those of all keys together. Unless given,
+    of each body those that are drawn (groups 0 to 2), or those that collide in their place where
+    these are not closed surfaces or have less than half of the others' volume.
+
+    groups   of MuJoCo, 0 to 5
+    classes  of defaults in the model
+    names    of geoms, or patterns such as "hull_*"
+    without  names or patterns of geoms that displace nothing; alone they are taken off those that
+             displace by rule
+    """
+
+    groups: tuple[Annotated[int, Field(ge=0, le=5)], ...] = ()
+    classes: tuple[Text, ...] = ()
+    names: tuple[Text, ...] = ()
+    without: tuple[Text, ...] = ()
+
+
 class SolidsTable(Table):
     """[solids]: the bodies.
 
@@ -37,12 +55,14 @@ class SolidsTable(Table):
     densities  body -> kg/m^3 of that body, in place of the model's density and of `density`
     floating   bodies that hang on the world without a joint, such as the root of a URDF: each gets
                a free joint of its own name
+    displace   which geoms the fluid meets
     """
 
     model: FileName
     density: Positive | None = None
     densities: dict[str, Positive] = Field(default_factory=dict)
     floating: tuple[Text, ...] = ()
+    displace: DisplaceTable = DisplaceTable()
 
 
 class ShapeTable(Table, OwnTable):

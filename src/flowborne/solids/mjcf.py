@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from flowborne.given_files import read_file
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
+from flowborne.solids.displacing import BY_RULE, Displace, chosen_geoms, write_groups
 from flowborne.solids.geoms import (
     CONTACT_ONLY,
     HIDDEN_GROUP,
@@ -45,13 +46,15 @@ def compiled(
     densities: Mapping[str, float],
     shapes: Sequence[PlacedShape] = (),
     floating: Sequence[str] = (),
+    displace: Displace = BY_RULE,
 ) -> mujoco.MjModel:
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    return bones_of(source, slab, gravity, density, densities, shapes, floating)[1]
+    given = density, densities, shapes, floating, displace
+    return bones_of(source, slab, gravity, *given)[1]
 
 
 def bones_of(
@@ -62,10 +65,12 @@ def bones_of(
     densities: Mapping[str, float],
     shapes: Sequence[PlacedShape] = (),
     floating: Sequence[str] = (),
+    displace: Displace = BY_RULE,
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """An MJCF file or text, as `compiled`, before flesh grows on it.
 
     floating  bodies on the world without a joint, which get a free one of their name
+    displace  which geoms the fluid meets
     """
     where = _named(source)
     _check_xml(source, where)
@@ -87,10 +92,16 @@ def bones_of(
         given = densities.get(geom.parent.name, density)
         if given is not None:
             geom.density, geom.mass = given, np.nan
+    mj = _compiled(spec, where)
     try:
-        mj = compiled_quietly(spec)
+        chosen = chosen_geoms(spec, mj, displace)
     except ValueError as error:
-        raise _unreadable(where, error) from error
+        raise ValueError(f"{where}: {error}") from error
+    weightless = _weightless(spec, chosen, densities, density)
+    for geom in weightless:
+        geom.mass = 0.0
+    if write_groups(spec, chosen) or weightless:
+        mj = _compiled(spec, where)
     _refuse_unsupported(mj, where)
     if slab:
         _set_slab_inertias(spec, mj)
@@ -99,6 +110,30 @@ def bones_of(
         except ValueError as error:
             raise ValueError(f"{where} cannot be made a slab: {error}.") from error
     return spec, mj
+
+
+def _compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
+    try:
+        return compiled_quietly(spec)
+    except ValueError as error:
+        raise _unreadable(where, error) from error
+
+
+def _weightless(
+    spec: mujoco.MjSpec,
+    chosen: set[int],
+    densities: Mapping[str, float],
+    density: float | None,
+) -> list[mujoco.MjsGeom]:
+    """Geoms that a density of the scene does not mean: others of their body displace the fluid."""
+    displacing = {geom.parent.id for geom in spec.geoms if geom.id in chosen}
+    return [
+        geom
+        for geom in spec.geoms
+        if geom.id not in chosen
+        and geom.parent.id in displacing
+        and densities.get(geom.parent.name, density) is not None
+    ]
 
 
 def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
@@ -227,13 +262,12 @@ def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
             "Put every body at z = 0."
         )
     always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    lowest, highest = spec.compiler.inertiagrouprange
     for body in spec.bodies:
         if body.id == 0 or (body.explicitinertial and not always):
             continue
         mass, moment, parts = 0.0, np.zeros(3), []
         for geom in spec.geoms:
-            if geom.parent.id != body.id or not lowest <= geom.group <= highest:
+            if geom.parent.id != body.id:
                 continue
             g = geom.id
             weightless = geom.mass == 0.0 or (np.isnan(geom.mass) and geom.density == 0.0)

@@ -15,6 +15,7 @@ from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
 from flowborne.solids.covered import covered
+from flowborne.solids.displacing import BY_RULE, Displace
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.own_shapes import own_by_mesh
 from flowborne.solids.state import SolidState
@@ -41,8 +42,8 @@ WIDTHS = {FREE: 7, BALL: 4, SLIDE: 1, HINGE: 1}
 class SolidModel:
     """Bodies, joints and geometries. Build with `from_file` or `from_string`; never changed after.
 
-    Geometries here are those that displace fluid: MuJoCo's planes, hfields and geoms in group 3
-    or above take part in contact alone. In a slab everything is per unit depth.
+    Geometries here are those that displace fluid, see `displacing`; others take part in contact
+    alone. In a slab everything is per unit depth.
 
     mj             MuJoCo's model
     slab           whether the solids are cross-sections at z = 0
@@ -111,6 +112,7 @@ class SolidModel:
         densities: Mapping[str, float] = MappingProxyType({}),
         shapes: Sequence[PlacedShape] = (),
         floating: Sequence[str] = (),
+        displace: Displace = BY_RULE,
     ) -> SolidModel:
         """Model of an MJCF or URDF file.
 
@@ -120,9 +122,11 @@ class SolidModel:
         densities  body -> kg/m^3 of its geoms, in place of `density`
         shapes   geometries of one's own, besides those of the file
         floating  bodies on the world without a joint, which get a free one of their name
+        displace  which geoms the fluid meets
         raises   ValueError when the model is bad
         """
-        mj = mjcf.compiled(Path(path), slab, gravity, density, densities, shapes, floating)
+        given = density, densities, shapes, floating, displace
+        mj = mjcf.compiled(Path(path), slab, gravity, *given)
         return cls(mj, slab, shapes=shapes)
 
     @classmethod
