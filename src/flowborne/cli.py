@@ -167,14 +167,15 @@ def check(
         bool, typer.Option("--strict", help="End with exit code 3 if there are warnings.")
     ] = False,
 ) -> None:
-    """Say everything that is wrong with a scene, what is implausible, and how the fluid meets its
-    bodies.
+    """Say what the creature is to the fluid, everything that is wrong with a scene, what is
+    implausible, and how the fluid meets its bodies.
 
     Bodies and fluid are set going, as in a run. A warning does not stop a run; it names a value
     that will do.
     """
     from flowborne.coupling.seen import seen_bodies
     from flowborne.progress import ProgressDisplay, RunProgress
+    from flowborne.scenes.creature import creature_of
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.notes import notes_of
     from flowborne.scenes.warn import headline, warnings_of
@@ -190,6 +191,9 @@ def check(
 
         with compilation_watched(tell), Simulation(loaded, workers=1) as simulation:
             setup = simulation.world.setup
+    creature = creature_of(loaded, setup)
+    for line in [] if creature is None else creature.lines():
+        print(line)
     found = warnings_of(loaded, setup)
     print(headline(found))
     for warning in found:

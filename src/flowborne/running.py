@@ -25,6 +25,7 @@ from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, che
 from flowborne.io.summary import peak_memory, summarise, versions
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
+from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
@@ -157,6 +158,8 @@ class _Run:
         self.frames = simulation.frames
         self.taken = earlier_joints(simulation.scene)
         self.warnings = warnings_of(simulation.scene, simulation.setup)
+        creature = creature_of(simulation.scene, simulation.setup)
+        self.creature = None if creature is None else asdict(creature)
         self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
@@ -361,6 +364,7 @@ class _Run:
             "doubts": self._doubts(),
             **summarise(self.folder.history, strength, every),
             "cells": cells,
+            "creature": self.creature,
             "warnings": self.warnings,
             "notes": list(notes_of(simulation.scene, world.setup.solid)),
             "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],

@@ -161,7 +161,10 @@ def test_slab_locks_what_leaves_the_plane() -> None:
 @pytest.mark.parametrize(
     ("xml", "words"),
     [
-        ("<body name='b' pos='0 0 .2'><geom size='1'/></body>", "'b' is at z = 0.2"),
+        (
+            "<body><geom size='1'/></body><body name='b' pos='0 0 .2'><geom size='1'/></body>",
+            "'b' is at z = 0.2",
+        ),
         (
             "<body><geom name='g' type='box' size='1 1 1' euler='30 0 0'/></body>",
             "'g' .box. has no local axis along z",

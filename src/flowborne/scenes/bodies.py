@@ -16,6 +16,7 @@ from flowborne.scenes.build_shapes import placed_shapes
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.earlier import earlier_motion
 from flowborne.scenes.formula import Formula
+from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import (
     MotionConstantTable,
@@ -34,7 +35,9 @@ from flowborne.scenes.tracks import (
 from flowborne.solids import mjcf
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
+from flowborne.solids.geoms import element_name
 from flowborne.solids.model import SolidModel
+from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue import Grown
 
@@ -157,7 +160,7 @@ def _told(table: MotionTable, model: SolidModel, constants: Mapping[str, float])
 
 def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Trajectory, ...]:
     """All prescribed motions: those of [[motion]] in their order, then that of [clip], then that of
-    [earlier].
+    [earlier], then joints that are held.
 
     start   (nq,) pose from which a clip is entered
     raises  SceneError when the clip or the earlier run cannot be used
@@ -166,12 +169,40 @@ def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Traj
         trajectory_of(table, model, scene.constants) for table in scene.motion
     ]
     found = clip_motion(scene, model, start), earlier_motion(scene, model)
-    return (*motions, *(motion for motion in found if motion is not None))
+    motions += [motion for motion in found if motion is not None]
+    return (*motions, *held(scene, model, motions, start))
+
+
+def own_pose(scene: Scene, model: SolidModel) -> SolidState:
+    """The model's own pose, or its keyframe that [initial] names."""
+    state = model.rest()
+    if scene.initial.keyframe is None:
+        return state
+    mj = keyframes(scene, model)
+    key = mj.key(scene.initial.keyframe)
+    for j in range(mj.njnt):
+        name = element_name(mj, mujoco.mjtObj.mjOBJ_JOINT, j)
+        places, dofs = model.positions_of(name), model.dofs_of(name)
+        first, speed = mj.jnt_qposadr[j], mj.jnt_dofadr[j]
+        state.q[places] = key.qpos[first : first + len(places)]
+        state.v[dofs] = key.qvel[speed : speed + len(dofs)]
+    return state
+
+
+def keyframes(scene: Scene, model: SolidModel) -> mujoco.MjModel:
+    """A model with the keyframes as the file has them: MuJoCo does not make room in them for the
+    joints of flesh and of floating bodies."""
+    if scene.model_path is None or not (scene.flesh or (scene.solids and scene.solids.floating)):
+        return model.mj
+    return compiled_quietly(mujoco.MjSpec.from_file(str(scene.model_path)))
 
 
 def posed(scene: Scene, model: SolidModel) -> SolidState:
-    """The model's own pose and `initial`, before any motion."""
-    state = model.rest()
+    """The model's own pose within the ranges of its joints, and `initial`, before any motion."""
+    state = own_pose(scene, model)
+    dofs = model.scalar_dofs
+    places = model.dof_position[dofs]
+    state.q[places] = np.clip(state.q[places], *model.dof_range[dofs].T)
     for joint, values in scene.initial.positions.items():
         places = model.positions_of(joint)
         kind = joint_kind(model, joint)

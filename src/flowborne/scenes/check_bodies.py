@@ -17,6 +17,7 @@ from flowborne.scenes.bodies import (
     initial_state,
     joint_kind,
     joint_unit,
+    keyframes,
 )
 from flowborne.scenes.check_flesh import check_flesh_places
 from flowborne.scenes.check_formulas import check_formulas
@@ -101,6 +102,7 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     named = []
     for body in () if scene.solids is None else scene.solids.densities:
         named += unknown_body(draft, model, body, "solids", "densities")
+    named += _unheld(draft, model)
     for body in scene.output.bodies:
         named += unknown_body(draft, model, body, "output", "bodies")
     joints = scene.output.joints
@@ -128,14 +130,44 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
         *check_formulas(draft),
     ]
     yield from state
-    if not state and draft.sound("initial", "motion", "constants"):
+    if not named and not state and draft.sound("initial", "motion", "constants"):
         yield from _check_ranges(draft, model)
         yield from _check_places(draft, model)
+
+
+def _unheld(draft: Draft, model: SolidModel) -> list[str]:
+    """Joints of [solids] hold that cannot be held."""
+    scene = draft.scene
+    hold = () if scene.solids is None or scene.solids.hold is True else scene.solids.hold or ()
+    where, problems = draft.at("solids", "hold"), []
+    moved = {table.joint: "a [[motion]]" for table in scene.motion}
+    moved |= dict.fromkeys(scene.controlled_joints(), "[[control]]")
+    for joint in hold:
+        unknown = unknown_joint(draft, model, joint, "solids", "hold")
+        problems += unknown
+        if not unknown and joint_kind(model, joint) == FREE:
+            problems.append(f"{where}: '{joint}' is a free joint, by which a body floats. Drop it.")
+        elif joint in moved:
+            problems.append(f"{where}: joint '{joint}' has {moved[joint]}. Keep one of them.")
+    return problems
 
 
 def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
     """The pose and the velocities that a scene starts with against the model's joints."""
     initial = draft.scene.initial
+    if initial.keyframe is not None:
+        own, where = keyframes(draft.scene, model), draft.at("initial", "keyframe")
+        keys = [own.key(n).name for n in range(own.nkey)]
+        if initial.keyframe not in keys:
+            end = suggestion(initial.keyframe, keys, "Its keyframes are")
+            yield f"{where}: the model has no '{initial.keyframe}'{end}"
+            return
+        if own is not model.mj and not all(own.joint(j).name for j in range(own.njnt)):
+            yield (
+                f"{where}: the model has nameless joints, which with flesh and floating bodies are "
+                "not found in a keyframe. Name them."
+            )
+            return
     if initial.impulse == "none" and not any(
         joint_kind(model, joint) == FREE for joint in model.joint_names
     ):

@@ -17,6 +17,7 @@ from flowborne.errors import SceneError
 from flowborne.given_files import read_file
 from flowborne.io.run_folder import reading
 from flowborne.scenes.check import cross_check
+from flowborne.scenes.contact_steps import with_steps
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.elbows import join_elbows
 from flowborne.scenes.keyframe_file import inline_keyframes
@@ -127,7 +128,8 @@ def _examine(
     draft, problems = _understood(raw, path)
     if draft is None:
         return None, problems
-    return draft.scene, problems + cross_check(draft)
+    problems = problems + cross_check(draft)
+    return draft.scene if problems else with_steps(draft.scene), problems
 
 
 def _understood(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str]]:

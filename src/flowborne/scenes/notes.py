@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.scenes.bodies import SLIDE, joint_kind
+from flowborne.scenes.bodies import HINGE, SLIDE, joint_kind, joint_unit, own_pose, posed
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.human.clip_skeleton import lost_bones
+from flowborne.scenes.not_taken import not_taken
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
 from flowborne.solids.model import SolidModel
@@ -17,9 +18,28 @@ from flowborne.solids.model import SolidModel
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Sentences for people, without a full stop."""
+    left_out = not_taken(scene, model)
+    if left_out is not None:
+        yield left_out
+    yield from _moved_into_range(scene, model)
     yield from _lost_bones(scene)
     yield from _standing_still(scene)
     yield from _wide_probes(scene, model)
+
+
+def _moved_into_range(scene: Scene, model: SolidModel) -> Iterator[str]:
+    """Joints whose own pose is outside their range."""
+    own, start = own_pose(scene, model).q, posed(scene, model).q
+    for joint in model.joint_names:
+        if joint_kind(model, joint) not in (HINGE, SLIDE) or joint in scene.initial.positions:
+            continue
+        place, unit = model.positions_of(joint)[0], joint_unit(model, joint)
+        if own[place] != start[place]:
+            mark = "m" if joint_kind(model, joint) == SLIDE else "degrees"
+            yield (
+                f"[initial]: joint '{joint}' is at {own[place] / unit:.4g} {mark} in the model, "
+                f"outside its range, and starts at {start[place] / unit:.4g}"
+            )
 
 
 def _standing_still(scene: Scene) -> Iterator[str]:

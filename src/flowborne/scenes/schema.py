@@ -54,7 +54,8 @@ class TimeTable(Table):
 
     frames_per_second  states, and pictures of the film, in a second of the run
     frames             how many the run has
-    steps_per_frame    steps of equal length in a frame
+    steps_per_frame    steps of equal length in a frame; where bodies can touch a floor of the model
+                       and it is not given, as many as keep that contact stiff
     """
 
     frames_per_second: Positive = 24.0

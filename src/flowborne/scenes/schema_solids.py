@@ -20,6 +20,7 @@ from flowborne.scenes.fields import (
     OwnTable,
     Parameters,
     Positive,
+    SwitchOrNames,
     Table,
     Text,
     Vector,
@@ -56,6 +57,9 @@ class SolidsTable(Table):
     floating   bodies that hang on the world without a joint, such as the root of a URDF: each gets
                a free joint of its own name
     displace   which geoms the fluid meets
+    hold       joints that stay as they start: true for all between bodies that nothing else drives
+               and no spring holds, or names. A position actuator of the model on such a joint
+               becomes its "pd" servo, with the actuator's stiffness and largest force
     """
 
     model: FileName
@@ -63,6 +67,7 @@ class SolidsTable(Table):
     densities: dict[str, Positive] = Field(default_factory=dict)
     floating: tuple[Text, ...] = ()
     displace: DisplaceTable = DisplaceTable()
+    hold: SwitchOrNames = False
 
 
 class ShapeTable(Table, OwnTable):
@@ -104,8 +109,10 @@ class ShapeTable(Table, OwnTable):
 
 
 class InitialTable(Table):
-    """[initial]: where the joints start. What is not named starts as in the model, at rest.
+    """[initial]: where the joints start. What is not named starts as in the model, at rest; a hinge
+    or slide whose place in the model is outside its range starts at the nearest end of it.
 
+    keyframe    of the model, whose positions and velocities take the place of those at rest
     positions   joint -> degrees (hinge) or m (slide); a ball joint takes a quaternion (w, x, y, z),
                 a free joint (x, y, z) in m and a quaternion
     velocities  joint -> degrees/s or m/s; a ball joint takes (x, y, z) in degrees/s, a free joint
@@ -115,6 +122,7 @@ class InitialTable(Table):
                 fluid together have no impulse, as after moving its joints from rest
     """
 
+    keyframe: Text | None = None
     positions: dict[str, JointValues] = Field(default_factory=dict)
     velocities: dict[str, JointValues] = Field(default_factory=dict)
     impulse: Literal["given", "none"] = "given"

@@ -6,16 +6,16 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.world import HYPOTHETICAL, Setup
-from flowborne.scenes.bodies import BALL, HINGE, SLIDE, joint_kind, joint_unit
+from flowborne.scenes.bodies import SLIDE, joint_kind, joint_unit
 from flowborne.scenes.build_control import input_motions
+from flowborne.scenes.holding import undriven
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import ObjectiveInputMotionTable
 from flowborne.scenes.schema_drives import ServoPD
 from flowborne.scenes.tracks import SPEED_SAMPLES
-from flowborne.scenes.wording import and_more, rounded_up
+from flowborne.scenes.wording import listed, rounded_up
 
 LEAST_STRENGTH = 2.0 * math.pi
 """Degrees/s. Whoever types radians for anything up to a turn a second types less than this; in
@@ -85,42 +85,12 @@ def too_slow(scene: Scene, setup: Setup) -> Iterator[str]:
                 )
 
 
-def driven_dofs(scene: Scene, setup: Setup) -> NDArray[np.bool_]:
-    """(nv,) which dofs are moved by a motion, a clip or the controller, or locked in a slab."""
-    driven = setup.solid.locked.copy()
-    for motion in setup.motions:
-        driven[motion.dofs] = True
-    for joint in scene.controlled_joints():
-        driven[setup.solid.dofs_of(joint)] = True
-    return driven
-
-
 def limp_joints(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Joints between bodies that nothing drives and that have no stiffness.
-
-    Joints on the world are those that a creature floats or swings on as a whole; joints within a
-    flesh, between bones that hold it, are as stiff as that.
-    """
-    model = setup.solid
-    mj = model.mj
-    driven = driven_dofs(scene, setup)
-    limp = []
-    for j, name in enumerate(model.joint_names):
-        body = int(mj.jnt_bodyid[j])
-        if body >= model.nbody or mj.jnt_type[j] not in (HINGE, SLIDE, BALL):
-            continue
-        dofs, parent = model.dofs_of(name), int(mj.body_parentid[body])
-        ends = {model.body_names[body], model.body_names[parent]}
-        if (
-            model.moves[parent].any()
-            and mj.jnt_stiffness[j] == 0.0
-            and not driven[dofs].all()
-            and not any(ends <= set(flesh.bones) for flesh in scene.flesh)
-        ):
-            limp.append(name)
+    """Joints between bodies that nothing drives and that have no stiffness; see `undriven`."""
+    limp = undriven(scene, setup.solid, setup.motions)
     if limp:
         yield (
-            f"[solids]: nothing drives {and_more(limp)}, and no stiffness holds "
-            f"{'it' if len(limp) == 1 else 'them'}; a [[motion]] of kind 'constant' holds a joint, "
-            "[[control]] moves it, and stiffness in the model makes it a spring"
+            f"[solids]: nothing drives {listed(limp)}, and no stiffness holds "
+            f"{'it' if len(limp) == 1 else 'them'}; hold = true keeps joints as they start, "
+            "[[motion]] and [[control]] move them, and stiffness in the model makes them springs"
         )

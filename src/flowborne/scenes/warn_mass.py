@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.coupling.world import Setup
+from flowborne.coupling.world import Fluid, Setup
+from flowborne.scenes.creature import creature_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import and_more, rounded_down, rounded_up
 from flowborne.solids.model import SolidModel
@@ -28,6 +29,10 @@ GRAM_PER_CM3 = 1000.0
 """kg/m^3."""
 
 
+def is_gas(fluid: Fluid) -> bool:
+    return fluid.density <= GAS_DENSITY and fluid.viscosity <= GAS_VISCOSITY
+
+
 def implausible_density(scene: Scene, setup: Setup) -> Iterator[str]:
     """Bodies far lighter or far heavier than the fluid in their place.
 
@@ -37,7 +42,7 @@ def implausible_density(scene: Scene, setup: Setup) -> Iterator[str]:
     if setup.fluid is None or setup.fluid.one_way:
         return
     rho = setup.fluid.density
-    gas = rho <= GAS_DENSITY and setup.fluid.viscosity <= GAS_VISCOSITY
+    gas = is_gas(setup.fluid)
     most = DENSEST if gas else HEAVY * rho
     found = [*_bones(setup.solid), *((table.name, table.density) for table in scene.flesh)]
     light = sorted((body for body in found if body[1] < LIGHT * rho), key=lambda body: body[1])
@@ -60,6 +65,28 @@ def implausible_density(scene: Scene, setup: Setup) -> Iterator[str]:
             f"{density / rho:.3g} times the mass of the fluid of {rho:.4g} kg/m^3 in {place} "
             f"place; {value}, and 1 g/cm^3 is 1000 kg/m^3"
         )
+
+
+def mass_apart(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Creatures whose mass and size in the fluid do not fit, though each body's do: much of their
+    mass is in bodies that displace nothing."""
+    creature = creature_of(scene, setup)
+    if (
+        creature is None
+        or not creature.displaced_mass
+        or next(implausible_density(scene, setup), "")
+    ):
+        return
+    assert setup.fluid is not None
+    times = creature.mass / creature.displaced_mass
+    if setup.fluid.one_way or is_gas(setup.fluid) or LIGHT <= times <= HEAVY:
+        return
+    yield (
+        f"[solids]: the creature of {creature.mass:.3g} kg displaces "
+        f"{creature.displaced_mass:.3g} kg of fluid, and has {times:.3g} times the mass of the "
+        "fluid in its place; [solids] displace names geoms that the fluid meets, and densities set "
+        "the mass"
+    )
 
 
 def _bones(model: SolidModel) -> Iterator[tuple[str, float]]:

@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
 from flowborne.coupling.seen import Seen, seen_bodies
 from flowborne.coupling.world import Setup
-from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.check_fluid import fits_memory
+from flowborne.scenes.creature import creature_extent
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import Domain
 from flowborne.scenes.wording import rounded_down, rounded_up
-from flowborne.solids.outline import Outline
 
 LEAST_CELLS = 2.0
 """Cells across the thinnest part of a body. A sheet of two cells holds a whole cell wherever it
@@ -71,7 +68,7 @@ def _remedy(scene: Scene, setup: Setup, thickness: float) -> str:
         if fits_memory(finer.counts()):
             return f"{said} gives {LEAST_CELLS:g}"
         smaller = spacing / domain.spacing()
-        if min(domain.extent()) * smaller > 2.0 * creature_length(scene, setup):
+        if min(domain.extent()) * smaller > 2.0 * max(creature_extent(scene, setup)):
             longest = rounded_down(max(domain.extent()) * smaller)
             return f"in a domain {longest} m long as many cells give {LEAST_CELLS:g}"
     return f"a thickness of {rounded_up(LEAST_CELLS * domain.spacing())} m gives {LEAST_CELLS:g}"
@@ -93,25 +90,10 @@ def lost_in_domain(scene: Scene, setup: Setup) -> Iterator[str]:
     """Creatures that are tiny in their domain."""
     if setup.fluid is None or setup.fluid.one_way or scene.domain is None:
         return
-    length, shortest = creature_length(scene, setup), min(scene.domain.extent())
+    length, shortest = max(creature_extent(scene, setup)), min(scene.domain.extent())
     if 0.0 < length < shortest / LARGEST_DOMAIN * (1.0 - 1e-9):
         yield (
             f"[domain]: its shortest side is {shortest:.3g} m, {shortest / length:.3g} times the "
             f"{length:.3g} m that the bodies measure, and sides so far away change nothing; "
             f"{rounded_down(LARGEST_DOMAIN * length)} m or less will do, and lengths are metres"
         )
-
-
-def creature_length(scene: Scene, setup: Setup) -> float:
-    """Longest extent at the start of all that moves, m; of all bodies where none does."""
-    model = setup.solid
-    outline, state = Outline(model), initial_state(scene, model)
-    places = outline.at(state.q)
-    moving = model.moves[outline.body].any(axis=1)
-    places = places[moving] if moving.any() else places
-    if model.flesh is not None:
-        places = np.concatenate([places, model.flesh.rest])
-    if not len(places):
-        return 0.0
-    axes = [0, 1] if scene.is_slab else [0, 1, 2]
-    return float(np.ptp(places[:, axes], axis=0).max())

@@ -15,10 +15,10 @@ from flowborne.coupling.world import Setup
 from flowborne.fluid.transport import LASTING
 from flowborne.scenes.bodies import initial_state, joint_unit
 from flowborne.scenes.fields import MOST_STEPS
+from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import InflowSide
 from flowborne.scenes.tracks import SPEED_SAMPLES
-from flowborne.scenes.warn_drives import driven_dofs
 from flowborne.solids.outline import Outline
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
 def _floating(scene: Scene, setup: Setup) -> list[int]:
     """Bodies on the world that some joint lets move as nothing drives them."""
     model = setup.solid
-    free = ~driven_dofs(scene, setup) & (model.dof_body == model.dof_root)
+    free = ~driven_dofs(scene, model, setup.motions) & (model.dof_body == model.dof_root)
     return [int(root) for root in np.unique(model.dof_root[free])]
 
 

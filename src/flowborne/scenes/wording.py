@@ -55,9 +55,13 @@ def suggestion(name: str, known: Iterable[str], what: str) -> str:
     close = get_close_matches(name, known, n=1, cutoff=0.6)
     if close:
         return f"; did you mean '{close[0]}'?"
-    listed = ", ".join(known[:LISTED]) if known else "none"
-    more = f" and {len(known) - LISTED} more" if len(known) > LISTED else ""
-    return f". {what}: {listed}{more}."
+    return f". {what}: {listed(known) if known else 'none'}."
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first LISTED names, and how many more there are."""
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more
 
 
 def place(file: str, keys: tuple[Key, ...], numbers: dict[str, list[int]] | None = None) -> str:

@@ -248,12 +248,25 @@ def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array
         ) from error
 
 
+def _lower(spec: mujoco.MjSpec, height: float) -> None:
+    """Move all that is in the world down by `height` m."""
+    for part in (*spec.worldbody.bodies, *spec.worldbody.geoms, *spec.worldbody.sites):
+        part.pos[2] -= height
+
+
 def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
     """Give each body of `spec` the mass, centre and inertia per unit depth of its sections.
 
-    A body's own <inertial> stays as it is, and is per unit depth.
+    A body's own <inertial> stays as it is, and is per unit depth. A height that all bodies have is
+    taken off.
     """
     body_position, body_rotation, geom_position, geom_rotation = rest_poses(mj)
+    heights = np.unique(body_position[1:, 2].round(9))
+    if heights.size == 1:
+        height = float(body_position[1, 2])
+        _lower(spec, height)
+        body_position[1:, 2] -= height
+        geom_position[:, 2] -= height
     off = np.flatnonzero(np.abs(body_position[:, 2]) > 1e-9)
     if off.size:
         name = element_name(mj, mujoco.mjtObj.mjOBJ_BODY, off[0])

@@ -1,0 +1,105 @@
+"""Joints that nothing drives, and those that a scene holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.servo import Servo, ServoExact, ServoPD
+from flowborne.scenes.build_drives import driven
+from flowborne.scenes.schema import Scene
+from flowborne.solids.model import BALL, HINGE, SLIDE, SolidModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TrajectoryHeld:
+    """A joint that stays where it is.
+
+    dofs   (k,)
+    place  (m,) rad, m, or a unit quaternion
+    """
+
+    dofs: NDArray[np.int64]
+    place: Array
+
+    def position(self, time: float) -> Array:
+        """(m,) as `place`."""
+        return self.place
+
+    def velocity(self, time: float) -> Array:
+        """(k,) zeros."""
+        return np.zeros(len(self.dofs))
+
+
+def driven_dofs(
+    scene: Scene, model: SolidModel, motions: Iterable[Trajectory]
+) -> NDArray[np.bool_]:
+    """(nv,) which dofs are moved by motions or the controller, or locked in a slab."""
+    moved = model.locked.copy()
+    for motion in motions:
+        moved[motion.dofs] = True
+    for joint in scene.controlled_joints():
+        moved[model.dofs_of(joint)] = True
+    return moved
+
+
+def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> list[str]:
+    """Joints between bodies that nothing drives and that have no stiffness.
+
+    Joints on the world are those that a creature floats or swings on as a whole; joints within a
+    flesh, between bones that hold it, are as stiff as that.
+    """
+    mj, moved, limp = model.mj, driven_dofs(scene, model, motions), []
+    for j, name in enumerate(model.joint_names):
+        body = int(mj.jnt_bodyid[j])
+        if body >= model.nbody or mj.jnt_type[j] not in (HINGE, SLIDE, BALL):
+            continue
+        parent = int(mj.body_parentid[body])
+        ends = {model.body_names[body], model.body_names[parent]}
+        if (
+            model.moves[parent].any()
+            and mj.jnt_stiffness[j] == 0.0
+            and not moved[model.dofs_of(name)].all()
+            and not any(ends <= set(flesh.bones) for flesh in scene.flesh)
+        ):
+            limp.append(name)
+    return limp
+
+
+def held(
+    scene: Scene, model: SolidModel, motions: Iterable[Trajectory], start: Array
+) -> Iterator[Trajectory]:
+    """Motions of the joints that [solids] hold keeps at `start` (nq,)."""
+    hold = () if scene.solids is None else scene.solids.hold
+    if isinstance(hold, bool):
+        hold = tuple(undriven(scene, model, motions)) if hold else ()
+    for joint in hold:
+        place = start[model.positions_of(joint)]
+        yield driven(TrajectoryHeld(model.dofs_of(joint), place), _servo(model, joint))
+
+
+def _servo(model: SolidModel, joint: str) -> Servo:
+    """That of the joint's position actuator: w = sqrt(kp / M) with M the inertia that the joint
+    feels at rest, and its largest force; exact without one."""
+    mj, number = model.mj, model.joint(joint)
+    for actuator in np.flatnonzero(mj.actuator_trnid[:, 0] == number):
+        if mj.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_JOINT:
+            continue
+        gear, gain = mj.actuator_gear[actuator, 0], mj.actuator_gainprm[actuator, 0]
+        stiffness = -gear * gear * mj.actuator_biasprm[actuator, 1]
+        if stiffness <= 0.0 or gain <= 0.0:
+            continue
+        inertia = mj.dof_M0[model.dofs_of(joint)[0]]
+        limit = np.inf
+        if mj.actuator_forcelimited[actuator]:
+            limit = abs(gear) * np.abs(mj.actuator_forcerange[actuator]).min()
+        return ServoPD(math.sqrt(stiffness / inertia), float(limit) or np.inf)
+    return ServoExact()

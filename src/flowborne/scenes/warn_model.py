@@ -1,0 +1,59 @@
+"""Warnings about what a model has that the fluid does not meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from flowborne.coupling.world import Setup
+from flowborne.scenes.creature import creature_of
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.wording import listed
+from flowborne.solids.geoms import element_name, kind_of, rest_poses
+
+LEAST_MASS = 0.01
+"""Part of the creature's mass. Bodies without any geom that have less together are frames; 1 % of
+the mass is less than a force of the fluid is right to on the grids that films have."""
+
+
+def unmet_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Moving bodies that displace no fluid, though they have geoms that could, or mass."""
+    creature, model = creature_of(scene, setup), setup.solid
+    if creature is None or setup.fluid is None:
+        return
+    mj, numbers = model.mj, [model.body(name) for name in creature.unmet]
+    shaped = [b for b in numbers if mj.body_geomnum[b] > 0]
+    bare = [b for b in numbers if mj.body_geomnum[b] == 0]
+    if model.body_mass[bare].sum() > LEAST_MASS * creature.mass:
+        shaped = sorted([*shaped, *bare])
+    if shaped:
+        them = "it" if len(shaped) == 1 else "them"
+        yield (
+            f"[solids]: no geom of {listed([model.body_names[b] for b in shaped])} displaces "
+            f"fluid, which flows through {them}; [solids] displace names geoms that do, and a body "
+            "without any needs one in the model"
+        )
+
+
+def floors_in_fluid(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Planes and height fields inside the domain: bodies rest on them, and the fluid does not."""
+    if setup.fluid is None or scene.domain is None:
+        return
+    mj, grid = setup.solid.mj, setup.fluid.grid
+    low, high = np.array(grid.origin), np.array(grid.origin) + grid.spacing * np.array(grid.shape)
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    _, _, position, rotation = rest_poses(mj)
+    for geom in range(mj.ngeom):
+        kind = kind_of(mj, geom)
+        if kind not in ("plane", "hfield"):
+            continue
+        height = (corners - position[geom]) @ rotation[geom][:, 2]
+        top = mj.hfield_size[mj.geom_dataid[geom], 2] if kind == "hfield" else 0.0
+        if height.min() < -grid.spacing and height.max() > top + grid.spacing:
+            name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
+            yield (
+                f"[domain]: the {kind} '{name}' lies inside the fluid, which flows through it; a "
+                "domain that ends there has a solid side, and a box in the model is met"
+            )
