@@ -118,6 +118,15 @@ def test_a_floor_inside_the_fluid(written: Written) -> None:
     assert found[0].startswith("[domain]: the plane 'floor' lies inside the fluid")
 
 
+def test_decoration_outside_the_domain_is_warned_of_and_left_out(written: Written) -> None:
+    far = {'<geom_name="floor"': '<geom name="target" size=".1" pos="5 0 0"/><geom name="floor"'}
+    scene = load_scene(written(**far))
+    found = [w for w in warnings_of(scene, build(scene).world.setup) if "target" in w]
+    assert found[0].startswith("[domain]: target lies outside the domain, and no fluid meets it; ")
+    scene = load_scene(written('displace = { without = ["target"] }\n', **far))
+    assert not any("target" in w for w in warnings_of(scene, build(scene).world.setup))
+
+
 def test_what_of_the_file_has_no_effect_is_said_once(written: Written) -> None:
     scene = load_scene(written("density = 500.0\n"))
     said = next(notes_of(scene, build(scene).world.setup.solid))
@@ -155,7 +164,8 @@ def test_a_place_outside_its_range_is_moved_into_it(written: Written) -> None:
     assert world.solid.q[7] == pytest.approx(np.radians(20.0))
     notes = list(notes_of(scene, world.setup.solid))
     assert (
-        "[initial]: joint 'elbow' is at 0 degrees in the model, outside its range, and starts at 20"
+        "[initial]: joints that the model has outside their ranges start within: "
+        "elbow (0 to 20 degrees)"
     ) in notes
     path = written()
     (problem,) = check_scene(path, {"initial.positions.elbow": "10.0"})

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.scenes.bodies import (
@@ -28,6 +28,8 @@ from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
 from flowborne.scenes.wording import Key, suggestion
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
+
+Array = NDArray[np.float64]
 
 NEEDS_BODIES = (
     "clip",
@@ -247,31 +249,35 @@ def _check_ranges(draft: Draft, model: SolidModel) -> Iterator[str]:
 
 
 def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
-    """No body may start outside the domain; a fixed one may reach out of it."""
-    domain = draft.scene.domain
-    if domain is None or not draft.scene.has_fluid or not draft.sound("domain", "solids"):
+    """No moving body may start outside the domain."""
+    scene, domain = draft.scene, draft.scene.domain
+    if domain is None or not scene.has_fluid or not draft.sound("domain", "solids"):
         return
-    start = initial_state(draft.scene, model)
+    start = initial_state(scene, model)
     yield from check_flesh_places(draft, model, start)
-    pose = kinematics(model, start.q)
-    axes = min(len(domain.lower), draft.scene.dimensions)
-    reach = model.mj.geom_aabb[model.geom_id]
+    low, high = geom_boxes(model, start.q)
+    axes = min(len(domain.lower), scene.dimensions)
     outside: set[int] = set()
     for geom in range(model.ngeom):
-        rotation = pose.geom_rotation[geom]
-        centre = pose.geom_position[geom] + rotation @ reach[geom, :3]
-        half = np.abs(rotation) @ reach[geom, 3:]
         body = int(model.geom_body[geom])
-        fixed = model.moves[body].any() == np.False_
+        if not model.moves[body].any() or body in outside or not np.isfinite(low[geom]).all():
+            continue
         for axis in range(axes):
-            low, high = centre[axis] - half[axis], centre[axis] + half[axis]
             first, last = domain.lower[axis], domain.upper[axis]
-            gone = (high <= first or low >= last) if fixed else (low < first or high > last)
-            if gone and body not in outside and math.isfinite(low):
+            if low[geom, axis] < first or high[geom, axis] > last:
                 outside.add(body)
-                how = "Move the body" if draft.scene.clip is None else PLACED
+                how = "Move the body" if scene.clip is None else PLACED
                 yield (
-                    f"{draft.at('domain')}: body '{model.body_names[body]}' reaches from {low:g} "
-                    f"to {high:g} m in {'xyz'[axis]} at the start, outside the domain from "
-                    f"{first:g} to {last:g} m. {how} or enlarge the domain."
+                    f"{draft.at('domain')}: body '{model.body_names[body]}' reaches from "
+                    f"{low[geom, axis]:g} to {high[geom, axis]:g} m in {'xyz'[axis]} at the start, "
+                    f"outside the domain from {first:g} to {last:g} m. {how} or enlarge the domain."
                 )
+                break
+
+
+def geom_boxes(model: SolidModel, q: Array) -> tuple[Array, Array]:
+    """(ngeom, 3) lowest and highest corners of boxes around the geometries at `q` (nq,), m."""
+    pose, reach = kinematics(model, q), model.mj.geom_aabb[model.geom_id]
+    centre = pose.geom_position + np.einsum("gij,gj->gi", pose.geom_rotation, reach[:, :3])
+    half = np.einsum("gij,gj->gi", np.abs(pose.geom_rotation), reach[:, 3:])
+    return centre - half, centre + half

@@ -13,6 +13,7 @@ from flowborne.scenes.human.clip_skeleton import lost_bones
 from flowborne.scenes.not_taken import not_taken
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
+from flowborne.scenes.wording import listed
 from flowborne.solids.model import SolidModel
 
 
@@ -30,16 +31,19 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
 def _moved_into_range(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Joints whose own pose is outside their range."""
     own, start = own_pose(scene, model).q, posed(scene, model).q
+    moved = []
     for joint in model.joint_names:
         if joint_kind(model, joint) not in (HINGE, SLIDE) or joint in scene.initial.positions:
             continue
         place, unit = model.positions_of(joint)[0], joint_unit(model, joint)
         if own[place] != start[place]:
             mark = "m" if joint_kind(model, joint) == SLIDE else "degrees"
-            yield (
-                f"[initial]: joint '{joint}' is at {own[place] / unit:.4g} {mark} in the model, "
-                f"outside its range, and starts at {start[place] / unit:.4g}"
-            )
+            moved.append(f"{joint} ({own[place] / unit:.4g} to {start[place] / unit:.4g} {mark})")
+    if moved:
+        yield (
+            "[initial]: joints that the model has outside their ranges start within: "
+            f"{listed(moved)}"
+        )
 
 
 def _standing_still(scene: Scene) -> Iterator[str]:

@@ -12,7 +12,7 @@ from flowborne.coupling.world import Setup
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn_drives import angles_in_radians, limp_joints, too_slow
 from flowborne.scenes.warn_mass import implausible_density, mass_apart
-from flowborne.scenes.warn_model import floors_in_fluid, unmet_bodies
+from flowborne.scenes.warn_model import fixed_outside, floors_in_fluid, unmet_bodies
 from flowborne.scenes.warn_size import lost_in_domain, thin_bodies
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow
 
@@ -26,6 +26,7 @@ WARNINGS: tuple[Warn, ...] = (
     mass_apart,
     unmet_bodies,
     floors_in_fluid,
+    fixed_outside,
     fast_bodies,
     fast_flow,
     angles_in_radians,

@@ -8,6 +8,8 @@ import mujoco
 import numpy as np
 
 from flowborne.coupling.world import Setup
+from flowborne.scenes.bodies import initial_state
+from flowborne.scenes.check_bodies import geom_boxes
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import listed
@@ -34,6 +36,23 @@ def unmet_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
             f"[solids]: no geom of {listed([model.body_names[b] for b in shaped])} displaces "
             f"fluid, which flows through {them}; [solids] displace names geoms that do, and a body "
             "without any needs one in the model"
+        )
+
+
+def fixed_outside(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Geoms of bodies that do not move, wholly outside the domain."""
+    if setup.fluid is None or scene.domain is None:
+        return
+    model, domain = setup.solid, scene.domain
+    low, high = geom_boxes(model, initial_state(scene, model).q)
+    axes = slice(0, scene.dimensions)
+    gone = (high[:, axes] <= domain.lower) | (low[:, axes] >= domain.upper)
+    fixed = ~model.moves[model.geom_body].any(axis=1)
+    names = [model.geom_names[g] for g in np.flatnonzero(gone.any(axis=1) & fixed)]
+    if names:
+        yield (
+            f"[domain]: {listed(names)} lie{'s' * (len(names) == 1)} outside the domain, and no "
+            "fluid meets it; a larger domain does, and [solids] displace.without leaves geoms out"
         )
 
 
