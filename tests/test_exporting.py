@@ -67,8 +67,8 @@ def test_files_that_a_scene_asks_for_belong_to_its_run(water: Path) -> None:
 def test_the_command_says_what_it_wrote(
     water: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    said = told(capsys, "export", water, "--out", tmp_path / "out.csv")
-    assert said == (0, f"written: {tmp_path / 'out.csv'}\n", "")
+    said = told(capsys, "export", water, "--out", tmp_path / "new" / "out.csv")
+    assert said == (0, f"written: {tmp_path / 'new' / 'out.csv'}\n", "")
     code, out, _ = told(capsys, "export", water, "--out", tmp_path / "out.vdb")
     first, last = tmp_path / "out_0000.vdb", tmp_path / "out_0002.vdb"
     assert (code, out) == (0, f"written: {first} to {last}\n")
@@ -79,12 +79,13 @@ def test_the_command_says_what_it_wrote(
     [
         ("out.fbx", "out.fbx: nothing writes '.fbx' files. End its name with one of .bvh, .usd"),
         ("out.glb", "has no bodies. Add [solids] or [human] to its scene."),
-        ("no/out.csv", "cannot be written (No such file or directory)"),
+        ("file/out.csv", "cannot be written (File exists)"),
     ],
 )
 def test_what_is_wrong_is_one_message(
     name: str, said: str, water: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
+    (tmp_path / "file").touch()
     code, out, err = told(capsys, "export", water, "--out", tmp_path / name)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert said in err

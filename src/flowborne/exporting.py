@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,7 @@ def export(
     """Write a run as a file; the ending of its name says as what.
 
     run         folder of the run; one that goes on, or was stopped, gives the frames that it has
-    out         file to write
+    out         file to write; its folder is made
     parameters  of the exporter
     returns     the files that were written, and what there is to tell of them
     raises      SceneError when nothing writes such files, the run lacks what they hold, or a
@@ -37,13 +35,12 @@ def export(
             f"{path.name}: nothing writes '{ending}' files. End its name with one of "
             f"{', '.join(endings())}."
         )
-    if not path.absolute().parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     try:
         exporter = EXPORTERS.make(ending, parameters or {})
     except ValueError as error:
         raise SceneError(f"{path.name}: exporter {error}.") from error
     opened = OpenRun(folder.path)
+    path.parent.mkdir(parents=True, exist_ok=True)
     passing = OSError, RunFolderError, SceneError
     part = f"exporter of '{ending}' files"
     with PartError.guarding(part, *passing):
