@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
-from flowborne.validation.case import Tier
-from flowborne.validation.report import failures, read_report, tier_of, verdicts
+from flowborne.validation.reference import entry
+from flowborne.validation.report import failures, read_report, verdicts
 from marked import with_part
 
 ROOT = Path(__file__).parents[1]
@@ -13,25 +14,22 @@ README, REPORT = ROOT / "README.md", ROOT / "docs" / "validation"
 
 
 def section() -> str:
-    """How many figures pass, and a table of those that do not."""
+    """How many figures pass, and the cases of which some fail."""
     data = read_report(REPORT)
-    tiers = [tier_of(case) for case in data.values()]
-    run = ", ".join(f"{tiers.count(tier)} in the tier {tier}" for tier in reversed(Tier))
     counts = verdicts(data)
-    said = (
-        f"[The report](docs/validation.md) has {len(data)} cases, {run}: "
-        f"{counts['pass']} of {counts['pass'] + counts['fail'] + counts['coarse']} figures pass, "
-        f"{counts['coarse']} are outside their tolerance on a grid too coarse for it, and "
-        f"{counts['unconfirmed']} more have values that are not confirmed at their source. "
-        "These fail:"
+    judged = counts["pass"] + counts["fail"] + counts["coarse"]
+    named = dict.fromkeys(name for name, _, _ in failures(data))
+    listed = ", ".join(f"{name} ({entry(name).name})" for name in named)
+    return (
+        textwrap.fill(
+            f"{counts['pass']} of {judged} figures of {len(data)} published and analytic cases pass; "
+            f"{counts['coarse']} are outside their tolerance on a grid too coarse for it. Figures of "
+            f"these fail: {listed}. [The report](docs/validation.md) has them all.",
+            100,
+            break_long_words=False,
+        )
+        + "\n"
     )
-    rows = [
-        f"| {name} | {tier} | {finding['quantity']} | {number(finding['value'])} | "
-        f"{number(finding['reference'])} | {finding['tolerance']} |"
-        for name, tier, finding in failures(data)
-    ]
-    head = ["| case | tier | figure | flowborne | reference | accepted |", "|" + " --- |" * 6]
-    return "\n".join([said, "", *head, *rows]) + "\n"
 
 
 def number(value: float | str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 from collections import Counter
 from typing import Any
@@ -84,7 +85,8 @@ def git(*arguments: str) -> str:
 
 
 def failing() -> str:
-    """What fails, each case in the tier that counts."""
+    """What fails, each case in the tier that counts, that which is farthest off first."""
+    found = sorted(failures(read_report(REPORT)), key=lambda failed: -off(failed[2]))
     rows = [
         [
             name,
@@ -94,9 +96,15 @@ def failing() -> str:
             number(f["reference"]),
             plain(str(f["tolerance"])),
         ]
-        for name, tier, f in failures(read_report(REPORT))
+        for name, tier, f in found
     ]
     return table(["case", "tier", *HEAD[1:-1]], rows)
+
+
+def off(finding: dict[str, Any]) -> float:
+    """Distance from the reference over its size; infinite where that is 0."""
+    value, reference = float(finding["value"]), float(finding["reference"])
+    return abs(value - reference) / abs(reference) if reference else math.inf
 
 
 def overview() -> str:
