@@ -2,10 +2,12 @@
 
 import os
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from threadpoolctl import threadpool_limits
 
 from flowborne.kernels import jit
 from flowborne.machine import cores
@@ -102,11 +104,17 @@ def pytest_xdist_auto_num_workers() -> int:
     return min(cores(), 4)
 
 
-@pytest.fixture(autouse=True)
-def share_of_the_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kernels of a test run on its process's share of the cores, as a validation's do."""
+@pytest.fixture(scope="session", autouse=True)
+def share_of_the_cores() -> Iterator[None]:
+    """Kernels of a test run on its process's share of the cores and BLAS on one thread, as in a
+    validation: threads of BLAS that wait spin, on a core that another process needs.
+
+    Of the session, so that it holds for its fixtures, whose kernels would compile twins otherwise.
+    """
     share = max(1, cores() // int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
-    monkeypatch.setattr(jit, "cores", lambda: share)
+    with pytest.MonkeyPatch.context() as patch, threadpool_limits(limits=1, user_api="blas"):
+        patch.setattr(jit, "cores", lambda: share)
+        yield
 
 
 @pytest.fixture
