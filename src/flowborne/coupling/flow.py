@@ -29,7 +29,7 @@ from flowborne.fluid.boundary import Boundaries, cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, parts
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides, pad_faces
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of, inner_product
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, beside_faces, carry_component
 from flowborne.kernels.faces import (
@@ -90,7 +90,7 @@ def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) 
     total = np.zeros(3)
     for axis in grid.axes:
         own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
-        total[axis] = float(np.vdot(mass[axis][own], velocity[axis][own]))
+        total[axis] = inner_product(mass[axis][own], velocity[axis][own])
     return total
 
 

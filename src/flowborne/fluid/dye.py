@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, Source, cells_in
 from flowborne.fluid.control_volumes import WHOLE as UNCUT
 from flowborne.fluid.ghosts import Scalar, edge
-from flowborne.fluid.grid import Array, Grid, faces_of
+from flowborne.fluid.grid import Array, Grid, faces_of, inner_product
 from flowborne.fluid.transport import SUBSTEPS, Transport
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, pass_on, sort_cells
@@ -74,8 +74,8 @@ def carry_dye(
     time, later, error = passage.transport.time + passage.transport.dt, {}, 0.0
     for name, values in scalars.items():
         later[name], gained = passage.carry(name, values, passage.bounds(name, values))
-        before = float(np.vdot(passage.transport.before.cells, values))
-        after = float(np.vdot(passage.transport.after.cells, later[name]))
+        before = inner_product(passage.transport.before.cells, values)
+        after = inner_product(passage.transport.after.cells, later[name])
         scale = max(abs(before), abs(after))
         if scale > 0.0:
             error = max(error, abs(after - before - gained) / scale)
