@@ -73,13 +73,13 @@ class SparseAnswer:
     """
 
     def __init__(self, matrix: csr_array, jacobian: csr_array, drag: csr_array) -> None:
-        self.drag, self.jacobian = drag, jacobian
-        self.factor = symmetric_factor(csc_array(matrix + jacobian.T @ drag @ jacobian))
+        self.drag, self.jacobian, self.transposed = drag, jacobian, jacobian.T
+        self.factor = symmetric_factor(csc_array(matrix + self.transposed @ drag @ jacobian))
         self.yields = matrix.shape[0] > 0
 
     def change(self, push: Array) -> Array:
         """See `Answering`."""
-        return np.asarray(self.jacobian @ self.factor.solve(self.jacobian.T @ push))
+        return np.asarray(self.jacobian @ self.factor.solve(self.transposed @ push))
 
     def to(self, push: Array) -> tuple[Array, Array]:
         """See `Answering`."""
