@@ -161,8 +161,8 @@ def test_meshes_and_includes_travel_with_the_scene(write: Write, tmp_path: Path)
     scene = load_scene(path)
     files = scene_files(scene)
     assert sorted(files) == [
-        "assets/0-tetra.obj",
-        "assets/1-tail.xml",
+        "assets/tail.xml",
+        "assets/tetra.obj",
         "fish.xml",
         "scene.toml",
     ]
@@ -171,7 +171,8 @@ def test_meshes_and_includes_travel_with_the_scene(write: Write, tmp_path: Path)
     assert_same(copy, scene)
     again = load_scene(save_scene(copy, tmp_path / "second"))
     assert_same(again, scene)
-    assert (run / "assets/0-tetra.obj").read_bytes() == files["assets/0-tetra.obj"]
+    assert scene_files(copy) == files
+    assert (run / "assets/tetra.obj").read_bytes() == files["assets/tetra.obj"]
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -88,6 +89,7 @@ def load_model(scene: Scene) -> SolidModel:
             shapes=placed_shapes(scene),
             floating=scene.solids.floating,
             displace=displace_of(scene.solids),
+            packages=packages_of(scene),
         )
     except ValueError as error:
         raise SceneError(_sentence(str(error))) from None
@@ -106,8 +108,15 @@ def bones_of(scene: Scene) -> mujoco.MjSpec:
     solids = scene.solids
     chosen = displace_of(solids)
     given = solids.density, solids.densities, placed_shapes(scene), solids.floating, chosen
-    spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given)
+    packages = packages_of(scene)
+    spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given, packages)
     return spec
+
+
+def packages_of(scene: Scene) -> list[Path]:
+    """Folders in which packages of ROS are looked for that the model names."""
+    assert scene.solids is not None
+    return [scene.folder / folder for folder in scene.solids.packages]
 
 
 def fleshed(scene: Scene) -> tuple[mujoco.MjSpec, list[Grown]]:

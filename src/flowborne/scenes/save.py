@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from xml.etree import ElementTree
 
 from flowborne.errors import SceneError
 from flowborne.given_files import read_file
 from flowborne.io.run_folder import OWN_NAMES
-from flowborne.scenes.bodies import bones_of
+from flowborne.scenes.bodies import bones_of, packages_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.earlier import EARLIER_FILE, earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_flesh import FleshTable
-from flowborne.solids.model_files import folders
+from flowborne.solids.model_files import ASSETS, gathered
 
 SCENE_FILE = "scene.toml"
 HUMAN_FILE = "human.xml"
 """The model of a scene's human, for other programs; the scene itself makes it anew."""
-
-ASSETS = "assets"
 
 
 class _Names:
@@ -73,8 +70,8 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     if model is not None:
         assert scene.solids is not None
         name = names.name(model.name)
-        files |= _model_files(model, name)
-        solids = scene.solids.model_copy(update={"model": name})
+        files |= _model_files(model, name, packages_of(scene))
+        solids = scene.solids.model_copy(update={"model": name, "packages": ()})
         scene = scene.model_copy(update={"solids": solids}).in_folder(scene.folder)
     for name in scene.plugins:
         files[Path(name).name] = _read(scene.folder / name)
@@ -127,50 +124,22 @@ def _flesh_files(scene: Scene, names: _Names) -> tuple[tuple[FleshTable, ...], d
     return tuple(tables), files
 
 
-def _model_files(model: Path, name: str) -> dict[str, bytes]:
-    """The model, under `name`, and what it names. One that names no file is copied as it is."""
-    taken: dict[Path, str] = {}
-    files: dict[str, bytes] = {}
-    _add_mjcf(model, name, model.parent, folders(model), taken, files)
-    return files
-
-
-def _add_mjcf(
-    path: Path,
-    name: str,
-    main_folder: Path,
-    folder_of: dict[str, str],
-    taken: dict[Path, str],
-    files: dict[str, bytes],
-) -> None:
-    """Add an MJCF file under `name`, with its references turned to the copies."""
-    text = _read(path)
-    root = ElementTree.fromstring(text)
-    changed = False
-    for element in root.iter():
-        if element.tag == "compiler":
-            for key in ("meshdir", "texturedir", "assetdir"):
-                changed |= element.attrib.pop(key, None) is not None
-        for key in [k for k in element.attrib if k.startswith("file") and element.attrib[k]]:
-            given = element.attrib[key]
-            if element.tag == "include":
-                source = main_folder / given
-            else:
-                source = main_folder / folder_of.get(element.tag, "") / given
-            source = source.resolve()
-            if source not in taken:
-                taken[source] = f"{ASSETS}/{len(taken)}-{source.name}"
-                if element.tag == "include":
-                    _add_mjcf(source, taken[source], main_folder, folder_of, taken, files)
-                else:
-                    files[taken[source]] = _read(source)
-            element.attrib[key] = taken[source]
-            changed = True
-    files[name] = ElementTree.tostring(root, encoding="utf-8") if changed else text
+def _model_files(model: Path, name: str, packages: Sequence[Path]) -> dict[str, bytes]:
+    """The model, under `name`, and what MuJoCo reads for it."""
+    try:
+        found = gathered(model, packages)
+    except OSError as error:
+        raise _unreadable(Path(error.filename), error) from None
+    texts = {name if one == found.name else one: found.texts[one] for one in found.texts}
+    return texts | found.assets
 
 
 def _read(path: Path) -> bytes:
     try:
         return read_file(path)
     except OSError as error:
-        raise SceneError(f"file {path} cannot be read: {error.strerror}. Put it there.") from None
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: Path, error: OSError) -> SceneError:
+    return SceneError(f"file {path} cannot be read: {error.strerror}. Put it there.")

@@ -51,7 +51,7 @@ class DisplaceTable(Table):
 class SolidsTable(Table):
     """[solids]: the bodies.
 
-    model      MJCF file, found from the folder of the scene file
+    model      MJCF or URDF file, found from the folder of the scene file
     density    kg/m^3 of every body, in place of the model's densities
     densities  body -> kg/m^3 of that body, in place of the model's density and of `density`
     floating   bodies that hang on the world without a joint, such as the root of a URDF: each gets
@@ -60,6 +60,8 @@ class SolidsTable(Table):
     hold       joints that stay as they start: true for all between bodies that nothing else drives
                and no spring holds, or names. A position actuator of the model on such a joint
                becomes its "pd" servo, with the actuator's stiffness and largest force
+    packages   folders in which `package://name/...` of a URDF is looked for, besides those above
+               it: each holds the package's folder, or is it
     """
 
     model: FileName
@@ -68,6 +70,7 @@ class SolidsTable(Table):
     floating: tuple[Text, ...] = ()
     displace: DisplaceTable = DisplaceTable()
     hold: SwitchOrNames = False
+    packages: tuple[FileName, ...] = ()
 
 
 class ShapeTable(Table, OwnTable):

@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.given_files import read_file
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids.displacing import BY_RULE, Displace, chosen_geoms, write_groups
@@ -25,8 +24,9 @@ from flowborne.solids.geoms import (
     mesh_of,
     rest_poses,
 )
-from flowborne.solids.model_files import check_named, parsed
+from flowborne.solids.model_files import ModelFiles, gathered, parsed
 from flowborne.solids.model_numbers import impossible, misgiven
+from flowborne.solids.model_refusal import refusal, unreadable
 from flowborne.solids.model_size import too_large
 from flowborne.solids.own_shapes import add_shapes
 from flowborne.solids.quiet import compiled_quietly
@@ -47,13 +47,14 @@ def compiled(
     shapes: Sequence[PlacedShape] = (),
     floating: Sequence[str] = (),
     displace: Displace = BY_RULE,
+    packages: Sequence[Path] = (),
 ) -> mujoco.MjModel:
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    given = density, densities, shapes, floating, displace
+    given = density, densities, shapes, floating, displace, packages
     return bones_of(source, slab, gravity, *given)[1]
 
 
@@ -66,21 +67,16 @@ def bones_of(
     shapes: Sequence[PlacedShape] = (),
     floating: Sequence[str] = (),
     displace: Displace = BY_RULE,
+    packages: Sequence[Path] = (),
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """An MJCF file or text, as `compiled`, before flesh grows on it.
 
     floating  bodies on the world without a joint, which get a free one of their name
     displace  which geoms the fluid meets
+    packages  folders in which packages of ROS are looked for besides those above the model
     """
     where = _named(source)
-    _check_xml(source, where)
-    try:
-        if isinstance(source, Path):
-            spec = mujoco.MjSpec.from_file(str(source))
-        else:
-            spec = mujoco.MjSpec.from_string(source)
-    except ValueError as error:
-        raise _unreadable(where, error) from error
+    spec = _read_spec(source, where, packages)
     wrong = next(misgiven(spec), None)
     if wrong is not None:
         raise ValueError(f"{where}: {wrong}")
@@ -116,7 +112,7 @@ def _compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
     try:
         return compiled_quietly(spec)
     except ValueError as error:
-        raise _unreadable(where, error) from error
+        raise refusal(spec, where, error) from error
 
 
 def _weightless(
@@ -147,27 +143,35 @@ def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
     held[name].add_freejoint(name=name)
 
 
-def _check_xml(source: str | Path, where: str) -> None:
-    """MuJoCo reads over what follows the end of a model, and what copies it does not; and it makes
-    all that a model asks for."""
+def _read_spec(source: str | Path, where: str, packages: Sequence[Path]) -> mujoco.MjSpec:
+    """What MuJoCo reads of a model.
+
+    MuJoCo reads over what follows the end of a model, and makes all that a model asks for. Of a
+    file it gets what a run folder has.
+    """
     try:
-        model = parsed(read_file(source) if isinstance(source, Path) else source)
         if isinstance(source, Path):
-            check_named(source)
+            files = gathered(source, packages)
+        else:
+            files = ModelFiles("", {"": source.encode()})
+        for text in files.texts.values():
+            for wrong in too_large(parsed(text)):
+                raise ValueError(wrong)
     except ElementTree.ParseError as error:
-        raise _unreadable(where, error) from error
+        raise unreadable(where, error) from error
     except OSError as error:
         which = where if Path(error.filename) == source else f"{where}: {error.filename}"
         raise ValueError(f"{which} cannot be read: {error.strerror}. Mend that.") from error
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
-    large = next(too_large(model), None)
-    if large is not None:
-        raise ValueError(f"{where}: {large}")
-
-
-def _unreadable(where: str, error: Exception) -> ValueError:
-    return ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.")
+    try:
+        if isinstance(source, str):
+            return mujoco.MjSpec.from_string(source)
+        spec = mujoco.MjSpec.from_file(files.name, vfs=files.in_memory())
+    except ValueError as error:
+        raise unreadable(where, error) from error
+    spec.assets = files.assets
+    return spec
 
 
 def _named(source: str | Path) -> str:

@@ -113,6 +113,7 @@ class SolidModel:
         shapes: Sequence[PlacedShape] = (),
         floating: Sequence[str] = (),
         displace: Displace = BY_RULE,
+        packages: Sequence[Path] = (),
     ) -> SolidModel:
         """Model of an MJCF or URDF file.
 
@@ -123,9 +124,10 @@ class SolidModel:
         shapes   geometries of one's own, besides those of the file
         floating  bodies on the world without a joint, which get a free one of their name
         displace  which geoms the fluid meets
+        packages  folders in which packages of ROS are looked for besides those above the model
         raises   ValueError when the model is bad
         """
-        given = density, densities, shapes, floating, displace
+        given = density, densities, shapes, floating, displace, packages
         mj = mjcf.compiled(Path(path), slab, gravity, *given)
         return cls(mj, slab, shapes=shapes)
 

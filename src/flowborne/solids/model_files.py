@@ -1,21 +1,40 @@
-"""The files that an MJCF model names."""
+"""The files that MuJoCo reads for a model, gathered so that they stand on their own.
+
+A model names meshes, height fields, skins, textures, parts to include and models to attach, each
+from a folder that its compiler elements or a package of ROS say. Here they get names in one folder;
+MuJoCo is given exactly these files, and a run folder the same.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import posixpath
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from flowborne.given_files import check_file, read_file
+import mujoco
+
+from flowborne.given_files import read_file
+from flowborne.solids.model_kinds import check_kind, check_mesh
+from flowborne.solids.model_text import with_attributes
+from flowborne.solids.packages import is_address, located
+
+ASSETS = "assets"
+"""Folder beside the model of all that it names."""
 
 FOLDER_KEYS = {
     "mesh": ("meshdir", "assetdir"),
-    "hfield": ("assetdir",),
-    "skin": ("assetdir",),
+    "hfield": ("meshdir", "assetdir"),
+    "skin": ("meshdir", "assetdir"),
+    "flexcomp": ("meshdir", "assetdir"),
     "texture": ("texturedir", "assetdir"),
+    "model": (),
 }
-"""Element that names a file -> compiler attributes that say where its folder is, first wins."""
+"""Element that names a file -> compiler attributes that say where its folder is."""
+
+FOLDERS = ("assetdir", "meshdir", "texturedir")
 
 MOST_NESTED = 500
 """Elements of a model in each other; readers and writers of it call themselves for each."""
@@ -38,40 +57,168 @@ def parsed(text: bytes | str) -> Element:
     return root
 
 
-def parts(path: Path) -> Iterator[tuple[Path, Element]]:
-    """A model and all that it includes, each once: file and tree.
+@dataclass(frozen=True)
+class ModelFiles:
+    """A model and what it names: name in one folder -> content.
 
-    raises  OSError for a file that cannot be read, else as `parsed`
+    name     of the model itself
+    texts    the model, parts that it includes, and models that it attaches
+    assets   all else
+    sources  name -> the file that it is a copy of
     """
-    pending, seen = [path], set[Path]()
-    while pending:
-        part = pending.pop()
-        if part.resolve() in seen:
+
+    name: str
+    texts: dict[str, bytes] = field(default_factory=dict)
+    assets: dict[str, bytes] = field(default_factory=dict)
+    sources: dict[str, Path] = field(default_factory=dict)
+
+    def in_memory(self) -> mujoco.MjVfs:
+        """The files as MuJoCo takes them in place of a disc."""
+        memory = mujoco.MjVfs()
+        for name, content in (self.texts | self.assets).items():
+            memory[name] = content
+        return memory
+
+
+def gathered(path: Path, packages: Sequence[Path] = ()) -> ModelFiles:
+    """An MJCF or URDF file and what MuJoCo reads for it.
+
+    Files keep their names, as nameless meshes are called by them, and line numbers stay. What has
+    been gathered once is gathered the same again.
+
+    packages  folders in which packages of ROS are looked for besides those above the model
+    raises    OSError for a file that cannot be read, ElementTree.ParseError for what is no XML,
+              ValueError for what MuJoCo does not read
+    """
+    files = ModelFiles(path.name)
+    _Gathering(files, packages).add_model(path, path.name)
+    return files
+
+
+@dataclass
+class _Part:
+    """A file of a model: the model itself, or what it includes.
+
+    included  number of an include -> its part
+    """
+
+    path: Path
+    text: bytes
+    elements: list[Element]
+    included: dict[int, _Part]
+
+    def compiler(self) -> dict[str, str]:
+        """Attributes of all compiler elements; the last one of the text counts."""
+        given: dict[str, str] = {}
+        for number, element in enumerate(self.elements):
+            if element.tag == "compiler":
+                given |= element.attrib
+            elif number in self.included:
+                given |= self.included[number].compiler()
+        return given
+
+
+class _Gathering:
+    """Files of a model as they are found."""
+
+    def __init__(self, files: ModelFiles, packages: Sequence[Path]) -> None:
+        self._files = files
+        self._packages = packages
+        self._names: dict[tuple[Path, str, str], str] = {}
+
+    def add_model(self, path: Path, name: str) -> None:
+        """Add a model and what it names; names in it are relative to the folder of its own."""
+        whole = _read(path, path.parent, set())
+        check_kind(whole.elements[0], path.suffix)
+        given = whole.compiler()
+        self._add_part(whole, name, posixpath.dirname(name), path, given)
+
+    def _add_part(
+        self, part: _Part, name: str, folder: str, model: Path, given: Mapping[str, str]
+    ) -> None:
+        changes: dict[int, dict[str, str | None]] = {}
+        for number, key in _references(part.elements, given):
+            element = part.elements[number]
+            if element.tag == "include":
+                inside = part.included[number]
+                target, new = self._named(inside.path, folder)
+                if new:
+                    self._add_part(inside, target, folder, model, given)
+            else:
+                source = self._source(element, key, model, given)
+                target, new = self._named(source, "")
+                if new and element.tag == "model":
+                    self.add_model(source, target)
+                elif new:
+                    self._files.assets[target] = read_file(source)
+            changes.setdefault(number, {})[key] = posixpath.relpath(target, folder or ".")
+        for number, element in enumerate(part.elements):
+            if element.tag == "compiler":
+                changes[number] = dict.fromkeys((*FOLDERS, "strippath"))
+        self._files.texts[name] = with_attributes(part.text, changes)
+        self._files.sources[name] = part.path
+
+    def _source(self, element: Element, key: str, model: Path, given: Mapping[str, str]) -> Path:
+        """The file that an attribute of an element means."""
+        file = element.attrib[key].replace("\\", "/")
+        if element.tag == "mesh":
+            check_mesh(file)
+        if is_address(file):
+            return located(file, model, self._packages)
+        if given.get("strippath") == "true":
+            file = posixpath.basename(file)
+        keys = FOLDER_KEYS[element.tag]
+        return model.parent / next((given[key] for key in keys if key in given), "") / file
+
+    def _named(self, source: Path, folder: str) -> tuple[str, bool]:
+        """The name that a file gets, and whether it is new.
+
+        folder  that names in it are relative to
+        """
+        known = source.resolve(), source.name, folder
+        if known in self._names:
+            return self._names[known], False
+        taken = {name.casefold() for name in self._names.values()}
+        name, number = f"{ASSETS}/{source.name}", 1
+        while name.casefold() in taken:
+            number += 1
+            name = f"{ASSETS}/{number}/{source.name}"
+        self._names[known] = name
+        self._files.sources[name] = source
+        return name, True
+
+
+def _read(path: Path, folder: Path, read: set[Path]) -> _Part:
+    """A file of a model in `folder`, of which those in `read` have been read."""
+    read.add(path.resolve())
+    text = read_file(path)
+    part = _Part(path, text, [*parsed(text).iter()], {})
+    for number, element in enumerate(part.elements):
+        file = element.get("file") if element.tag == "include" else None
+        if not file:
             continue
-        seen.add(part.resolve())
-        root = parsed(read_file(part))
-        yield part, root
-        included = (element.get("file") for element in root.iter("include"))
-        pending += [path.parent / name for name in included if name]
+        places = [one / file.replace("\\", "/") for one in (folder, path.parent)]
+        found = next((place for place in places if place.is_file()), places[0])
+        if found.resolve() in read:
+            raise ValueError(f"{path.name} includes {file} once more. Include it once.")
+        part.included[number] = _read(found, folder, read)
+    return part
 
 
-def folders(path: Path) -> dict[str, str]:
-    """Element -> folder in which its files are, as the compiler elements of a model say."""
-    given: dict[str, str] = {}
-    for _, root in parts(path):
-        for element in root.iter("compiler"):
-            given |= element.attrib
-    return {
-        tag: next((given[key] for key in keys if key in given), "")
-        for tag, keys in FOLDER_KEYS.items()
-    }
+def _references(elements: list[Element], given: Mapping[str, str]) -> Iterator[tuple[int, str]]:
+    """Number and attribute of each element that names a file which MuJoCo reads.
 
-
-def check_named(path: Path) -> None:
-    """Raise OSError for a file that a model names and that is none, or too large to be read."""
-    given = folders(path)
-    for _, root in parts(path):
-        for element in root.iter():
-            for key in element.attrib:
-                if key.startswith("file") and element.attrib[key] and element.tag != "include":
-                    check_file(path.parent / given.get(element.tag, "") / element.attrib[key])
+    Of a URDF these are meshes: those that are drawn are discarded, unless it says otherwise.
+    """
+    numbers = {element: number for number, element in enumerate(elements)}
+    if elements[0].tag == "robot":
+        parts = ["collision"] if given.get("discardvisual") != "false" else ["collision", "visual"]
+        for part in parts:
+            for mesh in elements[0].iterfind(f"link/{part}/geometry/mesh[@filename]"):
+                yield numbers[mesh], "filename"
+        return
+    for number, element in enumerate(elements):
+        if element.tag == "include" or element.tag in FOLDER_KEYS:
+            for key, value in element.attrib.items():
+                if key.startswith("file") and value:
+                    yield number, key
