@@ -13,6 +13,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flowborne.coupling.seen import seen_bodies
 from flowborne.errors import PartError, SceneError, WorkerError
 from flowborne.frame_report import PARTS, FrameReport
@@ -395,8 +397,10 @@ class _Run:
 
     def _doubts(self) -> list[str]:
         """Reasons not to trust the frames so far, those of earlier runs in the folder included."""
-        setup = self.simulation.setup
-        return doubts_of(self.folder.history, setup.solid.body_names[1:], setup.fluid)
+        model, fluid = self.simulation.setup.solid, self.simulation.setup.fluid
+        met = np.isin(np.arange(model.nbody), model.geom_body) & model.moves.any(axis=1)
+        bodies = [model.body_names[body] for body in np.flatnonzero(met)]
+        return doubts_of(self.folder.history, bodies, fluid)
 
     def _rows(self) -> int:
         """Frames that are in the history."""

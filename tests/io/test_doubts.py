@@ -70,7 +70,7 @@ def history(path, places, errors=None):
     ("places", "said"),
     [
         ((0.5, 0.9, 1.05), []),  # on its way out, still less than a cell beyond the side
-        ((1.5, 1.6, 1.7), []),  # outside from the beginning
+        ((1.5, 1.6, 1.7), ["body 'ball' left the fluid's domain in frame 1"]),
         ((0.5, 0.9, 1.15, 0.5), ["body 'ball' left the fluid's domain in frame 3"]),
         ((0.5, -0.15), ["body 'ball' left the fluid's domain in frame 2"]),
     ],

@@ -17,7 +17,7 @@ BUDGET_OPEN = 1e-6
 def doubts_of(history: Path, bodies: Sequence[str], fluid: Fluid | None) -> list[str]:
     """A sentence, without its full stop, for each reason not to trust the run; none in a sound one.
 
-    bodies  their names
+    bodies  names of those that move and that the fluid meets; a scene starts with them inside
     fluid   of the run
     """
     if fluid is None:
@@ -28,7 +28,7 @@ def doubts_of(history: Path, bodies: Sequence[str], fluid: Fluid | None) -> list
 
 def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
     """The first body that leaves the fluid's domain, more than a cell beyond a side; None when all
-    that begin in it stay there. Through periodic sides none leaves."""
+    stay there. Through periodic sides none leaves."""
     grid, periodic = fluid.grid, fluid.boundaries.periodic()
     axes = [axis for axis in grid.axes if not periodic[axis]]
     columns = [f"{body}_{'xyz'[axis]}_m" for body in bodies for axis in axes]
@@ -36,12 +36,9 @@ def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
         return None
     low = np.array([grid.origin[axis] - grid.spacing for axis in axes])
     high = np.array([grid.origin[axis] + (grid.shape[axis] + 1) * grid.spacing for axis in axes])
-    stays: np.ndarray | None = None
     for frame, *places in history_rows(history, ["frame", *columns]):
         at = np.reshape(places, (len(bodies), len(axes)))
-        inside = np.all((at >= low) & (at <= high), axis=1)
-        left = np.zeros(len(bodies), bool) if stays is None else stays & ~inside
-        stays = inside if stays is None else stays
+        left = np.any((at < low) | (at > high), axis=1)
         if left.any():
             return (
                 f"body '{bodies[int(left.argmax())]}' left the fluid's domain in frame "
