@@ -1,4 +1,5 @@
 import json
+import re
 import subprocess
 import sys
 from dataclasses import asdict, dataclass, field
@@ -435,3 +436,22 @@ def test_progress_says_that_it_compiles_and_how_long_the_first_frame_took(capsys
     assert lines[2] == "frame 1/3  objective 0.125  hinge 28.6°  slide 0.25 m"
     assert lines[3] == "frame 3/3  objective 0.125  hinge 28.6°  slide 0.25 m  1 s/frame  0 s left"
     assert len(lines) == 4
+
+
+def test_an_error_that_nobody_expected_is_one_line_and_its_traceback_with_debug(
+    command, small_scene, monkeypatch
+):
+    def fail(*_, **__):
+        raise KeyError("a slip")
+
+    monkeypatch.setattr(cli.log, "handlers", [])
+    monkeypatch.setattr(cli.log, "level", cli.log.level)
+    monkeypatch.setattr("flowborne.scenes.load.load_scene", fail)
+    said = r"flowborne: a fault of flowborne \(KeyError: 'a slip', in test_cli.py, line \d+\); "
+    code, out, err = command("check", small_scene)
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert re.match(said, err)
+    code, _, err = command("--debug", "check", small_scene)
+    assert code == 1
+    assert "Traceback (most recent call last)" in err
+    assert re.search(said, err)

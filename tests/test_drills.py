@@ -102,6 +102,7 @@ def test_files_cut_by_a_loss_of_power_are_one_message_each(small_scene, tmp_path
             messages = [line for line in text.splitlines() if line.startswith("flowborne: ")]
             assert len(messages) == (0 if code == 0 else 1), (command, text)
             assert "Traceback" not in text
+            assert "fault of flowborne" not in text
             assert code == 0 or str(out) in text, (command, text)
 
 

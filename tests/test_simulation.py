@@ -108,6 +108,10 @@ def lose_an_inverse(world, report):
     raise np.linalg.LinAlgError("3-th leading minor not positive definite")
 
 
+def stumble(world, report):
+    int("no number")
+
+
 @pytest.mark.parametrize(
     ("fail", "cause"),
     [
@@ -122,6 +126,7 @@ def lose_an_inverse(world, report):
         (rattle, r"contacts, torque limits or Coriolis forces did not settle \(at hinge\)$"),
         (creep, r"contacts, torque limits or Coriolis forces did not settle$"),
         (lose_an_inverse, "3-th leading minor not positive definite"),
+        (stumble, r"ValueError: invalid literal .*, in test_simulation.py, line \d+$"),
     ],
 )
 def test_a_blow_up_names_frame_and_cause_and_leaves_the_last_good_frame(small_scene, fail, cause):
@@ -130,8 +135,9 @@ def test_a_blow_up_names_frame_and_cause_and_leaves_the_last_good_frame(small_sc
             simulation.advance_frame()
         good = state_of(simulation.world)
         simulation._step = Failing(simulation._step, at=6, fail=fail)
-        with pytest.raises(BlowUpError, match=f"frame 3, step 2: .*{cause}"):
+        with pytest.raises(BlowUpError, match=f"frame 3, step 2: .*{cause}") as raised:
             simulation.advance_frame()
+        assert raised.value.fault is (fail is stumble)
         assert state_of(simulation.world) == good
         assert simulation.frame == 2
 

@@ -20,16 +20,12 @@ def section() -> str:
     judged = counts["pass"] + counts["fail"] + counts["coarse"]
     named = dict.fromkeys(name for name, _, _ in failures(data))
     listed = ", ".join(f"{name} ({entry(name).name})" for name in named)
-    return (
-        textwrap.fill(
-            f"{counts['pass']} of {judged} figures of {len(data)} published and analytic cases pass; "
-            f"{counts['coarse']} are outside their tolerance on a grid too coarse for it. Figures of "
-            f"these fail: {listed}. [The report](docs/validation.md) has them all.",
-            100,
-            break_long_words=False,
-        )
-        + "\n"
+    text = (
+        f"{counts['pass']} of {judged} figures of {len(data)} published and analytic cases pass; "
+        f"{counts['coarse']} are outside their tolerance on a grid too coarse for it. Figures of "
+        f"these fail: {listed}. [The report](docs/validation.md) has them all."
     )
+    return textwrap.fill(text, 100, break_long_words=False) + "\n"
 
 
 def number(value: float | str) -> str:

@@ -104,6 +104,10 @@ def stderr_into(lines: list[str]) -> Iterator[None]:
             lines += file.read().splitlines()
 
 
+FAULT = "fault of flowborne"
+"""In a message about an error that nothing should end with."""
+
+
 def command(*arguments: str | Path) -> Said:
     """Run a command of flowborne in this process; a run that lasts too long is interrupted."""
     out, lines = io.StringIO(), list[str]()
@@ -127,6 +131,8 @@ def fault(said: Said, accepted: tuple[int, ...]) -> str:
         return "said something and ended with 0" if said.messages else ""
     if not said.messages:
         return "not a word"
+    if any(FAULT in line for line in said.messages):
+        return "a fault of flowborne"
     if not all(line.startswith("flowborne: ") for line in said.messages):
         return "no message of flowborne's"
     if any(len(line) > LONGEST for line in said.messages):

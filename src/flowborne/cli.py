@@ -8,6 +8,7 @@ to be trusted, and `check --strict` where there are warnings, end with 3.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 import warnings
@@ -22,9 +23,11 @@ import typer
 from typer.core import TyperGroup
 
 from flowborne.console import complain, result_printer, run_lines, sentence_of
-from flowborne.errors import PartError, SceneError
+from flowborne.errors import PartError, SceneError, place_of, said_by
 from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write
 from flowborne.version import __version__
+
+log = logging.getLogger("flowborne")
 
 FAILED, WRONG, WARNED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes besides 0."""
@@ -84,8 +87,14 @@ def flowborne(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show the traceback of an error as well.")
+    ] = False,
 ) -> None:
     """Creatures that answer the fluid around them."""
+    if debug:
+        log.setLevel(logging.DEBUG)
+        log.addHandler(logging.StreamHandler())
 
 
 @app.command()
@@ -444,6 +453,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
+    except Exception as error:
+        log.debug("the error", exc_info=error)
+        where = f"{said_by(error)}, in {place_of(error)}"
+        complain(f"a fault of flowborne ({where}); please report it with flowborne --debug")
         code = FAILED
     sys.exit(code if isinstance(code, int) else 0)
 

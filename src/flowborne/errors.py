@@ -23,6 +23,10 @@ class SceneError(Exception):
         return type(self), (self.problems,)
 
 
+class BreakdownError(ValueError):
+    """A step cannot be taken from this state; the text says why, a sentence without a full stop."""
+
+
 class WorkerError(ValueError):
     """Processes that work for this one died, and again after a new start."""
 
@@ -60,6 +64,12 @@ class PartError(ValueError):
             f"{part} failed in {Path(at.filename).name}, line {at.lineno} "
             f"({said_by(error)}): mend it there"
         )
+
+
+def place_of(error: BaseException) -> str:
+    """File and line in which an error was raised."""
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{Path(at.filename).name}, line {at.lineno}"
 
 
 def said_by(error: BaseException) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -37,6 +38,8 @@ from flowborne.simulation import BlowUpError, Simulation
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
+
+log = logging.getLogger("flowborne")
 
 FILM_BYTES = 20_000_000
 """Room that is kept for the picture, the film and the history."""
@@ -384,8 +387,14 @@ class _Run:
             self._save()
         except OSError as full:
             kept += f", but its checkpoint could not be written ({full.strerror})"
+        log.debug("the blow-up", exc_info=error)
         if isinstance(error.__cause__, PartError | WorkerError):
             return f"the run stopped in {error}; {kept}; then {self._how()}"
+        if error.fault:
+            return (
+                f"the run stopped in {error}; {kept}; try more steps per frame. If that does not "
+                "help, it is a fault of flowborne: flowborne --debug run shows where"
+            )
         return f"the simulation blew up in {error}; {kept}; try more steps per frame"
 
     def _not_written(self, error: OSError) -> str:

@@ -17,7 +17,14 @@ from threadpoolctl import ThreadpoolController
 from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import Setup, World
-from flowborne.errors import PartError, SceneError
+from flowborne.errors import (
+    BreakdownError,
+    PartError,
+    SceneError,
+    WorkerError,
+    place_of,
+    said_by,
+)
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
@@ -40,20 +47,25 @@ LISTED = 4
 """Most dofs that a message names."""
 
 
+BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
+"""Errors with which a step may end; their text says what happened."""
+
+
 class BlowUpError(Exception):
     """The simulation cannot go on.
 
     frame  the frame that could not be finished, counted from 1
     step   the step in it, counted from 1
     cause  what happened, a sentence without a full stop
+    fault  whether that was an error that no step should end with
     """
 
-    def __init__(self, frame: int, step: int, cause: str) -> None:
+    def __init__(self, frame: int, step: int, cause: str, fault: bool = False) -> None:
         super().__init__(f"frame {frame}, step {step}: {cause}")
-        self.frame, self.step, self.cause = frame, step, cause
+        self.frame, self.step, self.cause, self.fault = frame, step, cause, fault
 
-    def __reduce__(self) -> tuple[type[BlowUpError], tuple[int, int, str]]:
-        return BlowUpError, (self.frame, self.step, self.cause)
+    def __reduce__(self) -> tuple[type[BlowUpError], tuple[int, int, str, bool]]:
+        return BlowUpError, (self.frame, self.step, self.cause, self.fault)
 
 
 @dataclass(frozen=True)
@@ -251,8 +263,11 @@ class Simulation:
                     raise BlowUpError(frame, number, cause)
             if controller is not None:
                 terms, targets = controller.measure(world, reports[-1]), controller.targets(world)
-        except (ArithmeticError, ValueError) as error:
+        except BREAKDOWNS as error:
             raise BlowUpError(frame, number, str(error)) from error
+        except ValueError as error:
+            cause = f"{said_by(error)}, in {place_of(error)}"
+            raise BlowUpError(frame, number, cause, fault=True) from error
         except MemoryError as error:
             cause = f"the memory is full ({error})" if str(error) else "the memory is full"
             raise BlowUpError(frame, number, cause) from error

@@ -23,6 +23,7 @@ from scipy.ndimage import map_coordinates
 
 from flowborne.coupling.flesh import face_centres
 from flowborne.coupling.fractions import Geometry
+from flowborne.errors import BreakdownError
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.solids.dynamics import Kinematics
@@ -125,7 +126,7 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     skin *= covered(places(at, 0.5, grid), mouth, centre, along, grid) * (skin > 0.0)
     here = skin > 0.0
     if not here.any():
-        raise ValueError(
+        raise BreakdownError(
             f"{mouth.name} covers no cell at {centre.round(6).tolist()} m, {time:g} s. Put its "
             "position on the body's skin, inside the domain, with the direction out of the body"
         )

@@ -9,6 +9,7 @@ from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import joint_command, step
 from flowborne.coupling.world import World
+from flowborne.errors import BreakdownError
 
 INSTANT = 1e-9
 """s of the step in which only impulses act."""
@@ -46,7 +47,7 @@ def start(
     scalars = {} if world.fluid is None else world.fluid.scalars
     report = step(world, half, command)
     if report.outcome is not Outcome.DONE:
-        raise ValueError(f"the first half of a step failed: {report.outcome.value}")
+        raise BreakdownError(f"the first half of a step failed: {report.outcome.value}")
     if world.fluid is not None:
         world.fluid.scalars = scalars
     world.setup, world.time, world.steps, world.ahead = setup, time, 0, half
@@ -61,7 +62,7 @@ def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
 
     given   (nv,) dofs that keep their velocity; the others get that at which no impulse acts on
             them and their share of the fluid from outside. All when None
-    raises  ValueError when the flow cannot be solved for
+    raises  BreakdownError when the flow cannot be solved for
     """
     fluid, state = world.flow()
     if fluid.one_way:
@@ -79,7 +80,7 @@ def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
     there.solid.v[:] = 0.0
     report = step(there, INSTANT, command)
     if report.outcome is not Outcome.DONE:
-        raise ValueError(f"the flow at the start was not found: {report.outcome.value}")
+        raise BreakdownError(f"the flow at the start was not found: {report.outcome.value}")
     _, found = there.flow()
     world.solid.v[:] = there.solid.v
     for axis in range(3):

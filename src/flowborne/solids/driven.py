@@ -143,7 +143,7 @@ def drive(
     before  state before the positions moved; see `assemble`
     limit   (nv,) largest |generalised force| of each drive, inf for none; one that has a limit may
             not reach `hold`, and the first forces of Coriolis are not made for it
-    raises  ValueError when the free dofs' matrix is not positive definite
+    raises  BreakdownError when the free dofs' matrix is not positive definite
     """
     if model.flesh is not None:
         flesh = assemble_flesh(model, state, applied, dt, before)

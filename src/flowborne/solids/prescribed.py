@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.sparse import csr_array
 
+from flowborne.errors import BreakdownError
 from flowborne.solids.dynamics import Kinematics, SolidSystem
 from flowborne.solvers.answers import DenseAnswer
 from flowborne.solvers.mobility import Mobility, dense_mobility
@@ -87,7 +88,7 @@ class PrescribedSystem:
 def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedSystem:
     """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly.
 
-    raises  ValueError when the free dofs' matrix is not positive definite
+    raises  BreakdownError when the free dofs' matrix is not positive definite
     """
     none = np.zeros(len(hold), bool)
     return _solved(system, prescribed, hold, none, np.zeros(len(hold)))
@@ -112,13 +113,13 @@ def _solved(
 def symmetric_inverse(matrix: Array) -> Array:
     """Inverse of a symmetric positive definite matrix by Cholesky, exactly symmetric.
 
-    raises  ValueError when it is not positive definite
+    raises  BreakdownError when it is not positive definite
     """
     factor, fault = dpotrf(matrix, lower=1)
     if fault == 0:
         lower, fault = dpotri(factor, lower=1)
     if fault:
-        raise ValueError(
+        raise BreakdownError(
             f"the solid's matrix is not positive definite at free dof {fault - 1}. "
             "Give the body there mass and inertia, or its joint some armature."
         )
