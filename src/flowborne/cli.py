@@ -322,6 +322,12 @@ def import_(
         ),
     ] = None,
     density: Annotated[float, typer.Option(help="Of the body, kg/m^3.")] = 1000.0,
+    scale: Annotated[
+        float, typer.Option(help="Larger by: 0.01 where the file is in centimetres.")
+    ] = 1.0,
+    fill: Annotated[
+        bool, typer.Option("--fill", help="Close holes of any size, and not only small ones.")
+    ] = False,
 ) -> None:
     """Make a scene of a rigged character and its clip; docs/import.md says what becomes of it."""
     if not density > 0.0:
@@ -329,7 +335,9 @@ def import_(
     from flowborne.characters.folder import import_character
 
     try:
-        made = import_character(file, out, clip=clip, animations=animations, density=density)
+        made = import_character(
+            file, out, clip=clip, animations=animations, density=density, scale=scale, fill=fill
+        )
     except OSError as error:
         raise cannot_write(out, error) from error
     print(f"written: {made.scene}")

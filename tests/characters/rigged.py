@@ -67,10 +67,17 @@ def clip() -> tuple[np.ndarray, dict[str, Rotation], np.ndarray]:
 
 
 def write_glb(
-    path: Path, *, skin: bool = True, closed: bool = True, clips: int = 1, texture: bool = False
+    path: Path,
+    *,
+    skin: bool = True,
+    closed: bool = True,
+    clips: int = 1,
+    texture: bool = False,
+    called: str = "Swim {}",
 ) -> None:
     """The box in centimetres under a node that is turned and scales, at rest in another pose.
 
+    called   of every clip, with its number where that has a place
     texture  of its left half white, of the right half black
     """
     import pygltflib as gl
@@ -150,7 +157,7 @@ def write_glb(
         gltf.skins.append(gl.Skin(joints=[1, 2, 3, 4], inverseBindMatrices=binds))
     for number in range(clips):
         times, turns, moved = clip()
-        animation = gl.Animation(name=f"Swim {number}")
+        animation = gl.Animation(name=called.format(number))
         stamps = add(times.astype(np.float32), "SCALAR")
         tracks = [(2, "translation", 100.0 * moved)]
         tracks += [(1 + NAMES.index(n), "rotation", r.as_quat()) for n, r in turns.items()]

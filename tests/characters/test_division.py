@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
-from flowborne.characters.division import LEAST, SAME, divided
+from flowborne.characters.closing import SAME
+from flowborne.characters.division import LEAST, divided
+from flowborne.characters.model import model_files
 from flowborne.characters.rig import Rig, Surface
 from flowborne.characters.source import read_source
 from flowborne.errors import SceneError
@@ -30,9 +35,9 @@ def rig(parents: tuple[int, ...] = rigged.PARENTS) -> Rig:
     return Rig(names, np.array(parents), np.zeros((count, 3)), frames)
 
 
-def volumes(surface: Surface, skeleton: Rig) -> dict[int, float]:
+def volumes(surface: Surface, skeleton: Rig, fill: bool = False) -> dict[int, float]:
     """Joint that moves -> volume of its piece, which is closed."""
-    division = divided(skeleton, surface, "box.glb")
+    division = divided(skeleton, surface, "box.glb", fill)
     for piece in division.pieces.values():
         assert not len(piece[1]) or is_closed(piece)
     return {
@@ -73,8 +78,46 @@ def test_pieces_fill_the_whole_whatever_the_weights(seed: int) -> None:
 
 def test_surface_with_a_hole_is_refused() -> None:
     vertices, faces, weights = rigged.box()
-    with pytest.raises(SceneError, match=r"box\.glb: .* not watertight: 4 edges .* Fill Holes"):
-        divided(rig(), Surface(vertices, faces[2:], weights / 0.8, GREY[2:]), "box.glb")
+    end = Surface(vertices, faces[2:], weights / 0.8, GREY[2:])
+    said = r"box\.glb: .* watertight: 4 edges .*: 1, the widest 0\.5 m .* Close them by --fill, or"
+    with pytest.raises(SceneError, match=said):
+        divided(rig(), end, "box.glb")
+    division = divided(rig(), end, "box.glb", fill=True)
+    assert division.filled == (pytest.approx(0.5),)
+    whole = rigged.WIDTH * rigged.HEIGHT * rigged.LENGTH
+    assert sum(volumes(end, rig(), fill=True).values()) == pytest.approx(whole, rel=1e-9)
+    inward = Surface(vertices, end.faces[:, ::-1], weights / 0.8, GREY[2:])
+    with pytest.raises(SceneError, match=r"0\.5 m across, at \(.*\) m\. Close them in Blender"):
+        divided(rig(), inward, "box.glb")
+
+
+def test_small_holes_are_closed_and_triangles_wound_alike() -> None:
+    """A ball with a triangle missing, and a tenth of the others turned over."""
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    faces = ball.faces[1:].copy()
+    faces[::10] = faces[::10, ::-1]
+    weights, colours = np.ones((len(ball.vertices), 1)), np.full((len(faces), 3), 0.5)
+    division = divided(rig((-1,)), Surface(ball.vertices, faces, weights, colours), "ball.glb")
+    (across,) = division.filled
+    assert 0.0 < across < 0.1
+    assert division.volume == pytest.approx(ball.volume, rel=1e-6)
+
+
+def test_sheets_that_touch_along_an_edge_have_their_mass() -> None:
+    """Two boxes with an edge in common, which MuJoCo's own integrals refuse."""
+    one, other = (trimesh.creation.box((1.0, 1.0, 1.0)) for _ in range(2))
+    other.apply_translation((1.0, 1.0, 0.0))
+    both = trimesh.util.concatenate(one, other)
+    grey = np.full((len(both.faces), 3), 0.5)
+    surface = Surface(both.vertices, both.faces, np.ones((len(both.vertices), 1)), grey)
+    skeleton = rig((-1,))
+    division = divided(skeleton, surface, "boxes.glb")
+    files = model_files("boxes", skeleton, division, surface, 1000.0)
+    text = {name: content for name, content in files.items() if not name.endswith("-skin.xml")}
+    xml = text.pop("boxes.xml").replace(b'<include file="boxes-skin.xml" />', b"").decode()
+    model = mujoco.MjModel.from_xml_string(xml, text)
+    assert model.body_mass.sum() == pytest.approx(2000.0)
+    assert_allclose(model.body_ipos[1], [0.5, 0.5, 0.0], atol=1e-9)
 
 
 @pytest.mark.skipif(not CREATURES.is_dir(), reason="the creatures are beside the project")

@@ -21,7 +21,9 @@ from flowborne.formats.creature import Creature
 from flowborne.io.bvh import read_bvh
 from flowborne.io.clip import Clip
 from flowborne.scenes.bodies import load_model
+from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene
+from flowborne.scenes.warn_speed import fast_bodies, steps_for_bodies
 from flowborne.solids.skins import skins_of
 from flowborne.view.run import Run
 
@@ -70,6 +72,36 @@ def box(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     assert "2 bodies of 4 joints, 0.24 m^3, 216 kg" in made.notes
     assert "rigid with the joint above them: trunk, tail_tip" in made.notes
     return made.scene
+
+
+def test_no_body_crosses_more_than_a_cell_in_a_step(box: Path) -> None:
+    """The tail's tip goes at some 7 m/s, 0.3 m a frame, through cells of 0.06 m."""
+    scene = fb.load_scene(box)
+    setup = build(scene).world.setup
+    assert scene.time.steps_per_frame > 3
+    assert not list(fast_bodies(scene, setup))
+    coarse = fb.load_scene(box, {"time.steps_per_frame": "1"})
+    assert steps_for_bodies(coarse, setup) == scene.time.steps_per_frame
+
+
+def test_a_character_of_another_unit_is_told_and_scaled(tmp_path: Path) -> None:
+    """The remedy that the note has leads to a character without one."""
+    rigged.write_glb(tmp_path / "box.glb")
+    made = fb.import_character(tmp_path / "box.glb", tmp_path / "huge", scale=100.0)
+    (said,) = (note for note in made.notes if "whale" in note)
+    assert said.startswith("it is 200 m long and 2.4e+08 kg, longer than a whale")
+    assert said.endswith("with --scale 1 it is 2 m long and 240 kg")
+    mended = fb.import_character(tmp_path / "box.glb", tmp_path / "own", scale=100.0 * 0.01)
+    assert not [note for note in mended.notes if "whale" in note]
+    said = r"0\.0008 m long and 1\.54e-08 kg, .*: with --scale 0\.4 it is 0\.8 m long and 15\.4 kg"
+    with pytest.raises(fb.SceneError, match=said):
+        fb.import_character(tmp_path / "box.glb", tmp_path / "tiny", scale=4e-4)
+    fb.import_character(tmp_path / "box.glb", tmp_path / "tiny", scale=4e-4 * 1000.0)
+    large, own = (read_bvh(one.scene.with_suffix(".bvh")) for one in (made, mended))
+    assert_allclose(large.offsets, 100.0 * own.offsets, atol=1e-5)
+    assert_allclose(large.translation, 100.0 * own.translation, atol=1e-5)
+    with pytest.raises(fb.SceneError, match=r"scale is -1\. Give a number above 0"):
+        fb.import_character(tmp_path / "box.glb", tmp_path / "none", scale=-1.0)
 
 
 def test_model_has_the_masses_of_the_pieces(box: Path) -> None:
@@ -211,6 +243,8 @@ def test_mistakes_in_an_import_are_told(tmp_path: Path) -> None:
     with pytest.raises(fb.SceneError, match=r"open\.glb: the surface is not watertight"):
         fb.import_character(tmp_path / "open.glb", tmp_path / "out")
     assert not (tmp_path / "out").exists()
+    made = fb.import_character(tmp_path / "open.glb", tmp_path / "out", fill=True)
+    assert "1 hole closed, the widest 0.316 m across" in made.notes
 
 
 @needs_creatures

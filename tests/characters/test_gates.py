@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import re
@@ -10,12 +11,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 import flowborne as fb
-from flowborne.characters.division import closed
+from flowborne.characters.closing import closed
 from flowborne.characters.gltf_document import inside
 from flowborne.characters.limits import check_frames, check_size, check_work
 from flowborne.characters.rig import Surface, own_names
@@ -162,7 +165,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
     ),
     "rotation": (key("nodes", 2, "rotation", value=[0] * 4), r"nodes\[2\]\.rotation is none"),
     "missing file": (buffer_elsewhere("box.bin"), r"buffers\[0\], 'box\.bin', cannot be read \(No"),
-    "data": (buffer_elsewhere("data:,x"), r"buffers\[0\]: its data uri is not base64"),
+    "data": (buffer_elsewhere("data:,x"), r"buffers\[0\] has 1 bytes, and its byteLength"),
 }
 
 
@@ -215,6 +218,44 @@ def test_a_buffer_without_an_end_is_refused(tmp_path: Path) -> None:
     (tmp_path / "box.gltf").write_text(json.dumps(document))
     with pytest.raises(SceneError, match=r"buffers\[0\], 'pipe', cannot be read \(it is a pipe"):
         read_source(tmp_path / "box.gltf")
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "data:application/octet-stream;base64,",
+        "data:application/gltf-buffer;base64,",
+        "DATA:;charset=utf-8;BASE64,",
+        "data:application/octet-stream,",
+    ],
+)
+def test_data_uris_of_any_type_are_read(
+    tmp_path: Path, box: tuple[dict[str, Any], bytes], head: str
+) -> None:
+    document = json.loads(json.dumps(box[0]))
+    coded = base64.b64encode(box[1]).decode().rstrip("=")
+    broken = "\n".join(coded[n : n + 76] for n in range(0, len(coded), 76))
+    document["buffers"][0]["uri"] = head + (broken if "64" in head else quote(box[1]))
+    (tmp_path / "box.gltf").write_text(json.dumps(document))
+    found, wanted = (read_source(path) for path in (tmp_path / "box.gltf", glb(tmp_path, box)))
+    assert found.surface is not None
+    assert wanted.surface is not None
+    assert_array_equal(found.surface.vertices, wanted.surface.vertices)
+
+
+def test_a_data_uri_that_is_none_is_refused(
+    tmp_path: Path, box: tuple[dict[str, Any], bytes]
+) -> None:
+    document = json.loads(json.dumps(box[0]))
+    for uri in ("data:application/octet-stream;base64", "data:;base64,AAA*"):
+        document["buffers"][0]["uri"] = uri
+        (tmp_path / "box.gltf").write_text(json.dumps(document))
+        with pytest.raises(SceneError, match=r"buffers\[0\]: its data uri cannot be read"):
+            read_source(tmp_path / "box.gltf")
+
+
+def glb(folder: Path, box: tuple[dict[str, Any], bytes]) -> Path:
+    return write(folder / "box.glb", *box)
 
 
 def test_deeply_nested_json_is_refused(tmp_path: Path) -> None:

@@ -82,6 +82,13 @@ def test_clip_has_the_rotations_of_the_file(source: Source) -> None:
     assert_allclose(action.position[:, 1] - handle, moved @ Z_UP.T, atol=1e-6)
 
 
+def test_clips_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    rigged.write_glb(tmp_path / "box.glb", clips=3, called="Swim")
+    source = read_source(tmp_path / "box.glb")
+    assert source.clips == ("Swim", "Swim_2", "Swim_3")
+    assert clip_number(source, "Swim_3", "box.glb") == 2
+
+
 def test_what_is_wrong_with_a_file_is_one_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

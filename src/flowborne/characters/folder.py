@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,10 +15,14 @@ from flowborne.characters.limits import check_work
 from flowborne.characters.model import model_files
 from flowborne.characters.pose import as_cycle, clip_of, posed
 from flowborne.characters.rig import Action, Array, Rig, Surface, printable
+from flowborne.characters.size import scaled, size_notes
 from flowborne.characters.source import clip_number, read_source
 from flowborne.errors import SceneError
 from flowborne.io.bvh import write_clip
 from flowborne.io.clip import Clip
+from flowborne.scenes.build import build
+from flowborne.scenes.load import load_scene
+from flowborne.scenes.warn_speed import steps_for_bodies
 from flowborne.solids.skins import skinned
 
 ROOM = 0.35
@@ -53,6 +57,8 @@ def import_character(
     clip: str | None = None,
     animations: str | Path | None = None,
     density: float = 1000.0,
+    scale: float = 1.0,
+    fill: bool = False,
 ) -> Imported:
     """Make a scene of a rigged character, in a folder of its own.
 
@@ -64,6 +70,8 @@ def import_character(
     clip        name of the clip; the only one by default
     animations  file that has the clip, on joints of the same names; `file` by default
     density     kg/m^3
+    scale       by which the character is made larger, 0.01 where its file is in centimetres
+    fill        whether holes of any size are closed, and not only small ones
     raises      SceneError when a file cannot be used, a library is missing, or the scene is there
                 already; OSError when the folder cannot be written
     """
@@ -90,28 +98,42 @@ def import_character(
     moves = path if animations is None else Path(animations)
     moving = source if animations is None else read_source(moves)
     number = clip_number(moving, clip, moves.name)
-    rig, action = source.rig, moving.action(number)
+    rig, surface = scaled(source.rig, surface, scale, path.name)
+    skeleton, action = moving.rig, moving.action(number)
+    if animations is None:
+        skeleton, action = rig, replace(action, position=scale * action.position)
     check_work(len(action.position), len(rig.names), len(surface.vertices), moves.name)
-    shared = set(rig.names) & set(moving.rig.names)
+    shared = set(rig.names) & set(skeleton.names)
     if not shared:
         raise SceneError(
             f"{moves.name} has none of the joints of {path.name}, which are "
             f"{', '.join(rig.names)}. Give clips of the same skeleton."
         )
-    division = divided(rig, surface, path.name)
-    pose = posed(rig, moving.rig, action)
+    division = divided(rig, surface, path.name, fill)
+    sizes = tuple(size_notes(surface.vertices, density * division.volume, scale, path.name))
+    pose = posed(rig, skeleton, action)
     once, strays = clip_of(rig, division, pose)
     motion = as_cycle(once) or once
     files = model_files(name, rig, division, surface, density)
     files[f"{name}.bvh"] = _bvh(motion)
     called = printable(f"{path.name}, {moving.clips[number]}")
-    text = _scene(name, called, motion, as_cycle(once) is not None, _reach(rig, surface, pose))
-    files[f"{name}.toml"] = text.encode()
+    loop, reach = as_cycle(once) is not None, _reach(rig, surface, pose)
+    files[scene.name] = _scene(name, called, motion, loop, reach).encode()
     for made, content in files.items():
         target = Path(out) / made
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(content)
-    notes = (*_told(rig, division, density), _told_clip(motion, moving.clips[number], strays))
+    try:
+        steps = _steps(scene)
+    except SceneError:
+        scene.unlink()  # what cannot be run is no obstacle to the next import
+        raise
+    scene.write_bytes(_scene(name, called, motion, loop, reach, steps).encode())
+    notes = (
+        *_told(rig, division, density),
+        *sizes,
+        _told_clip(motion, moving.clips[number], strays),
+    )
     return Imported(scene, notes)
 
 
@@ -138,7 +160,15 @@ def _reach(rig: Rig, surface: Surface, pose: Action) -> tuple[Array, Array]:
     return low, high
 
 
-def _scene(name: str, called: str, clip: Clip, loop: bool, reach: tuple[Array, Array]) -> str:
+def _steps(scene: Path) -> int:
+    """Steps a frame in which the fastest body of a scene crosses a cell at most."""
+    loaded = load_scene(scene)
+    return steps_for_bodies(loaded, build(loaded).world.setup)
+
+
+def _scene(
+    name: str, called: str, clip: Clip, loop: bool, reach: tuple[Array, Array], steps: int = 1
+) -> str:
     """The scene file, with remarks for whoever edits it."""
     low, high = reach
     room = ROOM * float((high - low).max())
@@ -149,6 +179,8 @@ dimensions = 3
 [time]
 frames_per_second = {1.0 / clip.frame_time:.6g}
 frames = {clip.frames - 1}
+# so many that the fastest body crosses one cell at most in each
+steps_per_frame = {steps}
 
 # z is up, and what looks along +z in glTF looks along -y here, as in Blender
 [domain]
@@ -208,6 +240,9 @@ def _told(rig: Rig, division: Division, density: float) -> Sequence[str]:
         f"{len(division.bodies)} bodies of {len(rig.names)} joints, {division.volume:.4g} m^3, "
         f"{density * division.volume:.4g} kg"
     ]
+    if division.filled:
+        count, widest = len(division.filled), max(division.filled)
+        lines.append(f"{count} hole{'s' * (count > 1)} closed, the widest {widest:.3g} m across")
     if rigid:
         lines.append(f"rigid with the joint above them: {', '.join(rigid)}")
     return lines

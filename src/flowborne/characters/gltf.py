@@ -29,6 +29,7 @@ from flowborne.characters.rig import (
     one_tree,
     own_names,
     placed,
+    told_apart,
 )
 from flowborne.errors import SceneError
 
@@ -68,9 +69,9 @@ class GltfSource:
 
     @property
     def clips(self) -> tuple[str, ...]:
-        """Names of the animations."""
+        """Names of the animations, each once."""
         found = self._gltf.animations
-        return tuple(clip.name or f"animation_{n}" for n, clip in enumerate(found))
+        return told_apart([clip.name or f"animation_{n}" for n, clip in enumerate(found)])
 
     @cached_property
     @np.errstate(all="ignore")  # what overflows is found in the end

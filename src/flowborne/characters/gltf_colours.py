@@ -5,7 +5,6 @@ source  Khronos glTF 2.0 specification, sections 3.8 (textures) and 3.9.2 (mater
 
 from __future__ import annotations
 
-from base64 import b64decode
 from io import BytesIO
 
 import numpy as np
@@ -13,7 +12,7 @@ from PIL import Image
 
 from flowborne.characters.colours import PLAIN, texture_at
 from flowborne.characters.gltf_accessors import Accessors, within, wrong
-from flowborne.characters.gltf_document import Document, Primitive, TextureInfo
+from flowborne.characters.gltf_document import Document, Primitive, TextureInfo, embedded
 from flowborne.characters.rig import Array, Integers
 from flowborne.colours import to_linear, to_srgb
 
@@ -77,7 +76,7 @@ class Colours:
                 end = view.byte_offset + view.byte_length
                 content = bytes(self._buffers[view.buffer][view.byte_offset : end])
             else:
-                content = b64decode((image.uri or "").partition("data:")[2].partition(",")[2])
+                content = embedded(image.uri or "")
             found = Image.open(BytesIO(content))
             return found.convert("RGB") if found.width * found.height <= MOST_PIXELS else None
         except Exception:  # its readers raise whatever goes wrong in them

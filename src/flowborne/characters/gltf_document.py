@@ -6,12 +6,11 @@ source  Khronos glTF 2.0 specification, sections 3.4, 3.6 and 4.4 (GLB), and app
 from __future__ import annotations
 
 import base64
-import binascii
 import json
 import struct
 from pathlib import Path
 from typing import Annotated, Any, Literal
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote, unquote_to_bytes, urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, model_validator
 from pydantic.alias_generators import to_camel
@@ -265,15 +264,30 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
 def _from_uri(path: Path, uri: str, where: str) -> bytes:
     """What a uri holds, or the file in the folder of `path` that it names."""
     if uri[:5].lower() == "data:":
-        head, _, text = uri.partition(",")
         try:
-            if not head.endswith(";base64"):
-                raise ValueError
-            return base64.b64decode(text, validate=True)
-        except (ValueError, binascii.Error):
-            raise SceneError(f"{where}: its data uri is not base64. Export it anew.") from None
+            return embedded(uri)
+        except ValueError as error:
+            raise SceneError(
+                f"{where}: its data uri cannot be read ({error}). Export it anew."
+            ) from None
     file = path.parent / inside(uri, path.parent, where)
     return _bounded(file, f"{where}, {uri[:100]!r},")
+
+
+def embedded(uri: str) -> bytes:
+    """What a data uri holds, of any type, as base64 or percent-encoded.
+
+    source  RFC 2397; base64 may have line breaks and lack its padding
+    raises  ValueError
+    """
+    head, comma, text = uri.partition(",")
+    if not comma:
+        raise ValueError("it has no comma")
+    content = unquote_to_bytes(text)
+    if not head.lower().endswith(";base64"):
+        return content
+    plain = b"".join(content.split()).rstrip(b"=")
+    return base64.b64decode(plain + b"=" * (-len(plain) % 4), validate=True)
 
 
 def inside(uri: str, folder: Path, where: str) -> Path:

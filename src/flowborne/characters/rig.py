@@ -99,12 +99,17 @@ def own_names(names: list[str]) -> tuple[str, ...]:
     Braces are BVH's own, and the name of the world is MuJoCo's.
     """
     plain = [re.sub(r"[{}]", "_", printable(name))[:LONGEST_NAME].strip() for name in names]
-    found = ["world"]
-    for number, name in enumerate(plain):
-        base = name or f"joint_{number}"
+    given = [name or f"joint_{number}" for number, name in enumerate(plain)]
+    return told_apart(["world", *given])[1:]
+
+
+def told_apart(names: Sequence[str]) -> tuple[str, ...]:
+    """Names each once: the second of a kind ends in _2."""
+    found: dict[str, None] = {}
+    for base in names:
         again = (f"{base}_{n}" for n in count(2))
-        found.append(base if base not in found else next(n for n in again if n not in found))
-    return tuple(found[1:])
+        found[base if base not in found else next(n for n in again if n not in found)] = None
+    return tuple(found)
 
 
 def printable(text: str) -> str:

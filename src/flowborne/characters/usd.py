@@ -26,6 +26,7 @@ from flowborne.characters.rig import (
     one_tree,
     own_names,
     placed,
+    told_apart,
 )
 from flowborne.characters.usd_gate import (
     check_faces,
@@ -82,8 +83,8 @@ class UsdSource:
 
     @property
     def clips(self) -> tuple[str, ...]:
-        """Names of the SkelAnimations."""
-        return tuple(animation.GetPrim().GetName() for animation in self._animations)
+        """Names of the SkelAnimations, each once."""
+        return told_apart([animation.GetPrim().GetName() for animation in self._animations])
 
     @cached_property
     def rig(self) -> Rig:

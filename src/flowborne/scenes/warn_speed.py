@@ -60,6 +60,16 @@ def fast_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
     yield from _said(scene, lambda dt: _fastest_body(scene, setup, dt), BODY_CELLS)
 
 
+def steps_for_bodies(scene: Scene, setup: Setup) -> int:
+    """Steps a frame, as many as the scene has or more, in which no body crosses more than
+    BODY_CELLS; the scene's where MOST_STEPS are too few."""
+    steps, fluid = scene.time.steps_per_frame, setup.fluid
+    if fluid is None or fluid.one_way or not setup.solid.ngeom:
+        return steps
+    count, _ = _enough(scene, lambda dt: _fastest_body(scene, setup, dt), BODY_CELLS)
+    return count if count <= MOST_STEPS else steps
+
+
 def fast_flow(scene: Scene, setup: Setup) -> Iterator[str]:
     """A stream, a source or a jet that crosses more cells in a step than FLOW_CELLS."""
     if setup.fluid is None:
@@ -72,19 +82,30 @@ def fast_flow(scene: Scene, setup: Setup) -> Iterator[str]:
 
 def _said(scene: Scene, crossing: Callable[[float], Crossing], most: float) -> Iterator[str]:
     """The warning, if more than `most` cells are crossed in a step, with the steps that mend it."""
-    steps = scene.time.steps_per_frame
-    found = crossing(scene.frame_time / steps)
-    if not found.cells > most * (1.0 + 1e-9):
+    count, found = _enough(scene, crossing, most)
+    if count == scene.time.steps_per_frame:
         return
-    count, left = steps, found.cells
-    while left > AFTER_CELLS * (1.0 + 1e-9) and count <= MOST_STEPS:
-        count = max(count + 1, math.ceil(min(count * left / AFTER_CELLS, MOST_STEPS + 1)))
-        left = crossing(scene.frame_time / count).cells
     if count <= MOST_STEPS:
         remedy = f"time.steps_per_frame = {count} makes it one at most"
     else:
         remedy = f"as slow as {1.0 / found.cells:.2g} of that it crosses one"
     yield f"[time]: {found.who} crosses up to {found.cells:.3g} cells in one step; {remedy}"
+
+
+def _enough(
+    scene: Scene, crossing: Callable[[float], Crossing], most: float
+) -> tuple[int, Crossing]:
+    """Steps a frame in which at most AFTER_CELLS are crossed, above MOST_STEPS where that many are
+    too few and the scene's own where these cross no more than `most`; what the scene's cross."""
+    count = scene.time.steps_per_frame
+    found = crossing(scene.frame_time / count)
+    if not found.cells > most * (1.0 + 1e-9):
+        return count, found
+    left = found.cells
+    while left > AFTER_CELLS * (1.0 + 1e-9) and count <= MOST_STEPS:
+        count = max(count + 1, math.ceil(min(count * left / AFTER_CELLS, MOST_STEPS + 1)))
+        left = crossing(scene.frame_time / count).cells
+    return count, found
 
 
 def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
