@@ -101,6 +101,15 @@ def test_only_what_slides_has_places_of_its_own(crane: Path, tmp_path: Path) -> 
     assert six == {"world", "sled_arm", "ball"}
 
 
+def test_a_body_around_its_joint_is_a_bone_that_reaches_its_surface(
+    crane: Path, tmp_path: Path
+) -> None:
+    fb.export(crane, tmp_path / "out.bvh")
+    ends = {joint.name: joint.end for joint in load_bvh(tmp_path / "out.bvh").joints}
+    assert ends["ball"] is not None
+    assert np.linalg.norm(ends["ball"]) == pytest.approx(10.0, rel=1e-6)  # cm
+
+
 def test_a_walk_is_its_clip(walk: Path, tmp_path: Path) -> None:
     fb.export(walk, tmp_path / "out.bvh")
     assert "left_knee" in read_bvh(tmp_path / "out.bvh", 0.01).names

@@ -15,6 +15,28 @@ from flowborne.io.cell_fields import cell_velocity
 tinyvdb = pytest.importorskip("tinyvdb")
 read_back = pytest.importorskip("read_back", exc_type=ImportError)
 
+BALL = (
+    "<mujoco><worldbody><body name='ball' pos='0.5 0.5 0'><freejoint/>"
+    "<geom type='sphere' size='0.1'/></body></worldbody></mujoco>"
+)
+
+LEFT_OUT = """
+name = "ball"
+dimensions = 2
+[time]
+frames_per_second = 10.0
+frames = 1
+[domain]
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+resolution = 16
+[fluid]
+coupling = "none"
+[boundaries]
+[solids]
+model = "ball.xml"
+"""
+
 
 @pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke")])
 def test_volumes_are_exact(
@@ -56,6 +78,14 @@ def test_fields_of_many_nodes_are_exact(tmp_path: Path) -> None:
 
 
 def test_a_run_without_fluid_is_refused(walk: Path, tmp_path: Path) -> None:
-    with pytest.raises(fb.SceneError, match=r"has no fluid. Add \[domain\] and \[fluid\]"):
+    with pytest.raises(fb.SceneError, match=r"has no fluid\. Add \[domain\] and \[fluid\]"):
         fb.export(walk, tmp_path / "water.vdb")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_leaves_its_fluid_out_says_so(tmp_path: Path) -> None:
+    (tmp_path / "ball.xml").write_text(BALL)
+    (tmp_path / "ball.toml").write_text(LEFT_OUT)
+    fb.run(tmp_path / "ball.toml", tmp_path / "run", film=False)
+    with pytest.raises(fb.SceneError, match=r"fluid\.coupling = 'none'\. Run it with 'one-way' or"):
+        fb.export(tmp_path / "run", tmp_path / "water.vdb")

@@ -154,3 +154,28 @@ def test_real_clip_through_angles_found_anew(
     monkeypatch.setattr(bvh, "SAME", -1.0)  # no frame keeps its own numbers
     write_bvh(path, MOCAP / name, own_rotations(clip))
     assert np.rad2deg(largest_difference(clip, read_bvh(path))) < 1e-4
+
+
+def test_no_bone_of_zero_length_is_written(path: Path) -> None:
+    """A last bone without an end goes straight on, as long as the nearest one above with a length;
+    one that has an end keeps it."""
+    offsets = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.1], [0.0, 0.0, 0.0], [0.0, 0.3, 0.0]])
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (1, 4, 1))
+    clip = Clip(
+        ("hip", "knee", "foot", "hand"),
+        np.array([-1, 0, 1, 0]),
+        offsets,
+        {"foot": np.zeros(3), "hand": np.array([0.0, 0.1, 0.0])},
+        0.1,
+        still,
+        np.zeros((1, 3)),
+    )
+    write_clip(path, clip, 0.01)
+    ends = read_bvh(path, 0.01).ends
+    assert_allclose(ends["foot"], offsets[1], atol=1e-9)
+    assert_allclose(ends["hand"], clip.ends["hand"], atol=1e-9)
+    lone = Clip(
+        ("ball",), np.array([-1]), np.zeros((1, 3)), {}, 0.1, still[:, :1], np.zeros((1, 3))
+    )
+    write_clip(path, lone, 0.01)
+    assert np.linalg.norm(read_bvh(path, 0.01).ends["ball"]) > 0.0

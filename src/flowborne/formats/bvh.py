@@ -21,7 +21,7 @@ UNIT = 0.01
 
 SLIDING = 1e-6
 """Part of the creature's size by which a joint moves in its parent's frame before the file says so,
-with channels of its own for it."""
+with channels of its own for it; and below which a bone has no length."""
 
 
 @provided(".bvh")
@@ -73,10 +73,16 @@ def clip_of(creature: Creature) -> tuple[Clip, dict[str, Array]]:
 
 
 def _ends(creature: Creature) -> dict[int, Array]:
-    """Bone -> (3,) m, where a last bone ends: twice as far as its surfaces' middle."""
+    """Bone -> (3,) m, where a last bone ends: twice as far as its surfaces' middle, or at their
+    farthest place where that is the joint itself."""
     skeleton, ends = creature.skeleton, {}
     for bone in set(range(len(skeleton.names))) - set(skeleton.parents.tolist()):
         own = [surface.vertices for surface in creature.surfaces if surface.bone == bone]
         start = skeleton.rest[0][bone]
-        ends[bone] = 2.0 * (np.concatenate(own).mean(axis=0) - start) if own else np.zeros(3)
+        if not own:
+            continue
+        away = np.concatenate(own) - start
+        ends[bone] = 2.0 * away.mean(axis=0)
+        if np.linalg.norm(ends[bone]) < SLIDING * creature.size:
+            ends[bone] = away[np.linalg.norm(away, axis=1).argmax()]
     return ends

@@ -28,7 +28,7 @@ class ExporterVdb:
 
     def write(self, run: OpenRun, path: Path) -> Written:
         if run.grid is None:
-            raise SceneError(f"{run.folder} has no fluid. Add [domain] and [fluid] to its scene.")
+            raise SceneError(f"{run.folder} has no flow: {_without_flow(run)}.")
         files = tuple(numbered(path, frame) for frame in run.frames)
         for number, file in enumerate(files):
             state = run.state(number)
@@ -38,6 +38,16 @@ class ExporterVdb:
             grids.append(_grid(run.grid, "velocity", "unknown", velocity, every))
             _write(file, grids)
         return Written(files)
+
+
+def _without_flow(run: OpenRun) -> str:
+    """Why a run has no grid, and what gives it one."""
+    if "fluid" in run.scene and "domain" in run.scene:
+        return (
+            "its scene leaves the fluid out by fluid.coupling = 'none'. Run it with 'one-way' or "
+            "'two-way'"
+        )
+    return "its scene has no fluid. Add [domain] and [fluid]"
 
 
 def write_dye(run: OpenRun, path: Path) -> tuple[Path, ...]:

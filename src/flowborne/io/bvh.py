@@ -38,6 +38,12 @@ SAME = 1e-6
 DEGREES_OF_FREEDOM = 0.01
 """degrees that may be lost where a joint of the file has fewer than three rotation channels."""
 
+SHORTEST = 1e-6
+"""m of a bone that has a length: programs that read BVH drop or lengthen the others."""
+
+LONE = 0.1
+"""m of a bone that has no length by itself, and none above it."""
+
 ZXY = (2, 0, 1)
 """Axes of the rotation channels in clips that have no file to take after."""
 
@@ -121,6 +127,8 @@ def write_clip(
 ) -> None:
     """Write a clip as a BVH file: y up, facing +z, channels Zrotation Xrotation Yrotation.
 
+    Every last bone gets an end site, and none of them has zero length (see `_tip`).
+
     unit     m per length of the file
     sliding  joint -> (frames, 3) m, places in the parent's axes of joints other than the root that
              do not stay where their offset is
@@ -135,7 +143,10 @@ def write_clip(
         local = _in_axes(clip.rotations[:, joint], back)
         columns.append(angles_of(local, ZXY, np.zeros(3)))
     offsets = clip.offsets @ back.T / unit
-    ends = {name: back @ end / unit for name, end in clip.ends.items()}
+    inner = {clip.names[joint] for joint in clip.parents if joint >= 0}
+    tips = {n: end for n, end in clip.ends.items() if np.linalg.norm(end) >= SHORTEST}
+    tips |= {n: _tip(clip, k) for k, n in enumerate(clip.names) if n not in {*inner, *tips}}
+    ends = {name: back @ end / unit for name, end in tips.items()}
     lines = [
         "HIERARCHY",
         *_block(clip, offsets, ends, set(moving), 0, 0),
@@ -239,6 +250,15 @@ def _runs(marked: Mask) -> list[tuple[int, int]]:
     """Begin and end of each run of marked frames."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _tip(clip: Clip, joint: int) -> Array:
+    """(3,) m, end site of a last bone for which the clip has none, or one at the joint itself: it
+    goes straight on from the nearest bone above that has a length, as long as that."""
+    found = np.zeros(3)
+    while np.linalg.norm(found) < SHORTEST and joint >= 0:
+        found, joint = clip.offsets[joint], int(clip.parents[joint])
+    return found if np.linalg.norm(found) >= SHORTEST else np.array([0.0, 0.0, LONE])
 
 
 def _block(
