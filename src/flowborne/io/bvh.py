@@ -7,7 +7,7 @@ joint's rotation is the product of its rotation channels in the file's order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -18,16 +18,21 @@ from flowborne.io.atomic import write_atomically, write_text
 from flowborne.io.bvh_file import BvhFile, BvhJoint, load_bvh
 from flowborne.io.clip import Clip
 from flowborne.io.euler import angles_of, quaternions_of
-from flowborne.quaternions import angle, inverse, product
+from flowborne.quaternions import angle, inverse, product, turned
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-TO_WORLD: dict[str, Array] = {
-    "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
-    "z": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
-}
+_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_Z_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_OVER = np.diag([1.0, -1.0, -1.0])
+"""Half a turn about x."""
+
+TO_WORLD: dict[str, Array] = {"y": _Y_UP, "z": _Z_UP, "-y": _Y_UP @ _OVER, "-z": _Z_UP @ _OVER}
 """Axis that is up in the file -> (3, 3) rotation of its axes to x forward, y left, z up."""
+
+RIGID = 0.2
+"""Of its distance from the joint above, what a joint moves to be no bone's end but a root."""
 
 STILL = 1e-3
 """m; a bone whose length channels move less counts as rigid: exporters round and solve so far."""
@@ -52,30 +57,76 @@ def read_bvh(path: str | Path, unit: float = 1.0, up: str = "y", skip: int = 0) 
     """The motion of a BVH file.
 
     unit    m per length of the file
-    up      axis of the file that is up, "y" or "z"
+    up      axis of the file that is up, one of TO_WORLD
     skip    frames left out at the start, such as a T-pose that an exporter put there
     raises  SceneError when the file is missing, none, cut or not finite, when a bone changes its
             length by more than 1 mm, and when `skip` leaves no frame
-    note    where the root has position channels they are its place and its OFFSET is not added
+    note    where the root has position channels they are its place and its OFFSET is not added. A
+            root with a single joint below it that moves in it is folded into that joint
     """
     bvh = load_bvh(Path(path))
+    clip = clip_of(bvh, unit, up, skip)
+    check_rigid(bvh, clip, clip.names)
+    return clip
+
+
+def clip_of(
+    bvh: BvhFile, unit: float = 1.0, up: str = "y", skip: int = 0, root: str | None = None
+) -> Clip:
+    """The motion of a BVH file that has been read, its bones made rigid.
+
+    root    joint with which the clip begins: those above are folded into it, and what hangs on
+            them beside it is left out. By default the file's own, or the first below it that does
+            not move in one that carries nothing else
+    raises  SceneError when `skip` leaves no frame
+    """
     if not 0 <= skip < len(bvh.values):
         raise SceneError(
             f"{bvh.name} has {len(bvh.values)} frames, and {skip} of them are to be skipped. "
             "Skip fewer."
         )
     values, world = bvh.values[skip:], TO_WORLD[up]
-    root, *others = bvh.joints
-    offsets = [np.zeros(3)] + [_offset(bvh, joint, values, unit) for joint in others]
+    if root is None:
+        first = _first_at_rest(bvh, values)
+    else:
+        first = [joint.name for joint in bvh.joints].index(root)
+    kept, translation, rotation = [first], *_folded(bvh, first, values, world)
+    for number, joint in enumerate(bvh.joints):
+        if joint.parent in kept:
+            kept.append(number)
+    joints = [bvh.joints[number] for number in kept]
+    offsets, strays = [np.zeros(3)], {}
+    for joint in joints[1:]:
+        places, _ = _places(joint, values)
+        offsets.append((places.min(axis=0) + places.max(axis=0)) / 2.0)
+        away = unit * np.abs(places - offsets[-1]).max(axis=1)
+        strays[joint.name] = float(away.max()), int(away.argmax())
     return Clip(
-        names=tuple(joint.name for joint in bvh.joints),
-        parents=np.array([joint.parent for joint in bvh.joints], dtype=np.int64),
+        names=tuple(joint.name for joint in joints),
+        parents=np.array([-1] + [kept.index(joint.parent) for joint in joints[1:]], np.int64),
         offsets=unit * np.array(offsets) @ world.T,
-        ends={j.name: unit * world @ j.end for j in bvh.joints if j.end is not None},
+        ends={j.name: unit * world @ j.end for j in joints if j.end is not None},
         frame_time=bvh.frame_time,
-        rotations=np.stack([_rotations(j, values, world) for j in bvh.joints], axis=1),
-        translation=unit * _positions(root, values)[0] @ world.T,
+        rotations=np.stack(
+            [rotation, *(_rotations(joint, values, world) for joint in joints[1:])], axis=1
+        ),
+        translation=unit * translation,
+        strays={name: stray for name, stray in strays.items() if stray[0] > 0.0},
     )
+
+
+def check_rigid(bvh: BvhFile, clip: Clip, joints: Iterable[str], most: float = STILL) -> None:
+    """Raise SceneError where one of some joints of a file moves by more than `most` (m) about where
+    a rigid bone has it."""
+    for joint in joints:
+        stray, frame = clip.strays.get(joint, (0.0, 0))
+        if stray > most:
+            raise SceneError(
+                f"{bvh.name}, line {bvh.lines[frame + len(bvh.values) - clip.frames]}: the "
+                f"position channels of joint '{joint}' move by {2.0 * stray:.3g} m, and bones are "
+                "rigid here. Export the clip without stretching bones, or skip frames that are "
+                "none of the motion."
+            )
 
 
 def write_bvh(
@@ -158,40 +209,46 @@ def write_clip(
     write_text(Path(path), "\n".join(lines) + "\n")
 
 
-def _positions(joint: BvhJoint, values: Array) -> tuple[Array, bool]:
-    """(frames, 3) a joint's position channels, OFFSET where there are none; whether it has any."""
-    result = np.tile(joint.offset, (len(values), 1))
-    given = False
-    for column, (axis, turns) in enumerate(joint.channels, start=joint.first):
-        if not turns:
-            result[:, axis], given = values[:, column], True
-    return result, given
+def _places(joint: BvhJoint, values: Array) -> tuple[Array, bool]:
+    """(frames, 3) a joint's place in its parent's axes, in the file's unit, and whether channels
+    give it.
 
-
-def _offset(bvh: BvhFile, joint: BvhJoint, values: Array, unit: float) -> Array:
-    """(3,) place of a joint other than the root in its parent's axes, in the file's unit.
-
-    Some tools write the whole place into position channels, others what comes on top of OFFSET:
-    the numbers are nearer to OFFSET in the first case and nearer to 0 in the second.
+    Of the root it is what the position channels say. Of others some tools write the whole place
+    into them, and others what comes on top of OFFSET: the numbers are nearer to OFFSET in the first
+    case and nearer to 0 in the second.
     """
-    places, given = _positions(joint, values)
-    if not given:
-        return joint.offset
-    middle = (places.min(axis=0) + places.max(axis=0)) / 2.0
-    moved = np.abs(places - middle).max(axis=1) * unit
-    if moved.max() > STILL:
-        frame = int(moved.argmax()) + len(bvh.values) - len(values)
-        raise SceneError(
-            f"{bvh.name}, line {bvh.lines[frame]}: the position channels of joint "
-            f"'{joint.name}' move by {2.0 * moved.max():.3g} m, and bones are rigid here. "
-            "Export the clip without stretching bones, or skip frames that are none of the motion."
-        )
-    if np.linalg.norm(middle - joint.offset) <= np.linalg.norm(middle):
-        return middle
-    moving = [axis for axis, turns in joint.channels if not turns]
-    result = joint.offset.copy()
-    result[moving] += middle[moving]
-    return result
+    result = np.tile(joint.offset, (len(values), 1))
+    axes = [axis for axis, turns in joint.channels if not turns]
+    columns = [joint.first + n for n, (_, turns) in enumerate(joint.channels) if not turns]
+    result[:, axes] = values[:, columns]
+    middle = (result.min(axis=0) + result.max(axis=0)) / 2.0
+    if joint.parent >= 0 and np.linalg.norm(middle - joint.offset) > np.linalg.norm(middle):
+        result[:, axes] += joint.offset[axes]
+    return result, bool(axes)
+
+
+def _folded(bvh: BvhFile, joint: int, values: Array, world: Array) -> tuple[Array, Array]:
+    """(frames, 3) place, in the file's unit, and (frames, 4) rotation of a joint in the world."""
+    own = bvh.joints[joint]
+    place, rotation = _places(own, values)[0] @ world.T, _rotations(own, values, world)
+    if own.parent < 0:
+        return place, rotation
+    start, above = _folded(bvh, own.parent, values, world)
+    return start + turned(above, place), product(above, rotation)
+
+
+def _first_at_rest(bvh: BvhFile, values: Array) -> int:
+    """The joint to begin with: each that moves within the only one above it takes its place."""
+    first = 0
+    while True:
+        below = [number for number, j in enumerate(bvh.joints) if j.parent == first]
+        if len(below) != 1:
+            return first
+        places, given = _places(bvh.joints[below[0]], values)
+        moved = np.ptp(places, axis=0).max()
+        if not given or moved <= RIGID * np.linalg.norm(places, axis=1).max():
+            return first
+        first = below[0]
 
 
 def _turning(joint: BvhJoint) -> tuple[list[int], list[int]]:

@@ -35,6 +35,7 @@ class BvhFile:
     rows        text of each frame
     lines       line of the file where each frame begins, from 1
     values      (frames, channels) in the file's unit and degrees
+    note        what is wrong with the number of frames; may be empty
     """
 
     name: str
@@ -46,6 +47,7 @@ class BvhFile:
     rows: list[str] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
     values: Array = field(default_factory=lambda: np.empty((0, 0)))
+    note: str = ""
 
 
 def load_bvh(path: Path) -> BvhFile:
@@ -84,8 +86,6 @@ def _motion_header(lines: list[str], after: int, name: str) -> tuple[int, str, f
     count = re.fullmatch(r"\s*Frames\s*:\s*(\d+)\s*", lines[head], re.IGNORECASE)
     if count is None:
         raise SceneError(f"{name}, line {head + 1}: not 'Frames: ' and a number. Mend the file.")
-    if int(count[1]) == 0:
-        raise SceneError(f"{name}, line {head + 1}: zero frames. Give a clip that has a motion.")
     given = re.fullmatch(r"\s*Frame\s*Time\s*:\s*(\S+)\s*", lines[second], re.IGNORECASE)
     time = number_in(given[1]) if given else math.nan
     if given is None or not (math.isfinite(time) and time > 0.0):
@@ -117,17 +117,11 @@ def _read_rows(bvh: BvhFile, lines: list[str], after: int, frames: int) -> None:
             bvh.rows.append(line if len(words) == width else " ".join(held))
             values.append(_row(bvh, held, len(values)))
             held = []
-    if len(values) != frames:
-        rest = f" and {len(held)} values of a next" if held else ""
-        why = "it is cut. Export it anew" if len(values) < frames else "Correct the number"
-        sign = ":" if len(values) < frames else "."
-        raise SceneError(
-            f"{bvh.name} says {frames} frames and has {len(values)}{rest}{sign} {why}."
-        )
-    if held:
-        raise SceneError(
-            f"{bvh.name}, line {bvh.lines[-1]}: {len(held)} values too many. Cut them."
-        )
+    if not values:
+        raise SceneError(f"{bvh.name} has no frame. Give a clip that has a motion.")
+    if len(values) != frames or held:
+        rest = f" and {len(held)} of the {width} values of another, left out" if held else ""
+        bvh.note = f"says {frames} frames and has {len(values)}{rest}"
     bvh.values = np.array(values)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ class Clip:
     frame_time   s
     rotations    (frames, n, 4) unit quaternions, joint relative to parent (root: to the world)
     translation  (frames, 3) m, place of the root
+    strays       joint name -> m by which the file has it off the end of its rigid bone, at most,
+                 and the frame where it does
     """
 
     names: tuple[str, ...]
@@ -33,6 +35,7 @@ class Clip:
     frame_time: float
     rotations: Array
     translation: Array
+    strays: Mapping[str, tuple[float, int]] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -61,7 +64,7 @@ class Clip:
         translation = begin + turned(left, self.translation - begin) + np.array(offset)
         return replace(self, rotations=rotations, translation=translation)
 
-    def places(self, frame: int | slice = slice(None)) -> tuple[Array, Array]:
+    def places(self, frame: int | slice | NDArray[np.int64] = slice(None)) -> tuple[Array, Array]:
         """Where the joints are in the world, in one frame or in several.
 
         returns  (..., n, 3) m, places and (..., n, 4) unit quaternions, the joints' rotations;
