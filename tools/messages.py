@@ -88,9 +88,9 @@ def mistakes() -> Iterator[Mistake]:
         CHECK,
     )
     yield (
-        "a clip with the wrong axis up",
+        "a clip in the wrong unit",
         "walk",
-        scene("walk", "unit = 0.01", 'unit = 0.01\nup = "z"'),
+        scene("walk", "unit = 0.01", "unit = 1.0"),
         CHECK,
     )
     yield (

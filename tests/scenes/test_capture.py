@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flowborne.io.bvh import read_bvh, write_clip
+from flowborne.io.bvh import TO_WORLD, read_bvh, write_clip
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.human.gait import gait_clip
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.notes import notes_of
+from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.save import HUMAN_FILE, save_scene, scene_files
+from flowborne.scenes.warn_clip import lying
 from flowborne.simulation import Simulation
 
 Write = Callable[..., Path]
@@ -177,14 +181,23 @@ FAULTS: dict[str, tuple[str, dict[str, str], dict[str, str], str]] = {
         {},
         "wlak.bvh",
     ),
-    "no frames": ("", {}, {"Frames: 127": "Frames: 0"}, "walk.bvh"),
-    "fewer frames than it says": ("", {}, {"Frames: 127": "Frames: 900"}, "900"),
-    "a unit that is off by 100": ("", {"unit = 0.01": "unit = 1.0"}, {}, "Set unit = 0.01 (cm)."),
+    "a unit that is off by 100": (
+        "",
+        {"unit = 0.01": "unit = 1.0"},
+        {},
+        "Set unit = 0.01 (cm), or leave",
+    ),
     "a knee that nothing names": (
         "",
         {},
         {"JOINT left_knee": "JOINT bone_17"},
-        "no joint of the clip is known for left_knee.",
+        "no joint of the clip is known for left_knee (looked for: knee, tibia, leg,",
+    ),
+    "an elbow that nothing names": (
+        "",
+        {},
+        {"JOINT right_elbow": "JOINT bone_18"},
+        "no joint of the clip is known for right_elbow (looked for: elbow, radius, forearm,",
     ),
     "a mapping to what is not there": (
         '[clip.mapping]\nleft_knee = "left_kene"\n',
@@ -324,9 +337,113 @@ def test_a_clip_shorter_than_the_run_says_where_it_stands_still(write: Write) ->
     assert "walk.bvh goes on for 0.55 s of the run's 0.833 s, and stands still" in notes[0]
 
 
-def test_a_clip_with_the_wrong_axis_up_is_told_the_other(write: Write) -> None:
-    (problem,) = check_scene(write(), {"clip.up": "z"})
-    assert problem == (
-        "scene stroll.toml, [clip]: with up = 'z' its legs do not point down when no joint is "
-        "turned. Set up = 'y', or correct the mapping."
+def warned(path: Path, settings: dict[str, str]) -> tuple[list[str], list[str]]:
+    """Warnings and notes about the clip of a scene without a fault."""
+    scene = load_scene(path, settings)
+    setup = build(scene).world.setup
+    return list(lying(scene, setup)), list(clip_notes(scene))
+
+
+def test_a_walker_who_lies_is_told_the_axis_that_makes_it_stand(write: Write) -> None:
+    path = write()
+    assert warned(path, {"clip.up": "z"})[0] == [
+        "[clip]: with up = 'z' the person of walk.bvh lies; up = 'y' makes it stand"
+    ]
+    for up in ("y", "auto"):
+        assert warned(path, {"clip.up": up}) == ([], [])
+
+
+@pytest.mark.parametrize("up", ["y", "z", "-y"])
+def test_the_axis_that_is_up_and_the_unit_are_found(write: Write, up: str) -> None:
+    """Of one walk, in feet, whose file has its axes swapped or is upside down."""
+    path = write(scene={"unit = 0.01\n": ""})
+    clip = read_bvh(path.with_name("walk.bvh"), 0.01)
+    back = TO_WORLD["y"].T @ TO_WORLD[up]  # writes what `up` would turn back
+    axes = TO_WORLD["y"] @ back.T @ TO_WORLD["y"].T
+    turned = replace(
+        clip,
+        offsets=clip.offsets @ axes.T,
+        ends={name: axes @ end for name, end in clip.ends.items()},
+        rotations=np.concatenate([clip.rotations[..., :1], clip.rotations[..., 1:] @ axes.T], -1),
+        translation=clip.translation @ axes.T,
     )
+    write_clip(path.with_name("walk.bvh"), turned, 0.3048)
+    capture = capture_of(load_scene(path))
+    assert capture is not None
+    assert (capture.unit, capture.up) == (0.3048, up)
+    _, (note,) = warned(path, {})
+    said = "walk.bvh is read with unit = 0.3048 (feet), which makes legs of 0.86 m"
+    assert note == f"[clip]: {said}" + (f", and up = '{up}'" if up != "y" else "")
+    walked = capture.clip.translation
+    assert walked - walked[0] == pytest.approx(clip.translation - clip.translation[0], abs=0.01)
+
+
+def test_a_wrong_number_of_frames_is_a_note(write: Write) -> None:
+    path = write(clip={"Frames: 127": "Frames: 900"})
+    assert check_scene(path) == []
+    assert warned(path, {})[1] == ["[clip]: walk.bvh says 900 frames and has 127"]
+
+
+def test_a_bone_that_is_put_in_is_told_with_its_length(write: Write) -> None:
+    """Of the neck of a file that starts it on the thorax itself."""
+    path = write()
+    lines = path.with_name("walk.bvh").read_text().splitlines()
+    at = next(n for n, line in enumerate(lines) if "JOINT lower_neck" in line) + 2
+    assert "OFFSET" in lines[at]
+    lines[at] = "OFFSET 0 0 0"
+    path.with_name("walk.bvh").write_text("\n".join(lines) + "\n")
+    _, (note,) = warned(path, {})
+    assert re.search(r"no bone above 'lower_neck', as .*; one of 2\d cm is put in", note), note
+
+
+@pytest.mark.parametrize(
+    ("most", "told"),
+    [
+        (0.5, "bones of walk.bvh stretch, that to 'left_knee' by 10 mm; each has its middle"),
+        (3.0, "the position channels of joint 'left_knee' move by 0.06 m"),
+    ],
+)
+def test_bones_that_stretch_a_little_have_their_middle(
+    write: Write, walk: str, most: float, told: str
+) -> None:
+    """By channels of position that go up and down by some centimetres."""
+    path = write()
+    head, motion = walk.split("MOTION")
+    joints = [line.split()[-1] for line in head.splitlines() if "JOINT" in line]
+    column = 6 + 3 * joints.index("left_knee")
+    before, after = head.split("JOINT left_knee", 1)
+    height = float(after.split("OFFSET", 1)[1].split()[1])
+    after = after.replace("CHANNELS 3", "CHANNELS 4 Yposition", 1)
+    rows = motion.strip().splitlines()
+    for n, row in enumerate(rows[2:], start=2):
+        words = row.split()
+        words.insert(column, f"{height + most * (-1) ** n:.6f}")
+        rows[n] = " ".join(words)
+    text = "\n".join([f"{before}JOINT left_knee{after}MOTION", *rows])
+    path.with_name("walk.bvh").write_text(text + "\n")
+    said = check_scene(path) or warned(path, {})[1]
+    assert len(said) == 1
+    assert told in said[0]
+
+
+def test_a_joint_that_the_clip_lacks_and_the_scene_names_is_held_until_it_is_moved(
+    write: Write,
+) -> None:
+    """Toes of a clip without any: welded, or controlled from the pose in which they are held."""
+    lacking = {"JOINT upper_neck": "JOINT cervix"}
+    path = write(clip=lacking | {"JOINT lower_neck": "JOINT neck"})
+    scene = load_scene(path)
+    capture = capture_of(scene)
+    assert capture is not None
+    assert "upper_neck" not in capture.held, "found by its place"
+    path = write(clip={"JOINT left_toes": "JOINT digits"})
+    alone = build(load_scene(path)).world.setup.solid
+    assert "left_toes" not in alone.joint_names
+    assert alone.nbody == 24
+    control = CONTROL.replace('"lower_back", "left_elbow"', '"left_toes"')
+    path = write(control, clip={"JOINT left_toes": "JOINT digits"})
+    assert "[clip]: not in walk.bvh, held: left_toes" in warned(path, {})[1]
+    world = built(path).world
+    model = world.setup.solid
+    assert model.dofs_of("left_toes").size == 3
+    assert world.solid.q[model.positions_of("left_toes")] == pytest.approx([1.0, 0.0, 0.0, 0.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,13 +10,19 @@ import numpy as np
 import pytest
 
 from flowborne.errors import SceneError
-from flowborne.io.bvh import read_bvh, write_clip
+from flowborne.io.bvh import TO_WORLD, read_bvh, write_clip
 from flowborne.quaternions import angle, inverse, product
 from flowborne.running import run
+from flowborne.scenes.bodies import load_model
+from flowborne.scenes.capture import capture_of
 from flowborne.scenes.human.gait import gait_clip
 from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.motion_out import export_bvh
+
+from .plain_bvh import plain
+
+CLIPS = Path(__file__).parent / "clips"
 
 SCENE = """
 gravity = [0.0, 0.0, -9.81]
@@ -111,3 +118,45 @@ def test_a_run_without_a_clip_is_refused(tmp_path: Path) -> None:
     run(load_scene("block-effort-wind"), out=tmp_path / "run", film=False, frames=2)
     with pytest.raises(SceneError, match=r"follows no clip, and there is none to give back"):
         export_bvh(tmp_path / "run", tmp_path / "out.bvh")
+
+
+NECK = """
+[initial]
+positions = { upper_neck = [0.9, 0.0, 0.4, 0.0] }
+[[control]]
+joints = ["upper_neck", "lower_back"]
+strength = 5.0
+[[objectives]]
+kind = "effort"
+"""
+
+
+def test_a_joint_that_the_file_lacks_turns_what_hangs_on_it(tmp_path: Path) -> None:
+    """A controlled neck of two joints in a file with one, whose zeros are no person: the head turns
+    as the run's does, the back as well, and a sentence says what is not in the file."""
+    shutil.copy(CLIPS / "rokoko-jesse.bvh", tmp_path / "walk.bvh")
+    (tmp_path / "scene.toml").write_text(SCENE + 'file = "walk.bvh"\n' + NECK)
+    run(load_scene(tmp_path / "scene.toml"), out=tmp_path / "run", film=False, frames=3)
+    note = export_bvh(tmp_path / "run", tmp_path / "out.bvh")
+    assert note == (
+        "walk.bvh has no joint for upper_neck: its motion turns Head there and moves nothing; "
+        ".usd and .glb have it"
+    )
+    source, out = (plain((tmp_path / f).read_text()) for f in ("walk.bvh", "out.bvh"))
+    frames = len(out.places["Hips"])
+    capture = capture_of(load_scene(tmp_path / "scene.toml"))
+    assert capture is not None
+    world = TO_WORLD[capture.up]
+    model = load_model(load_scene(tmp_path / "scene.toml"))
+    for joint, bone in (("lower_back", "Spine"), ("head", "Head"), ("left_knee", "LeftLeg")):
+        body = int(model.mj.jnt_bodyid[model.joint(joint)])
+        since = []
+        for frame in (0, 3):
+            with np.load(tmp_path / "run" / "states" / f"{frame:06d}.npz") as state:
+                moment = round(float(state["time"]) / source.frame_time)
+                turned = state["body_rotation"][body]
+            theirs = world @ out.rotations[bone][min(moment, frames - 1)] @ world.T
+            since.append(turned.T @ theirs)
+        assert since[0] == pytest.approx(since[1], abs=2e-3), joint
+    away = source.rotations["Head"][0].T @ out.rotations["Head"][0]
+    assert np.degrees(np.arccos((np.trace(away) - 1.0) / 2.0)) > 20.0

@@ -12,7 +12,7 @@ from flowborne.errors import SceneError
 from flowborne.formats.creature import Array, Creature
 from flowborne.io.bvh import write_clip
 from flowborne.io.clip import Clip
-from flowborne.io.exporters import provided
+from flowborne.io.exporters import Written, provided
 from flowborne.io.open_run import OpenRun
 from flowborne.scenes.motion_out import export_bvh
 
@@ -33,15 +33,15 @@ class ExporterBvh:
     of the run, lengths are centimetres, y is up.
     """
 
-    def write(self, run: OpenRun, path: Path) -> None:
+    def write(self, run: OpenRun, path: Path) -> Written | None:
         if len(run) < 2:
             raise SceneError(f"{run.folder} has no motion yet. Let the run go on with --resume.")
         if "clip" in run.scene:
-            export_bvh(run.folder, path)
-            return
+            return Written((path,), export_bvh(run.folder, path))
         creature = Creature(run)
         clip, places = clip_of(creature)
         write_clip(path, clip, UNIT, places)
+        return None
 
 
 def clip_of(creature: Creature) -> tuple[Clip, dict[str, Array]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from flowborne.io.arrays_file import read_state
 from flowborne.io.bvh import write_bvh, write_clip
 from flowborne.io.clip import Clip
 from flowborne.io.run_folder import STATE_NAME, RunFolder
+from flowborne.quaternions import inverse, product
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.capture import Capture, capture_of, followers
 from flowborne.scenes.load import load_scene
@@ -23,7 +26,7 @@ from flowborne.solids.model import SolidModel
 Array = NDArray[np.float64]
 
 
-def export_bvh(run: Path, path: Path) -> None:
+def export_bvh(run: Path, path: Path) -> str:
     """Write the motion of the run in folder `run` as a BVH file.
 
     With a clip of its own the file is that clip, frame for frame, over the time that was
@@ -31,6 +34,7 @@ def export_bvh(run: Path, path: Path) -> None:
     motion that was found for them; all else stays to the letter. The generated walk is written
     anew, a frame per frame of the run.
 
+    returns a sentence on joints that moved and are not in the clip's file; empty without any
     raises  SceneError when the run has no clip or no motion; OSError when a file is missing or
             cannot be written
     """
@@ -48,8 +52,13 @@ def export_bvh(run: Path, path: Path) -> None:
     model = load_model(scene)
     if scene.clip.file is None:
         write_clip(path, _walked(scene, capture, model, q), 0.01)
-        return
-    free = set(capture.mapping) - set(followers(scene, capture, model))
+        return ""
+    following = followers(scene, capture, model)
+    own = {j: bone for j, bone in capture.mapping.items() if j not in capture.held}
+    capture, added = replace(capture, mapping=own), set(capture.mapping) - set(own)
+    moved = [joint for joint in model.joint_names if joint in added - set(following)]
+    carried = {joint: _carried(model, capture, joint) for joint in moved}
+    free = set(own) - set(following) | {joint for below in carried.values() for joint in below}
     frames, first = _frames(scene, capture.clip, float(times[-1]))
     at = (frames - scene.clip.start / capture.clip.frame_time) * capture.clip.frame_time
     relative = _relative(model, capture, q)
@@ -57,15 +66,50 @@ def export_bvh(run: Path, path: Path) -> None:
     for joint in sorted(free & set(model.joint_names)):
         turning = RotationSpline(times, relative[joint])(at)
         between = _between(capture, model, joint, frames)
-        replaced[capture.mapping[joint]] = (between.inv() * turning).as_quat(scalar_first=True)
+        turned = (between.inv() * turning).as_quat(scalar_first=True)
+        replaced[own[joint]] = _in_file(capture, own[joint], turned)
     write_bvh(
         path,
         scene.folder / scene.clip.file,
         replaced,
-        up=scene.clip.up,
+        up=capture.up,
         first=first,
         last=first + len(frames),
     )
+    return _left_out(scene.clip.file, {j: [own[k] for k in below] for j, below in carried.items()})
+
+
+def _in_file(capture: Capture, bone: str, rotations: Array) -> Array:
+    """(frames, 4) rotations of a joint relative to its parent as counted by the clip's file."""
+    if capture.rest is None:
+        return rotations
+    number = capture.clip.names.index(bone)
+    result = product(rotations, capture.rest[number])
+    parent = int(capture.clip.parents[number])
+    return result if parent < 0 else product(inverse(capture.rest[parent]), result)
+
+
+def _carried(model: SolidModel, capture: Capture, joint: str) -> list[str]:
+    """Joints that the clip has and that hang on one that it lacks."""
+    body = _body(model, joint)
+    found = []
+    for name in capture.mapping:
+        if name in model.joint_names:
+            below = int(model.mj.body_parentid[_body(model, name)])
+            while below > 0 and below != body and not _mapped(model, capture, below):
+                below = int(model.mj.body_parentid[below])
+            if below == body:
+                found.append(name)
+    return found
+
+
+def _left_out(file: str, carried: Mapping[str, Sequence[str]]) -> str:
+    """A sentence on joints that a file lacks -> its joints that hang on them."""
+    if not carried:
+        return ""
+    turned = [bone for bones in carried.values() for bone in bones]
+    how = f"turns {', '.join(turned)} there and moves nothing" if turned else "is left out"
+    return f"{file} has no joint for {', '.join(carried)}: its motion {how}; .usd and .glb have it"
 
 
 def _poses(states: list[Path]) -> tuple[Array, Array]:
@@ -116,13 +160,17 @@ def _above(model: SolidModel, capture: Capture, joint: str) -> str | None:
     """The nearest joint above that the clip has too."""
     body = int(model.mj.body_parentid[_body(model, joint)])
     while body > 0:
-        first = int(model.mj.body_jntadr[body])
-        names = model.joint_names[first : first + int(model.mj.body_jntnum[body])]
-        for name in names:
-            if name in capture.mapping:
-                return name
+        for name in _mapped(model, capture, body):
+            return name
         body = int(model.mj.body_parentid[body])
     return None
+
+
+def _mapped(model: SolidModel, capture: Capture, body: int) -> list[str]:
+    """Joints of a body that the clip has."""
+    first = int(model.mj.body_jntadr[body])
+    names = model.joint_names[first : first + int(model.mj.body_jntnum[body])]
+    return [name for name in names if name in capture.mapping]
 
 
 def _between(

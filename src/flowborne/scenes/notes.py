@@ -9,8 +9,8 @@ import numpy as np
 from flowborne.scenes.bodies import HINGE, SLIDE, joint_kind, joint_unit, own_pose, posed
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
-from flowborne.scenes.human.clip_skeleton import lost_bones
 from flowborne.scenes.not_taken import not_taken
+from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
 from flowborne.scenes.wording import listed
@@ -23,7 +23,7 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     if left_out is not None:
         yield left_out
     yield from _moved_into_range(scene, model)
-    yield from _lost_bones(scene)
+    yield from clip_notes(scene)
     yield from _standing_still(scene)
     yield from _wide_probes(scene, model)
 
@@ -63,21 +63,6 @@ def _standing_still(scene: Scene) -> Iterator[str]:
         yield (
             f"[clip]: {table.file} goes on for {left:.3g} s of the run's {run:.3g} s, and stands "
             "still from there; loop = true lets it begin again, and fewer frames end with it"
-        )
-
-
-def _lost_bones(scene: Scene) -> Iterator[str]:
-    """Joints of a clip that lie on each other."""
-    capture = capture_of(scene)
-    if scene.human is None or scene.clip is None or scene.clip.file is None or capture is None:
-        return
-    lost = lost_bones(capture.clip, capture.mapping)
-    if lost:
-        names = ", ".join(f"'{capture.mapping[joint]}'" for joint in lost)
-        yield (
-            f"[clip]: {scene.clip.file} has no bone between {names} and the joint above, as BVH "
-            "files of the CMU database; bones of usual length are put in, so that head and "
-            "shoulders are where anatomy has them, higher than in the file"
         )
 
 

@@ -40,8 +40,10 @@ class ClipTable(Table):
 
     file         BVH file, found from the folder of the scene file; without it, a walk by published
                  curves of a gait (for [human])
-    unit         m per unit of length of the file
-    up           axis of the file that points up
+    unit         m per unit of length of the file; "auto" is what makes a human's legs 0.65 to
+                 1.1 m long, and 1 for other creatures
+    up           axis of the file that points up; "auto" is the one along which a human stands, and
+                 y for other creatures
     skip         frames dropped at the start, which often hold a T-pose
     start, stop  s, the part that is used, counted after the skipped frames
     loop         whether it starts again when it ends, from where it has come to; unless given the
@@ -62,8 +64,8 @@ class ClipTable(Table):
     """
 
     file: FileName | None = None
-    unit: Positive = 1.0
-    up: Literal["y", "z"] = "y"
+    unit: Positive | Literal["auto"] = "auto"
+    up: Literal["auto", "y", "z", "-y", "-z"] = "auto"
     skip: WholeNumber = 0
     start: NotNegative = 0.0
     stop: Positive | None = None

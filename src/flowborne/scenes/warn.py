@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 
 from flowborne.coupling.world import Setup
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.warn_clip import lying
 from flowborne.scenes.warn_drives import angles_in_radians, limp_joints, too_slow
 from flowborne.scenes.warn_mass import implausible_density, mass_apart
 from flowborne.scenes.warn_model import fixed_outside, floors_in_fluid, unmet_bodies
@@ -32,6 +33,7 @@ WARNINGS: tuple[Warn, ...] = (
     angles_in_radians,
     too_slow,
     limp_joints,
+    lying,
 )
 """In the order in which they are listed."""
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.io.clip import Clip
-from flowborne.scenes.human.skeleton import BODIES, PARENTS, SIDES, TIPS, Array, Skeleton
+from flowborne.quaternions import angle, inverse, turned
+from flowborne.scenes.human.skeleton import BODIES, PARENTS, SIDES, TIPS, Array, Link, Skeleton
 from flowborne.scenes.human.standard import FOREARM, HAND, standard_skeleton
 from flowborne.scenes.wording import suggestion
 
@@ -18,6 +19,12 @@ NAMES = tuple(joint for _, joint, _ in BODIES)
 
 TINY = 1e-6
 """Of a bone's standard length: what is shorter is no bone."""
+
+NEAR = 1e-3
+"""m by which a joint may be off where the clip has it."""
+
+SAME = 1e-6
+"""rad; a joint that turns less is none."""
 
 ENDS = {
     "lower_neck": "head_top",
@@ -33,10 +40,13 @@ SHORTEST = 0.1
 """Of the standard thorax, the least length of such a bone."""
 
 
-def skeleton_of(clip: Clip, mapping: Mapping[str, str]) -> Skeleton:
+def skeleton_of(
+    clip: Clip, mapping: Mapping[str, str], between: Mapping[str, Sequence[str]] | None = None
+) -> Skeleton:
     """Skeleton with a clip's own bones, no joint of the clip turned.
 
     mapping  joint of the model -> joint of the clip; the root must be among them
+    between  joint of the model -> joints of the clip above it that are links, from the top
     returns  joints that are mapped are where the clip has them. Where one lies on its mapped
              parent, other than the root, the file lacks the bone between: it is put in (neck and
              collar bones: such that head and shoulders are as high as the standard skeleton's
@@ -50,6 +60,7 @@ def skeleton_of(clip: Clip, mapping: Mapping[str, str]) -> Skeleton:
     """
     _check_names(clip, mapping)
     standard = standard_skeleton()
+    place = _places(clip)
     found = _found(clip, mapping)
     scale = _scale(found, standard)
     _insert_lost_bones(found, standard, scale, _lost(found, standard, scale))
@@ -60,7 +71,42 @@ def skeleton_of(clip: Clip, mapping: Mapping[str, str]) -> Skeleton:
         wrist, tip = found[f"{side}_wrist"], found[f"{side}_fingertip"]
         length = HAND / FOREARM * float(np.linalg.norm(wrist - found[f"{side}_elbow"]))
         found[f"{side}_fingertip"] = wrist + length * (tip - wrist) / np.linalg.norm(tip - wrist)
-    return Skeleton({name: found[name] for name in NAMES}, {tip: found[tip] for tip in TIPS})
+    links = {
+        joint: tuple(
+            Link(
+                f"{joint}_base{number or ''}",
+                bone,
+                found[joint] + place[bone] - place[mapping[joint]],
+            )
+            for number, bone in enumerate(bones)
+        )
+        for joint, bones in (between or {}).items()
+    }
+    joints, tips = ({name: found[name] for name in names} for names in (NAMES, TIPS))
+    return Skeleton(joints, tips, links)
+
+
+def between(clip: Clip, mapping: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """Joint of the model -> joints of the clip between its own and that of the nearest mapped joint
+    above, from the top, where these move it by more than NEAR."""
+    places, rotations = clip.places()
+    found = {}
+    for joint in NAMES[1:]:
+        if joint not in mapping:
+            continue
+        own = clip.names.index(mapping[joint])
+        above = clip.names.index(mapping[_above(joint, mapping)])
+        way = turned(inverse(rotations[:, above]), places[:, own] - places[:, above])
+        bones, at = [], own
+        rest = np.zeros(3)
+        while at != above:
+            rest = rest + clip.offsets[at]
+            at = int(clip.parents[at])
+            bones.append(at)
+        if np.linalg.norm(way - rest, axis=1).max() > NEAR:
+            turning = [n for n in bones[-2::-1] if angle(clip.rotations[:, n]).max() > SAME]
+            found[joint] = tuple(clip.names[n] for n in turning)
+    return found
 
 
 def _check_names(clip: Clip, mapping: Mapping[str, str]) -> None:
@@ -82,11 +128,7 @@ def _check_names(clip: Clip, mapping: Mapping[str, str]) -> None:
 
 def _found(clip: Clip, mapping: Mapping[str, str]) -> dict[str, Array]:
     """Places of the mapped joints, and of the tips below them, m."""
-    place: dict[str, Array] = {}
-    for number, name in enumerate(clip.names):
-        parent = int(clip.parents[number])
-        above = place[clip.names[parent]] if parent >= 0 else np.zeros(3)
-        place[name] = above + clip.offsets[number]
+    place = _places(clip)
     found = {joint: place[mapping[joint]] for joint in NAMES if joint in mapping}
     for tip, joint in TIPS.items():
         if joint not in mapping:
@@ -101,6 +143,16 @@ def _found(clip: Clip, mapping: Mapping[str, str]) -> dict[str, Array]:
         if np.linalg.norm(far - start) > 0.0:
             found[tip] = far
     return found
+
+
+def _places(clip: Clip) -> dict[str, Array]:
+    """(3,) m, place of each joint of the clip with none turned, from the root."""
+    place: dict[str, Array] = {}
+    for number, name in enumerate(clip.names):
+        parent = int(clip.parents[number])
+        above = place[clip.names[parent]] if parent >= 0 else np.zeros(3)
+        place[name] = above + clip.offsets[number]
+    return place
 
 
 def _lineage(clip: Clip, name: str) -> list[str]:
@@ -131,7 +183,7 @@ def _scale(found: Mapping[str, Array], standard: Skeleton) -> float:
     return ours / theirs
 
 
-def _above(name: str, found: Mapping[str, Array]) -> str:
+def _above(name: str, found: Container[str]) -> str:
     """Nearest joint above that the clip has."""
     above = PARENTS[name]
     while above not in found:

@@ -26,6 +26,10 @@ class Inertia:
     centre: Array
     tensor: Array
 
+    def part(self, share: float) -> Inertia:
+        """A share of the mass, spread as the whole."""
+        return Inertia(share * self.mass, self.centre, share * self.tensor)
+
 
 def axes_of(start: Array, end: Array, ahead: Array | None = None) -> Array:
     """(3, 3) columns: sagittal, transverse and longitudinal axis of a segment, right-handed.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
@@ -77,15 +77,31 @@ KNUCKLES = 86.2 / 187.9
 
 
 @dataclass(frozen=True, eq=False)
+class Link:
+    """A joint of a clip between two that the human has.
+
+    name   of its joint and body in the model
+    bone   the clip's joint
+    place  (3,) m, at rest
+    """
+
+    name: str
+    bone: str
+    place: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Skeleton:
     """Rest positions; z up, x forward, y left, m. No joint is turned there.
 
     joints  name -> (3,), all 23
     tips    name -> (3,): head_top, left_ and right_fingertip and _toe_tip
+    links   joint -> what stands between it and the one that carries it, from there
     """
 
     joints: Mapping[str, Array]
     tips: Mapping[str, Array]
+    links: Mapping[str, tuple[Link, ...]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
         """(3,) place of a joint or tip."""

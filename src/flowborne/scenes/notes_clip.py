@@ -1,0 +1,67 @@
+"""What was found out about a clip's file and its person, for notes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from flowborne.io.bvh import STILL
+from flowborne.scenes.capture import capture_of
+from flowborne.scenes.clip_scale import UPRIGHT, leg_length, named, standing_axis
+from flowborne.scenes.human.clip_skeleton import lost_bones
+from flowborne.scenes.human.skeleton import PARENTS
+from flowborne.scenes.schema import Scene
+
+
+def clip_notes(scene: Scene) -> Iterator[str]:
+    """Sentences on how a clip's file was read, without a full stop."""
+    yield from _read_as(scene)
+    yield from _lost_bones(scene)
+
+
+def _read_as(scene: Scene) -> Iterator[str]:
+    """What was found out about a clip's file and its person, and what is not in it."""
+    table, capture = scene.clip, capture_of(scene)
+    if table is None or capture is None or table.file is None:
+        return
+    if capture.note:
+        yield f"[clip]: {table.file} {capture.note}"
+    if capture.skeleton is None or capture.posture is None:
+        return
+    found = []
+    if table.unit == "auto":
+        legs = leg_length(capture.clip, capture.mapping)
+        found.append(f"unit = {named(capture.unit)}, which makes legs of {legs:.2f} m")
+    if table.up == "auto" and capture.up != "y":
+        found.append(f"up = '{capture.up}'")
+    if found:
+        yield f"[clip]: {table.file} is read with {', and '.join(found)}"
+    if capture.held:
+        yield f"[clip]: not in {table.file}, held: {', '.join(capture.held)}"
+    stray, bone = max(
+        (capture.clip.strays.get(b, (0.0, 0))[0], b) for b in capture.mapping.values()
+    )
+    if stray > STILL:
+        yield (
+            f"[clip]: bones of {table.file} stretch, that to '{bone}' by {2e3 * stray:.3g} mm; "
+            "each has its middle length here"
+        )
+    if capture.posture[2] < UPRIGHT and standing_axis(capture.posture, capture.up) is None:
+        yield f"[clip]: the person of {table.file} lies rather than stands, whichever axis is up"
+
+
+def _lost_bones(scene: Scene) -> Iterator[str]:
+    """Joints of a clip that lie on each other."""
+    capture = capture_of(scene)
+    if scene.clip is None or scene.clip.file is None or capture is None or capture.skeleton is None:
+        return
+    skeleton = capture.skeleton
+    lost = lost_bones(capture.clip, capture.mapping)
+    for joint in lost:
+        length = 100.0 * float(np.linalg.norm(skeleton[joint] - skeleton[PARENTS[joint]]))
+        yield (
+            f"[clip]: {scene.clip.file} has no bone above '{capture.mapping[joint]}', as BVH files "
+            f"of the CMU database; one of {length:.2g} cm is put in, so that head and shoulders "
+            "are where anatomy has them, higher than in the file"
+        )
