@@ -11,7 +11,14 @@ import pytest
 import tomli_w
 
 from flowborne.errors import SceneError
-from flowborne.scenes.load import check_scene, load_scene, override, scene_names
+from flowborne.scenes.load import (
+    check_scene,
+    library,
+    load_scene,
+    override,
+    read_scene,
+    scene_names,
+)
 from flowborne.scenes.save import save_scene, scene_files
 from flowborne.scenes.schema import Scene
 
@@ -88,7 +95,7 @@ def test_the_name_of_a_scene_is_that_of_its_file(write: Write) -> None:
 
 @pytest.mark.parametrize("name", scene_names())
 def test_built_in_scene_written_and_loaded_is_identical(name: str, tmp_path: Path) -> None:
-    scene = load_scene(name)
+    scene = read_scene(library() / f"{name}.toml")
     assert_same(load_scene(save_scene(scene, tmp_path)), scene)
 
 
