@@ -94,7 +94,7 @@ class Flesh:
 
     def moving(self, s: Scratch) -> csr_array:
         """(3n, nv) `jacobian` where `s` has been placed."""
-        return csr_array(kron(self.weights, eye_array(3), format="csr") @ self.moving_nodes(s))
+        return csr_array(self._of_nodes @ self.moving_nodes(s))
 
     def nodes(self, s: Scratch) -> Array:
         """(np, 3) the nodes where `s` has been placed, m."""
@@ -106,11 +106,25 @@ class Flesh:
         twists = twists_about_origin(s.cdof, s.subtree_com[self.model.dof_root])
         node, dof = self.moved
         velocity = twists[dof, :3] + cross(twists[dof, 3:], places[node])
-        row = (3 * node[:, None] + np.arange(3)).ravel()
-        shape = (3 * len(places), self.model.nv)
-        moving = csr_array((velocity.ravel(), (row, np.repeat(dof, 3))), shape=shape)
+        entry = self._entries
+        data = velocity.ravel()[entry.data]
+        moving = csr_array((data, entry.indices, entry.indptr), shape=entry.shape, copy=True)
         moving.eliminate_zeros()
         return moving
+
+    @cached_property
+    def _of_nodes(self) -> csr_array:
+        """(3n, 3np) from the nodes' velocities to the vertices', x y z of each in turn."""
+        return csr_array(kron(self.weights, eye_array(3), format="csr"))
+
+    @cached_property
+    def _entries(self) -> csr_array:
+        """(3np, nv) where `moving_nodes` may have entries, by their number among the velocities,
+        x y z of each of the pairs `moved` in turn."""
+        node, dof = self.moved
+        row = (3 * node[:, None] + np.arange(3)).ravel()
+        shape = (3 * len(self.body), self.model.nv)
+        return csr_array((np.arange(row.size), (row, np.repeat(dof, 3))), shape=shape)
 
     def of_vertices(self, velocity: Array) -> Array:
         """(nv,) velocity of the free points from that of vertices (n, 3), each point being one."""
