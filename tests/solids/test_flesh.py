@@ -58,20 +58,26 @@ def moving(model: SolidModel, seed: int = 0) -> SolidState:
 
 
 def by_differences(model: SolidModel, state: SolidState) -> tuple[Array, Array]:
-    """K and D (nv, nv) of springs, dampers and flesh, from the forces around a state."""
+    """K and D (nv, nv) of springs, dampers and flesh, from the forces around a state.
+
+    Those between the nodes are a function of their places alone.
+    """
     s, nothing, eps = scratch(model), np.zeros(model.nv), 1e-6
     flesh = flesh_of_model(model)
 
-    def force(q: Array, v: Array) -> Array:
+    def passive(q: Array, v: Array) -> Array:
         s.smooth_forces(q, v, nothing)
-        elastic = flesh.elasticity.forces(flesh.nodes(s)).ravel()
-        return s.data.qfrc_passive + flesh.moving_nodes(s).T @ elastic
+        return np.array(s.data.qfrc_passive)
+
+    def force(q: Array) -> Array:
+        of_joints = passive(q, nothing)
+        return of_joints + flesh.moving_nodes(s).T @ flesh.elasticity.forces(flesh.nodes(s)).ravel()
 
     K, D = np.empty((model.nv, model.nv)), np.empty((model.nv, model.nv))
     for n, one in enumerate(np.eye(model.nv)):
-        ahead, back = (force(model.integrate(state.q, one, e), nothing) for e in (eps, -eps))
+        ahead, back = (force(model.integrate(state.q, one, e)) for e in (eps, -eps))
         K[:, n] = (back - ahead) / (2.0 * eps)
-        ahead, back = (force(state.q, e * one) for e in (eps, -eps))
+        ahead, back = (passive(state.q, e * one) for e in (eps, -eps))
         D[:, n] = (back - ahead) / (2.0 * eps)
     elastic = static_forces(model, state.q, nothing)[0].toarray()
     bones = ~flesh.dofs
