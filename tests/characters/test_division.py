@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -11,6 +12,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 from flowborne.characters.closing import SAME
 from flowborne.characters.division import LEAST, divided
@@ -38,7 +40,7 @@ def rig(parents: tuple[int, ...] = rigged.PARENTS) -> Rig:
 def volumes(surface: Surface, skeleton: Rig, fill: bool = False) -> dict[int, float]:
     """Joint that moves -> volume of its piece, which is closed."""
     division = divided(skeleton, surface, "box.glb", fill)
-    for piece in division.pieces.values():
+    for piece in (*division.pieces.values(), *division.shapes.values()):
         assert not len(piece[1]) or is_closed(piece)
     return {
         joint: ShapeMesh(*piece).volume if len(piece[1]) else 0.0
@@ -76,6 +78,26 @@ def test_pieces_fill_the_whole_whatever_the_weights(seed: int) -> None:
     assert sum(found.values()) == pytest.approx(whole, rel=100 * SAME)
 
 
+def test_no_crack_opens_at_a_joint_that_turns() -> None:
+    """Places around it stay within one body or the other; masses are those of the plain pieces."""
+    vertices, faces, weights = rigged.box()
+    skeleton = replace(rig(), position=rigged.PLACES)
+    division = divided(skeleton, Surface(vertices, faces, weights / 0.8, GREY), "box.glb")
+    trunk, tail = division.shapes[0], division.shapes[2]
+    assert is_closed(tail)
+    assert trunk[1].shape == division.pieces[0][1].shape
+    joint = np.array([0.0, 0.0, -rigged.JOINT])
+    corner = 0.5 * np.hypot(rigged.WIDTH, rigged.HEIGHT)
+    assert tail[0][:, 2].max() == pytest.approx(-rigged.JOINT + corner, abs=1e-5)
+    around = np.random.default_rng(3).uniform(-1.0, 1.0, (500, 3))
+    around = joint + 0.9 * 0.5 * rigged.HEIGHT * around / np.linalg.norm(around, axis=1)[:, None]
+    for angle in (-30.0, 15.0, 30.0):
+        turn = Rotation.from_euler("x", angle, True).as_matrix()
+        turned = ShapeMesh(joint + (tail[0] - joint) @ turn.T, tail[1])
+        apart = np.minimum(ShapeMesh(*trunk).distance(around), turned.distance(around))
+        assert apart.max() < 1e-3
+
+
 def test_surface_with_a_hole_is_refused() -> None:
     vertices, faces, weights = rigged.box()
     end = Surface(vertices, faces[2:], weights / 0.8, GREY[2:])
@@ -104,7 +126,7 @@ def test_small_holes_are_closed_and_triangles_wound_alike() -> None:
 
 
 def test_sheets_that_touch_along_an_edge_have_their_mass() -> None:
-    """Two boxes with an edge in common, which MuJoCo's own integrals refuse."""
+    """Two boxes with an edge in common, for which MuJoCo's own integrals refuse the mesh."""
     one, other = (trimesh.creation.box((1.0, 1.0, 1.0)) for _ in range(2))
     other.apply_translation((1.0, 1.0, 0.0))
     both = trimesh.util.concatenate(one, other)

@@ -113,6 +113,7 @@ def test_model_has_the_masses_of_the_pieces(box: Path) -> None:
     section = rigged.WIDTH * rigged.HEIGHT
     lengths = np.array([0.0, rigged.JOINT, 0.0, rigged.LENGTH - rigged.JOINT, 0.0])
     assert_allclose(solid.body_mass[[1, 3]], 900.0 * section * lengths[[1, 3]], rtol=1e-4)
+    assert_allclose(solid.volume[[1, 3]], section * lengths[[1, 3]], rtol=1e-4)
     assert solid.body_mass.sum() == pytest.approx(900.0 * section * rigged.LENGTH, rel=1e-6)
 
 

@@ -23,6 +23,9 @@ SAME = 1e-7
 CROWDED = 50
 """Points that may be one, on average."""
 
+RINGS = 6
+"""Rings of triangles of a dome, 15 degrees each in a half ball."""
+
 
 def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tuple[float, ...]]:
     """The surface with every point once, no triangle without an area, all triangles of a part
@@ -79,6 +82,46 @@ def fans(points: Array, loops: list[Integers]) -> Mesh:
         corners.append(np.average(0.5 * (start + stop), axis=0, weights=length)[None])
         lids.append(np.stack([np.roll(rim, -1), rim, tip], axis=1))
     return np.concatenate(corners), np.concatenate(lids)
+
+
+def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
+    """As `fans`, but each rim around a joint is closed by a dome about it, so that two bodies with
+    one in the other part neither at the rim nor beneath it as the joint turns.
+
+    centre  (3,) of the joint, m
+    """
+    flat, lids = fans(points, loops)
+    corners, faces, count = [flat], [np.zeros((0, 3), np.int64)], len(flat)
+    triangles = np.split(lids, np.cumsum([len(rim) for rim in loops], dtype=int))[:-1]
+    for rim, fan in zip(loops, triangles, strict=True):
+        start, middle = points[rim], flat[fan[0, 2]]
+        normal = np.cross(*np.moveaxis(flat[fan[:, :2]] - middle, 1, 0)).sum(axis=0)
+        width = np.linalg.norm(start - middle, axis=1).mean()
+        if np.linalg.norm(centre - middle) > width or not normal.any():
+            faces.append(fan)
+            continue
+        normal /= np.linalg.norm(normal)
+        about = centre + min(float(((start - centre) @ normal).mean()), 0.0) * normal
+        away = start - about
+        height, radius = away @ normal, np.linalg.norm(away, axis=1)
+        side = away - height[:, None] * normal
+        side /= np.maximum(np.linalg.norm(side, axis=1), np.finfo(float).tiny)[:, None]
+        tilt = np.arccos(np.clip(height / np.maximum(radius, np.finfo(float).tiny), -1.0, 1.0))
+        ring = rim
+        for share in np.arange(1, RINGS) / RINGS:
+            angle, far = ((1.0 - share) * tilt)[:, None], (1.0 - share) * radius[:, None]
+            far = far + share * radius.mean()
+            corners.append(about + far * (np.sin(angle) * side + np.cos(angle) * normal))
+            above = count + np.arange(len(rim))
+            count += len(rim)
+            a, b, c, d = np.roll(ring, -1), ring, above, np.roll(above, -1)
+            faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+            ring = above
+        corners.append((about + radius.mean() * normal)[None])
+        tip = np.full(len(rim), count)
+        count += 1
+        faces.append(np.stack([np.roll(ring, -1), ring, tip], axis=1))
+    return np.concatenate(corners), np.concatenate(faces)
 
 
 def edges_of(faces: Integers) -> Integers:

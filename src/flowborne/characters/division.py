@@ -4,7 +4,9 @@ A point of the surface lies beyond a joint where that joint and all below it hav
 the weight, and belongs to the last joint beyond which it lies. Weights being linear in a triangle,
 triangles are cut there. What lies beyond a joint is never partly beyond another one, so that every
 rim is between two bodies alone. The fan that closes it, about its middle, is the same on both
-sides: the pieces fill the whole.
+sides: the pieces fill the whole. As rigid pieces turn, a crack would open between them, and fluid
+would enter it a hundred times as fast as they move: the shapes that the fluid meets have a dome
+about the joint in place of the fan, inside the body above.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.characters.closing import closed, fans, loops_of, rims_of, volume_of, weld
+from flowborne.characters.closing import closed, domes, fans, loops_of, rims_of, volume_of, weld
 from flowborne.characters.rig import Array, Integers, Rig, Surface
 from flowborne.errors import SceneError
 from flowborne.shapes.shape import Mesh
@@ -36,6 +38,7 @@ class Division:
     owners  (n,) number of the joint that each joint is rigid with, itself where it moves
     leader  joint of the topmost body whose motion is that of the body
     pieces  joint that moves -> its closed part of the surface, m, where the rig has it at rest
+    shapes  the same with domes about the joints
     volume  m^3 within the whole surface
     filled  m across each hole of the surface that was closed
     """
@@ -43,6 +46,7 @@ class Division:
     owners: Integers
     leader: int
     pieces: dict[int, Mesh]
+    shapes: dict[int, Mesh]
     volume: float
     filled: tuple[float, ...] = ()
 
@@ -71,11 +75,13 @@ def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Divisi
             f"{name}: the surface holds {volume:.3g} m^3. Turn its faces outward (in Blender: "
             "Mesh, Normals, Recalculate Outside), and take a surface with an inside."
         )
-    own = _pieces(rig, np.arange(len(rig.names)), whole)
+    own, _ = _pieces(rig, np.arange(len(rig.names)), whole, domed=False)
     owners, leader = _merged(rig, np.array([volume_of(piece) for piece in own]) / volume)
-    cut = _pieces(rig, owners, whole)
-    pieces = {joint: piece for joint, piece in enumerate(cut) if owners[joint] == joint}
-    return Division(owners, leader, pieces, volume, filled)
+    moves = np.flatnonzero(owners == np.arange(len(owners))).tolist()
+    pieces, shapes = (
+        {joint: meshes[joint] for joint in moves} for meshes in _pieces(rig, owners, whole)
+    )
+    return Division(owners, leader, pieces, shapes, volume, filled)
 
 
 def _merged(rig: Rig, parts: Array) -> tuple[Integers, int]:
@@ -100,8 +106,11 @@ def _merged(rig: Rig, parts: Array) -> tuple[Integers, int]:
     return owners, leader
 
 
-def _pieces(rig: Rig, owners: Integers, surface: Surface) -> list[Mesh]:
-    """The closed part of each joint, without triangles where it has none."""
+def _pieces(
+    rig: Rig, owners: Integers, surface: Surface, *, domed: bool = True
+) -> tuple[list[Mesh], list[Mesh]]:
+    """The closed part of each joint, without triangles where it has none; and those with domes,
+    where they are asked for."""
     share = surface.weights @ _beyond(rig.parents) - HALF
     below = [np.flatnonzero(_parents(rig, owners) == joint) for joint in range(len(owners))]
     share[:, owners != np.arange(len(owners))] = -HALF
@@ -122,18 +131,23 @@ def _pieces(rig: Rig, owners: Integers, surface: Surface) -> list[Mesh]:
     sound = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     faces, of_face = faces[sound], of_face[sound]
     beyond = _beyond(rig.parents) > 0.0
-    caps = {
-        joint: fans(points, loops_of(rims_of(faces[beyond[of_face, joint]])))
+    rims = {
+        joint: loops_of(rims_of(faces[beyond[of_face, joint]]))
         for joint in np.unique(of_face).tolist()
         if rig.parents[joint] >= 0
     }
-    found = []
+    caps = {joint: fans(points, loops) for joint, loops in rims.items()}
+    found, round_ones = [], []
     for joint in range(len(owners)):
         parts = [(points, faces[of_face == joint])]
-        parts += [caps[joint]] if joint in caps else []
         parts += [(caps[d][0], caps[d][1][:, ::-1]) for d in below[joint] if d in caps]
-        found.append(_joined(parts))
-    return found
+        found.append(_joined([*parts, caps[joint]] if joint in caps else parts))
+        if domed and joint in rims:
+            dome = domes(points, rims[joint], rig.position[joint])
+            round_ones.append(_joined([*parts, dome]))
+        else:
+            round_ones.append(found[-1])
+    return found, round_ones
 
 
 def _beyond(parents: Integers) -> Array:

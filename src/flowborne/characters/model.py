@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flowborne.characters.closing import edges_of
 from flowborne.characters.colours import few_colours
 from flowborne.characters.division import Division
 from flowborne.characters.rig import Array, Rig, Surface
 from flowborne.shapes.shape import Mesh
+from flowborne.solids.geoms import DISPLACED
 
 INFLUENCES = 8
 """Joints that carry a vertex of the skin at most: as many as exporters write."""
@@ -35,6 +36,7 @@ def model_files(
     values = {"type": "mesh", "contype": "0", "conaffinity": "0", "density": f"{density:g}"}
     ElementTree.SubElement(default, "geom", values)
     assets = ElementTree.SubElement(root, "asset")
+    custom = ElementTree.SubElement(root, "custom")
     ElementTree.SubElement(root, "include", file=f"{name}-skin.xml")
     bodies: dict[int, Element] = {-1: ElementTree.SubElement(root, "worldbody")}
     for joint, parent in enumerate(rig.parents.tolist()):
@@ -47,38 +49,38 @@ def model_files(
             ElementTree.SubElement(body, "freejoint", name=own)
         else:
             ElementTree.SubElement(body, "joint", name=own, type="ball")
-        vertices, faces = division.pieces[joint]
-        if len(faces):
+        if len(division.pieces[joint][1]):
             file = f"{name}-meshes/{joint}.obj"
-            local = (vertices - rig.position[joint]) @ rig.rotation[joint]
-            files[file] = _obj((local, faces))
-            mesh = ElementTree.SubElement(assets, "mesh", name=own, file=file)
-            edges = edges_of(faces)
-            if len(np.unique(edges, axis=0)) == len(edges):
-                mesh.set("inertia", "exact")
-            else:
-                body.append(_inertial((local, faces), density))
+            shape, piece = (
+                ((vertices - rig.position[joint]) @ rig.rotation[joint], faces)
+                for vertices, faces in (division.shapes[joint], division.pieces[joint])
+            )
+            files[file] = _obj(shape)
+            ElementTree.SubElement(assets, "mesh", name=own, file=file)
+            mass = mass_of(piece, density)
+            body.append(_inertial(mass))
+            data = _numbers(np.array([mass.volume, *mass.center_mass]))
+            ElementTree.SubElement(custom, "numeric", name=DISPLACED + own, data=data)
             ElementTree.SubElement(body, "geom", name=own, mesh=own)
     files[f"{name}.xml"] = _text(root)
     files[f"{name}-skin.xml"] = _text(_skins(name, rig, surface))
     return files
 
 
-def _inertial(mesh: Mesh, density: float) -> Element:
-    """Mass and inertia of a closed surface whose sheets touch along edges, which MuJoCo's own
-    integrals refuse.
-
-    density  kg/m^3
-    """
-    import trimesh  # a tenth of a second that few surfaces need
+def mass_of(mesh: Mesh, density: float) -> Any:
+    """Mass, centre and inertia of a closed surface, as trimesh has them."""
+    import trimesh  # a tenth of a second that only characters need
 
     vertices, faces = mesh
-    found = trimesh.triangles.mass_properties(vertices[faces], density=density)
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = found.inertia
+    return trimesh.triangles.mass_properties(vertices[faces], density=density)
+
+
+def _inertial(mass: Any) -> Element:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = mass.inertia
     return ElementTree.Element(
         "inertial",
-        pos=_numbers(found.center_mass),
-        mass=_numbers(found.mass),
+        pos=_numbers(mass.center_mass),
+        mass=_numbers(mass.mass),
         fullinertia=_numbers(np.array([xx, yy, zz, xy, xz, yz])),
     )
 

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 HIDDEN_GROUP = 3
 """Geometries in this group and above collide but displace no fluid (MuJoCo's convention)."""
 
+DISPLACED = "displaced by "
+"""What stands before a body's name in the name of its <numeric>, see `said_to_displace`."""
+
 KINDS = {
     mujoco.mjtGeom.mjGEOM_PLANE: "plane",
     mujoco.mjtGeom.mjGEOM_HFIELD: "hfield",
@@ -94,3 +97,15 @@ def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:
         data.geom_xpos.copy(),
         data.geom_xmat.reshape(-1, 3, 3).copy(),
     )
+
+
+def said_to_displace(mj: mujoco.MjModel, body: int) -> tuple[float, Array] | None:
+    """Volume, m^3, and (3,) centre in a body's frame, m, that a model gives as a <numeric> of four
+    numbers, DISPLACED before the body's name, where bodies overlap; None where it has none."""
+    name = DISPLACED + element_name(mj, mujoco.mjtObj.mjOBJ_BODY, body)
+    number = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_NUMERIC, name)
+    if number < 0:
+        return None
+    first = int(mj.numeric_adr[number])
+    volume, *centre = mj.numeric_data[first : first + 4].tolist()
+    return volume, np.array(centre)

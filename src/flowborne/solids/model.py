@@ -65,7 +65,8 @@ class SolidModel:
     body_mass      (nbody + nodes,) kg; nodes of flesh come after the bodies
     subtree_mass   (nbody + nodes,) kg, of the body and all below
     volume         (nbody,) displaced volume, m^3 (area in a slab), each region counted once where
-                   geometries of a body overlap; see displaced.united. 0 for the world body, and
+                   geometries of a body overlap; see displaced.united and
+                   geoms.said_to_displace. 0 for the world body, and
                    for bones in flesh
     centroid       (nbody, 3) centroid of that volume in the body's frame, m
     geom_id        (ngeom,) MuJoCo's number
@@ -314,6 +315,10 @@ class SolidModel:
                 for g in np.flatnonzero((self.geom_body == body) & ~self.geom_covered)
             ]
             if solids and body > 0:
+                given = None if self.slab else geoms.said_to_displace(self.mj, body)
+                if given is not None:
+                    self.volume[body], self.centroid[body] = given
+                    continue
                 self.volume[body], centre = displaced.united(solids, self.slab)
                 self.centroid[body] = body_rotation[body].T @ (centre - body_position[body])
 
