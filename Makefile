@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: closeness demo test browser dist docs imports failing exporters fuzz messages validation-page clean
+.PHONY: closeness demo test browser dist docs gltf-validator imports failing exporters fuzz messages validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -24,6 +24,10 @@ dist: $(VENV)/installed-test
 docs: $(VENV)/installed-test
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 	@echo build/docs/index.html
+
+gltf-validator:
+	npm install --silent --no-save --prefix build gltf-validator@2.0.0-dev.3.10
+	$(BIN)/pytest -rs --numprocesses 0 tests/formats/test_glb.py -k khronos
 
 imports: $(VENV)/installed-test
 	$(BIN)/python tools/imports.py

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +43,30 @@ def files(
 
 
 Files = dict[str, tuple[Creature, Path]]
+
+
+VALIDATOR = """
+const validator = require("gltf-validator");
+const bytes = new Uint8Array(require("fs").readFileSync(process.argv[1]));
+validator.validateBytes(bytes).then((report) => console.log(JSON.stringify(report.issues)));
+"""
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_khronos_validator_finds_nothing(name: str, files: Files) -> None:
+    """`make gltf-validator` installs it, by npm."""
+    modules = Path(__file__).parents[2] / "build" / "node_modules"
+    if shutil.which("node") is None or not (modules / "gltf-validator").is_dir():
+        pytest.skip("the glTF validator is not installed")
+    done = subprocess.run(
+        ["node", "-e", VALIDATOR, str(files[name][1])],
+        env={**os.environ, "NODE_PATH": str(modules)},
+        capture_output=True,
+        check=True,
+    )
+    issues = json.loads(done.stdout)
+    assert issues["messages"] == []
+    assert issues["numErrors"] == issues["numWarnings"] == 0
 
 
 @pytest.mark.parametrize("name", RUNS)
