@@ -7,12 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.coupling.step import cut_at
 from flowborne.coupling.world import Setup
 from flowborne.scenes.bodies import displace_of, initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import listed
 from flowborne.solids.displacing import solid_geoms
+from flowborne.solids.dynamics import kinematics
 from flowborne.solids.outline import Outline
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -20,8 +24,8 @@ class Creature:
     """All that moves at the start of a run; all bodies where nothing does.
 
     mass              kg; kg/m in a slab
-    displaced         m^3; m^2 in a slab, each body and flesh by itself
-    displaced_mass    kg of fluid in its place; None without a fluid
+    displaced_mass    kg of fluid in its place, as thick as the grid sees it; None without a fluid
+                      that feels bodies
     size              (3,) extent along x, y and z, m; (2,) in a slab
     geoms             that have a volume, of the whole model
     displacing_geoms  of them those that the fluid meets
@@ -30,7 +34,6 @@ class Creature:
     """
 
     mass: float
-    displaced: float
     displaced_mass: float | None
     size: tuple[float, ...]
     geoms: int
@@ -63,17 +66,14 @@ def creature_of(scene: Scene, setup: Setup) -> Creature | None:
     model = setup.solid
     if not scene.has_bodies:
         return None
-    moving, fluid = model.moves.any(axis=1), setup.fluid
+    moving = model.moves.any(axis=1)
     counted = moving if moving.any() else np.ones(model.nbody, bool)
-    mass, displaced = model.body_mass[: model.nbody][counted].sum(), model.volume[counted].sum()
-    if model.flesh is not None:
-        mass += model.body_mass[model.nbody :].sum()
-        displaced += model.flesh.volumes.sum()
+    counted = np.append(counted, np.ones(len(model.body_mass) - model.nbody, bool))
     met = np.isin(np.arange(model.nbody), model.geom_body)
+    start = initial_state(scene, model).q
     return Creature(
-        float(mass),
-        float(displaced),
-        None if fluid is None else float(fluid.density * displaced),
+        float(model.body_mass[counted].sum()),
+        _displaced(setup, start, counted),
         tuple(creature_extent(scene, setup).tolist()),
         len(solid_geoms(model.mj)),
         model.ngeom,
@@ -82,7 +82,17 @@ def creature_of(scene: Scene, setup: Setup) -> Creature | None:
     )
 
 
-def creature_extent(scene: Scene, setup: Setup) -> NDArray[np.float64]:
+def _displaced(setup: Setup, start: Array, counted: NDArray[np.bool_]) -> float | None:
+    """kg of fluid in place of the counted bodies and of flesh, in the cells nearest to them."""
+    fluid = setup.fluid
+    if fluid is None or fluid.one_way:
+        return None
+    cut = cut_at(setup, kinematics(setup.solid, start))
+    closed = fluid.grid.cell_volume - cut.volume
+    return float(fluid.density * closed[counted[cut.nearest[:-1, :-1, :-1]]].sum())
+
+
+def creature_extent(scene: Scene, setup: Setup) -> Array:
     """(dimensions,) extent at the start of all that moves, m; of all bodies where none does."""
     model, axes = setup.solid, scene.dimensions
     outline, state = Outline(model), initial_state(scene, model)

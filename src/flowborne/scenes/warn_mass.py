@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.coupling.world import Fluid, Setup
-from flowborne.scenes.creature import creature_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import and_more, rounded_down, rounded_up
 from flowborne.solids.model import SolidModel
@@ -70,22 +69,22 @@ def implausible_density(scene: Scene, setup: Setup) -> Iterator[str]:
 def mass_apart(scene: Scene, setup: Setup) -> Iterator[str]:
     """Creatures whose mass and size in the fluid do not fit, though each body's do: much of their
     mass is in bodies that displace nothing."""
-    creature = creature_of(scene, setup)
-    if (
-        creature is None
-        or not creature.displaced_mass
-        or next(implausible_density(scene, setup), "")
-    ):
+    model, fluid = setup.solid, setup.fluid
+    if fluid is None or fluid.one_way or is_gas(fluid) or any(implausible_density(scene, setup)):
         return
-    assert setup.fluid is not None
-    times = creature.mass / creature.displaced_mass
-    if setup.fluid.one_way or is_gas(setup.fluid) or LIGHT <= times <= HEAVY:
+    moving = model.moves.any(axis=1)
+    mass, displaced = model.body_mass[: model.nbody][moving].sum(), model.volume[moving].sum()
+    if model.flesh is not None:
+        mass += model.body_mass[model.nbody :].sum()
+        displaced += model.flesh.volumes.sum()
+    if not displaced:
+        return
+    times = float(mass / (fluid.density * displaced))
+    if LIGHT <= times <= HEAVY:
         return
     yield (
-        f"[solids]: the creature of {creature.mass:.3g} kg displaces "
-        f"{creature.displaced_mass:.3g} kg of fluid, and has {times:.3g} times the mass of the "
-        "fluid in its place; [solids] displace names geoms that the fluid meets, and densities set "
-        "the mass"
+        f"[solids]: the creature of {mass:.3g} kg has {times:.3g} times the mass of the fluid in "
+        "its place; [solids] displace names geoms that the fluid meets, and densities set the mass"
     )
 
 
