@@ -10,12 +10,9 @@ from scipy.spatial import cKDTree
 from flowborne.characters.colours import PLAIN
 from flowborne.characters.rig import Array, Integers, Surface
 from flowborne.errors import SceneError
+from flowborne.shapes.closing import SMALL_HOLE, across_of, fans, loops_of, rims_of, wound
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh
-
-SMALL_HOLE = 0.05
-"""Part of the surface's size that a hole may be across to be closed without being asked for: seams
-that do not meet, the back of an eye, the end of a lash."""
 
 SAME = 1e-7
 """Points this close, relative to the size of the surface, are one."""
@@ -44,7 +41,7 @@ def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tu
     faces = wound(faces[kept])
     rims = rims_of(faces)
     loops = loops_of(rims)
-    across = [_across(points[loop]) for loop in loops]
+    across = [across_of(points[loop]) for loop in loops]
     size = float(np.ptp(points, axis=0).max())
     every, lids = fans(points, loops)
     whole = np.concatenate([faces, lids])
@@ -62,26 +59,6 @@ def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tu
     means = [weights[loop].mean(axis=0, keepdims=True) for loop in loops]
     colours = np.concatenate([surface.colours[kept], np.full((len(lids), 3), PLAIN)])
     return Surface(every, whole, np.concatenate([weights, *means]), colours), tuple(across)
-
-
-def _across(rim: Array) -> float:
-    """m, twice the largest distance of the points (k, 3) of a rim from their middle."""
-    return 2.0 * float(np.linalg.norm(rim - rim.mean(axis=0), axis=1).max())
-
-
-def fans(points: Array, loops: list[Integers]) -> Mesh:
-    """Fans about their middles that close rims, which are points followed by those middles.
-
-    loops  numbers of the points along each rim
-    """
-    corners, lids = [points], [np.zeros((0, 3), np.int64)]
-    for rim in loops:
-        start, stop = points[rim], points[np.roll(rim, -1)]
-        length = np.linalg.norm(stop - start, axis=1)
-        tip = np.full(len(rim), len(points) + len(corners) - 1)
-        corners.append(np.average(0.5 * (start + stop), axis=0, weights=length)[None])
-        lids.append(np.stack([np.roll(rim, -1), rim, tip], axis=1))
-    return np.concatenate(corners), np.concatenate(lids)
 
 
 def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
@@ -122,74 +99,6 @@ def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
         count += 1
         faces.append(np.stack([np.roll(ring, -1), ring, tip], axis=1))
     return np.concatenate(corners), np.concatenate(faces)
-
-
-def edges_of(faces: Integers) -> Integers:
-    """(3 m, 2) directed edges of triangles (m, 3): the first of each, the second, the third."""
-    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-
-
-def wound(faces: Integers) -> Integers:
-    """Triangles (m, 3) of which fewer than half in each connected part are turned over, so that
-    neighbours use the edge between them in opposite directions, where that can be."""
-    edges = edges_of(faces)
-    _, number, uses = np.unique(
-        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    twice = np.flatnonzero(uses[number.ravel()] == 2)
-    between = twice[np.argsort(number.ravel()[twice], kind="stable")].reshape(-1, 2)
-    alike = edges[between[:, 0], 0] == edges[between[:, 1], 0]
-    if not alike.any():
-        return faces
-    # each triangle stands twice, as it is and turned over: a part and its reverse are connected
-    count = len(faces)
-    first, second = (between % count).T
-    start = np.concatenate([first, first + count])
-    stop = np.concatenate([second + count * alike, second + count * ~alike])
-    links = coo_array((np.ones(len(start)), (start, stop)), shape=(2 * count, 2 * count))
-    part = np.asarray(connected_components(links, directed=False)[1])
-    kept = np.bincount(part[:count], minlength=part.max() + 1)
-    turned = kept[part[count:]] > kept[part[:count]]
-    return np.where(turned[:, None], faces[:, ::-1], faces)
-
-
-def rims_of(faces: Integers) -> Integers:
-    """(k, 2) directed edges that are not used as often in the other direction."""
-    edges = edges_of(faces)
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    pairs, number = np.unique(np.stack([low, high], axis=1), axis=0, return_inverse=True)
-    surplus = np.zeros(len(pairs), np.int64)
-    np.add.at(surplus, number.ravel(), np.where(edges[:, 0] == low, 1, -1))
-    ahead = np.repeat(pairs, np.maximum(surplus, 0), axis=0)
-    back = np.repeat(pairs[:, ::-1], np.maximum(-surplus, 0), axis=0)
-    return np.concatenate([ahead, back])
-
-
-def loops_of(edges: Integers) -> list[Integers]:
-    """Closed ways through directed edges (k, 2) of which as many enter as leave every point."""
-    leaving: dict[int, list[int]] = {}
-    for start, stop in edges.tolist():
-        leaving.setdefault(start, []).append(stop)
-    loops = []
-    while leaving:
-        way = [next(iter(leaving))]
-        place = {way[0]: 0}
-        while way:
-            after = leaving[way[-1]].pop()
-            if not leaving[way[-1]]:
-                del leaving[way[-1]]
-            if after not in place:
-                place[after] = len(way)
-                way.append(after)
-                continue
-            loop = way[place[after] :]
-            loops.append(np.array(loop))
-            for point in loop[1:]:
-                del place[point]
-            way = way[: place[after] + 1]
-            if way[-1] not in leaving:
-                break
-    return loops
 
 
 def weld(points: Array) -> tuple[Integers, Integers]:

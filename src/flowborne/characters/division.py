@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.characters.closing import closed, domes, fans, loops_of, rims_of, volume_of, weld
+from flowborne.characters.closing import closed, domes, volume_of, weld
 from flowborne.characters.rig import Array, Integers, Rig, Surface
 from flowborne.errors import SceneError
+from flowborne.shapes.closing import fans, loops_of, rims_of
 from flowborne.shapes.shape import Mesh
 
 HALF = 0.5 + 1e-7

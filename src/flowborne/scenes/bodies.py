@@ -90,6 +90,7 @@ def load_model(scene: Scene) -> SolidModel:
             floating=scene.solids.floating,
             displace=displace_of(scene.solids),
             packages=packages_of(scene),
+            hulls=scene.solids.mend == "hull",
         )
     except ValueError as error:
         raise SceneError(_sentence(str(error))) from None
@@ -108,8 +109,8 @@ def bones_of(scene: Scene) -> mujoco.MjSpec:
     solids = scene.solids
     chosen = displace_of(solids)
     given = solids.density, solids.densities, placed_shapes(scene), solids.floating, chosen
-    packages = packages_of(scene)
-    spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given, packages)
+    files = packages_of(scene), solids.mend == "hull"
+    spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given, *files)
     return spec
 
 

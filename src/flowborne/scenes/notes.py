@@ -14,6 +14,7 @@ from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
 from flowborne.scenes.wording import listed
+from flowborne.solids.mending import mended_meshes
 from flowborne.solids.model import SolidModel
 
 
@@ -22,6 +23,8 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     left_out = not_taken(scene, model)
     if left_out is not None:
         yield left_out
+    if mended := mended_meshes(model.mj):
+        yield f"[solids]: open meshes: {mended}"
     yield from _moved_into_range(scene, model)
     yield from clip_notes(scene)
     yield from _standing_still(scene)

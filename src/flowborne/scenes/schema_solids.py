@@ -62,6 +62,8 @@ class SolidsTable(Table):
                becomes its "pd" servo, with the actuator's stiffness and largest force
     packages   folders in which `package://name/...` of a URDF is looked for, besides those above
                it: each holds the package's folder, or is it
+    mend       "hull": open meshes are replaced by their convex hulls. Holes up to a twentieth of
+               the mesh are closed without it
     """
 
     model: FileName
@@ -71,6 +73,7 @@ class SolidsTable(Table):
     displace: DisplaceTable = DisplaceTable()
     hold: SwitchOrNames = False
     packages: tuple[FileName, ...] = ()
+    mend: Literal["hull"] | None = None
 
 
 class ShapeTable(Table, OwnTable):

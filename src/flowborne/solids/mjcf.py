@@ -19,11 +19,10 @@ from flowborne.solids.geoms import (
     displacing_geoms,
     element_name,
     geom_shape,
-    is_closed,
     kind_of,
-    mesh_of,
     rest_poses,
 )
+from flowborne.solids.mending import mend_meshes
 from flowborne.solids.model_files import ModelFiles, gathered, parsed
 from flowborne.solids.model_numbers import impossible, misgiven
 from flowborne.solids.model_refusal import refusal, unreadable
@@ -48,13 +47,14 @@ def compiled(
     floating: Sequence[str] = (),
     displace: Displace = BY_RULE,
     packages: Sequence[Path] = (),
+    hulls: bool = False,
 ) -> mujoco.MjModel:
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    given = density, densities, shapes, floating, displace, packages
+    given = density, densities, shapes, floating, displace, packages, hulls
     return bones_of(source, slab, gravity, *given)[1]
 
 
@@ -68,12 +68,14 @@ def bones_of(
     floating: Sequence[str] = (),
     displace: Displace = BY_RULE,
     packages: Sequence[Path] = (),
+    hulls: bool = False,
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """An MJCF file or text, as `compiled`, before flesh grows on it.
 
     floating  bodies on the world without a joint, which get a free one of their name
     displace  which geoms the fluid meets
     packages  folders in which packages of ROS are looked for besides those above the model
+    hulls     whether meshes with holes that are not small are replaced by their convex hulls
     """
     where = _named(source)
     spec = _read_spec(source, where, packages)
@@ -99,6 +101,12 @@ def bones_of(
     if write_groups(spec, chosen) or weightless:
         mj = _compiled(spec, where)
     _refuse_unsupported(mj, where)
+    try:
+        mended = mend_meshes(spec, mj, displacing_geoms(mj), hulls)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
+    if mended:
+        mj = _compiled(spec, where)
     if slab:
         _set_slab_inertias(spec, mj)
         try:
@@ -230,12 +238,6 @@ def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
             raise ValueError(
                 f"{where}: geom '{name}' is a signed distance plugin. "
                 f"Use a mesh, or put it into group {HIDDEN_GROUP} or above."
-            )
-        mesh = mesh_of(mj, geom)
-        if mesh is not None and not is_closed(mesh):
-            raise ValueError(
-                f"{where}: the mesh of geom '{name}' is not a closed surface with outward faces. "
-                f"Close it, or put the geom into group {HIDDEN_GROUP} or above."
             )
 
 

@@ -115,6 +115,7 @@ class SolidModel:
         floating: Sequence[str] = (),
         displace: Displace = BY_RULE,
         packages: Sequence[Path] = (),
+        hulls: bool = False,
     ) -> SolidModel:
         """Model of an MJCF or URDF file.
 
@@ -126,9 +127,10 @@ class SolidModel:
         floating  bodies on the world without a joint, which get a free one of their name
         displace  which geoms the fluid meets
         packages  folders in which packages of ROS are looked for besides those above the model
+        hulls    whether meshes with holes that are not small are replaced by their convex hulls
         raises   ValueError when the model is bad
         """
-        given = density, densities, shapes, floating, displace, packages
+        given = density, densities, shapes, floating, displace, packages, hulls
         mj = mjcf.compiled(Path(path), slab, gravity, *given)
         return cls(mj, slab, shapes=shapes)
 
