@@ -254,6 +254,22 @@ def test_a_data_uri_that_is_none_is_refused(
             read_source(tmp_path / "box.gltf")
 
 
+def test_meshes_that_no_joint_carries_are_named(
+    tmp_path: Path, box: tuple[dict[str, Any], bytes]
+) -> None:
+    document = json.loads(json.dumps(box[0]))
+    document["nodes"] += [{"name": "hat", "mesh": 0}, {"mesh": 0}]
+    made = fb.import_character(write(tmp_path / "box.glb", document, box[1]), tmp_path / "out")
+    assert "left out, for no joint carries them by weights: hat, nodes[7]" in made.notes
+    pxr = pytest.importorskip("pxr.UsdGeom")
+    rigged.write_usd(tmp_path / "box.usda")
+    assert read_source(tmp_path / "box.usda").left_out == ()
+    stage = pytest.importorskip("pxr.Usd").Stage.Open(str(tmp_path / "box.usda"))
+    pxr.Mesh.Define(stage, "/Root/hat")
+    stage.Save()
+    assert read_source(tmp_path / "box.usda").left_out == ("hat",)
+
+
 def glb(folder: Path, box: tuple[dict[str, Any], bytes]) -> Path:
     return write(folder / "box.glb", *box)
 

@@ -129,8 +129,10 @@ def import_character(
         scene.unlink()  # what cannot be run is no obstacle to the next import
         raise
     scene.write_bytes(_scene(name, called, motion, loop, reach, steps).encode())
+    left_out = printable(", ".join(source.left_out))
     notes = (
         *_told(rig, division, density),
+        *([f"left out, for no joint carries them by weights: {left_out}"] if left_out else []),
         *sizes,
         _told_clip(motion, moving.clips[number], strays),
     )

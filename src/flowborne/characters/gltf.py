@@ -121,6 +121,13 @@ class GltfSource:
                 found.append(Surface(vertices, triangles, weights, colours))
         return joined(found, self._name)
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the nodes whose mesh has no skin."""
+        nodes = enumerate(self._gltf.nodes)
+        bare = [(k, node) for k, node in nodes if node.mesh is not None and node.skin is None]
+        return tuple(node.name or f"nodes[{k}]" for k, node in bare)
+
     def _points(self, node: Node) -> int:
         """Number of vertices of a node's mesh."""
         assert node.mesh is not None

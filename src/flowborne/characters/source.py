@@ -22,9 +22,10 @@ BLENDER = (
 class Source(Protocol):
     """What a reader gives.
 
-    clips    names of the clips
-    rig      the skeleton
-    surface  None when nothing is bound to it
+    clips     names of the clips
+    rig       the skeleton
+    surface   None when nothing is bound to it
+    left_out  names of meshes that no joint carries
     """
 
     @property
@@ -35,6 +36,9 @@ class Source(Protocol):
 
     @property
     def surface(self) -> Surface | None: ...
+
+    @property
+    def left_out(self) -> tuple[str, ...]: ...
 
     def action(self, clip: int) -> Action:
         """A clip by its number in `clips`."""

@@ -98,6 +98,21 @@ class UsdSource:
         with reading_usd(self._name):
             return self._surface()
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the meshes that are not bound to the skeleton."""
+        with reading_usd(self._name):
+            carried = {
+                target.GetPrim()
+                for binding in self._bound
+                if binding.GetSkeleton().GetPrim() == self._skeleton.GetPrim()
+                for target in binding.GetSkinningTargets()
+                if target.HasJointInfluences()
+            }
+            prims = Usd.PrimRange.Stage(self._stage, EVERYTHING)
+            meshes = [prim for prim in prims if prim.IsA(UsdGeom.Mesh)]
+            return tuple(prim.GetName() for prim in meshes if prim not in carried)
+
     def action(self, clip: int) -> Action:
         """The `clip`-th animation, sampled at its own rate.
 
