@@ -34,7 +34,10 @@ PERSON = 0.5
 POSES = 400
 """Most frames of a clip that are looked at, evenly spread."""
 
-FAR = np.radians(45.0)
+DIGITS = 1e-6
+"""rad that the digits of a file leave open."""
+
+FAR = np.radians(60.0)
 """A joint of trunk or leg that turns farther than this from a file's zeros to where its person
 stands: these zeros are no pose of a person, however they look."""
 
@@ -100,7 +103,9 @@ def _is_below(clip: Clip, joint: int, above: int) -> bool:
 
 
 def _back(axes: Array) -> Array:
-    """(4,) the inverse of a rotation (3, 3)."""
+    """(4,) the inverse of a rotation (3, 3); none where a file's digits alone make it one."""
+    if np.abs(axes - np.eye(3)).max() < DIGITS:
+        return np.array([1.0, 0.0, 0.0, 0.0])
     return np.asarray(Rotation.from_matrix(axes.T).as_quat(scalar_first=True))
 
 
