@@ -52,10 +52,14 @@ JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free j
 
 
 def load_model(scene: Scene) -> SolidModel:
-    """The model of a scene, its human or its file.
+    """The model of a scene, its human or its file: made once for a scene as it was loaded.
 
     raises  SceneError when a file is missing or MuJoCo refuses it
     """
+    return scene.kept.get(scene, _loaded)
+
+
+def _loaded(scene: Scene) -> SolidModel:
     x, y, z = scene.gravity
     if scene.human is not None:
         try:
@@ -112,6 +116,12 @@ def bones_of(scene: Scene) -> mujoco.MjSpec:
     files = packages_of(scene), solids.mend == "hull"
     spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given, *files)
     return spec
+
+
+def spec_of(scene: Scene) -> mujoco.MjSpec:
+    """The model file of a scene as it is. Raises ValueError when it is bad."""
+    assert scene.model_path is not None
+    return mjcf.read_spec(scene.model_path, packages_of(scene))
 
 
 def packages_of(scene: Scene) -> list[Path]:
@@ -204,7 +214,7 @@ def keyframes(scene: Scene, model: SolidModel) -> mujoco.MjModel:
     joints of flesh and of floating bodies."""
     if scene.model_path is None or not (scene.flesh or (scene.solids and scene.solids.floating)):
         return model.mj
-    return compiled_quietly(mujoco.MjSpec.from_file(str(scene.model_path)))
+    return compiled_quietly(spec_of(scene))
 
 
 def posed(scene: Scene, model: SolidModel) -> SolidState:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.scenes.bodies import load_model
+from flowborne.scenes.bodies import load_model, spec_of
 from flowborne.scenes.schema import Scene
 from flowborne.solids.geoms import CONTACT_ONLY, kind_of
 from flowborne.solids.model import SolidModel
@@ -23,7 +23,7 @@ def with_steps(scene: Scene) -> Scene:
     """
     if "steps_per_frame" in scene.time.model_fields_set or scene.model_path is None:
         return scene
-    if not has_floors(mujoco.MjSpec.from_file(str(scene.model_path))):
+    if not has_floors(spec_of(scene)):
         return scene
     longest = longest_step(load_model(scene))
     steps = max(1, math.ceil(scene.frame_time / longest * (1.0 - 1e-9)))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from flowborne.scenes.bodies import spec_of
 from flowborne.scenes.contact_steps import has_floors
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import listed
@@ -27,7 +28,7 @@ def not_taken(scene: Scene, model: SolidModel) -> str | None:
     """One sentence on what of the model file has no effect, None where all of it has."""
     if scene.model_path is None or scene.solids is None:
         return None
-    spec = mujoco.MjSpec.from_file(str(scene.model_path))
+    spec = spec_of(scene)
     said = [*_options(scene, spec), *_elements(scene, spec), *_densities(scene, spec, model)]
     if not said:
         return None

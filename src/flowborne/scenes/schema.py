@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import tomli_w
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
@@ -113,6 +114,37 @@ class OutputTable(Table):
     exports: tuple[Annotated[ExportTable, BeforeValidator(_named_file)], ...] = ()
 
 
+Made = TypeVar("Made")
+
+MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
+"""Keys that say what the model of a scene is."""
+
+
+class Kept:
+    """What is made of a scene once, by the tables that it is made of. It is no part of the scene:
+    all of them are equal, and copies by pickle are empty."""
+
+    def __init__(self) -> None:
+        self._made: tuple[Any, Any] | None = None
+
+    def get(self, scene: Scene, make: Callable[[Scene], Made]) -> Made:
+        """What `make` makes of the scene's bodies, or has made of the same ones."""
+        parts = scene.folder, *(getattr(scene, key) for key in MODEL)
+        if self._made is None or self._made[0] != parts:
+            self._made = parts, make(scene)
+        made: Made = self._made[1]
+        return made
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Kept)
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __reduce__(self) -> tuple[type[Kept], tuple[()]]:
+        return Kept, ()
+
+
 class Scene(Table):
     """A scene, checked and with every default filled in.
 
@@ -155,6 +187,7 @@ class Scene(Table):
     film: FilmTable = FilmTable()
 
     _folder: Path = PrivateAttr(default=Path())
+    _kept: Kept = PrivateAttr(default_factory=Kept)
 
     @model_validator(mode="before")
     @classmethod
@@ -177,6 +210,10 @@ class Scene(Table):
     @property
     def is_slab(self) -> bool:
         return self.dimensions == 2
+
+    @property
+    def kept(self) -> Kept:
+        return self._kept
 
     @property
     def folder(self) -> Path:

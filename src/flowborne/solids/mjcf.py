@@ -78,7 +78,7 @@ def bones_of(
     hulls     whether meshes with holes that are not small are replaced by their convex hulls
     """
     where = _named(source)
-    spec = _read_spec(source, where, packages)
+    spec = read_spec(source, packages)
     wrong = next(misgiven(spec), None)
     if wrong is not None:
         raise ValueError(f"{where}: {wrong}")
@@ -151,12 +151,15 @@ def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
     held[name].add_freejoint(name=name)
 
 
-def _read_spec(source: str | Path, where: str, packages: Sequence[Path]) -> mujoco.MjSpec:
-    """What MuJoCo reads of a model.
+def read_spec(source: str | Path, packages: Sequence[Path] = ()) -> mujoco.MjSpec:
+    """What MuJoCo reads of a model file (a Path) or text.
 
     MuJoCo reads over what follows the end of a model, and makes all that a model asks for. Of a
     file it gets what a run folder has.
+    packages  folders in which packages of ROS are looked for
+    raises    ValueError for a bad model
     """
+    where = _named(source)
     try:
         if isinstance(source, Path):
             files = gathered(source, packages)
