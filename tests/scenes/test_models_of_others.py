@@ -208,6 +208,14 @@ def test_held_joints_stay_by_the_actuators_of_the_model(written: Written) -> Non
     np.testing.assert_array_equal(wrist.velocity(1.0), np.zeros(3))
 
 
+def test_an_arm_on_a_fixed_body_hangs_limp(written: Written) -> None:
+    fixed = {'<freejoint_name="root"/>': "", '<key_name="bent"': '<!-- <key name="bent"'}
+    fixed |= {'0_0_.5_0_0_0"/>': '0 0 .5 0 0 0"/> -->'}
+    scene = load_scene(written(**fixed))
+    (said,) = [w for w in warnings_of(scene, build(scene).world.setup) if "nothing drives" in w]
+    assert said.startswith("[solids]: nothing drives elbow, wrist, and no stiffness holds them; ")
+
+
 def test_what_cannot_be_held_is_refused(written: Written) -> None:
     (problem,) = check_scene(written('hold = ["root"]\n'))
     assert "'root' is a free joint" in problem

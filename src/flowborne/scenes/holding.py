@@ -54,8 +54,8 @@ def driven_dofs(
 def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> list[str]:
     """Joints between bodies that nothing drives and that have no stiffness.
 
-    Joints on the world are those that a creature floats or swings on as a whole; joints within a
-    flesh, between bones that hold it, are as stiff as that.
+    Joints on the world itself are those that a creature floats or swings on as a whole; joints
+    within a flesh, between bones that hold it, are as stiff as that.
     """
     mj, moved, limp = model.mj, driven_dofs(scene, model, motions), []
     for j, name in enumerate(model.joint_names):
@@ -65,7 +65,7 @@ def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> 
         parent = int(mj.body_parentid[body])
         ends = {model.body_names[body], model.body_names[parent]}
         if (
-            model.moves[parent].any()
+            parent > 0
             and mj.jnt_stiffness[j] == 0.0
             and not moved[model.dofs_of(name)].all()
             and not any(ends <= set(flesh.bones) for flesh in scene.flesh)
