@@ -11,7 +11,6 @@ from flowborne.scenes.bodies import spec_of
 from flowborne.scenes.contact_steps import has_floors
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import listed
-from flowborne.solids.model import SolidModel
 
 REPLACED = {
     "integrator": mujoco.mjtIntegrator,
@@ -24,12 +23,12 @@ MEDIUM = ("density", "viscosity", "wind")
 """Options of MuJoCo's own medium, in whose place the fluid is."""
 
 
-def not_taken(scene: Scene, model: SolidModel) -> str | None:
+def not_taken(scene: Scene) -> str | None:
     """One sentence on what of the model file has no effect, None where all of it has."""
     if scene.model_path is None or scene.solids is None:
         return None
     spec = spec_of(scene)
-    said = [*_options(scene, spec), *_elements(scene, spec), *_densities(scene, spec, model)]
+    said = [*_options(scene, spec), *_elements(scene, spec), *_densities(scene, spec)]
     if not said:
         return None
     return f"[solids]: of {scene.model_path.name} these have no effect: {'; '.join(said)}"
@@ -75,7 +74,7 @@ def _elements(scene: Scene, spec: mujoco.MjSpec) -> Iterator[str]:
         yield f"{len(spec.sensors)} sensor{'s' * (len(spec.sensors) > 1)}"
 
 
-def _densities(scene: Scene, spec: mujoco.MjSpec, model: SolidModel) -> Iterator[str]:
+def _densities(scene: Scene, spec: mujoco.MjSpec) -> Iterator[str]:
     """Bodies whose own inertia counts, and not the densities of the scene."""
     assert scene.solids is not None
     given = scene.solids
