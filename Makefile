@@ -2,15 +2,17 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: closeness demo test browser dist docs gltf-validator imports failing exporters fuzz messages validation-page clean
+.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing exporters fuzz messages validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
 
-test: $(VENV)/installed-test
+lint: $(VENV)/installed-test
 	$(BIN)/ruff check src tests tools docs
 	$(BIN)/ruff format --check src tests tools docs
 	$(BIN)/mypy
+
+test: lint
 	$(BIN)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 browser: $(VENV)/installed-test
