@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from flowborne.io.bvh import TO_WORLD, read_bvh, write_clip
+from flowborne.quaternions import product
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.human.gait import gait_clip
@@ -351,6 +352,39 @@ def test_a_walker_who_lies_is_told_the_axis_that_makes_it_stand(write: Write) ->
     ]
     for up in ("y", "auto"):
         assert warned(path, {"clip.up": up}) == ([], [])
+
+
+def test_a_swimmer_is_told_to_lie_and_no_axis_that_would_be_refused(write: Write) -> None:
+    """A person who lies along the line from side to side, which no axis of the file makes stand."""
+    path = write(scene={"unit = 0.01\n": ""})
+    clip = read_bvh(path.with_name("walk.bvh"), 0.01)
+    over = np.array([np.cos(np.pi / 4), np.sin(np.pi / 4), 0.0, 0.0])
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = product(over, rotations[:, 0])
+    write_clip(path.with_name("walk.bvh"), replace(clip, rotations=rotations), 0.01)
+    assert check_scene(path) == []
+    warnings, notes = warned(path, {})
+    assert warnings == []
+    assert notes[1:] == [
+        "[clip]: the person of walk.bvh lies rather than stands, whichever axis is up"
+    ]
+
+
+def test_limbs_on_a_line_are_refused(write: Write) -> None:
+    path = write()
+    lines = path.with_name("walk.bvh").read_text().splitlines()
+    for n, line in enumerate(lines):
+        if line.split()[:1] == ["OFFSET"]:
+            y = line.split()[2]
+            lines[n] = f"OFFSET 0 {y} 0"
+    at = next(n for n, line in enumerate(lines) if line.startswith("Frame Time"))
+    lines[at + 1 :] = [" ".join("0" for _ in row.split()) for row in lines[at + 1 :]]
+    path.with_name("walk.bvh").write_text("\n".join(lines) + "\n")
+    (problem,) = check_scene(path)
+    assert problem == (
+        "scene stroll.toml, [clip]: its hips, shoulders and ankles lie on a line. "
+        "Correct the mapping or the file."
+    )
 
 
 @pytest.mark.parametrize("up", ["y", "z", "-y"])

@@ -50,6 +50,8 @@ def test_a_walker_is_where_its_file_has_it(name: str, tmp_path: Path) -> None:
     notes = list(notes_of(scene, model))
     assert any(f"read with unit = {capture.unit:g}" in note for note in notes)
     assert any("held: upper_neck" in note for note in notes) == bool(capture.held)
+    assert any("thorax_base turns as" in note for note in notes) == bool(capture.links)
+    assert model.body_mass.sum() == pytest.approx(73.0)
 
 
 @pytest.mark.parametrize("name", ["mixamo-freebvh.bvh", "pybvh-test3.bvh"])

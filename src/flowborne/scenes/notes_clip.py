@@ -39,6 +39,9 @@ def _read_as(scene: Scene) -> Iterator[str]:
         yield f"[clip]: {table.file} is read with {', and '.join(found)}"
     if capture.held:
         yield f"[clip]: not in {table.file}, held: {', '.join(capture.held)}"
+    links = [f"{name} turns as '{capture.mapping[name]}'" for name in sorted(capture.links)]
+    if links:
+        yield f"[clip]: {table.file} has joints between the human's: {', '.join(links)}"
     stray, bone = max(
         (capture.clip.strays.get(b, (0.0, 0))[0], b) for b in capture.mapping.values()
     )

@@ -3,10 +3,12 @@
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from flowborne import SolidModel, step
 from flowborne.bodies import human_mjcf, standard_skeleton
-from flowborne.scenes.human.skeleton import BODIES, Skeleton
+from flowborne.scenes.human.body import elbow_hinge
+from flowborne.scenes.human.skeleton import BODIES, Link, Skeleton
 from flowborne.worlds import advance, make_world
 
 MASS = 73.0
@@ -177,3 +179,64 @@ def test_it_falls_freely_as_one_and_stays_as_it_is() -> None:
         assert step(world, 0.01).outcome.name == "DONE"
     assert world.solid.v[2] == pytest.approx(-9.81 * 0.2, rel=1e-12)
     assert np.abs(np.delete(world.solid.v, 2)).max() < 1e-11
+
+
+def arm_to(skeleton, elbow, wrist):
+    """The skeleton with its left elbow and wrist so far from shoulder and elbow."""
+    joints, tips = dict(skeleton.joints), dict(skeleton.tips)
+    joints["left_elbow"] = joints["left_shoulder"] + elbow
+    joints["left_wrist"] = joints["left_elbow"] + wrist
+    tips["left_fingertip"] = joints["left_wrist"] + 0.5 * np.asarray(wrist)
+    return Skeleton(joints, tips)
+
+
+@pytest.mark.parametrize(
+    ("elbow", "wrist", "axis", "bend"),
+    [
+        ((0.0, 0.0, -0.3), (0.0, 0.0, -0.3), (0.0, -1.0, 0.0), 0.0),
+        ((0.0, 0.0, -0.3), (0.1, 0.0, -0.1), (0.0, -1.0, 0.0), 45.0),
+        ((0.0, 0.3, 0.0), (0.0, 0.1, 0.1), (1.0, 0.0, 0.0), 45.0),
+        ((0.3, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, -1.0, 0.0), 0.0),
+    ],
+)
+def test_a_hinge_bends_an_elbow_the_way_it_is_bent_at_rest(elbow, wrist, axis, bend):
+    """And a straight one forward, or up where the arm points forward."""
+    skeleton = arm_to(standard_skeleton(), elbow, wrist)
+    found, bent = elbow_hinge(skeleton, "left_elbow")
+    assert found == pytest.approx(axis)
+    assert bent == pytest.approx(bend)
+    model = model_of(skeleton, ("left_elbow",))
+    joint = model.joint("left_elbow")
+    assert np.degrees(model.mj.jnt_range[joint]) == pytest.approx([-bend, 150.0 - bend])
+
+
+def test_links_and_held_joints_change_neither_mass_nor_inertia():
+    """A link at half the thorax's height, and a neck without its upper joint."""
+    skeleton = standard_skeleton()
+    place = 0.5 * (skeleton["upper_back"] + skeleton["thorax"])
+    links = {"thorax": (Link("thorax_base", "Spine2", place),)}
+    linked = Skeleton(skeleton.joints, skeleton.tips, links)
+    model = SolidModel.from_string(human_mjcf(linked, MASS, "male", held=("upper_neck",)))
+    plain = model_of()
+    assert "upper_neck" not in model.joint_names
+    assert model.body_names[model.mj.body_parentid[model.body_names.index("thorax")]] == (
+        "thorax_base"
+    )
+    sums = []
+    for one in (model, plain):
+        data = posed(one)
+        sums.append([data.subtree_com[0], one.mj.body_subtreemass[0]])
+        momentum = np.zeros((3, 3))
+        for axis in range(3):
+            data.qvel[:] = 0.0
+            data.qvel[3 + axis] = 1.0
+            mujoco.mj_forward(one.mj, data)
+            mujoco.mj_subtreeVel(one.mj, data)
+            momentum[axis] = data.subtree_angmom[0]
+        sums[-1].append(momentum)
+    for ours, theirs in zip(*sums, strict=True):
+        assert ours == pytest.approx(theirs, abs=1e-9)
+    data = posed(model, thorax_base=(0.0, 20.0, 0.0))
+    assert data.body("thorax").xpos == pytest.approx(
+        place + Rotation.from_rotvec([0.0, np.radians(20.0), 0.0]).apply(skeleton["thorax"] - place)
+    )

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from flowborne.errors import SceneError
 from flowborne.io.clip import Clip
 from flowborne.quaternions import angle, inverse, product, turned
 from flowborne.scenes.human.skeleton import SIDES, Array
@@ -64,16 +65,23 @@ def posture_of(clip: Clip, mapping: Mapping[str, str]) -> Posture:
     zeros that hold it out are none.
 
     mapping  joint of the human -> joint of the clip; hips, knees, ankles and shoulders among them
+    raises   SceneError when hips, shoulders and ankles lie on a line
     """
     frames = np.unique(np.linspace(0, clip.frames - 1, POSES).astype(np.int64))
     number = {joint: clip.names.index(bone) for joint, bone in mapping.items()}
     places, rotations = clip.places(frames)
-    up = axes_of_bodies(places, number)[:, :, 2].mean(axis=0)
+    own = axes_of_bodies(places, number)
+    if not np.allclose(np.linalg.det(own), 1.0):
+        raise SceneError(
+            "its hips, shoulders and ankles lie on a line. Correct the mapping or the file."
+        )
+    up = own[:, :, 2].mean(axis=0)
     axes, cost = _judged(places, number, BODY, SIDES)
     best = int(cost.argmin())
     unturned = np.tile([1.0, 0.0, 0.0, 0.0], (1, len(clip.names), 1))
     zero = replace(clip, rotations=unturned, translation=np.zeros((1, 3)))
     zero_axes, zero_cost = _judged(zero.places()[0], number, BODY, SIDES)
+    zero_cost[~np.isclose(np.linalg.det(zero_axes), 1.0)] = np.inf  # zeros on a line
     body = [n for joint, n in number.items() if joint != "root" and not _of_an_arm(joint)]
     if zero_cost[0] < PERSON and angle(clip.rotations[frames[best], body]).max() < FAR:
         rest = product(_back(zero_axes[0]), unturned[0])
