@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.io.bvh import TO_WORLD, read_bvh, write_clip
@@ -21,6 +22,7 @@ from flowborne.scenes.load import load_scene
 from flowborne.scenes.motion_out import export_bvh
 
 from .plain_bvh import plain
+from .rigs import Way, rig
 
 CLIPS = Path(__file__).parent / "clips"
 
@@ -160,3 +162,32 @@ def test_a_joint_that_the_file_lacks_turns_what_hangs_on_it(tmp_path: Path) -> N
         assert since[0] == pytest.approx(since[1], abs=2e-3), joint
     away = source.rotations["Head"][0].T @ out.rotations["Head"][0]
     assert np.degrees(np.arccos((np.trace(away) - 1.0) / 2.0)) > 20.0
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_a_root_that_floats_is_written_where_it_went(tmp_path: Path, reference: bool) -> None:
+    """Of a person who falls, in a file with z up whose hips move in a root of their own or do not;
+    heading and offset of the scene are not in the file."""
+    way = Way(up="z", unit=0.01, turned=True, whole=False, reference=reference, seed=3)
+    arm = "*Shoulder *Arm *ForeArm *Hand"
+    text = rig("Hips Spine", "Neck Head", "*UpLeg *Leg *Foot", arm, ("Left", "Right"), way)
+    (tmp_path / "walk.bvh").write_text(text)
+    clip = 'file = "walk.bvh"\nfree = ["root"]\nheading = 30.0\noffset = [1.0, 2.0, 0.5]\n'
+    scene = SCENE.replace("frames = 12", "frames = 3").replace("30.0", "40.0")
+    (tmp_path / "scene.toml").write_text(scene + clip + 'floor = "file"\n')
+    run(load_scene(tmp_path / "scene.toml"), out=tmp_path / "run", film=False)
+    export_bvh(tmp_path / "run", tmp_path / "out.bvh")
+    source, out = (plain((tmp_path / f).read_text()) for f in ("walk.bvh", "out.bvh"))
+    assert out.places["Hips"][0] == pytest.approx(source.places["Hips"][0], abs=1e-3)
+    world, back = TO_WORLD["z"], Rotation.from_euler("z", -30.0, degrees=True).as_matrix()
+    moved, turned = [], []
+    for frame in range(4):
+        with np.load(tmp_path / "run" / "states" / f"{frame:06d}.npz") as state:
+            moved.append(back @ state["q"][:3])
+            turned.append(back @ state["body_rotation"][1])
+        theirs = world @ (out.places["Hips"][frame] - out.places["Hips"][0])
+        assert 0.01 * theirs == pytest.approx(moved[-1] - moved[0], abs=1e-6)
+        own = world @ out.rotations["Hips"][frame] @ world.T
+        first = world @ out.rotations["Hips"][0] @ world.T
+        assert own @ first.T == pytest.approx(turned[-1] @ turned[0].T, abs=1e-6)
+    assert moved[-1][2] - moved[0][2] < -0.01, "it falls"

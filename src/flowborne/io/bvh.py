@@ -134,6 +134,8 @@ def write_bvh(
     source: str | Path,
     rotations: Mapping[str, Array],
     *,
+    root: tuple[str, Array, Array] | None = None,
+    unit: float = 1.0,
     up: str = "y",
     first: int = 0,
     last: int | None = None,
@@ -144,7 +146,9 @@ def write_bvh(
     rotations  joint -> (frames, 4) unit quaternions relative to its parent in the file, in the
                world's axes. Their angles go on from frame to frame without a turn of 360 degrees;
                those of a rotation that is the file's own stay the file's
-    up         as in `read_bvh`
+    root       a joint with channels of position, and its (frames, 3) places, m, and (frames, 4)
+               rotations in the world
+    unit, up   as in `read_bvh`
     first      frame of the file with which the new one begins, skipped ones counted
     last       frame after the last one; the file's end by default
     raises     SceneError when the file is bad, lacks a joint or a channel, or has no frame in the
@@ -159,7 +163,14 @@ def write_bvh(
             "Give a range that has frames."
         )
     joints = {joint.name: joint for joint in bvh.joints}
-    words = [row.split() for row in rows] if rotations else []
+    words = [row.split() for row in rows] if rotations or root is not None else []
+    if root is not None:
+        name, places, turns = root
+        columns, numbers, turns = _within(bvh, name, places / unit, turns, values, TO_WORLD[up])
+        rotations = {name: turns, **rotations}
+        for row, new in zip(words, numbers, strict=True):
+            for column, number in zip(columns, new, strict=True):
+                row[column] = f"{number:.6f}"
     for name, wanted in rotations.items():
         if name not in joints:
             raise SceneError(f"{bvh.name} has no joint '{name}'. It has: {', '.join(joints)}.")
@@ -235,6 +246,24 @@ def _folded(bvh: BvhFile, joint: int, values: Array, world: Array) -> tuple[Arra
         return place, rotation
     start, above = _folded(bvh, own.parent, values, world)
     return start + turned(above, place), product(above, rotation)
+
+
+def _within(
+    bvh: BvhFile, name: str, places: Array, rotations: Array, values: Array, world: Array
+) -> tuple[list[int], Array, Array]:
+    """Columns of a joint's position channels, (frames, k) numbers for them, and (frames, 4) the
+    joint's rotations in its parent, of places in the file's unit and rotations in the world."""
+    joint = next(joint for joint in bvh.joints if joint.name == name)
+    if joint.parent >= 0:
+        start, above = _folded(bvh, joint.parent, values, world)
+        places = turned(inverse(above), places - start)
+        rotations = product(inverse(above), rotations)
+    numbered = [
+        (joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if not turns
+    ]
+    columns, axes = [column for column, _ in numbered], [axis for _, axis in numbered]
+    added = _places(joint, values)[0][:, axes] - values[:, columns]  # OFFSET, where that is added
+    return columns, (places @ world)[:, axes] - added, rotations
 
 
 def _first_at_rest(bvh: BvhFile, values: Array) -> int:

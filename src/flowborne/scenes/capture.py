@@ -50,6 +50,7 @@ class Capture:
     rest      (n, 4) what the clip's joints are counted from, as counted by the file; None where it
               is the file's own zeros
     posture   the person's mean direction from ankles to shoulders, z up; None without [human]
+    lift      (frames,) m by which the root is raised above where the file has it, or None
     held      joints of the human that the clip's file does not have
     note      what is wrong with the file's number of frames; may be empty
     """
@@ -61,6 +62,7 @@ class Capture:
     up: str = "y"
     rest: Array | None = None
     posture: Array | None = None
+    lift: Array | None = None
     held: tuple[str, ...] = ()
     note: str = ""
 
@@ -126,7 +128,14 @@ def _creature(path: Path, stamp: tuple[int, int], how: _Reading) -> Capture:
     unit, up = 1.0 if how.unit is None else how.unit, how.up or "y"
     clip = clip_of(bvh, unit, up, how.skip)
     check_rigid(bvh, clip, clip.names)
-    return Capture(clip, _named(clip, dict(how.mapping)), None, unit, up, note=bvh.note)
+    return Capture(
+        clip,
+        _named(clip, dict(how.mapping)),
+        None,
+        unit,
+        up,
+        note=bvh.note,
+    )
 
 
 @lru_cache(maxsize=8)
@@ -147,6 +156,7 @@ def _person(path: Path, stamp: tuple[int, int], how: _Reading) -> Capture:
     clip = counted_from(clip, posture.rest)
     skeleton = skeleton_of(clip, mapping, between(clip, mapping))
     links = {link.name: link.bone for links in skeleton.links.values() for link in links}
+    height = clip.translation[:, 2]
     if how.floor == "soles":
         clip = on_the_floor(clip, mapping, skeleton, how.mass, how.sex)
     return Capture(
@@ -155,10 +165,11 @@ def _person(path: Path, stamp: tuple[int, int], how: _Reading) -> Capture:
         skeleton,
         unit,
         up,
-        posture.rest,
-        posture.up,
-        tuple(joint for joint in JOINTS if joint not in mapping),
-        bvh.note,
+        rest=posture.rest,
+        posture=posture.up,
+        lift=clip.translation[:, 2] - height,
+        held=tuple(joint for joint in JOINTS if joint not in mapping),
+        note=bvh.note,
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from flowborne.errors import SceneError
@@ -15,9 +16,10 @@ from flowborne.io.arrays_file import read_state
 from flowborne.io.bvh import write_bvh, write_clip
 from flowborne.io.clip import Clip
 from flowborne.io.run_folder import STATE_NAME, RunFolder
-from flowborne.quaternions import inverse, product
-from flowborne.scenes.bodies import load_model
+from flowborne.quaternions import inverse, product, turned
+from flowborne.scenes.bodies import FREE, joint_kind, load_model
 from flowborne.scenes.capture import Capture, capture_of, followers
+from flowborne.scenes.clip_curves import UP
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
@@ -66,12 +68,20 @@ def export_bvh(run: Path, path: Path) -> str:
     for joint in sorted(free & set(model.joint_names)):
         turning = RotationSpline(times, relative[joint])(at)
         between = _between(capture, model, joint, frames)
-        turned = (between.inv() * turning).as_quat(scalar_first=True)
-        replaced[own[joint]] = _in_file(capture, own[joint], turned)
+        local = (between.inv() * turning).as_quat(scalar_first=True)
+        replaced[own[joint]] = _in_file(capture, own[joint], local)
+    root = None
+    bone = capture.clip.names[0]
+    joint = next((joint for joint in free if own[joint] == bone), "")
+    if joint in model.joint_names and joint_kind(model, joint) == FREE:
+        places = CubicSpline(times, q[:, model.positions_of(joint)[:3]])(at)
+        root = (bone, *_unplaced(scene, capture, frames, places, replaced.pop(bone)))
     write_bvh(
         path,
         scene.folder / scene.clip.file,
         replaced,
+        root=root,
+        unit=capture.unit,
         up=capture.up,
         first=first,
         last=first + len(frames),
@@ -87,6 +97,21 @@ def _in_file(capture: Capture, bone: str, rotations: Array) -> Array:
     result = product(rotations, capture.rest[number])
     parent = int(capture.clip.parents[number])
     return result if parent < 0 else product(inverse(capture.rest[parent]), result)
+
+
+def _unplaced(
+    scene: Scene, capture: Capture, frames: NDArray[np.int64], places: Array, rotations: Array
+) -> tuple[Array, Array]:
+    """(frames, 3) and (frames, 4) a root's places, m, and rotations where the clip's file has it,
+    before heading, offset and floor."""
+    assert scene.clip is not None
+    offset, start = np.array(scene.clip.offset), capture.clip.translation[0]
+    half = 0.5 * np.radians(scene.clip.heading)
+    back = np.array([np.cos(half), 0.0, 0.0, -np.sin(half)])
+    places = start - offset + turned(back, places - start)
+    if capture.lift is not None:
+        places = places - capture.lift[frames, None] * UP
+    return places, product(back, rotations)
 
 
 def _carried(model: SolidModel, capture: Capture, joint: str) -> list[str]:
