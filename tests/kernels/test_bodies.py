@@ -6,13 +6,20 @@ import numpy as np
 import pytest
 import trimesh
 
+from flowborne.kernels.crossings import crossings, crossings_reference
 from flowborne.kernels.momentum import (
     about_origin,
     about_origin_reference,
     momentum_impulse,
     momentum_impulse_reference,
 )
-from flowborne.kernels.thickness import way_inward, way_inward_reference
+from flowborne.kernels.thickness import (
+    any_within,
+    any_within_reference,
+    by_cells,
+    way_inward,
+    way_inward_reference,
+)
 from flowborne.kernels.wind import places, pushed, pushed_reference
 
 
@@ -60,6 +67,21 @@ def test_way_inward() -> None:
     assert np.isinf(expected).any()
     assert np.isfinite(expected).sum() > 20
     np.testing.assert_allclose(way_inward(vertices, triangles), expected, rtol=1e-9)
+
+
+def test_triangles_within_a_radius_and_lines_through_them() -> None:
+    mesh = trimesh.creation.torus(0.5, 0.2, major_sections=12, minor_sections=8)
+    vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    places = np.random.default_rng(0).uniform(-0.9, 0.9, (60, 3))
+    found = any_within(places, 0.1, vertices, triangles, by_cells(vertices, triangles))
+    np.testing.assert_array_equal(found, any_within_reference(places, 0.1, vertices, triangles))
+    assert 0 < found.sum() < 60
+    direction = np.array([0.3, -0.4, 0.8])
+    ours = crossings(vertices, triangles, places, direction)
+    theirs = crossings_reference(vertices, triangles, places, direction)
+    order, expected = np.lexsort(ours[1::-1]), np.lexsort(theirs[1::-1])
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(one[order], other[expected], rtol=1e-9)
 
 
 def test_way_inward_on_edges_of_the_cells() -> None:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Point
 from flowborne.kernels.skin import ON_SKIN
+from flowborne.kernels.triangles import (
+    closest_on_triangle,
+    closest_on_triangle_reference,
+    squared_distance,
+)
 
 MOST_CELLS = 128.0
 """Cells along the longest side of a body in which its triangles are looked up, at most."""
@@ -34,13 +42,38 @@ def apart(vertices: Array, a: int, b: int) -> Point:
     return q[0] - p[0], q[1] - p[1], q[2] - p[2]
 
 
+class Cells(NamedTuple):
+    """Triangles listed by the cells of a lattice that they reach.
+
+    low     (3,) corner of the lattice, m
+    edge    of a cell, m
+    counts  (3,) cells along each axis
+    start   (cells + 1,) where a cell's triangles begin in the list
+    listed  numbers of triangles
+    """
+
+    low: Array
+    edge: float
+    counts: Integers
+    start: Integers
+    listed: Integers
+
+
 def way_inward(vertices: Array, triangles: Integers) -> Array:
     """(k,) distance from the middle of each triangle straight inward to another one, m.
 
-    Infinite where there is no other side. The triangles are looked up in cells, about as many
-    along the longest side as a sphere of so many triangles has of them.
+    Infinite where there is no other side.
 
     vertices, triangles  (n, 3) m; (k, 3) outward
+    """
+    return _way_inward(vertices, triangles, *by_cells(vertices, triangles))
+
+
+def by_cells(vertices: Array, triangles: Integers) -> Cells:
+    """Triangles in cells, about as many along the longest side as a sphere of so many triangles has
+    of them.
+
+    vertices, triangles  (n, 3) m; (k, 3)
     """
     low, extent = vertices.min(axis=0), np.ptp(vertices, axis=0)
     cells = min(MOST_CELLS, np.sqrt(len(triangles)))
@@ -61,7 +94,74 @@ def way_inward(vertices: Array, triangles: Integers) -> Array:
     cell = np.ravel_multi_index(tuple((first[triangle] + across).T), tuple(counts))
     order = np.argsort(cell, kind="stable")
     start = np.searchsorted(cell[order], np.arange(counts.prod() + 1))
-    return _way_inward(vertices, triangles, low, edge, counts, start, triangle[order])
+    return Cells(low, edge, counts, start, triangle[order])
+
+
+def any_within(
+    places: Array, radius: float, vertices: Array, triangles: Integers, cells: Cells
+) -> NDArray[np.bool_]:
+    """(m,) whether a triangle is within `radius` m of each of places (m, 3).
+
+    The nearest cells first: where there is one, most of the others are not looked into.
+    """
+    found = np.zeros(len(places), np.bool_)
+    for part in (0.25, 0.5, 1.0):
+        left = ~found
+        found[left] = _any_within(places[left], part * radius, vertices, triangles, *cells)
+    return found
+
+
+@njit(nogil=True, cache=True)
+def _any_within(
+    places: Array,
+    radius: float,
+    vertices: Array,
+    triangles: Integers,
+    low: Array,
+    edge: float,
+    counts: Integers,
+    start: Integers,
+    listed: Integers,
+) -> NDArray[np.bool_]:
+    found = np.zeros(len(places), np.bool_)
+    first, last = np.empty(3, np.int64), np.empty(3, np.int64)
+    looked_at = np.full(len(triangles), -1)
+    for n in range(len(places)):
+        p = (places[n, 0], places[n, 1], places[n, 2])
+        for d in range(3):
+            first[d] = max(int(np.floor((p[d] - radius - low[d]) / edge)), 0)
+            last[d] = min(int(np.floor((p[d] + radius - low[d]) / edge)), counts[d] - 1)
+        for row in range(max(last[0] - first[0] + 1, 0) * max(last[1] - first[1] + 1, 0)):
+            i = first[0] + row // (last[1] - first[1] + 1)
+            j = first[1] + row % (last[1] - first[1] + 1)
+            if found[n] or last[2] < first[2]:
+                break
+            along_z = (i * counts[1] + j) * counts[2]
+            for at in range(start[along_z + first[2]], start[along_z + last[2] + 1]):
+                t = listed[at]
+                if looked_at[t] == n:
+                    continue
+                looked_at[t] = n
+                u, v, w = triangles[t]
+                a = (vertices[u, 0], vertices[u, 1], vertices[u, 2])
+                b = (vertices[v, 0], vertices[v, 1], vertices[v, 2])
+                c = (vertices[w, 0], vertices[w, 1], vertices[w, 2])
+                closest = closest_on_triangle(p, a, b, c)
+                if squared_distance(p, a, b, c, closest) <= radius * radius:
+                    found[n] = True
+                    break
+    return found
+
+
+def any_within_reference(
+    places: Array, radius: float, vertices: Array, triangles: Integers
+) -> NDArray[np.bool_]:
+    """`any_within` in NumPy, every place with every triangle."""
+    corners, found = vertices[triangles], np.zeros(len(places), np.bool_)
+    for n, p in enumerate(places):
+        closest = [closest_on_triangle_reference(p, one) @ one for one in corners]
+        found[n] = np.linalg.norm(np.array(closest) - p, axis=1).min() <= radius
+    return found
 
 
 @njit(nogil=True, cache=True)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
+from flowborne.kernels.crossings import crossings
 from flowborne.kernels.distance import MESH
 from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.kernels.node_distance import BAND
@@ -39,6 +42,8 @@ class ShapeMesh(Shape):
     def __init__(self, vertices: Array, faces: Integers) -> None:
         self.vertices, self.faces = welded(vertices, faces)
         self.size = 0.5 * np.ptp(vertices, axis=0)
+        self._thickened: dict[float, Shape] = {}
+        self._tips: dict[float, float] = {}
 
     @property
     def volume(self) -> float:
@@ -65,7 +70,12 @@ class ShapeMesh(Shape):
 
     @property
     def thickness(self) -> float:
-        return thinnest(self.vertices, self.faces, False)
+        return thinnest(self.vertices, self.faces, False, self._way)
+
+    @cached_property
+    def _way(self) -> Array:
+        """(m,) distance from the middle of each triangle straight inward to another one, m."""
+        return way_inward(self.vertices, self.faces)
 
     def distance(self, points: Array) -> Array:
         return distances_to_mesh(points, self.vertices, self.faces)
@@ -106,23 +116,7 @@ class ShapeMesh(Shape):
         return Section("segments", (0.0, 0.0), foot, axes, np.ascontiguousarray(segments))
 
     def crossings(self, origins: Array, direction: Array) -> tuple[Integers, Array, Array]:
-        """Triangle by triangle (Möller and Trumbore 1997)."""
-        lines, places, signs = [], [], []
-        for first, second, third in self.vertices[self.faces]:
-            e1, e2 = second - first, third - first
-            p = np.cross(direction, e2)
-            determinant = float(e1 @ p)
-            if abs(determinant) < 1e-300:
-                continue
-            s = origins - first
-            u = s @ p / determinant
-            q = np.cross(s, e1)
-            v = q @ direction / determinant
-            hit = np.flatnonzero((u >= 0.0) & (v >= 0.0) & (u + v < 1.0))
-            lines.append(hit)
-            places.append(q[hit] @ e2 / determinant)
-            signs.append(np.full(hit.size, np.sign(determinant)))
-        return np.concatenate(lines), np.concatenate(places), np.concatenate(signs)
+        return crossings(self.vertices, self.faces, origins, direction)
 
     def patches(self) -> tuple[Array, Array]:
         import trimesh  # a tenth of a second that only meshes need
@@ -147,10 +141,17 @@ class ShapeMesh(Shape):
 
     def thickened(self, half: float) -> Shape:
         """Each thin side moves outward, by moving its corners along the normals of thin sides."""
-        offset = np.maximum(half - 0.5 * way_inward(self.vertices, self.faces), 0.0)
-        if not offset.any():
-            return self
-        return ShapeMesh(self.vertices + offsets(self.vertices, self.faces, offset), self.faces)
+        if half not in self._thickened:
+            offset = np.maximum(half - 0.5 * self._way, 0.0)
+            moved = offsets(self.vertices, self.faces, offset)
+            grown = ShapeMesh(self.vertices + moved, self.faces) if offset.any() else self
+            self._thickened[half] = grown
+        return self._thickened[half]
+
+    def tips(self, width: float) -> float:
+        if width not in self._tips:
+            self._tips[width] = super().tips(width)
+        return self._tips[width]
 
     def endless(self, rotation: Array, height: float) -> Shape:
         """The sides of a prism, whose ends are missing."""

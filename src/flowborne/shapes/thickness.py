@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from flowborne.kernels.skin import skin_weights
-from flowborne.kernels.thickness import MOST_CELLS, way_inward
+from flowborne.kernels.thickness import Cells, any_within, by_cells, way_inward
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -25,17 +24,18 @@ MOST_FACETS = 1e5
 """Pieces that a skin is cut into to look for its tips, about."""
 
 
-def thinnest(vertices: Array, triangles: Indices, slab: bool) -> float:
+def thinnest(vertices: Array, triangles: Indices, slab: bool, way: Array | None = None) -> float:
     """Thickness in m that all of a closed skin has but for its `RIMS`.
 
     vertices, triangles  (n, 3) m; (k, 3) outward
     slab                 whether its faces across z are cuts, not skin
+    way                  what `way_inward` gives of it, where that is known
     """
     normal = outward(vertices[triangles])
     area = np.linalg.norm(normal, axis=1)
     if slab:
         area[across(normal)] = 0.0
-    way = way_inward(vertices, triangles)
+    way = way_inward(vertices, triangles) if way is None else way
     order = np.argsort(way)
     part = np.cumsum(area[order]) / area.sum()
     return float(way[order][np.searchsorted(part, RIMS)])
@@ -57,7 +57,10 @@ def thin_parts(vertices: Array, triangles: Indices, width: float) -> float:
     edge = max(0.5 * width, 2.0 * np.sqrt(area / MOST_FACETS))
     facets = divided(corners, edge)
     edge = max(edge, float(side_lengths(facets).max()))
-    fits = np.all([ball_fits(facets, vertices, triangles, part * width) for part in BALLS], axis=0)
+    cells = by_cells(vertices, triangles)
+    fits = np.ones(len(facets), bool)
+    for part in BALLS:
+        fits[fits] = ball_fits(facets[fits], vertices, triangles, cells, part * width)
     if not fits.any():
         return 0.0
     touched = cKDTree(facets[fits].mean(axis=1))
@@ -66,20 +69,18 @@ def thin_parts(vertices: Array, triangles: Indices, width: float) -> float:
 
 
 def ball_fits(
-    facets: Array, vertices: Array, triangles: Indices, width: float
+    facets: Array, vertices: Array, triangles: Indices, cells: Cells, width: float
 ) -> NDArray[np.bool_]:
     """(k,) whether a ball `width` m across that lies beneath the middle of a facet is off the skin.
 
     facets               (k, 3, 3) corners of pieces of its triangles, m
     vertices, triangles  (n, 3) m; (k, 3) outward
+    cells                of these triangles
     """
     normal = outward(facets)
     length = np.linalg.norm(normal, axis=1)[:, None]
     centre = facets.mean(axis=1) - 0.5 * width * normal / np.maximum(length, np.finfo(float).tiny)
-    cell = max(0.5 * width, np.ptp(vertices, axis=0).max() / MOST_CELLS)
-    corner, weight = skin_weights(centre, vertices, triangles, cell)
-    nearest = np.einsum("kc,kcd->kd", weight, vertices[corner])
-    return np.asarray(np.linalg.norm(centre - nearest, axis=1) > 0.5 * width * FITTING)
+    return ~any_within(centre, 0.5 * width * FITTING, vertices, triangles, cells)
 
 
 def divided(facets: Array, longest: float) -> Array:
