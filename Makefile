@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing exporters fuzz messages validation-page clean
+.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing exporters fuzz messages strangers validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -45,6 +45,9 @@ exporters: $(VENV)/installed-test
 
 fuzz: $(VENV)/installed-test
 	$(BIN)/python tools/fuzz.py --seed "$(SEED)"
+
+strangers: $(VENV)/installed-test
+	$(BIN)/python tools/strangers.py
 
 messages: $(VENV)/installed-test
 	$(BIN)/python tools/messages.py
