@@ -18,8 +18,9 @@ from flowborne.io.clip import Clip
 from flowborne.io.run_folder import STATE_NAME, RunFolder
 from flowborne.quaternions import inverse, product, turned
 from flowborne.scenes.bodies import FREE, joint_kind, load_model
-from flowborne.scenes.capture import Capture, capture_of, followers
+from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.clip_curves import UP
+from flowborne.scenes.clip_reading import Capture
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
