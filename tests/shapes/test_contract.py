@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.shapes.kinds import PRIMITIVES, shape_of
 from flowborne.shapes.mesh import ShapeMesh
-from flowborne.shapes.shape import ENDLESS, Shape
+from flowborne.shapes.shape import ENDLESS, Shape, lattice_points
 
 SIZE = np.array([0.3, 0.5, 0.2])
 TORUS = trimesh.creation.torus(0.5, 0.2, major_sections=24, minor_sections=12)
@@ -88,3 +88,21 @@ def test_endless_it_has_its_section_at_any_height(shape: Shape) -> None:
         flat = points * [1.0, 1.0, 0.0]
         np.testing.assert_array_equal(inside, shape.distance(flat) < 0.0)
         assert prism.reach.max() < ENDLESS
+
+
+def test_thin_parts_of_a_mesh_become_sheets_no_longer_than_it() -> None:
+    """A tube with walls of 0.02 m, thickened to 0.2 m: where its corners are moved along normals
+    its inner side folds."""
+    tube = trimesh.creation.annulus(0.12, 0.14, 0.4, sections=64)
+    shape = ShapeMesh(np.asarray(tube.vertices), np.asarray(tube.faces))
+    thick = shape.thickened(0.1)
+    assert thick.thickness == pytest.approx(0.2)
+    assert thick.tips(0.15) == 0.0
+    found = thick.samples(0.1)
+    assert found is not None
+    places = lattice_points(found.corner, found.pitch, np.array(found.values.shape))
+    inside = found.values.ravel() < 0.0
+    radius, height = np.hypot(places[:, 0], places[:, 1]), np.abs(places[:, 2])
+    off = np.maximum(np.abs(radius - 0.13) - 0.1, height - 0.2)
+    np.testing.assert_array_equal(inside[off < -0.003], True)
+    np.testing.assert_array_equal(inside[off > 0.003], False)

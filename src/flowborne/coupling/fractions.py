@@ -152,7 +152,7 @@ def skin_distance(
     """(box shape) distance to a geometry with a skin at the nodes of a box, m.
 
     In a slab that to the triangles themselves; in a room the same within NEAR cells, and farther
-    away what its table has.
+    away what its table has; the smaller of both where that is of sheets.
     """
     vertices, faces = shapes.skins[geom]
     placed = position[geom] + vertices @ rotation[geom].T
@@ -160,9 +160,10 @@ def skin_distance(
     near = sample_skin(placed, faces, box, np.array(grid.origin), h, grid.is_slab, band)
     if grid.is_slab:
         return near
-    far = np.abs(sampled(shapes, np.array([geom]), box, position, rotation, grid))
-    beyond = np.copysign(np.maximum(far, NEAR * h), near)
-    return np.where(np.abs(near) < NEAR * h, near, beyond)
+    far = sampled(shapes, np.array([geom]), box, position, rotation, grid)
+    beyond = np.copysign(np.maximum(np.abs(far), NEAR * h), near)
+    found = np.where(np.abs(near) < NEAR * h, near, beyond)
+    return np.minimum(found, far) if shapes.sheets[geom] else found
 
 
 def geometry(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
+from flowborne.shapes.mesh import ShapeThickened
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.model import SolidModel
 
@@ -34,6 +35,7 @@ class Shapes:
     corner  (ng, 3) first sample's place in the geometry's frame, m
     pitch   (ng,) distance between samples, m
     skins   geometry -> vertices and faces to which distances near by are exact
+    sheets  (ng,) whether the samples are of sheets within a skin
     """
 
     kind: NDArray[np.int64]
@@ -46,6 +48,7 @@ class Shapes:
     corner: Array
     pitch: Array
     skins: dict[int, Mesh]
+    sheets: NDArray[np.bool_]
 
 
 def shapes(model: SolidModel, grid: Grid) -> Shapes:
@@ -76,6 +79,7 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
         corner,
         pitch,
         {n: skin for n, skin in skins.items() if skin is not None},
+        np.array([isinstance(shape, ShapeThickened) for shape in seen], bool),
     )
 
 

@@ -10,6 +10,7 @@ from flowborne.kernels.crossings import crossings
 from flowborne.kernels.distance import MESH
 from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.kernels.node_distance import BAND
+from flowborne.kernels.sheets import lower_to_sheets
 from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.thickness import way_inward
 from flowborne.shapes.section import Section, cross
@@ -23,11 +24,20 @@ from flowborne.shapes.shape import (
     Shape,
     lattice,
 )
-from flowborne.shapes.thickness import thinnest
+from flowborne.shapes.thickness import thin_parts, thinnest
 
 UNDETERMINED = 0.02
 """Mean square of the normals' part along a direction up to which they do not determine a vertex's
 motion along it: all of them are within some 8 degrees of a plane across."""
+
+SMOOTH = np.cos(np.pi / 4.0)
+"""Cosine of the angle between triangles up to which a sheet goes on from one to the other."""
+
+SHEET_FINENESS = 2.0
+"""Samples of the distance to sheets for each cell of the grid along an axis."""
+
+SHEET_BAND = 2.5
+"""Cells up to which these are known."""
 
 
 class ShapeMesh(Shape):
@@ -140,12 +150,10 @@ class ShapeMesh(Shape):
         return np.asarray(self.vertices[farthest])
 
     def thickened(self, half: float) -> Shape:
-        """Each thin side moves outward, by moving its corners along the normals of thin sides."""
+        """With sheets in its thin parts."""
         if half not in self._thickened:
-            offset = np.maximum(half - 0.5 * self._way, 0.0)
-            moved = offsets(self.vertices, self.faces, offset)
-            grown = ShapeMesh(self.vertices + moved, self.faces) if offset.any() else self
-            self._thickened[half] = grown
+            thin = self._way < 2.0 * half
+            self._thickened[half] = ShapeThickened(self, half) if thin.any() else self
         return self._thickened[half]
 
     def tips(self, width: float) -> float:
@@ -167,7 +175,93 @@ class ShapeMesh(Shape):
             np.stack([start, end, end + above], axis=1),
             np.stack([start, end + above, start + above], axis=1),
         ]
-        return ShapeMesh(np.concatenate([ring - rise, ring + rise]), np.concatenate(sides))
+        return ShapePrism(np.concatenate([ring - rise, ring + rise]), np.concatenate(sides))
+
+
+class ShapePrism(ShapeMesh):
+    """The sides of a prism."""
+
+    def thickened(self, half: float) -> Shape:
+        """Each thin side moves outward, by moving its corners along the normals of thin sides."""
+        offset = np.maximum(half - 0.5 * self._way, 0.0)
+        if not offset.any():
+            return self
+        return ShapePrism(self.vertices + offsets(self.vertices, self.faces, offset), self.faces)
+
+
+class ShapeThickened(ShapeMesh):
+    """A mesh with sheets 2 `half` m thick along the middle of its thin parts.
+
+    The fluid takes the distance to both; all else is the mesh's. A sheet ends at a rim where its
+    part does; there it is as long and wide as the mesh.
+
+    mesh  as it is given
+    half  m
+    """
+
+    def __init__(self, mesh: ShapeMesh, half: float) -> None:
+        super().__init__(mesh.vertices, mesh.faces)
+        self.half, self._way = half, mesh._way
+        self._thin = self._way < 2.0 * half
+
+    @property
+    def reach(self) -> Array:
+        return super().reach + self.half
+
+    @property
+    def thickness(self) -> float:
+        way = np.maximum(self._way, 2.0 * self.half)
+        return thinnest(self.vertices, self.faces, False, way)
+
+    def samples(self, spacing: float) -> Samples:
+        """Distances to the sheets alone."""
+        pitch = spacing / SHEET_FINENESS
+        corner, counts = lattice(self.reach, pitch, BAND * spacing)
+        values = np.full(counts, BAND * spacing)
+        lower_to_sheets(values, corner, pitch, *self._sheets(), self.half, SHEET_BAND * spacing)
+        return Samples(corner, pitch, values)
+
+    def tips(self, width: float) -> float:
+        """A ball fits into the sheets."""
+        return thin_parts(self.vertices, self.faces, width, self._thin)
+
+    def _sheets(self) -> tuple[Array, Array, Array, Array, Integers, Integers, Integers]:
+        """The triangles in the middle of thin parts, as `lower_to_sheets` takes them."""
+        corners = self.vertices[self.faces[self._thin]]
+        first, second, third = np.moveaxis(self.vertices[self.faces], 1, 0)
+        normals = unit(np.cross(second - first, third - first))
+        normal = normals[self._thin]
+        middle = corners - 0.5 * self._way[self._thin, None, None] * normal[:, None]
+        edge = np.roll(corners, -1, axis=1) - corners
+        across = unit(np.cross(edge, normal[:, None]))
+        beside = neighbours(self.faces)[self._thin]
+        smooth = np.einsum("ted,td->te", normals[beside], normal) > SMOOTH
+        ends = np.maximum(self.half - 0.5 * self._way[beside], 0.0)
+        limit = np.where(smooth & self._thin[beside], np.inf, ends)
+        number = self.faces[self._thin]
+        limited = np.flatnonzero(np.isfinite(limit))
+        ends_at = np.concatenate([number.ravel(), np.roll(number, -1, axis=1).ravel()])
+        ends_at = ends_at.reshape(2, -1)[:, limited].ravel()
+        order = np.argsort(ends_at, kind="stable")
+        start = np.searchsorted(ends_at[order], np.arange(len(self.vertices) + 1))
+        return middle, normal, across, limit, number, start, np.tile(limited, 2)[order]
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors (..., 3) of length 1; 0 of those without one."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.maximum(length, np.finfo(float).tiny)
+
+
+def neighbours(faces: Integers) -> Integers:
+    """(m, 3) triangle on the other side of each edge of triangles (m, 3); itself where none is."""
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    order = np.lexsort(edges.T)
+    same = np.flatnonzero((edges[order[1:]] == edges[order[:-1]]).all(axis=1))
+    beside = np.repeat(np.arange(len(faces)), 3)
+    one, other = order[same], order[same + 1]
+    beside[one], beside[other] = other // 3, one // 3
+    return beside.reshape(-1, 3)
 
 
 def welded(vertices: Array, faces: Integers) -> Mesh:

@@ -41,7 +41,12 @@ def thinnest(vertices: Array, triangles: Indices, slab: bool, way: Array | None 
     return float(way[order][np.searchsorted(part, RIMS)])
 
 
-def thin_parts(vertices: Array, triangles: Indices, width: float) -> float:
+def thin_parts(
+    vertices: Array,
+    triangles: Indices,
+    width: float,
+    thickened: NDArray[np.bool_] | None = None,
+) -> float:
     """How far a body reaches along its skin beyond where a ball `width` m across fits in, m.
 
     Up to the edge of a wedge of angle a that is half the width over tan(a / 2). It is found to a
@@ -49,21 +54,25 @@ def thin_parts(vertices: Array, triangles: Indices, width: float) -> float:
     too short. It is 0 where the ball fits nowhere: such a body is thin, and has no tips.
 
     vertices, triangles  (n, 3) m; (k, 3) outward. Of a prism the sides, without its ends
+    thickened            (k,) triangles beneath which the ball fits in any case
     """
     if width <= 0.0:
         return 0.0
     corners = vertices[triangles]
     area = 0.5 * float(np.linalg.norm(outward(corners), axis=1).sum())
     edge = max(0.5 * width, 2.0 * np.sqrt(area / MOST_FACETS))
-    facets = divided(corners, edge)
+    sure = np.zeros((0, 3, 3)) if thickened is None else divided(corners[thickened], edge)
+    facets = divided(corners if thickened is None else corners[~thickened], edge)
+    if not len(facets):
+        return 0.0
     edge = max(edge, float(side_lengths(facets).max()))
     cells = by_cells(vertices, triangles)
     fits = np.ones(len(facets), bool)
     for part in BALLS:
         fits[fits] = ball_fits(facets[fits], vertices, triangles, cells, part * width)
-    if not fits.any():
+    if not fits.any() and not len(sure):
         return 0.0
-    touched = cKDTree(facets[fits].mean(axis=1))
+    touched = cKDTree(np.concatenate([sure, facets[fits]]).mean(axis=1))
     beyond = touched.query(facets[~fits].reshape(-1, 3))[0].max(initial=0.0)
     return max(0.0, float(beyond) - 0.5 * edge)
 
