@@ -145,7 +145,7 @@ def scene_of(path: Path, edits: dict[str, Any]) -> dict[str, Any]:
     """The scene that a newcomer would write: water around the creature, and its model."""
     low, high = np.zeros(3), np.ones(3)
     with contextlib.suppress(ValueError):
-        low, high = extent(compiled(path, False, (0.0, 0.0, 0.0), None, {}), "domain" in edits)
+        low, high = extent(compiled(path, False, (0.0, 0.0, 0.0)), "domain" in edits)
     margin = MARGIN * float((high - low).max())
     return {
         "gravity": [0.0, 0.0, -9.81],

@@ -112,4 +112,4 @@ def test_a_model_that_is_no_file(write: Write, kind: str, tmp_path: Path) -> Non
 def test_a_model_that_includes_itself_comes_to_an_end(write: Write) -> None:
     include = '<include file="squid.xml"/><worldbody>'
     (problem,) = check_scene(write(model=MODEL.replace("<worldbody>", include, 1)))
-    assert "squid.xml cannot be read" in problem
+    assert "squid.xml includes squid.xml once more. Include it once." in problem

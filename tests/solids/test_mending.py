@@ -11,6 +11,7 @@ import trimesh
 from flowborne.solids import mjcf
 from flowborne.solids.geoms import is_closed, mesh_of
 from flowborne.solids.mending import mended_meshes
+from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 
 BALL = trimesh.creation.icosphere(4, 0.1)
@@ -60,7 +61,7 @@ def test_wide_holes_are_named_at_once_by_body_and_hulls_taken_on_request(tmp_pat
         SolidModel.from_file(path)
     assert 'mend = "hull"' in str(raised.value)
     whole = trimesh.convex.convex_hull(open_one.triangles.reshape(-1, 3))
-    model = SolidModel.from_file(path, hulls=True)
+    model = SolidModel.from_file(path, given=Given(hulls=True))
     assert model.volume[1] == pytest.approx(8.0 * whole.volume, rel=1e-4)
     assert model.body_mass[1] == pytest.approx(500.0 * model.volume[1], rel=1e-4)
     mesh = mesh_of(model.mj, 0)
@@ -75,6 +76,6 @@ def test_a_mesh_that_two_bodies_have_is_mended_once(tmp_path: Path) -> None:
     start, stop = text.index("<body"), text.index("</worldbody>")
     second = text[start:stop].replace('name="b0" pos="0', 'name="b1" pos="1')
     path.write_text(text[:stop] + second + text[stop:])
-    mj = mjcf.compiled(path, False, (0.0, 0.0, 0.0), None, {})
+    mj = mjcf.compiled(path, False, (0.0, 0.0, 0.0))
     assert mended_meshes(mj) == "b0 (3 open edges) closed"
     assert len(set(mj.geom_dataid)) == 1

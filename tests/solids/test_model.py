@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 
 
@@ -256,7 +257,7 @@ def test_root_of_a_urdf_floats_when_it_is_told_to(tmp_path: Path) -> None:
     path.write_text(ROBOT)
     held = SolidModel.from_file(path)
     assert held.body_names == ("world", "tail"), "MuJoCo makes the root part of the world"
-    free = SolidModel.from_file(path, floating=("base",))
+    free = SolidModel.from_file(path, given=Given(floating=("base",)))
     assert free.body_names == ("world", "base", "tail")
     assert free.joint_names == ("base", "bend")
     assert free.nv == 7
@@ -264,7 +265,7 @@ def test_root_of_a_urdf_floats_when_it_is_told_to(tmp_path: Path) -> None:
     with pytest.raises(
         ValueError, match=r"no body 'tail' that hangs .* can be floating, are: base"
     ):
-        SolidModel.from_file(path, floating=("tail",))
+        SolidModel.from_file(path, given=Given(floating=("tail",)))
 
 
 IMPOSSIBLE = {

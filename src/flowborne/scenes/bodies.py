@@ -37,6 +37,7 @@ from flowborne.solids import mjcf
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import element_name
+from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.state import SolidState
@@ -85,16 +86,7 @@ def _loaded(scene: Scene) -> SolidModel:
                 shapes=placed_shapes(scene),
             )
         return SolidModel.from_file(
-            path,
-            slab=scene.is_slab,
-            gravity=(x, y, z),
-            density=scene.solids.density,
-            densities=scene.solids.densities,
-            shapes=placed_shapes(scene),
-            floating=scene.solids.floating,
-            displace=displace_of(scene.solids),
-            packages=packages_of(scene),
-            hulls=scene.solids.mend == "hull",
+            path, slab=scene.is_slab, gravity=(x, y, z), given=given_of(scene)
         )
     except ValueError as error:
         raise SceneError(_sentence(str(error))) from None
@@ -105,17 +97,26 @@ def displace_of(solids: SolidsTable) -> Displace:
     return Displace(table.groups, table.classes, table.names, table.without)
 
 
+def given_of(scene: Scene) -> Given:
+    """What a scene with a model file says about its model besides."""
+    solids = scene.solids
+    assert solids is not None
+    return Given(
+        solids.density,
+        solids.densities,
+        placed_shapes(scene),
+        solids.floating,
+        displace_of(solids),
+        packages_of(scene),
+        solids.mend == "hull",
+    )
+
+
 def bones_of(scene: Scene) -> mujoco.MjSpec:
     """The model file of a scene before flesh grows on it. Raises ValueError when it is bad."""
     x, y, z = scene.gravity
-    assert scene.solids is not None
     assert scene.model_path is not None
-    solids = scene.solids
-    chosen = displace_of(solids)
-    given = solids.density, solids.densities, placed_shapes(scene), solids.floating, chosen
-    files = packages_of(scene), solids.mend == "hull"
-    spec, _ = mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), *given, *files)
-    return spec
+    return mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), given_of(scene))[0]
 
 
 def spec_of(scene: Scene) -> mujoco.MjSpec:

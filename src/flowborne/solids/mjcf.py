@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -37,72 +38,82 @@ ARENA = 1 << 26
 in the number of dofs."""
 
 
+@dataclass(frozen=True)
+class Given:
+    """What is given of a model besides its file.
+
+    density    kg/m^3, in place of the density or mass of every geom that displaces fluid
+    densities  body -> kg/m^3 of its geoms, in place of `density`
+    shapes     geometries of one's own, besides those of the file
+    floating   bodies on the world without a joint, which get a free one of their name
+    displace   which geoms the fluid meets
+    packages   folders in which packages of ROS are looked for besides those above the model
+    hulls      whether meshes with holes that are not small are replaced by their convex hulls
+    """
+
+    density: float | None = None
+    densities: Mapping[str, float] = field(default_factory=dict)
+    shapes: Sequence[PlacedShape] = ()
+    floating: Sequence[str] = ()
+    displace: Displace = BY_RULE
+    packages: Sequence[Path] = ()
+    hulls: bool = False
+
+    def density_of(self, body: str) -> float | None:
+        """kg/m^3 of a body's geoms; None as the model has it."""
+        return self.densities.get(body, self.density)
+
+
+NOTHING = Given()
+
+
 def compiled(
     source: str | Path,
     slab: bool,
     gravity: tuple[float, float, float],
-    density: float | None,
-    densities: Mapping[str, float],
-    shapes: Sequence[PlacedShape] = (),
-    floating: Sequence[str] = (),
-    displace: Displace = BY_RULE,
-    packages: Sequence[Path] = (),
-    hulls: bool = False,
+    given: Given = NOTHING,
 ) -> mujoco.MjModel:
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller take their places. raises ValueError for a bad model.
     """
-    given = density, densities, shapes, floating, displace, packages, hulls
-    return bones_of(source, slab, gravity, *given)[1]
+    return bones_of(source, slab, gravity, given)[1]
 
 
 def bones_of(
     source: str | Path,
     slab: bool,
     gravity: tuple[float, float, float],
-    density: float | None,
-    densities: Mapping[str, float],
-    shapes: Sequence[PlacedShape] = (),
-    floating: Sequence[str] = (),
-    displace: Displace = BY_RULE,
-    packages: Sequence[Path] = (),
-    hulls: bool = False,
+    given: Given = NOTHING,
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    """An MJCF file or text, as `compiled`, before flesh grows on it.
-
-    floating  bodies on the world without a joint, which get a free one of their name
-    displace  which geoms the fluid meets
-    packages  folders in which packages of ROS are looked for besides those above the model
-    hulls     whether meshes with holes that are not small are replaced by their convex hulls
-    """
+    """An MJCF file or text, as `compiled`, before flesh grows on it."""
     where = _named(source)
-    spec = read_spec(source, packages)
+    spec = read_spec(source, given.packages)
     wrong = next(misgiven(spec), None)
     if wrong is not None:
         raise ValueError(f"{where}: {wrong}")
     _set_options(spec, gravity)
-    add_shapes(spec, shapes)
-    for name in floating:
+    add_shapes(spec, given.shapes)
+    for name in given.floating:
         _set_floating(spec, name, where)
     for geom in spec.geoms:
-        given = densities.get(geom.parent.name, density)
-        if given is not None:
-            geom.density, geom.mass = given, np.nan
+        density = given.density_of(geom.parent.name)
+        if density is not None:
+            geom.density, geom.mass = density, np.nan
     mj = _compiled(spec, where)
     try:
-        chosen = chosen_geoms(spec, mj, displace)
+        chosen = chosen_geoms(spec, mj, given.displace)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
-    weightless = _weightless(spec, chosen, densities, density)
+    weightless = _weightless(spec, chosen, given)
     for geom in weightless:
         geom.mass = 0.0
     if write_groups(spec, chosen) or weightless:
         mj = _compiled(spec, where)
     _refuse_unsupported(mj, where)
     try:
-        mended = mend_meshes(spec, mj, displacing_geoms(mj), hulls)
+        mended = mend_meshes(spec, mj, displacing_geoms(mj), given.hulls)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
     if mended:
@@ -123,12 +134,7 @@ def _compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
         raise refusal(spec, where, error) from error
 
 
-def _weightless(
-    spec: mujoco.MjSpec,
-    chosen: set[int],
-    densities: Mapping[str, float],
-    density: float | None,
-) -> list[mujoco.MjsGeom]:
+def _weightless(spec: mujoco.MjSpec, chosen: set[int], given: Given) -> list[mujoco.MjsGeom]:
     """Geoms that a density of the scene does not mean: others of their body displace the fluid."""
     displacing = {geom.parent.id for geom in spec.geoms if geom.id in chosen}
     return [
@@ -136,7 +142,7 @@ def _weightless(
         for geom in spec.geoms
         if geom.id not in chosen
         and geom.parent.id in displacing
-        and densities.get(geom.parent.name, density) is not None
+        and given.density_of(geom.parent.name) is not None
     ]
 
 

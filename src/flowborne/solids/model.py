@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -15,8 +14,8 @@ from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
 from flowborne.solids.covered import covered
-from flowborne.solids.displacing import BY_RULE, Displace
 from flowborne.solids.flesh import flesh_of, points_of_flesh
+from flowborne.solids.mjcf import NOTHING, Given
 from flowborne.solids.own_shapes import own_by_mesh
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue import Grown
@@ -109,30 +108,16 @@ class SolidModel:
         *,
         slab: bool = False,
         gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
-        density: float | None = None,
-        densities: Mapping[str, float] = MappingProxyType({}),
-        shapes: Sequence[PlacedShape] = (),
-        floating: Sequence[str] = (),
-        displace: Displace = BY_RULE,
-        packages: Sequence[Path] = (),
-        hulls: bool = False,
+        given: Given = NOTHING,
     ) -> SolidModel:
         """Model of an MJCF or URDF file.
 
         slab     take the cross-sections at z = 0, per unit depth
         gravity  (3,) m/s^2, in place of the file's own
-        density  kg/m^3, in place of every geom's own density or mass
-        densities  body -> kg/m^3 of its geoms, in place of `density`
-        shapes   geometries of one's own, besides those of the file
-        floating  bodies on the world without a joint, which get a free one of their name
-        displace  which geoms the fluid meets
-        packages  folders in which packages of ROS are looked for besides those above the model
-        hulls    whether meshes with holes that are not small are replaced by their convex hulls
+        given    densities, shapes and choices besides the file
         raises   ValueError when the model is bad
         """
-        given = density, densities, shapes, floating, displace, packages, hulls
-        mj = mjcf.compiled(Path(path), slab, gravity, *given)
-        return cls(mj, slab, shapes=shapes)
+        return cls(mjcf.compiled(Path(path), slab, gravity, given), slab, shapes=given.shapes)
 
     @classmethod
     def from_string(
@@ -142,12 +127,11 @@ class SolidModel:
         slab: bool = False,
         gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
         density: float | None = None,
-        densities: Mapping[str, float] = MappingProxyType({}),
         shapes: Sequence[PlacedShape] = (),
     ) -> SolidModel:
         """Model of an MJCF text; as `from_file`."""
-        mj = mjcf.compiled(xml, slab, gravity, density, densities, shapes)
-        return cls(mj, slab, shapes=shapes)
+        given = Given(density, shapes=shapes)
+        return cls(mjcf.compiled(xml, slab, gravity, given), slab, shapes=shapes)
 
     @classmethod
     def with_flesh(
