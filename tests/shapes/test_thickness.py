@@ -135,3 +135,9 @@ def test_of_a_slab_only_the_outline_counts() -> None:
     assert shape.section(upright, -15.0).tips(1.0) < 0.75
     ellipse = shape_of("ellipsoid", np.array([20.0, 1.0, 20.0]), None).section(np.eye(3), 0.0)
     assert ellipse.tips(1.0) == pytest.approx(20.0 * (1.0 - np.sqrt(0.75)), abs=1.0 / 3.0)
+
+
+def test_a_mesh_that_is_thickened_all_over_has_no_tips() -> None:
+    box = trimesh.creation.box((1.0, 1.0, 0.01))
+    plate = ShapeMesh(np.asarray(box.vertices), np.asarray(box.faces))
+    assert plate.thickened(1.0).tips(0.5) == 0.0

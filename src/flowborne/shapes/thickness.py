@@ -97,7 +97,7 @@ def divided(facets: Array, longest: float) -> Array:
 
     Four times `MOST_FACETS` at once, as slivers come to, are not divided further.
     """
-    done = []
+    done = [facets[:0]]
     while len(facets):
         side = side_lengths(facets)
         long = (side.max(axis=1) > longest) & (len(facets) <= 4.0 * MOST_FACETS)
