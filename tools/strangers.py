@@ -55,6 +55,9 @@ MARGIN = 0.5
 SAY_NOTHING = ("cmeel.prefix", "share", "robots", "envs", "assets")
 """Folders of the wheels that the page leaves out."""
 
+LONGEST = 300
+"""Most letters of a message in the table."""
+
 ANSWERS = {
     'mend = "hull"': {"solids.mend": "hull"},
     "enlarge the domain": {"domain": "around the world's geoms too"},
@@ -190,7 +193,7 @@ def tried(path: Path, name: str, folder: Path) -> Stranger:
         if not answer.keys() - edits.keys():
             break
         edits |= answer
-    found = re.match(r"(\d+) warning", out)
+    found = re.search(r"^(\d+) warning", out, re.M)
     stranger = Stranger(
         name, refusal, refused, tuple(edits), int(found[1]) if found else 0, "", (checked, 0.0)
     )
@@ -283,8 +286,9 @@ def short(name: str) -> str:
 
 
 def shown(message: str) -> str:
-    """A message without paths of this machine."""
-    return plain(re.sub(rf"{re.escape(str(KEPT / 'models'))}/|scene scene\.toml, ", "", message))
+    """The beginning of a message, without paths of this machine."""
+    said = re.sub(rf"{re.escape(str(KEPT))}/(models/)?|scene scene\.toml, ", "", message)
+    return plain(said if len(said) <= LONGEST else f"{said[:LONGEST]} ...")
 
 
 def main() -> int:
