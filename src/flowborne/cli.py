@@ -22,9 +22,16 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from flowborne.console import complain, result_printer, run_lines, sentence_of
-from flowborne.errors import PartError, SceneError, place_of, said_by
-from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write
+from flowborne.console import (
+    check_lines,
+    complain,
+    fault_of,
+    result_printer,
+    run_lines,
+    sentence_of,
+)
+from flowborne.errors import PartError, SceneError
+from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, make_folder
 from flowborne.version import __version__
 
 log = logging.getLogger("flowborne")
@@ -182,12 +189,9 @@ def check(
     Bodies and fluid are set going, as in a run. A warning does not stop a run; it names a value
     that will do.
     """
-    from flowborne.coupling.seen import seen_bodies
     from flowborne.progress import ProgressDisplay, RunProgress
-    from flowborne.scenes.creature import creature_of
     from flowborne.scenes.load import load_scene
-    from flowborne.scenes.notes import notes_of
-    from flowborne.scenes.warn import headline, warnings_of
+    from flowborne.scenes.warn import warnings_of
 
     loaded = load_scene(scene, _overrides(settings or []), trust=trust)
     began = perf_counter()
@@ -200,17 +204,8 @@ def check(
 
         with compilation_watched(tell), Simulation(loaded, workers=1) as simulation:
             setup = simulation.world.setup
-    creature = creature_of(loaded, setup)
-    for line in [] if creature is None else creature.lines():
-        print(line)
     found = warnings_of(loaded, setup)
-    print(headline(found))
-    for warning in found:
-        print(f"  warning: {warning}")
-    for note in notes_of(loaded, setup.solid):
-        print(f"  {note}")
-    for seen in seen_bodies(setup):
-        print(f"  {seen.sentence()}")
+    print(check_lines(loaded, setup, found))
     if strict and found:
         raise typer.Exit(WARNED)
 
@@ -371,7 +366,7 @@ def validate(
     (wanted,) = _known([tier], tuple(Tier), "tier", "--tier")
     show = None if as_json else result_printer("id", "reference", "tolerance")
     if report is not None:
-        _make_folder(report)
+        make_folder(report)
     try:
         results = run_cases(ids or None, Tier(wanted), on_result=show, report=report)
     except ValueError as error:
@@ -412,7 +407,7 @@ def figures(
     from flowborne.validation.figures import figure_names, make_figures
 
     chosen = _known(names or [], figure_names(), "figure", "NAME")
-    _make_folder(out)
+    make_folder(out)
     try:
         make_figures(out, chosen or None)
     except (ArithmeticError, BlowUpError, OSError, ValueError) as error:
@@ -464,8 +459,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = FAILED
     except Exception as error:
         log.debug("the error", exc_info=error)
-        where = f"{said_by(error)}, in {place_of(error)}"
-        complain(f"a fault of flowborne ({where}); please report it with flowborne --debug")
+        complain(fault_of(error))
         code = FAILED
     sys.exit(code if isinstance(code, int) else 0)
 
@@ -485,16 +479,6 @@ def _overrides(settings: list[str]) -> dict[str, str]:
             value = str(Path(value).absolute())
         overrides[key] = value
     return overrides
-
-
-def _make_folder(path: Path) -> None:
-    """Make a folder if need be. Raises RunFolderError when it cannot be written into."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    if not os.access(path, os.W_OK | os.X_OK):
-        raise RunFolderError(f"{path} cannot be written; name another folder with --out")
 
 
 def _known(asked: list[str], known: Sequence[str], kind: str, option: str) -> list[str]:

@@ -6,8 +6,12 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from flowborne.errors import place_of, said_by
+
 if TYPE_CHECKING:
+    from flowborne.coupling.world import Setup
     from flowborne.running import RunResult
+    from flowborne.scenes.schema import Scene
 
 
 LONGEST = 1000
@@ -47,6 +51,31 @@ def run_lines(result: RunResult) -> str:
     if summary["peak_memory_bytes"] is not None:
         pace += f", {summary['peak_memory_bytes'] / 1e6:.0f} MB at most"
     return "\n".join([*lines, pace])
+
+
+def check_lines(scene: Scene, setup: Setup, warnings: list[str]) -> str:
+    """What there is to say of a scene that can be run."""
+    from flowborne.coupling.seen import seen_bodies
+    from flowborne.scenes.creature import creature_of
+    from flowborne.scenes.notes import notes_of
+    from flowborne.scenes.warn import headline
+
+    creature = creature_of(scene, setup)
+    return "\n".join(
+        [
+            *([] if creature is None else creature.lines()),
+            headline(warnings),
+            *(f"  warning: {warning}" for warning in warnings),
+            *(f"  {note}" for note in notes_of(scene, setup.solid)),
+            *(f"  {seen.sentence()}" for seen in seen_bodies(setup)),
+        ]
+    )
+
+
+def fault_of(error: Exception) -> str:
+    """An error that nothing should end with, for a person."""
+    where = f"{said_by(error)}, in {place_of(error)}"
+    return f"a fault of flowborne ({where}); please report it with flowborne --debug"
 
 
 def sentence_of(error: Exception) -> str:

@@ -60,16 +60,16 @@ class PartError(ValueError):
         ours = str(Path(__file__).parent)
         calls = traceback.extract_tb(error.__traceback__)
         at = next((c for c in reversed(calls) if not c.filename.startswith(ours)), calls[-1])
-        return cls(
-            f"{part} failed in {Path(at.filename).name}, line {at.lineno} "
-            f"({said_by(error)}): mend it there"
-        )
+        return cls(f"{part} failed in {_line(at)} ({said_by(error)}): mend it there")
 
 
 def place_of(error: BaseException) -> str:
     """File and line in which an error was raised."""
-    at = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{Path(at.filename).name}, line {at.lineno}"
+    return _line(traceback.extract_tb(error.__traceback__)[-1])
+
+
+def _line(call: traceback.FrameSummary) -> str:
+    return f"{Path(call.filename).name}, line {call.lineno}"
 
 
 def said_by(error: BaseException) -> str:

@@ -163,6 +163,7 @@ class _Run:
         self.frames = simulation.frames
         self.taken = earlier_joints(simulation.scene)
         self.warnings = warnings_of(simulation.scene, simulation.setup)
+        self.notes = list(notes_of(simulation.scene, simulation.setup.solid))
         creature = creature_of(simulation.scene, simulation.setup)
         self.creature = None if creature is None else asdict(creature)
         self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
@@ -371,7 +372,7 @@ class _Run:
             "cells": cells,
             "creature": self.creature,
             "warnings": self.warnings,
-            "notes": list(notes_of(simulation.scene, world.setup.solid)),
+            "notes": self.notes,
             "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],
             "state_bytes": state_bytes(world),
             "bytes_per_cell": None if cells is None else state_bytes(world) / cells,
@@ -407,8 +408,7 @@ class _Run:
     def _doubts(self) -> list[str]:
         """Reasons not to trust the frames so far, those of earlier runs in the folder included."""
         model, fluid = self.simulation.setup.solid, self.simulation.setup.fluid
-        met = np.isin(np.arange(model.nbody), model.geom_body) & model.moves.any(axis=1)
-        bodies = [model.body_names[body] for body in np.flatnonzero(met)]
+        bodies = [model.body_names[body] for body in np.flatnonzero(model.met & model.moving)]
         return doubts_of(self.folder.history, bodies, fluid)
 
     def _rows(self) -> int:

@@ -20,8 +20,8 @@ from flowborne.characters.model import model_files
 from flowborne.characters.rig import Rig, Surface
 from flowborne.characters.source import read_source
 from flowborne.errors import SceneError
+from flowborne.shapes.closing import is_closed
 from flowborne.shapes.mesh import ShapeMesh
-from flowborne.solids.geoms import is_closed
 
 from . import rigged
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from flowborne.shapes.closing import is_closed
 from flowborne.solids import mjcf
-from flowborne.solids.geoms import is_closed, mesh_of
+from flowborne.solids.geoms import mesh_of
 from flowborne.solids.mending import mended_meshes
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel

@@ -214,11 +214,10 @@ def geometry(
             counts = np.array(grid.face_shape(d))
             at = list_closed(share[d], box, d, body, counts, at, axis, face, part_body, closed)
     kind = kinds_of_cells(ox, oy, oz, walls)
-    open_cells, covered = kind >= NARROW, kind == COVERED
-    if boundaries.has_open_side(grid):
-        covered[:] = False
+    open_cells = kind >= NARROW
     bones = [share for share in shares if share[0] < first_skin]
-    rows, common = bone_rows(bones, open_cells, grid), bone_rows(bones, covered, grid)
+    rows = bone_rows(bones, open_cells, grid)
+    common = bone_rows([] if boundaries.has_open_side(grid) else bones, kind == COVERED, grid)
     if flat:
         oz[:] = 0.0
     volume = np.empty(grid.shape)
@@ -237,9 +236,10 @@ def geometry(
         owner = np.append(owner, part_body[first:][part])
         force = np.concatenate([force, push])
         rows = joined(rows, of_skin)
-        beside_bones = np.zeros(grid.shape, bool)
-        beside_bones.flat[common[0]] = True
-        common = joined(common, flesh_rows(*skin, beside_bones)[1])
+        if common[0].size:
+            beside_bones = np.zeros(grid.shape, bool)
+            beside_bones.flat[common[0]] = True
+            common = joined(common, flesh_rows(*skin, beside_bones)[1])
     if common[0].size:
         lent = handed_on(common, kind, 6 * first_skin + skins.vertices.size)
         owner = np.append(owner, np.full(lent[0].size, -1))

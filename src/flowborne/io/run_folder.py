@@ -318,6 +318,16 @@ def cannot_write(path: Path, error: OSError) -> RunFolderError:
     )
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder if need be. Raises RunFolderError when it cannot be written into."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise RunFolderError(f"{path} cannot be written; name another folder with --out")
+
+
 def check_space(path: Path, needed: int) -> None:
     """Raise RunFolderError when the disc that holds `path` has less than `needed` bytes free."""
     place = path.absolute()

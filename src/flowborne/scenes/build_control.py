@@ -216,7 +216,7 @@ def input_motions(scene: Scene, model: SolidModel) -> dict[int, Trajectory]:
 def _bodies(model: SolidModel, names: tuple[str, ...] | None) -> Integers:
     """Numbers of the named bodies, or of all that can move."""
     if names is None:
-        return np.flatnonzero(model.moves.any(axis=1)).astype(np.int64)
+        return np.flatnonzero(model.moving)
     return np.array([model.body(name) for name in names], dtype=np.int64)
 
 

@@ -37,24 +37,26 @@ def capture_of(scene: Scene) -> Capture | None:
         found = _walk(scene.human.height)
     else:
         found = read_clip(scene)
-        named = tuple(joint for joint in found.held if _names(scene, joint))
-        if named:
-            found = with_still(found, named)
+        named = _words(scene) if found.held else set()
+        if still := tuple(joint for joint in found.held if joint in named):
+            found = with_still(found, still)
     return replace(found, clip=found.clip.placed(offset, heading))
 
 
-def _names(scene: Scene, joint: str) -> bool:
-    """Whether the scene has something to say of a joint."""
-
-    def within(value: object) -> bool:
+def _words(scene: Scene) -> set[object]:
+    """All that a scene says something of: its keys and values, but for names of the clip's joints,
+    and the joints of an earlier run."""
+    found = set[object](earlier_joints(scene))
+    left: list[object] = [scene.model_dump(exclude={"clip": {"mapping"}}, exclude_none=True)]
+    while left:
+        value = left.pop()
         if isinstance(value, dict):
-            return any(within(part) for part in (*value, *value.values()))
-        if isinstance(value, list | tuple):
-            return any(within(part) for part in value)
-        return value == joint
-
-    said = scene.model_dump(exclude={"clip": {"mapping"}}, exclude_none=True)
-    return within(said) or joint in earlier_joints(scene)
+            left += [*value, *value.values()]
+        elif isinstance(value, list | tuple):
+            left += value
+        else:
+            found.add(value)
+    return found
 
 
 @lru_cache(maxsize=4)

@@ -260,7 +260,7 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
     outside: set[int] = set()
     for geom in range(model.ngeom):
         body = int(model.geom_body[geom])
-        if not model.moves[body].any() or body in outside or not np.isfinite(low[geom]).all():
+        if not model.moving[body] or body in outside or not np.isfinite(low[geom]).all():
             continue
         for axis in range(axes):
             first, last = domain.lower[axis], domain.upper[axis]

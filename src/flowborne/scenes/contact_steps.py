@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.scenes.bodies import load_model, spec_of
+from flowborne.scenes.bodies import load_model
 from flowborne.scenes.schema import Scene
-from flowborne.solids.geoms import CONTACT_ONLY, kind_of
+from flowborne.solids.geoms import floors
 from flowborne.solids.model import SolidModel
 
 
@@ -23,8 +22,6 @@ def with_steps(scene: Scene) -> Scene:
     """
     if "steps_per_frame" in scene.time.model_fields_set or scene.model_path is None:
         return scene
-    if not has_floors(spec_of(scene)):
-        return scene
     longest = longest_step(load_model(scene))
     steps = max(1, math.ceil(scene.frame_time / longest * (1.0 - 1e-9)))
     if steps == scene.time.steps_per_frame:
@@ -36,22 +33,15 @@ def with_steps(scene: Scene) -> Scene:
 def longest_step(model: SolidModel) -> float:
     """s, for which contacts of moving bodies with planes and height fields are stiff."""
     mj = model.mj
-    moving = [g for g in range(mj.ngeom) if model.moves[mj.geom_bodyid[g]].any()]
-    floors = [g for g in range(mj.ngeom) if kind_of(mj, g) in CONTACT_ONLY]
+    moving = np.flatnonzero(model.moving[mj.geom_bodyid]).tolist()
     longest = np.inf
-    for floor in floors:
+    for floor in floors(mj):
         for geom in moving:
             if _collide(mj.geom_contype, mj.geom_conaffinity, floor, geom):
                 constant = mj.geom_solref[[floor, geom], 0].min()
                 step = 0.5 * constant if constant > 0.0 else mj.opt.timestep
                 longest = min(longest, step)
     return longest
-
-
-def has_floors(spec: mujoco.MjSpec) -> bool:
-    """Whether a model has planes or height fields, which is seen without compiling it."""
-    floors = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD
-    return any(geom.type in floors for geom in spec.geoms)
 
 
 def _collide(types: NDArray[np.int32], affinities: NDArray[np.int32], one: int, other: int) -> bool:

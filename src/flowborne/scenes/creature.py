@@ -12,8 +12,9 @@ from flowborne.coupling.world import Setup
 from flowborne.scenes.bodies import displace_of, initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import listed
-from flowborne.solids.displacing import solid_geoms
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.geoms import solid_geoms
+from flowborne.solids.model import SolidModel
 from flowborne.solids.outline import Outline
 
 Array = NDArray[np.float64]
@@ -66,11 +67,7 @@ def creature_of(scene: Scene, setup: Setup) -> Creature | None:
     model = setup.solid
     if not scene.has_bodies:
         return None
-    moving = model.moves.any(axis=1)
-    counted = moving if moving.any() else np.ones(model.nbody, bool)
-    counted = np.append(counted, np.ones(len(model.body_mass) - model.nbody, bool))
-    met = np.isin(np.arange(model.nbody), model.geom_body)
-    start = initial_state(scene, model).q
+    counted, start = counted_bodies(model), initial_state(scene, model).q
     return Creature(
         float(model.body_mass[counted].sum()),
         _displaced(setup, start, counted),
@@ -78,8 +75,19 @@ def creature_of(scene: Scene, setup: Setup) -> Creature | None:
         len(solid_geoms(model.mj)),
         model.ngeom,
         _rule(scene),
-        tuple(model.body_names[body] for body in np.flatnonzero(moving & ~met)),
+        tuple(model.body_names[body] for body in unmet_bodies(model)),
     )
+
+
+def counted_bodies(model: SolidModel) -> NDArray[np.bool_]:
+    """(nbody + nodes,) bodies that move, all of them where none does, and nodes of flesh."""
+    counted = model.moving if model.moving.any() else np.ones(model.nbody, bool)
+    return np.append(counted, np.ones(len(model.body_mass) - model.nbody, bool))
+
+
+def unmet_bodies(model: SolidModel) -> NDArray[np.int64]:
+    """(k,) numbers of moving bodies that the fluid does not meet."""
+    return np.flatnonzero(model.moving & ~model.met)
 
 
 def _displaced(setup: Setup, start: Array, counted: NDArray[np.bool_]) -> float | None:
@@ -97,7 +105,7 @@ def creature_extent(scene: Scene, setup: Setup) -> Array:
     model, axes = setup.solid, scene.dimensions
     outline, state = Outline(model), initial_state(scene, model)
     places = outline.at(state.q)
-    moving = model.moves[outline.body].any(axis=1)
+    moving = model.moving[outline.body]
     places = places[moving] if moving.any() else places
     if model.flesh is not None:
         places = np.concatenate([places, model.flesh.rest])

@@ -8,9 +8,10 @@ import mujoco
 import numpy as np
 
 from flowborne.scenes.bodies import spec_of
-from flowborne.scenes.contact_steps import has_floors
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import listed
+from flowborne.solids.geoms import floors
+from flowborne.solids.model import SolidModel
 
 REPLACED = {
     "integrator": mujoco.mjtIntegrator,
@@ -23,20 +24,20 @@ MEDIUM = ("density", "viscosity", "wind")
 """Options of MuJoCo's own medium, in whose place the fluid is."""
 
 
-def not_taken(scene: Scene) -> str | None:
+def not_taken(scene: Scene, model: SolidModel) -> str | None:
     """One sentence on what of the model file has no effect, None where all of it has."""
     if scene.model_path is None or scene.solids is None:
         return None
-    spec = spec_of(scene)
-    said = [*_options(scene, spec), *_elements(scene, spec), *_densities(scene, spec)]
+    spec, on_floors = spec_of(scene), bool(floors(model.mj))
+    said = [*_options(scene, spec, on_floors), *_elements(scene, spec), *_densities(scene, spec)]
     if not said:
         return None
     return f"[solids]: of {scene.model_path.name} these have no effect: {'; '.join(said)}"
 
 
-def _options(scene: Scene, spec: mujoco.MjSpec) -> Iterator[str]:
+def _options(scene: Scene, spec: mujoco.MjSpec, on_floors: bool) -> Iterator[str]:
     option, default = spec.option, mujoco.MjSpec().option
-    given = not np.array_equal(option.gravity, default.gravity) or has_floors(spec)
+    given = not np.array_equal(option.gravity, default.gravity) or on_floors
     if given and not np.array_equal(option.gravity, scene.gravity):
         x, y, z = option.gravity
         own = ", ".join(f"{g:g}" for g in scene.gravity)

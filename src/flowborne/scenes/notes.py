@@ -20,7 +20,7 @@ from flowborne.solids.model import SolidModel
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Sentences for people, without a full stop."""
-    left_out = not_taken(scene)
+    left_out = not_taken(scene, model)
     if left_out is not None:
         yield left_out
     if mended := mended_meshes(model.mj):

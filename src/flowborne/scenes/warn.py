@@ -13,7 +13,7 @@ from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn_clip import lying
 from flowborne.scenes.warn_drives import angles_in_radians, limp_joints, too_slow
 from flowborne.scenes.warn_mass import implausible_density, mass_apart
-from flowborne.scenes.warn_model import fixed_outside, floors_in_fluid, unmet_bodies
+from flowborne.scenes.warn_model import bodies_not_met, fixed_outside, floors_in_fluid
 from flowborne.scenes.warn_size import lost_in_domain, thin_bodies
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow
 
@@ -25,7 +25,7 @@ WARNINGS: tuple[Warn, ...] = (
     lost_in_domain,
     implausible_density,
     mass_apart,
-    unmet_bodies,
+    bodies_not_met,
     floors_in_fluid,
     fixed_outside,
     fast_bodies,

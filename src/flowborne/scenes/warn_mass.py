@@ -72,7 +72,7 @@ def mass_apart(scene: Scene, setup: Setup) -> Iterator[str]:
     model, fluid = setup.solid, setup.fluid
     if fluid is None or fluid.one_way or is_gas(fluid) or any(implausible_density(scene, setup)):
         return
-    moving = model.moves.any(axis=1)
+    moving = model.moving
     mass, displaced = model.body_mass[: model.nbody][moving].sum(), model.volume[moving].sum()
     if model.flesh is not None:
         mass += model.body_mass[model.nbody :].sum()
@@ -92,6 +92,5 @@ def _bones(model: SolidModel) -> Iterator[tuple[str, float]]:
     """Name and mean density, kg/m^3, of every body that moves and that no flesh covers in part."""
     covered = np.zeros(model.nbody, bool)
     covered[model.geom_body[model.geom_covered]] = True
-    moving = model.moves.any(axis=1)
-    for body in np.flatnonzero(moving & ~covered & (model.volume > 0.0)):
+    for body in np.flatnonzero(model.moving & ~covered & (model.volume > 0.0)):
         yield model.body_names[body], float(model.body_mass[body] / model.volume[body])

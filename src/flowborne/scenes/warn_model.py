@@ -10,30 +10,30 @@ import numpy as np
 from flowborne.coupling.world import Setup
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.check_bodies import geom_boxes
-from flowborne.scenes.creature import creature_of
+from flowborne.scenes.creature import counted_bodies, unmet_bodies
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import listed
-from flowborne.solids.geoms import element_name, kind_of, rest_poses
+from flowborne.solids.geoms import element_name, floors, kind_of, rest_poses
 
 LEAST_MASS = 0.01
 """Part of the creature's mass. Bodies without any geom that have less together are frames; 1 % of
 the mass is less than a force of the fluid is right to on the grids that films have."""
 
 
-def unmet_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
+def bodies_not_met(scene: Scene, setup: Setup) -> Iterator[str]:
     """Moving bodies that displace no fluid, though they have geoms that could, or mass."""
-    creature, model = creature_of(scene, setup), setup.solid
-    if creature is None or setup.fluid is None:
+    if setup.fluid is None:
         return
-    mj, numbers = model.mj, [model.body(name) for name in creature.unmet]
-    shaped = [b for b in numbers if mj.body_geomnum[b] > 0]
-    bare = [b for b in numbers if mj.body_geomnum[b] == 0]
-    if model.body_mass[bare].sum() > LEAST_MASS * creature.mass:
-        shaped = sorted([*shaped, *bare])
-    if shaped:
-        them = "it" if len(shaped) == 1 else "them"
+    model, unmet = setup.solid, unmet_bodies(setup.solid)
+    bare = model.mj.body_geomnum[unmet] == 0
+    whole = model.body_mass[counted_bodies(model)].sum()
+    named = unmet
+    if model.body_mass[unmet[bare]].sum() <= LEAST_MASS * whole:
+        named = unmet[~bare]
+    if named.size:
+        them = "it" if named.size == 1 else "them"
         yield (
-            f"[solids]: no geom of {listed([model.body_names[b] for b in shaped])} displaces "
+            f"[solids]: no geom of {listed([model.body_names[b] for b in named])} displaces "
             f"fluid, which flows through {them}; [solids] displace names geoms that do, and a body "
             "without any needs one in the model"
         )
@@ -47,7 +47,7 @@ def fixed_outside(scene: Scene, setup: Setup) -> Iterator[str]:
     low, high = geom_boxes(model, initial_state(scene, model).q)
     axes = slice(0, scene.dimensions)
     gone = (high[:, axes] <= domain.lower) | (low[:, axes] >= domain.upper)
-    fixed = ~model.moves[model.geom_body].any(axis=1)
+    fixed = ~model.moving[model.geom_body]
     names = [model.geom_names[g] for g in np.flatnonzero(gone.any(axis=1) & fixed)]
     if names:
         yield (
@@ -64,10 +64,8 @@ def floors_in_fluid(scene: Scene, setup: Setup) -> Iterator[str]:
     low, high = np.array(grid.origin), np.array(grid.origin) + grid.spacing * np.array(grid.shape)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     _, _, position, rotation = rest_poses(mj)
-    for geom in range(mj.ngeom):
+    for geom in floors(mj):
         kind = kind_of(mj, geom)
-        if kind not in ("plane", "hfield"):
-            continue
         height = (corners - position[geom]) @ rotation[geom][:, 2]
         top = mj.hfield_size[mj.geom_dataid[geom], 2] if kind == "hfield" else 0.0
         if height.min() < -grid.spacing and height.max() > top + grid.spacing:

@@ -55,6 +55,12 @@ def open_edges(mesh: Mesh) -> int:
     return len(rims_of(welded(*mesh)[1]))
 
 
+def is_closed(mesh: Mesh) -> bool:
+    """Whether every edge is used once in each direction and the enclosed volume is positive."""
+    vertices, faces = mesh
+    return open_edges(mesh) == 0 and bool(np.linalg.det(vertices[faces]).sum() > 0.0)
+
+
 def across_of(rim: Array) -> float:
     """m, twice the largest distance of the points (k, 3) of a rim from their middle."""
     return 2.0 * float(np.linalg.norm(rim - rim.mean(axis=0), axis=1).max())
@@ -107,10 +113,13 @@ def wound(faces: Integers) -> Integers:
 def rims_of(faces: Integers) -> Integers:
     """(k, 2) directed edges that are not used as often in the other direction."""
     edges = edges_of(faces)
+    edges = edges[edges[:, 0] != edges[:, 1]]
     low, high = edges.min(axis=1), edges.max(axis=1)
-    pairs, number = np.unique(np.stack([low, high], axis=1), axis=0, return_inverse=True)
+    points = int(edges.max(initial=0)) + 1
+    keys, number = np.unique(low * points + high, return_inverse=True)
+    pairs = np.stack(np.divmod(keys, points), axis=1)
     surplus = np.zeros(len(pairs), np.int64)
-    np.add.at(surplus, number.ravel(), np.where(edges[:, 0] == low, 1, -1))
+    np.add.at(surplus, number, np.where(edges[:, 0] == low, 1, -1))
     ahead = np.repeat(pairs, np.maximum(surplus, 0), axis=0)
     back = np.repeat(pairs[:, ::-1], np.maximum(-surplus, 0), axis=0)
     return np.concatenate([ahead, back])

@@ -23,6 +23,7 @@ from flowborne.shapes.shape import (
     Samples,
     Shape,
     lattice,
+    unit,
 )
 from flowborne.shapes.thickness import thin_parts, thinnest
 
@@ -245,12 +246,6 @@ class ShapeThickened(ShapeMesh):
         order = np.argsort(ends_at, kind="stable")
         start = np.searchsorted(ends_at[order], np.arange(len(self.vertices) + 1))
         return middle, normal, across, limit, number, start, np.tile(limited, 2)[order]
-
-
-def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) of length 1; 0 of those without one."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.maximum(length, np.finfo(float).tiny)
 
 
 def neighbours(faces: Integers) -> Integers:

@@ -184,3 +184,9 @@ def lattice(reach: Array, pitch: float, margin: float) -> tuple[Array, Integers]
 def lattice_points(corner: Array, pitch: float, counts: Integers) -> Array:
     """(n, 3) places on a lattice, z fastest, m."""
     return corner + pitch * np.stack([i.ravel() for i in np.indices(tuple(counts))], axis=1)
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors (..., 3) of length 1; 0 of those without one."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny))

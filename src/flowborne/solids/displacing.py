@@ -17,14 +17,14 @@ from fnmatch import fnmatchcase
 import mujoco
 import numpy as np
 
+from flowborne.shapes.closing import is_closed
 from flowborne.solids.geoms import (
-    CONTACT_ONLY,
     HIDDEN_GROUP,
     element_name,
     geom_shape,
-    is_closed,
     kind_of,
     mesh_of,
+    solid_geoms,
 )
 
 DRAWN = HIDDEN_GROUP - 1
@@ -78,11 +78,6 @@ def chosen_geoms(spec: mujoco.MjSpec, mj: mujoco.MjModel, displace: Displace) ->
     by_rule = [_of_body(mj, own) for own in _by_body(mj, names)] if displace.by_rule else []
     chosen = set[int]().union(*named, *classed, *grouped, *by_rule)
     return chosen.difference(*without)
-
-
-def solid_geoms(mj: mujoco.MjModel) -> list[int]:
-    """Numbers of the geoms that have a volume."""
-    return [g for g in range(mj.ngeom) if kind_of(mj, g) not in CONTACT_ONLY]
 
 
 def write_groups(spec: mujoco.MjSpec, chosen: set[int]) -> bool:

@@ -39,13 +39,19 @@ def kind_of(mj: mujoco.MjModel, geom: int) -> str:
     return KINDS[mujoco.mjtGeom(int(mj.geom_type[geom]))]
 
 
+def floors(mj: mujoco.MjModel) -> list[int]:
+    """Numbers of the planes and height fields."""
+    return [g for g in range(mj.ngeom) if kind_of(mj, g) in CONTACT_ONLY]
+
+
+def solid_geoms(mj: mujoco.MjModel) -> list[int]:
+    """Numbers of the geoms that have a volume."""
+    return [g for g in range(mj.ngeom) if kind_of(mj, g) not in CONTACT_ONLY]
+
+
 def displacing_geoms(mj: mujoco.MjModel) -> list[int]:
-    """MuJoCo ids of the geometries that displace fluid: no planes, no hfields, no group >= 3."""
-    return [
-        g
-        for g in range(mj.ngeom)
-        if mj.geom_group[g] < HIDDEN_GROUP and kind_of(mj, g) not in CONTACT_ONLY
-    ]
+    """Numbers of the geoms that displace fluid: solid ones below HIDDEN_GROUP."""
+    return [g for g in solid_geoms(mj) if mj.geom_group[g] < HIDDEN_GROUP]
 
 
 def element_name(mj: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
@@ -74,17 +80,6 @@ def geom_shape(mj: mujoco.MjModel, geom: int, own: Own = NONE) -> Shape:
         if geometry is not None:
             return own_shape(mj, number, geometry, mesh)
     return shape_of(kind_of(mj, geom), mj.geom_size[geom], mesh)
-
-
-def is_closed(mesh: Mesh) -> bool:
-    """Whether every edge is used once in each direction and the enclosed volume is positive."""
-    vertices, faces = mesh
-    welded = np.unique(vertices, axis=0, return_inverse=True)[1].ravel()[faces]
-    edges = np.concatenate([welded[:, [0, 1]], welded[:, [1, 2]], welded[:, [2, 0]]])
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    forward = np.sort(edges[:, 0] * len(vertices) + edges[:, 1])
-    backward = np.sort(edges[:, 1] * len(vertices) + edges[:, 0])
-    return bool(np.array_equal(forward, backward) and np.linalg.det(vertices[faces]).sum() > 0.0)
 
 
 def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 
-from flowborne.shapes.closing import SMALL_HOLE, closed, hull, open_edges
+from flowborne.shapes.closing import SMALL_HOLE, closed, hull, is_closed, open_edges
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.geoms import element_name, is_closed, mesh_of
+from flowborne.solids.geoms import element_name, mesh_of
 
 MENDED = "(mended)"
 """End of the names of meshes that are not as in their files, and name of the text about them."""

@@ -182,6 +182,16 @@ class SolidModel:
         return displacement
 
     @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """(nbody,) whether any dof moves a body."""
+        return np.asarray(self.moves.any(axis=1))
+
+    @cached_property
+    def met(self) -> NDArray[np.bool_]:
+        """(nbody,) whether a body has a geometry, which the fluid meets."""
+        return np.isin(np.arange(self.nbody), self.geom_body)
+
+    @cached_property
     def outboard(self) -> NDArray[np.bool_]:
         """(m, m) whether a dof (column) is of a body below the one that another (row) moves, for
         the dofs of bones, which are the first m."""

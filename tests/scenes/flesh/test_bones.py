@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flowborne.scenes.flesh.bones import bones_of
 from flowborne.scenes.flesh.contour import contour
-from flowborne.solids.geoms import is_closed
+from flowborne.shapes.closing import is_closed
 
 Array = NDArray[np.float64]
 

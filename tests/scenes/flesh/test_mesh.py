@@ -26,9 +26,9 @@ from flowborne.scenes.flesh.mesh import (
     surface_mesh,
 )
 from flowborne.scenes.flesh.mesh_file import mesh_bytes, read_mesh, recipe_of
+from flowborne.shapes.closing import is_closed
 from flowborne.solids.elements import measures, with_middles
 from flowborne.solids.flesh import outer_surface
-from flowborne.solids.geoms import is_closed
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import Tissue, add_flesh
 

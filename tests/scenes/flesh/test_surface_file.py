@@ -10,7 +10,7 @@ import pyvista as pv
 import trimesh
 
 from flowborne.scenes.flesh.surface_file import read_surface
-from flowborne.solids.geoms import is_closed
+from flowborne.shapes.closing import is_closed
 
 
 def sphere() -> pv.PolyData:

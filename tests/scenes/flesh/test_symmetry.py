@@ -17,11 +17,11 @@ from flowborne.scenes.flesh.contour import contour
 from flowborne.scenes.flesh.mesh import ASTRAY, FIDELITY, FleshMesh, skin_mesh
 from flowborne.scenes.flesh.symmetry import Chamber, chamber_of, reflection
 from flowborne.scenes.load import load_scene
+from flowborne.shapes.closing import is_closed
 from flowborne.shapes.shape import Mesh
 from flowborne.simulation import Simulation
 from flowborne.solids.elements import measures
 from flowborne.solids.flesh import outer_surface
-from flowborne.solids.geoms import is_closed
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import Tissue, add_flesh
 from flowborne.validation.flyer import held

@@ -17,6 +17,7 @@ from flowborne.io.clip import Clip
 from flowborne.quaternions import angle, inverse, product, turned
 from flowborne.scenes.human.skeleton import SIDES, Array
 from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.shapes.shape import unit
 
 BODY = {
     ("hip", "knee"): 1.0,
@@ -141,8 +142,8 @@ def axes_of_bodies(places: Array, number: Mapping[str, int]) -> Array:
     ends = {joint: places[:, n] for joint, n in number.items()}
     left = ends["left_hip"] - ends["right_hip"] + ends["left_shoulder"] - ends["right_shoulder"]
     up = ends["left_shoulder"] - ends["left_ankle"] + ends["right_shoulder"] - ends["right_ankle"]
-    up = _unit(up)
-    left = _unit(left - np.sum(left * up, axis=-1, keepdims=True) * up)
+    up = unit(up)
+    left = unit(left - np.sum(left * up, axis=-1, keepdims=True) * up)
     return np.stack([np.cross(left, up), left, up], axis=-1)
 
 
@@ -164,13 +165,7 @@ def _judged(
         for side in sides:
             start, end = (j if j in number else f"{side}_{j}" for j in joints)
             if start in number and end in number:
-                line = _unit(places[:, number[end]] - places[:, number[start]])
-                usual = _unit(standard[end] - standard[start])
+                line = unit(places[:, number[end]] - places[:, number[start]])
+                usual = unit(standard[end] - standard[start])
                 cost += weight * (1.0 - np.einsum("fi,fij,j->f", line, axes, usual))
     return axes, cost
-
-
-def _unit(vectors: Array) -> Array:
-    """Vectors (..., 3) over their lengths; 0 where there is none."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0.0, length, 1.0))

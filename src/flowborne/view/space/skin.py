@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from flowborne.shapes.shape import unit
 from flowborne.view import style
 from flowborne.view.run import Skin, State
 from flowborne.view.space.shapes import LIT
@@ -64,7 +65,7 @@ def creased(vertices: Array, triangles: Indices) -> tuple[Indices, Indices]:
     corners = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
     order = np.lexsort(np.sort(edges, axis=1).T)
     here, there = order[:-1], order[1:]
-    facing = _unit(_across(vertices[triangles]))
+    facing = unit(_across(vertices[triangles]))
     joined = (edges[here] == edges[there][:, ::-1]).all(axis=1)
     joined &= (facing[here // 3] * facing[there // 3]).sum(axis=1) > np.cos(np.radians(CREASE))
     here, there = here[joined], there[joined]
@@ -82,16 +83,12 @@ def normals(points: Array, triangles: Indices) -> Array:
     """(n, 3) mean normal of the triangles (m, 3) around each point, weighted by their areas."""
     total = np.zeros((len(points), 3))
     np.add.at(total, triangles, _across(points[triangles])[:, None])
-    return _unit(total)
+    return unit(total)
 
 
 def _across(corners: Array) -> Array:
     """(m, 3) normals of triangles with corners (m, 3, 3), as long as twice their areas."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
 def way_out(place: Array, along: Array, corners: Array) -> float:
