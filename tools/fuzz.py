@@ -55,7 +55,7 @@ MEMORY = 8 << 30
 """Bytes that an input may ask for."""
 
 RESIDENT = 3 << 29
-"""Bytes of memory that it may fill."""
+"""Bytes of memory that it may fill, besides those of the process before it."""
 
 INPUTS_EACH = 500
 """Inputs that a process judges before another one takes its place."""
@@ -178,7 +178,9 @@ def _finished_run() -> Path:
     _kept.append(TemporaryDirectory(prefix="flowborne-fuzz-run-"))
     folder = Path(_kept[0].name)
     Broken(bases()["pendulum"]).write(folder, folder)
-    command("run", folder / "scene.toml", "--no-film", "--out", folder / "run")
+    said = command("run", folder / "scene.toml", "--no-film", "--out", folder / "run")
+    if not (folder / "run").is_dir():
+        raise RuntimeError(f"the run that is damaged was not made: {said}")
     return folder / "run"
 
 
@@ -189,16 +191,18 @@ def serve() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     for line in sys.stdin:
         Path("/proc/self/clear_refs").write_text("5")
+        before = _resident("VmRSS")
         kind, outcome = attack(*json.loads(line))
-        if (filled := _resident()) > RESIDENT:
+        if (filled := _resident("VmHWM") - before) > RESIDENT:
             outcome = Outcome(f"fills {filled >> 30} GB of memory", 0, outcome.detail)
         print(json.dumps([kind, *outcome]), file=out, flush=True)
 
 
-def _resident() -> int:
-    """Most bytes of memory that this process has filled since it was asked to begin anew."""
+def _resident(field: str) -> int:
+    """Bytes of memory that this process fills, VmRSS, or the most since it was asked to begin
+    anew, VmHWM."""
     status = Path("/proc/self/status").read_text()
-    return int(status.partition("VmHWM:")[2].split()[0]) << 10
+    return int(status.partition(f"{field}:")[2].split()[0]) << 10
 
 
 class Worker:

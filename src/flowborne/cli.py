@@ -475,7 +475,7 @@ def _overrides(settings: list[str]) -> dict[str, str]:
         if not equals or not key.strip():
             raise InputError(f"--set {setting} has no KEY=VALUE; write for example fluid.density=1")
         key, value = key.strip(), value.strip()
-        if key in FILE_KEYS and Path(value).exists():
+        if key in FILE_KEYS and os.path.exists(value):  # False for what is no path, too
             value = str(Path(value).absolute())
         overrides[key] = value
     return overrides

@@ -11,7 +11,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from flowborne.solids.dynamics import ACTIVE, OFF, PUSHED_UP, SolidSystem, assemble, kinematics
+from flowborne.solids.dynamics import (
+    ACTIVE,
+    FRICTION,
+    OFF,
+    PUSHED_UP,
+    UNDAMPED,
+    Rows,
+    SolidSystem,
+    assemble,
+    kinematics,
+)
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum, kinetic_energy, momentum, potential_energy
 from flowborne.solids.state import SolidState
@@ -301,3 +311,22 @@ def test_threads_with_different_steps_do_not_disturb_each_other() -> None:
     for (A, r), (B, s) in zip(alone, together, strict=True):
         np.testing.assert_array_equal(A, B)
         np.testing.assert_array_equal(r, s)
+
+
+def test_dry_friction_is_found_where_newton_jumps_over_it() -> None:
+    """A row that sticks within 1e-4 of rest, with a push of a tenth of its friction: full steps of
+    Newton's method and half ones go back and forth between both directions of slip."""
+    rows = Rows(
+        np.ones((1, 1)), np.array([1e4]), np.zeros(1), np.ones(1), np.array([FRICTION]), -np.ones(1)
+    )
+    A, push, still = np.ones((1, 1)), np.array([0.1]), np.zeros(1)
+    slipping = push + rows.friction
+    system = SolidSystem(
+        A, slipping, 1.0, still, (A, push), rows, np.array([PUSHED_UP]), None, still, still
+    )
+    v = slipping
+    while (changed := system.updated(v)) is not None:
+        system = changed
+        v = np.linalg.solve(system.A, system.impulse)
+        assert system.turns <= UNDAMPED + 2
+    assert v == pytest.approx(0.1 / (1.0 + 1e4))

@@ -47,12 +47,30 @@ def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDA
             raise ValueError(f"{path} is cut or no archive of arrays ({_said(error)})") from error
 
 
+IN_EVERY_STATE = (
+    "q",
+    "v",
+    "geom_position",
+    "geom_rotation",
+    "body_position",
+    "body_rotation",
+    "fluid_centre",
+    "fluid_force",
+)
+"""Arrays of a state, whatever the scene has."""
+
+
 def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
-    """Arrays of a file of states/; raises RunFolderError when it is missing or cut."""
+    """Arrays of a file of states/, all unless names are given; raises RunFolderError when it is
+    missing or cut, or has not what every state has."""
     try:
-        return read_arrays(path, names)
+        arrays = read_arrays(path, names)
     except (OSError, ValueError) as error:
         raise _without(path, error) from error
+    lacking = [name for name in IN_EVERY_STATE if name not in arrays and names is None]
+    if lacking:
+        raise _without(path, ValueError(f"it lacks {', '.join(lacking)}"))
+    return arrays
 
 
 def check_states(folder: RunFolder, frame: int) -> None:

@@ -58,5 +58,6 @@ def open_budget(history: Path) -> str | None:
         return None
     return (
         f"momentum was lost or made: {column} is {error:.2g} in frame {frame:.0f}, and some 1e-13 "
-        "in a sound run; take more steps per frame"
+        "in a sound run; take more steps per frame, or enlarge [domain] if a body reaches "
+        "through a side of it then"
     )

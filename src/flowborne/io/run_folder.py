@@ -213,9 +213,11 @@ class RunFolder:
             return read_toml(self.scene)
 
     def model_files(self) -> list[str]:
-        """Names of the files that this run has copied beside its scene, none outside the folder."""
+        """Names of the files that this run has copied beside its scene, none outside the folder
+        and none that no file can have."""
         copied = self.read_summary().get("model_files", []) if self.is_run() else []
-        paths = [Path(str(name)) for name in copied] if isinstance(copied, list) else []
+        names = [str(name) for name in copied] if isinstance(copied, list) else []
+        paths = [Path(name) for name in names if "\0" not in name]
         return [str(path) for path in paths if not path.is_absolute() and ".." not in path.parts]
 
     def remove(self) -> None:

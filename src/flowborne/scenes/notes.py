@@ -14,6 +14,7 @@ from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
 from flowborne.scenes.wording import listed
+from flowborne.solids.joined import joined_pairs
 from flowborne.solids.mending import mended_meshes
 from flowborne.solids.model import SolidModel
 
@@ -25,6 +26,11 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
         yield left_out
     if mended := mended_meshes(model.mj):
         yield f"[solids]: open meshes: {mended}"
+    if joined := joined_pairs(model.mj):
+        yield (
+            "[solids]: no contact between fixed bodies and those jointed to them that they overlap "
+            f"at rest: {listed(joined)}"
+        )
     yield from _moved_into_range(scene, model)
     yield from clip_notes(scene)
     yield from _standing_still(scene)

@@ -53,8 +53,8 @@ class Domain(Table):
             raise ValueError(
                 "mixes two ways of saying where it is. Give lower and upper, or size (and origin)"
             )
-        origin = [0.0] * len(size) if origin is None else origin
         try:
+            origin = [0.0] * len(size) if origin is None else origin
             upper = [float(a) + float(b) for a, b in zip(origin, size, strict=True)]
         except (TypeError, ValueError):
             raise ValueError(

@@ -23,6 +23,9 @@ OFF, ACTIVE, PUSHED_UP, PUSHED_DOWN = 0, 1, 2, 3
 """State of a constraint row, numbered as mjtConstraintState: no force, a force linear in the
 acceleration, or the whole of the dry friction along or against the row's direction."""
 
+FRICTION_SIGN = np.array([0.0, 0.0, 1.0, -1.0])
+"""Of the dry friction in each zone."""
+
 TWO_SIDED, FRICTION, ONE_SIDED = 0, 1, 2
 """Kinds of rows: equalities; dry friction; limits and the edges of contact pyramids."""
 
@@ -36,7 +39,10 @@ SETTLED = 1e-13
 """Forces of Coriolis are found to this share of the momentum."""
 
 UNDAMPED = 8
-"""Turns after which contacts are searched for in half steps."""
+"""Turns of Newton's method for the contacts after which it searches along its direction."""
+
+HALVINGS = 40
+"""Of the interval in which such a search looks for the least of a convex function."""
 
 AT_REST = 1e-12
 """What is slower than this is at rest, m/s and rad/s."""
@@ -134,12 +140,17 @@ class Rows:
         active = self.contact[zones == ACTIVE]
         return int(np.unique(active[active >= 0]).size)
 
+    def force(self, acceleration: Array, zones: Zones) -> Array:
+        """(k,) force along each row's direction at an acceleration (nv,), if in these zones."""
+        spring = self.D * (self.aref - self.J @ acceleration)
+        return np.where(zones == ACTIVE, spring, FRICTION_SIGN[zones] * self.friction)
+
     def acting(self, zones: Zones) -> tuple[Array, Array, Array]:
         """J and D of the active rows, and the force (nv,) of all rows at no acceleration."""
         on = zones == ACTIVE
         J, D = self.J[on], self.D[on]
-        push = np.where(zones == PUSHED_UP, 1.0, np.where(zones == PUSHED_DOWN, -1.0, 0.0))
-        return J, D, J.T @ (D * self.aref[on]) + self.J.T @ (push * self.friction)
+        slipping = FRICTION_SIGN[zones] * self.friction
+        return J, D, J.T @ (D * self.aref[on]) + self.J.T @ slipping
 
 
 @dataclass(frozen=True)
@@ -178,15 +189,15 @@ class SolidSystem:
 
         None when it has them. The repeated solve is Newton's method on a piecewise quadratic
         function, and a fixed point for the forces of Coriolis. It ends after few turns as a rule;
-        when it has not, contacts are those half-way from where they were found before, so that it
-        does not go in circles. The caller bounds the number of turns.
+        when it has not, contacts are those where the function is least on the way from where they
+        were found before, so that it does not go in circles. The caller bounds the number of turns.
         """
         zones, own, at, settled = self.zones, self.own, v_plus, True
         if self.rows is not None:
             zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
             settled = np.array_equal(zones, self.zones)
             if not settled and self.turns >= UNDAMPED:
-                at = 0.5 * (self.at + v_plus)
+                at = self._least_towards(v_plus, self.rows)
                 zones = self.rows.zones((at - self.v) / self.dt, self.zones)
         if self.halfway is not None:
             own, rounding = self.halfway.impulse(v_plus)
@@ -197,6 +208,25 @@ class SolidSystem:
         A, impulse = self.smooth
         system = self._with(zones, A, impulse + own - self.own)
         return replace(system, own=own, at=at, turns=self.turns + 1)
+
+    def _least_towards(self, v_plus: Array, rows: Rows) -> Array:
+        """(nv,) velocity of least cost between `at` and the solution `v_plus` for its zones.
+
+        The cost is the one whose gradient is A v+ - impulse with the rows' forces as they are at
+        v+. A lacks the fluid's mass, with which the least would lie nearer to `v_plus`.
+        """
+        along = v_plus - self.at
+        curvature, pull = along @ self.A @ along, self.dt * (rows.J @ along)
+        low, high = 0.0, 1.0
+        for _ in range(HALVINGS):
+            share = 0.5 * (low + high)
+            a = (self.at + share * along - self.v) / self.dt
+            more = rows.force(a, rows.zones(a, self.zones)) - rows.force(a, self.zones)
+            if (share - 1.0) * curvature < pull @ more:
+                low = share
+            else:
+                high = share
+        return self.at + high * along
 
     def pushed(self, force: Array) -> SolidSystem:
         """System with an additional generalised force (nv,)."""

@@ -23,6 +23,7 @@ from flowborne.solids.geoms import (
     kind_of,
     rest_poses,
 )
+from flowborne.solids.joined import exclude_joined
 from flowborne.solids.mending import mend_meshes
 from flowborne.solids.model_files import ModelFiles, gathered, parsed
 from flowborne.solids.model_numbers import impossible, misgiven
@@ -116,7 +117,7 @@ def bones_of(
         mended = mend_meshes(spec, mj, displacing_geoms(mj), given.hulls)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
-    if mended:
+    if exclude_joined(spec, mj) or mended:
         mj = _compiled(spec, where)
     if slab:
         _set_slab_inertias(spec, mj)

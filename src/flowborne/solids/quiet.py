@@ -7,14 +7,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import mujoco
+import numpy as np
 
 STDERR = 2
 
 
 def compiled_quietly(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The model of a spec. Raises ValueError for a bad one; what Qhull says of it is left out."""
+    """The model of a spec, its colours between 0 and 1. Raises ValueError for a bad one; what Qhull
+    says of it is left out."""
     with _nothing_on_stderr():
-        return spec.compile()
+        mj = spec.compile()
+    for colours in (mj.geom_rgba, mj.mat_rgba, mj.skin_rgba):
+        np.clip(np.nan_to_num(colours), 0.0, 1.0, out=colours)
+    return mj
 
 
 @contextmanager
