@@ -12,27 +12,17 @@ from flowborne.scenes.schema import Scene
 from flowborne.solids.geoms import floors
 from flowborne.solids.model import SolidModel
 
-DEEPEST = 0.01
-"""Part of a cell to which a body on a floor may sink more than the file asks for."""
-
 
 def with_steps(scene: Scene) -> Scene:
     """The scene with so many steps a frame that contact with a floor is stiff, or those it gives.
 
-    A contact of MuJoCo is a critically damped spring with the time constant T of `solref`, and a
-    step of more than half of that softens it (`refsafe`): of a humanoid on one step of 42 ms the
-    feet rest 12 mm deep, on five 0.8 mm. Where `solref` is a stiffness, the file's timestep counts.
-    A body rests at most g T^2 / 9 deep with the usual impedance of 0.9, and the grid does not see
-    what is a small part of a cell: a fly with T = 0.2 ms on cells of 26 mm needs 5 steps a frame
-    and not 334.
+    A contact of MuJoCo is a critically damped spring with the time constant of `solref`, and a step
+    of more than half of that softens it (`refsafe`): of a humanoid on one step of 42 ms the feet
+    rest 12 mm deep, on five 0.8 mm. Where `solref` is a stiffness, the file's timestep counts.
     """
     if "steps_per_frame" in scene.time.model_fields_set or scene.model_path is None:
         return scene
     longest = longest_step(load_model(scene))
-    weight = math.hypot(*scene.gravity)
-    if scene.domain is not None and weight > 0.0:
-        constant = math.sqrt(9.0 * DEEPEST * scene.domain.spacing() / weight)
-        longest = max(longest, 0.5 * constant)
     steps = max(1, math.ceil(scene.frame_time / longest * (1.0 - 1e-9)))
     if steps == scene.time.steps_per_frame:
         return scene
