@@ -47,22 +47,13 @@ def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDA
             raise ValueError(f"{path} is cut or no archive of arrays ({_said(error)})") from error
 
 
-IN_EVERY_STATE = (
-    "q",
-    "v",
-    "geom_position",
-    "geom_rotation",
-    "body_position",
-    "body_rotation",
-    "fluid_centre",
-    "fluid_force",
-)
-"""Arrays of a state, whatever the scene has."""
+IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
+"""Arrays of a state that are drawn, whatever the scene has."""
 
 
 def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
     """Arrays of a file of states/, all unless names are given; raises RunFolderError when it is
-    missing or cut, or has not what every state has."""
+    missing or cut, or has not what is drawn of every state."""
     try:
         arrays = read_arrays(path, names)
     except (OSError, ValueError) as error:
