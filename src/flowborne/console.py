@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from flowborne.errors import place_of, said_by
+from flowborne.errors import described
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import Setup
@@ -74,8 +74,7 @@ def check_lines(scene: Scene, setup: Setup, warnings: list[str]) -> str:
 
 def fault_of(error: Exception) -> str:
     """An error that nothing should end with, for a person."""
-    where = f"{said_by(error)}, in {place_of(error)}"
-    return f"a fault of flowborne ({where}); please report it with flowborne --debug"
+    return f"a fault of flowborne ({described(error)}); please report it with flowborne --debug"
 
 
 def sentence_of(error: Exception) -> str:

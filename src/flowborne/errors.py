@@ -63,9 +63,9 @@ class PartError(ValueError):
         return cls(f"{part} failed in {_line(at)} ({said_by(error)}): mend it there")
 
 
-def place_of(error: BaseException) -> str:
-    """File and line in which an error was raised."""
-    return _line(traceback.extract_tb(error.__traceback__)[-1])
+def described(error: BaseException) -> str:
+    """Type and text of an error, and the file and line in which it was raised."""
+    return f"{said_by(error)}, in {_line(traceback.extract_tb(error.__traceback__)[-1])}"
 
 
 def _line(call: traceback.FrameSummary) -> str:

@@ -15,16 +15,9 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from flowborne.coupling.named import BodyState, JointState, Named
-from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.world import Setup, World
-from flowborne.errors import (
-    BreakdownError,
-    PartError,
-    SceneError,
-    WorkerError,
-    place_of,
-    said_by,
-)
+from flowborne.errors import PartError, SceneError, described
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
@@ -45,10 +38,6 @@ TORN = 0.02
 
 LISTED = 4
 """Most dofs that a message names."""
-
-
-BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
-"""Errors with which a step may end; their text says what happened."""
 
 
 class BlowUpError(Exception):
@@ -266,8 +255,7 @@ class Simulation:
         except BREAKDOWNS as error:
             raise BlowUpError(frame, number, str(error)) from error
         except ValueError as error:
-            cause = f"{said_by(error)}, in {place_of(error)}"
-            raise BlowUpError(frame, number, cause, fault=True) from error
+            raise BlowUpError(frame, number, described(error), fault=True) from error
         except MemoryError as error:
             cause = f"the memory is full ({error})" if str(error) else "the memory is full"
             raise BlowUpError(frame, number, cause) from error

@@ -27,18 +27,15 @@ from flowborne.control.plan import Horizon, PlanCourse
 from flowborne.control.rules import FixedStep, Rule
 from flowborne.control.trial import Hypothesis, PoseCourse, without_scalars
 from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.report import StepReport
+from flowborne.coupling.report import BREAKDOWNS, StepReport
 from flowborne.coupling.servo import Servo, ServoExact
-from flowborne.errors import BreakdownError, PartError, WorkerError
+from flowborne.errors import PartError
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-OF_TRIALS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, WorkerError, MemoryError
-"""What a trial may end with, whoever asked for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,4 +396,4 @@ def _wrong(kind: str, part: object, given: object, asked: str, shape: tuple[int,
 def _guarding(kind: str, part: object) -> AbstractContextManager[None]:
     """Context in which a rule or gradient fails as a part; what trials raise is no fault of it."""
     name = f"{kind} {type(part).__name__}"
-    return PartError.guarding(name, *OF_TRIALS)
+    return PartError.guarding(name, *BREAKDOWNS, MemoryError)

@@ -8,7 +8,12 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.errors import BreakdownError, PartError, WorkerError
+
 Array = NDArray[np.float64]
+
+BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
+"""Errors with which a step may end; their text says what happened."""
 
 
 class Outcome(Enum):

@@ -58,7 +58,7 @@ def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDAr
         arrays = read_arrays(path, names)
     except (OSError, ValueError) as error:
         raise _without(path, error) from error
-    lacking = [name for name in IN_EVERY_STATE if name not in arrays and names is None]
+    lacking = [] if names else [name for name in IN_EVERY_STATE if name not in arrays]
     if lacking:
         raise _without(path, ValueError(f"it lacks {', '.join(lacking)}"))
     return arrays

@@ -10,7 +10,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from flowborne.solids.geoms import element_name, floors
+from flowborne.solids.geoms import floors
 
 LEFT_OUT = "overlap at rest: "
 """What stands before the names of two bodies in the name of their <exclude>."""
@@ -20,26 +20,26 @@ TURNING = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
 
 def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
     """Leave out contact between fixed bodies and those that hinges and ball joints hold on them,
-    where they overlap at rest; whether there are any. A body with a floor is as it is."""
+    where they overlap at rest; whether any was left out. Bodies with a floor or without a name are
+    as they are."""
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     mujoco.mj_comPos(mj, data)
     mujoco.mj_collision(mj, data)
-    with_floor = set(mj.geom_bodyid[floors(mj)].tolist())
-    pairs = set[tuple[int, int]]()
-    for contact in data.contact:
-        ends = mj.geom_bodyid[contact.geom].tolist() if contact.dist < 0.0 else []
-        for base, other in (ends, ends[::-1]) if ends else ():
-            fixed = mj.body_weldid[base] == 0 and base not in with_floor
-            if fixed and _hangs_on_the_world(mj, other):
-                pairs.add((base, other))
+    with_floor = mj.geom_bodyid[floors(mj)]
+    overlapping = mj.geom_bodyid[data.contact.geom[data.contact.dist < 0.0]]
+    pairs = {(base, other) for ends in overlapping.tolist() for base, other in (ends, ends[::-1])}
+    excluded = False
     for base, other in sorted(pairs):
-        names = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, body) for body in (base, other)]
-        if all(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name) >= 0 for name in names):
+        if mj.body_weldid[base] or base in with_floor or not _hangs_on_the_world(mj, other):
+            continue
+        names = [mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_BODY, body) for body in (base, other)]
+        if all(names):
             spec.add_exclude(
                 name=LEFT_OUT + " and ".join(names), bodyname1=names[0], bodyname2=names[1]
             )
-    return bool(pairs)
+            excluded = True
+    return excluded
 
 
 def _hangs_on_the_world(mj: mujoco.MjModel, body: int) -> bool:
@@ -51,7 +51,7 @@ def _hangs_on_the_world(mj: mujoco.MjModel, body: int) -> bool:
 
 
 def joined_pairs(mj: mujoco.MjModel) -> list[str]:
-    """ "base and body" of the pairs whose contact was left out."""
+    """Both names of the pairs whose contact was left out, joined by "and"."""
     names = [
         mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_EXCLUDE, number) for number in range(mj.nexclude)
     ]
