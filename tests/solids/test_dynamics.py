@@ -31,7 +31,8 @@ SPRINGS = """<mujoco><worldbody><body><joint axis="0 1 0" damping=".3"/>
 <body pos="1 0 0"><joint name="b" axis="0 1 .2" stiffness="5" springref="20" armature=".1"/>
 <geom type="box" size=".3 .1 .1" pos=".3 0 0"/><body pos=".6 0 0"><joint name="c" axis="0 0 1"/>
 <geom type="box" size=".3 .1 .1" pos=".3 0 0"/></body></body></body></worldbody>
-<tendon><fixed stiffness="30" damping="2"><joint joint="b" coef="1"/><joint joint="c" coef="-.5"/>
+<tendon><fixed><joint joint="c" coef="1"/></fixed>
+<fixed stiffness="30" damping="2"><joint joint="b" coef="1"/><joint joint="c" coef="-.5"/>
 </fixed></tendon></mujoco>"""
 
 CROWD = """<mujoco><worldbody><geom type="plane" size="5 5 .1" pos="0 0 -.6"/>

@@ -31,7 +31,8 @@ ARM = """<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbod
 stiffness="3"/><geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/>
 <body name="lower" pos=".2 0 0"><joint name="elbow" axis="0 1 .3" armature=".01"/>
 <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02"/></body></body></worldbody>
-<tendon><fixed stiffness="2" damping=".3" springlength=".01"><joint joint="shoulder" coef="1"/>
+<tendon><fixed><joint joint="elbow" coef="1"/></fixed>
+<fixed stiffness="2" damping=".3" springlength=".01"><joint joint="shoulder" coef="1"/>
 <joint joint="elbow" coef="-.5"/></fixed></tendon></mujoco>"""
 
 

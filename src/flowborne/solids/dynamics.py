@@ -315,11 +315,11 @@ def _smooth(model: SolidModel, s: Scratch, mass: Array) -> tuple[Array, Array]:
         return mass, s.smooth.copy()
     A = mass.copy()
     A.flat[:: model.nv + 1] += centred(data.efm_diag, data.efm_ck, s.dt)
-    for t in data.efm_tid[: data.nefmT]:
+    for n, t in enumerate(data.efm_tid[: data.nefmT]):
         first, count = s.mj.ten_J_rowadr[t], s.mj.ten_J_rownnz[t]
         row = np.zeros(model.nv)
         row[s.mj.ten_J_colind[first : first + count]] = data.ten_J[first : first + count]
-        A += centred(data.efm_ts[t], data.efm_tk[t], s.dt) * np.outer(row, row)
+        A += centred(data.efm_ts[n], data.efm_tk[n], s.dt) * np.outer(row, row)
     return A, s.smooth.copy()
 
 

@@ -157,12 +157,14 @@ def sparse_mass(model: SolidModel, s: Scratch) -> csr_array:
 def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float) -> csr_array:
     """What `part` makes of MuJoCo's dt D + dt^2 K and dt K of joints and tendons."""
     data = s.data
-    tendons = _tendons(s, part(data.efm_ts, data.efm_tk, dt), data.efm_tid[: data.nefmT])
+    active = slice(data.nefmT)
+    strength = part(data.efm_ts[active], data.efm_tk[active], dt)
+    tendons = _tendons(s, strength, data.efm_tid[active])
     return csr_array(tendons + _diagonal(part(data.efm_diag, data.efm_ck, dt)))
 
 
 def _tendons(s: Scratch, strength: Array, active: NDArray[np.int32]) -> csr_array:
-    """Sum of strength J^T J over tendons."""
+    """Sum of strength J^T J over active tendons; `strength` is theirs alone."""
     mj, data = s.mj, s.data
     if active.size == 0:
         return csr_array((mj.nv, mj.nv))
@@ -170,7 +172,7 @@ def _tendons(s: Scratch, strength: Array, active: NDArray[np.int32]) -> csr_arra
         (data.ten_J.copy(), mj.ten_J_colind, _starts(mj.ten_J_rownnz)), (mj.ntendon, mj.nv)
     )
     chosen = J[active]
-    return csr_array(chosen.T @ _diagonal(strength[active]) @ chosen)
+    return csr_array(chosen.T @ _diagonal(strength) @ chosen)
 
 
 def _diagonal(values: Array) -> dia_array:

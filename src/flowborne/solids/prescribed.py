@@ -121,7 +121,7 @@ def symmetric_inverse(matrix: Array) -> Array:
     if fault:
         raise BreakdownError(
             f"the solid's matrix is not positive definite at free dof {fault - 1}. "
-            "Give the body there mass and inertia, or its joint some armature."
+            "Give the body there mass and inertia, or its joint some armature"
         )
     inverse = lower + lower.T  # dpotrf has cleared the upper triangle
     inverse.flat[:: len(inverse) + 1] *= 0.5
