@@ -29,8 +29,9 @@ def write_atomically(
              as it was
     """
     partial = path.with_name(partial_name(path.name))
+    partial.unlink(missing_ok=True)  # of a run that was killed; or a link, or a pipe
     try:
-        with open(partial, "wb") as file:
+        with open(partial, "xb") as file:
             write(file)
             if durable:
                 file.flush()

@@ -149,6 +149,7 @@ def film_file(
     rate  of the film, 1/s
     """
     partial = path.with_name(partial_name(path.name))
+    partial.unlink(missing_ok=True)
     codec, pixels, options = CODING[path.suffix.lower()]
     writer = imageio_ffmpeg.write_frames(
         str(partial),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -18,6 +19,7 @@ from flowborne.scenes.flesh.distance import signed_distance
 from flowborne.scenes.flesh.mesher import tetrahedra_within
 from flowborne.scenes.flesh.surface_file import check_covers, place, read_surface
 from flowborne.scenes.flesh.symmetry import Chamber, chamber_of
+from flowborne.scenes.wording import rounded_up
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import with_middles
 from flowborne.solids.flesh import outer_surface
@@ -52,8 +54,9 @@ TRIES = 8
 FILLING = 6.0 * np.sqrt(2.0)
 """Regular tetrahedra that a cube of their edges has room for."""
 
-MOST_ELEMENTS = 3_000_000
-"""Most elements that the box of a creature may have room for: the mesher takes hours for them."""
+MOST_ELEMENTS = 300_000
+"""Most elements that the mesher's box may have room for: two balls of 0.6 m, 320 m apart, with
+edges of 0.25 m (208,000) take 70 s and 1.3 GB, and a skin of the built-in creatures has 2,000."""
 
 
 @dataclass(frozen=True)
@@ -113,13 +116,18 @@ def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: fl
 
 
 def _check_elements(extent: Array, size: float) -> None:
-    """Raise ValueError where a box of this extent, m, has room for too many elements."""
-    most = float((FILLING / MOST_ELEMENTS * extent.prod()) ** (1.0 / 3.0))
+    """Raise ValueError where the mesher's box has room for too many elements.
+
+    That box is one edge farther out on every side than flesh that reaches over `extent` m.
+    """
+    # FILLING * prod(extent + 2 s) elements of volume s^3: as many as allowed at the largest root
+    beside = 8.0 * FILLING * Polynomial.fromroots(-0.5 * extent)
+    most = (beside - Polynomial([0.0, 0.0, 0.0, MOST_ELEMENTS])).roots().real.max()
     if size < most:
         raise ValueError(
             f"flesh that reaches over {extent.max():.3g} m would have more than "
-            f"{MOST_ELEMENTS:,} elements with edges of {size:g} m. Make the size {most:.2g} m at "
-            "least, or the flesh smaller."
+            f"{MOST_ELEMENTS:,} elements with edges of {size:g} m. Make the size "
+            f"{rounded_up(most)} m at least, or the flesh smaller."
         )
 
 
