@@ -27,7 +27,7 @@ import mujoco
 import numpy as np
 import tomli_w
 
-from flowborne.solids.mjcf import compiled
+from flowborne.solids.mjcf import Given, compiled
 from markdown_text import plain, table
 from marked import with_part
 
@@ -61,8 +61,9 @@ LONGEST = 300
 ANSWERS = {
     'mend = "hull"': {"solids.mend": "hull"},
     "enlarge the domain": {"domain": "around the world's geoms too"},
+    "enlarge [domain]": {"room": "twice as much"},
 }
-"""What a refusal may propose -> what is then tried."""
+"""What a message may propose -> what is then tried."""
 
 
 class Stranger(NamedTuple):
@@ -148,8 +149,9 @@ def scene_of(path: Path, edits: dict[str, Any]) -> dict[str, Any]:
     """The scene that a newcomer would write: water around the creature, and its model."""
     low, high = np.zeros(3), np.ones(3)
     with contextlib.suppress(ValueError):
-        low, high = extent(compiled(path, False, (0.0, 0.0, 0.0)), "domain" in edits)
-    margin = MARGIN * float((high - low).max())
+        given = Given(hulls="solids.mend" in edits)
+        low, high = extent(compiled(path, False, (0.0, 0.0, 0.0), given), "domain" in edits)
+    margin = MARGIN * float((high - low).max()) * (2.0 if "room" in edits else 1.0)
     return {
         "gravity": [0.0, 0.0, -9.81],
         "time": {"frames_per_second": 30.0, "frames": FRAMES},
@@ -160,7 +162,7 @@ def scene_of(path: Path, edits: dict[str, Any]) -> dict[str, Any]:
         },
         "fluid": {"density": 1000.0, "viscosity": 1e-3},
         "solids": {"model": str(path)}
-        | {key.removeprefix("solids."): edits[key] for key in edits if key != "domain"},
+        | {key.removeprefix("solids."): edits[key] for key in edits if key.startswith("solids.")},
     }
 
 
@@ -188,22 +190,20 @@ def tried(path: Path, name: str, folder: Path) -> Stranger:
         scene.write_text(tomli_w.dumps(scene_of(path, edits)), "utf-8")
         began = perf_counter()
         out, refused = said("check", str(scene))
-        checked = perf_counter() - began
-        answer = next((keys for text, keys in ANSWERS.items() if text in refused), {})
-        if not answer.keys() - edits.keys():
+        checked, ran, began = perf_counter() - began, "", perf_counter()
+        if not refused:
+            _, ran = said("run", str(scene), "--out", str(folder / "run"), "--replace")
+            if not ran and not (folder / "run" / "preview.png").is_file():
+                ran = "no picture"
+        seconds = checked, 0.0 if refused else perf_counter() - began
+        proposed = [keys for text, keys in ANSWERS.items() if text in (refused or ran)]
+        answer = next((keys for keys in proposed if keys.keys() - edits.keys()), {})
+        if not answer:
             break
         edits |= answer
     found = re.search(r"^(\d+) warning", out, re.M)
-    stranger = Stranger(
-        name, refusal, refused, tuple(edits), int(found[1]) if found else 0, "", (checked, 0.0)
-    )
-    if refused:
-        return stranger
-    began = perf_counter()
-    _, ran = said("run", str(scene), "--out", str(folder / "run"))
-    if not ran and not (folder / "run" / "preview.png").is_file():
-        ran = "no picture"
-    return stranger._replace(ran=ran, seconds=(checked, perf_counter() - began))
+    warnings = int(found[1]) if found else 0
+    return Stranger(name, refusal, refused, tuple(edits), warnings, ran, seconds)
 
 
 def mujoco_refusal(path: Path) -> str:

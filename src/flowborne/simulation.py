@@ -220,7 +220,7 @@ class Simulation:
                 start(world, self.frame_time / self.steps_per_frame, given, held)
         except PartError as error:
             raise SceneError(f"scene {scene.name}: {error}") from error
-        except (ArithmeticError, ValueError) as error:
+        except BREAKDOWNS as error:
             raise SceneError(
                 f"scene {scene.name}, [initial]: {error}. Look for bodies that are in each other "
                 "or in a side of the domain, and for velocities that are too large."

@@ -57,7 +57,12 @@ ONE_FAULT = {
     "a body outside the domain": (
         {"lower = [-1.0, -1.0]": "lower = [-1.0, -0.5]", "resolution = 16": "cells = [16, 12]"},
         "scene swim.toml, [domain]: body 'hand' reaches from -0.6 to -0.4 m in y at the start, "
-        "outside the domain from -0.5 to 1 m. Move the body or enlarge the domain.",
+        "outside the domain from -0.5 to 1 m. The creature takes -0.6 to 0.6 m in x and -0.6 to "
+        "0.6 m in y. Move it or enlarge the domain.",
+    ),
+    "a creature outside the domain": (
+        {"lower = [-1.0, -1.0]": "lower = [1.0, -1.0]", "upper = [1.0, 1.0]": "upper = [3.0, 1.0]"},
+        "at the start, outside the domain from 1 to 3 m, and so do 3 more bodies. The creature ",
     ),
     "an infinite velocity": (
         {"velocity = [1.0, 0.0]": "velocity = [inf, 0.0]"},

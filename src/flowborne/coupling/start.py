@@ -32,7 +32,7 @@ def start(
     dt       s, of the steps to come
     given    as in `set_going`
     command  to joints without a trajectory
-    raises   ValueError when the flow cannot be solved for, or the half step fails
+    raises   BreakdownError when the flow cannot be solved for, or the half step fails
     """
     setup, time, half = world.setup, world.time, 0.5 * dt
     if world.fluid is not None:

@@ -257,22 +257,25 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
     yield from check_flesh_places(draft, model, start)
     low, high = geom_boxes(model, start.q)
     axes = min(len(domain.lower), scene.dimensions)
-    outside: set[int] = set()
-    for geom in range(model.ngeom):
-        body = int(model.geom_body[geom])
-        if not model.moving[body] or body in outside or not np.isfinite(low[geom]).all():
-            continue
-        for axis in range(axes):
-            first, last = domain.lower[axis], domain.upper[axis]
-            if low[geom, axis] < first or high[geom, axis] > last:
-                outside.add(body)
-                how = "Move the body" if scene.clip is None else PLACED
-                yield (
-                    f"{draft.at('domain')}: body '{model.body_names[body]}' reaches from "
-                    f"{low[geom, axis]:g} to {high[geom, axis]:g} m in {'xyz'[axis]} at the start, "
-                    f"outside the domain from {first:g} to {last:g} m. {how} or enlarge the domain."
-                )
-                break
+    moving = model.moving[model.geom_body] & np.isfinite(low).all(axis=1)
+    outside = (low[:, :axes] < domain.lower[:axes]) | (high[:, :axes] > domain.upper[:axes])
+    outside &= moving[:, None]
+    if not outside.any():
+        return
+    geom, axis = np.argwhere(outside)[0]
+    bodies = np.unique(model.geom_body[outside.any(axis=1)])
+    more = f", and so do {bodies.size - 1} more bodies" if bodies.size > 1 else ""
+    creature = " and ".join(
+        f"{low[moving, k].min():.4g} to {high[moving, k].max():.4g} m in {'xyz'[k]}"
+        for k in range(axes)
+    )
+    how = "Move it" if scene.clip is None else PLACED
+    yield (
+        f"{draft.at('domain')}: body '{model.body_names[model.geom_body[geom]]}' reaches from "
+        f"{low[geom, axis]:g} to {high[geom, axis]:g} m in {'xyz'[axis]} at the start, outside the "
+        f"domain from {domain.lower[axis]:g} to {domain.upper[axis]:g} m{more}. The creature takes "
+        f"{creature}. {how} or enlarge the domain."
+    )
 
 
 def geom_boxes(model: SolidModel, q: Array) -> tuple[Array, Array]:
