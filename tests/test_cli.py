@@ -8,10 +8,10 @@ from types import ModuleType
 import pytest
 
 from flowborne import cli
-from flowborne.io.bvh import write_clip
+from flowborne.motion.bvh import write_clip
+from flowborne.motion.human.gait import gait_clip
+from flowborne.motion.human.standard import standard_skeleton
 from flowborne.progress import ProgressDisplay, RunProgress
-from flowborne.scenes.human.gait import gait_clip
-from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import scene_names
 
 
@@ -162,7 +162,7 @@ def test_a_faulty_scene_is_refused_by_name_and_place(command, small_scene, old, 
 def test_a_disc_without_room_is_found_before_the_run(command, small_scene, monkeypatch, tmp_path):
     from collections import namedtuple
 
-    from flowborne.io import run_folder
+    from flowborne.runs import run_folder
 
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(run_folder.shutil, "disk_usage", lambda path: usage(10**9, 10**9, 10**6))

@@ -14,11 +14,11 @@ import flowborne
 from flowborne import cli, running
 from flowborne.control.executors import Processes
 from flowborne.errors import WorkerError
-from flowborne.io.run_folder import LOCK_NAME, RunFolder, RunFolderError
 from flowborne.running import RunInterrupted, RunOutcome
+from flowborne.runs.run_folder import LOCK_NAME, RunFolder, RunFolderError
 from flowborne.simulation import BlowUpError, Simulation
 
-from .runs import numbers, run, start, summary_of, wait_for_rows
+from .made_runs import numbers, run, start, summary_of, wait_for_rows
 
 FRAMES = 12
 

@@ -10,8 +10,8 @@ import pytest
 
 import flowborne as fb
 from flowborne.cli import main
-from flowborne.io.exporters import EXPORTERS, FORMATS, can_write
-from flowborne.io.run_folder import RunFolder
+from flowborne.runs.exporters import EXPORTERS, FORMATS, can_write
+from flowborne.runs.run_folder import RunFolder
 
 OURS = f"flowborne.formats.{FORMATS['.csv']}"
 """Module of the exporters of tables."""

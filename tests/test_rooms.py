@@ -14,12 +14,15 @@ ROOMS = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
 MODULES = of_modules()
 
 BELOW = {
+    "files": set(),
     "kernels": set(),
     "solvers": {"kernels"},
     "fluid": {"kernels", "solvers"},
     "shapes": {"kernels"},
-    "solids": {"kernels", "solvers", "shapes"},
+    "solids": {"files", "kernels", "solvers", "shapes"},
     "coupling": {"kernels", "solvers", "fluid", "shapes", "solids"},
+    "motion": {"files", "shapes", "solids"},
+    "runs": {"files", "kernels", "fluid", "shapes", "solids", "coupling"},
 }
 """Rooms that each of these may import from, besides itself; single modules are free."""
 

@@ -17,13 +17,13 @@ from numba.core.errors import TypingError
 import flowborne
 from flowborne import running
 from flowborne.errors import SceneError
-from flowborne.io import recorder, run_folder
-from flowborne.io.history import History
-from flowborne.io.run_folder import RunFolder, RunFolderError
 from flowborne.running import RunOutcome
+from flowborne.runs import recorder, run_folder
+from flowborne.runs.history import History
+from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.simulation import Simulation
 
-from .runs import numbers, run, start, summary_of, wait_for_rows
+from .made_runs import numbers, run, start, summary_of, wait_for_rows
 
 FRAMES = 12
 

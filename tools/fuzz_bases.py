@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import trimesh
 
-from flowborne.io.bvh import write_clip
-from flowborne.scenes.human.gait import gait_clip
-from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.motion.bvh import write_clip
+from flowborne.motion.human.gait import gait_clip
+from flowborne.motion.human.standard import standard_skeleton
 from flowborne.scenes.load import library
 from fuzz_changes import OUTSIDE
 

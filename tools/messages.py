@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pyvista as pv
 
-from flowborne.io.run_folder import RunFolder
+from flowborne.runs.run_folder import RunFolder
 from fuzz_bases import ARM, KEYFRAMES, Files, bases
 from fuzz_judge import Said, command
 from marked import with_part

@@ -10,8 +10,8 @@ from docstrings import prose
 from flowborne.control.gradients import GRADIENTS
 from flowborne.control.objectives import OBJECTIVES
 from flowborne.control.rules import RULES
-from flowborne.io.exporters import EXPORTERS, FORMATS
 from flowborne.registry import Registry
+from flowborne.runs.exporters import EXPORTERS, FORMATS
 from flowborne.scenes.load import library, scene_names
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import ControllerTable, ObjectiveTable

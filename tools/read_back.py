@@ -23,8 +23,8 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from flowborne.formats.creature import Creature
-from flowborne.io.bvh import TO_WORLD
-from flowborne.io.bvh_file import load_bvh
+from flowborne.motion.bvh import TO_WORLD
+from flowborne.motion.bvh_file import load_bvh
 
 Array = NDArray[Any]
 

@@ -42,15 +42,15 @@ if TYPE_CHECKING:
     from flowborne.fluid.grid import Array, Faces, Grid
     from flowborne.fluid.state import FluidState
     from flowborne.frame_report import FrameReport
-    from flowborne.io.open_run import OpenRun, open_run
-    from flowborne.io.run_folder import RunFolderError
     from flowborne.running import RunInterrupted, RunResult, run
+    from flowborne.runs.open_run import OpenRun, open_run
+    from flowborne.runs.run_folder import RunFolderError
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.schema import Scene
     from flowborne.simulation import BlowUpError, Simulation
     from flowborne.solids.model import SolidModel
     from flowborne.solids.state import SolidState
-    from flowborne.solids.tissue import Tissue
+    from flowborne.solids.tissue.growth import Tissue
     from flowborne.worlds import advance, make_world
 
 __all__ = [
@@ -151,11 +151,11 @@ _PLACES = {
     "JointState": "flowborne.coupling.named",
     "Measurement": "flowborne.control.measurement",
     "Momentum": "flowborne.coupling.report",
-    "OpenRun": "flowborne.io.open_run",
+    "OpenRun": "flowborne.runs.open_run",
     "Outcome": "flowborne.coupling.report",
     "PartError": "flowborne.errors",
     "Refinement": "flowborne.error_bars",
-    "RunFolderError": "flowborne.io.run_folder",
+    "RunFolderError": "flowborne.runs.run_folder",
     "RunInterrupted": "flowborne.running",
     "RunResult": "flowborne.running",
     "Scene": "flowborne.scenes.schema",
@@ -166,7 +166,7 @@ _PLACES = {
     "SolidState": "flowborne.solids.state",
     "StepReport": "flowborne.coupling.report",
     "StrengthInPhase": "flowborne.control.controller",
-    "Tissue": "flowborne.solids.tissue",
+    "Tissue": "flowborne.solids.tissue.growth",
     "Velocities": "flowborne.control.trial",
     "World": "flowborne.coupling.world",
     "advance": "flowborne.worlds",
@@ -175,7 +175,7 @@ _PLACES = {
     "import_character": "flowborne.characters.folder",
     "load_scene": "flowborne.scenes.load",
     "make_world": "flowborne.worlds",
-    "open_run": "flowborne.io.open_run",
+    "open_run": "flowborne.runs.open_run",
     "run": "flowborne.running",
     "step": "flowborne.coupling.step",
 }

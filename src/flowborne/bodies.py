@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flowborne.scenes.human.body import human_mjcf
-from flowborne.scenes.human.skeleton import SIDES
-from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.motion.human.body import human_mjcf
+from flowborne.motion.human.skeleton import SIDES
+from flowborne.motion.human.standard import standard_skeleton
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.effort import holding
 from flowborne.solids.flesh import Flesh
@@ -19,7 +19,7 @@ from flowborne.solids.momentum import (
     potential_energy,
 )
 from flowborne.solids.state import SolidState
-from flowborne.solids.tissue import Tissue, add_flesh
+from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solvers.cholesky import symmetric_factor
 
 __all__ = [

@@ -31,7 +31,7 @@ from flowborne.console import (
     sentence_of,
 )
 from flowborne.errors import PartError, SceneError
-from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, make_folder
+from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, make_folder
 from flowborne.version import __version__
 
 log = logging.getLogger("flowborne")

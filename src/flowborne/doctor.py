@@ -90,7 +90,7 @@ def findings() -> Iterator[Finding]:
 
 def versions_here() -> str:
     """Versions of what the numbers depend on."""
-    from flowborne.io.summary import versions
+    from flowborne.runs.summary import versions
 
     return ", ".join(f"{name} {number}" for name, number in versions().items())
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from flowborne.errors import SceneError
-from flowborne.io.open_run import OpenRun
 from flowborne.running import RunOutcome, run
+from flowborne.runs.open_run import OpenRun
 from flowborne.scenes.load import load_scene
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ that flowborne brings.
 
 from __future__ import annotations
 
-from flowborne.io.atomic import replaced_whole, write_atomically
-from flowborne.io.exporters import EXPORTERS, Exporter, Written, endings
-from flowborne.io.open_run import OpenRun
-from flowborne.io.state_arrays import StateArray
+from flowborne.files.atomic import replaced_whole, write_atomically
+from flowborne.runs.exporters import EXPORTERS, Exporter, Written, endings
+from flowborne.runs.open_run import OpenRun
+from flowborne.runs.state_arrays import StateArray
 
 __all__ = [
     "Exporter",

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from flowborne.errors import PartError, SceneError
-from flowborne.io.exporters import EXPORTERS, Written, can_write, endings
-from flowborne.io.open_run import OpenRun
-from flowborne.io.run_folder import RunFolder, RunFolderError
+from flowborne.runs.exporters import EXPORTERS, Written, can_write, endings
+from flowborne.runs.open_run import OpenRun
+from flowborne.runs.run_folder import RunFolder, RunFolderError
 
 
 def export(

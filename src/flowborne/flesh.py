@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flowborne.scenes.flesh.grow import grow
-from flowborne.scenes.flesh.mesh import FleshMesh
-from flowborne.scenes.flesh.mesh_file import mesh_bytes, read_mesh
+from flowborne.scenes.build_flesh import grow
 from flowborne.scenes.schema_flesh import FleshTable
+from flowborne.solids.tissue.mesh import FleshMesh
+from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh
 
 __all__ = ["FleshMesh", "FleshTable", "grow", "mesh_bytes", "read_mesh"]

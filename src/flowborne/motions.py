@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flowborne.coupling.motion import JointCommand, Trajectory
 from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
-from flowborne.scenes.tracks import (
+from flowborne.motion.tracks import (
     Curve,
     TrajectoryConstant,
     TrajectoryFormula,

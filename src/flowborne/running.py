@@ -19,15 +19,15 @@ import numpy as np
 from flowborne.coupling.seen import seen_bodies
 from flowborne.errors import PartError, SceneError, WorkerError
 from flowborne.frame_report import PARTS, FrameReport
-from flowborne.io.arrays_file import check_states
-from flowborne.io.checkpoint import load_checkpoint, save_checkpoint, state_bytes
-from flowborne.io.doubts import doubts_of
-from flowborne.io.history import History
-from flowborne.io.recorder import Recorder, write_model
-from flowborne.io.run_folder import RunFolder, RunFolderError, cannot_write, check_space
-from flowborne.io.summary import peak_memory, summarise, versions
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
+from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
+from flowborne.runs.doubts import doubts_of
+from flowborne.runs.history import History
+from flowborne.runs.recorder import Recorder, write_model
+from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, check_space
+from flowborne.runs.states import check_states
+from flowborne.runs.summary import peak_memory, summarise, versions
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
@@ -95,7 +95,7 @@ def run(
     film: bool = True,
     progress: Callable[[RunProgress], None] | None = None,
 ) -> RunResult:
-    """Run a scene and leave behind what is listed in `flowborne.io.run_folder`.
+    """Run a scene and leave behind what is listed in `flowborne.runs.run_folder`.
 
     scene     a Scene, or the name of a built-in one, or the path of a scene file
     out       folder to write

@@ -18,8 +18,8 @@ from flowborne.characters.rig import Z_UP, Action, Rig, Surface
 from flowborne.characters.source import read_source
 from flowborne.colours import to_linear
 from flowborne.formats.creature import Creature
-from flowborne.io.bvh import read_bvh
-from flowborne.io.clip import Clip
+from flowborne.motion.bvh import read_bvh
+from flowborne.motion.clip import Clip
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene

@@ -29,7 +29,7 @@ from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.servo import ServoExact
 from flowborne.coupling.world import World
-from flowborne.scenes.tracks import TrajectoryConstant
+from flowborne.motion.tracks import TrajectoryConstant
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]

@@ -12,9 +12,9 @@ from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling import flow
 from flowborne.coupling.leak_proof import leak_proof_flux
 from flowborne.coupling.mouths import Mouth
+from flowborne.motion.inflow import FactorSteady
 from flowborne.motions import TrajectorySinusoid
 from flowborne.operators import cut_by_bodies
-from flowborne.scenes.inflow import FactorSteady
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
 

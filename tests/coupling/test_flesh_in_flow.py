@@ -18,7 +18,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.inversion import inversion
 from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue import Law, Tissue, add_flesh
+from flowborne.solids.tissue.growth import Law, Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 
 Array = NDArray[np.float64]

@@ -27,10 +27,10 @@ from flowborne.coupling import flow
 from flowborne.coupling.flow import carry_fluid, face_masses, volumes_of
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import move_bodies
+from flowborne.motion.inflow import FactorSteady
 from flowborne.motions import JointCommand, TrajectorySinusoid
 from flowborne.operators import Passage, cut_by_bodies
-from flowborne.scenes.inflow import FactorSteady
-from flowborne.solids.tissue import Law, add_flesh
+from flowborne.solids.tissue.growth import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.validation.worlds import PERIODIC, RING, mjcf
 from flowborne.worlds import make_world, set_velocity

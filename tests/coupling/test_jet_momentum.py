@@ -10,7 +10,7 @@ import pytest
 from flowborne import Array, Grid, World, step
 from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.mouths import Mouth
-from flowborne.scenes.inflow import FactorPulse
+from flowborne.motion.inflow import FactorPulse
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
 

@@ -13,10 +13,10 @@ from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.flow import face_masses, fluid_momentum, volumes_of
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import jets_at
+from flowborne.motion.formula import Formula
+from flowborne.motion.inflow import FactorFormula, FactorSteady
 from flowborne.operators import cut_by_bodies
-from flowborne.scenes.formula import Formula
-from flowborne.scenes.inflow import FactorFormula, FactorSteady
-from flowborne.solids.tissue import Law, add_flesh
+from flowborne.solids.tissue.growth import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import advance, make_world

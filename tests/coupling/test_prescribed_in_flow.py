@@ -13,7 +13,7 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.tracks import Curve, TrajectoryKeyframes, TrajectorySinusoid
+from flowborne.motion.tracks import Curve, TrajectoryKeyframes, TrajectorySinusoid
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
 

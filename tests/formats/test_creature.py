@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import flowborne as fb
-from flowborne.io.exporters import FORMATS
+from flowborne.runs.exporters import FORMATS
 
 ROOM = """
 dimensions = 2

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flowborne.scenes.human.gait import gait_clip
-from flowborne.scenes.human.standard import standard_skeleton
+from flowborne.motion.human.gait import gait_clip
+from flowborne.motion.human.standard import standard_skeleton
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flowborne.io.bvh import TO_WORLD, read_bvh, write_clip
+from flowborne.motion.bvh import TO_WORLD, read_bvh, write_clip
+from flowborne.motion.human.gait import gait_clip
+from flowborne.motion.human.standard import standard_skeleton
 from flowborne.quaternions import product
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.capture import capture_of, followers
-from flowborne.scenes.human.gait import gait_clip
-from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.notes_clip import clip_notes

@@ -20,7 +20,7 @@ from flowborne.scenes.earlier import TIME, earlier_of
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.notes import notes_of
 
-from ..runs import numbers, run
+from ..made_runs import numbers, run
 
 Array = NDArray[np.float64]
 Write = Callable[..., Path]

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from flowborne.motion.formula import Formula
+from flowborne.motion.tracks import TrajectoryFormula
 from flowborne.scenes.build import build
-from flowborne.scenes.formula import Formula
 from flowborne.scenes.load import load_scene
-from flowborne.scenes.tracks import TrajectoryFormula
 from flowborne.simulation import Simulation
 
 THICKNESS, LENGTH, WATER = 0.016, 0.61, 1000.0

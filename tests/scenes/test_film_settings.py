@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from flowborne.errors import SceneError
-from flowborne.io.run_folder import RunFolder
+from flowborne.runs.run_folder import RunFolder
 from flowborne.scenes.film_settings import film_settings
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.view.shot import Shot

@@ -11,13 +11,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
-from flowborne.io.bvh import TO_WORLD, read_bvh, write_clip
+from flowborne.motion.bvh import TO_WORLD, read_bvh, write_clip
+from flowborne.motion.human.gait import gait_clip
+from flowborne.motion.human.standard import standard_skeleton
 from flowborne.quaternions import angle, inverse, product
 from flowborne.running import run
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.capture import capture_of
-from flowborne.scenes.human.gait import gait_clip
-from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.motion_out import export_bvh
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flowborne.io.bvh import TO_WORLD
+from flowborne.motion.bvh import TO_WORLD
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation

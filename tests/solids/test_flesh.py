@@ -18,7 +18,7 @@ from flowborne.solids.inversion import inversion
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState
-from flowborne.solids.tissue import Grown, Law, Tissue, add_flesh
+from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
 from flowborne.validation.flag_in_channel import flag_of, flag_tissue
 from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
 

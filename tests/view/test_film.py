@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flowborne.io.run_folder import RunFolderError
+from flowborne.runs.run_folder import RunFolderError
 from flowborne.view import drawing
 from flowborne.view.drawing import drawn_frames
 from flowborne.view.film import make_preview, write_film, write_shot

@@ -13,12 +13,12 @@ import pytest
 
 from flowborne.cli import main
 from flowborne.coupling.world import Setup, World
-from flowborne.io.history import History
-from flowborne.io.recorder import Recorder, write_model
-from flowborne.io.run_folder import RunFolder
+from flowborne.runs.history import History
+from flowborne.runs.recorder import Recorder, write_model
+from flowborne.runs.run_folder import RunFolder
 from flowborne.solids.flesh import surface_of
 from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue import Tissue, add_flesh
+from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
 from flowborne.view import style
 from flowborne.view.map_slab import MapSlab

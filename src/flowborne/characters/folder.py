@@ -18,8 +18,8 @@ from flowborne.characters.rig import Action, Array, Rig, Surface, printable
 from flowborne.characters.size import scaled, size_notes
 from flowborne.characters.source import clip_number, read_source
 from flowborne.errors import SceneError
-from flowborne.io.bvh import write_clip
-from flowborne.io.clip import Clip
+from flowborne.motion.bvh import write_clip
+from flowborne.motion.clip import Clip
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.warn_speed import steps_for_bodies

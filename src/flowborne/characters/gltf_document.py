@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, mode
 from pydantic.alias_generators import to_camel
 
 from flowborne.errors import SceneError
-from flowborne.given_files import check_file
+from flowborne.files.given import check_file
 
 LARGEST_FILE = 1 << 30
 """Bytes of a file, and of all its buffers together."""

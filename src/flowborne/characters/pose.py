@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.characters.division import Division
 from flowborne.characters.rig import Action, Array, Rig
-from flowborne.io.clip import Clip
+from flowborne.motion.clip import Clip
+from flowborne.motion.clip_loop import CLOSED
 from flowborne.quaternions import angle, inverse, product
-from flowborne.scenes.clip_loop import CLOSED
 
 
 def posed(rig: Rig, source: Rig, action: Action) -> Action:

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.formats.creature import Array, Creature
-from flowborne.io.bvh import write_clip
-from flowborne.io.clip import Clip
-from flowborne.io.exporters import Written, provided
-from flowborne.io.open_run import OpenRun
+from flowborne.motion.bvh import write_clip
+from flowborne.motion.clip import Clip
+from flowborne.runs.exporters import Written, provided
+from flowborne.runs.open_run import OpenRun
 from flowborne.scenes.motion_out import export_bvh
 
 UNIT = 0.01

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
-from flowborne.io.open_run import OpenRun
-from flowborne.io.recorder import on_skin
+from flowborne.runs.open_run import OpenRun
+from flowborne.runs.recorder import on_skin
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import read_scene
 from flowborne.solids.dynamics import kinematics

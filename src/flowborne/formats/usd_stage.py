@@ -25,8 +25,8 @@ from scipy.spatial.transform import Rotation
 from flowborne.colours import to_linear
 from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Surface
 from flowborne.formats.morphs import strongest
-from flowborne.io.open_run import OpenRun
 from flowborne.quaternions import continuous
+from flowborne.runs.open_run import OpenRun
 from flowborne.version import __version__
 
 Array = NDArray[np.float64]

@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
+from flowborne.motion.formula import Formula
+from flowborne.motion.tracks import (
+    Curve,
+    TrajectoryConstant,
+    TrajectoryFormula,
+    TrajectoryKeyframes,
+    TrajectorySinusoid,
+)
 from flowborne.scenes.build_drives import driven, servo_of
 from flowborne.scenes.build_shapes import placed_shapes
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.earlier import earlier_motion
-from flowborne.scenes.formula import Formula
 from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import (
@@ -26,13 +33,6 @@ from flowborne.scenes.schema_solids import (
     MotionTable,
     SolidsTable,
 )
-from flowborne.scenes.tracks import (
-    Curve,
-    TrajectoryConstant,
-    TrajectoryFormula,
-    TrajectoryKeyframes,
-    TrajectorySinusoid,
-)
 from flowborne.solids import mjcf
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
@@ -41,7 +41,7 @@ from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.state import SolidState
-from flowborne.solids.tissue import Grown
+from flowborne.solids.tissue.growth import Grown
 
 Array = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ def packages_of(scene: Scene) -> list[Path]:
 
 def fleshed(scene: Scene) -> tuple[mujoco.MjSpec, list[Grown]]:
     """The model of a scene with its flesh. Raises ValueError when it cannot be made."""
-    from flowborne.scenes.flesh.grow import grow
+    from flowborne.scenes.build_flesh import grow
 
     spec = bones_of(scene)
     return spec, grow(spec, scene.flesh, scene.folder)

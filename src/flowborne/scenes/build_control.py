@@ -42,15 +42,15 @@ from flowborne.control.rules import (
 )
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Trajectory
+from flowborne.motion.clip_motion import TrajectoryPart
+from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
 from flowborne.scenes import schema_control as tables
 from flowborne.scenes.bodies import joint_unit, posed
 from flowborne.scenes.build_drives import servo_of
 from flowborne.scenes.capture import clip_motion
-from flowborne.scenes.clip_motion import TrajectoryPart
 from flowborne.scenes.fields import triple
 from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
 from flowborne.solids.model import SolidModel
 
 Integers = NDArray[np.int64]

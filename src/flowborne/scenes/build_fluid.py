@@ -17,9 +17,7 @@ from flowborne.fluid.boundary import (
     Source,
 )
 from flowborne.fluid.grid import Array, Grid
-from flowborne.scenes.check_fluid import band_axis
-from flowborne.scenes.fields import as_interval, triple
-from flowborne.scenes.inflow import (
+from flowborne.motion.inflow import (
     Bands,
     DyeBandsValue,
     Factor,
@@ -31,6 +29,9 @@ from flowborne.scenes.inflow import (
     Span,
     even_bands,
 )
+from flowborne.motion.tracks import Curve
+from flowborne.scenes.check_fluid import band_axis
+from flowborne.scenes.fields import as_interval, triple
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import (
     BoundarySide,
@@ -43,7 +44,6 @@ from flowborne.scenes.schema_fluid import (
     OpenSide,
     SourceTable,
 )
-from flowborne.scenes.tracks import Curve
 
 DyeValue = Callable[[Array, Array, Array, float], Array]
 

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 
 from flowborne.coupling.mouths import Mouth, Strength
-from flowborne.scenes.formula import Formula
-from flowborne.scenes.inflow import FactorFormula, FactorKeyframes, FactorPulse, FactorSteady
+from flowborne.motion.formula import Formula
+from flowborne.motion.inflow import FactorFormula, FactorKeyframes, FactorPulse, FactorSteady
+from flowborne.motion.tracks import Curve
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_mouths import MouthTable
-from flowborne.scenes.tracks import Curve
 from flowborne.solids.model import SolidModel
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from flowborne.coupling.stream import WindStream
 from flowborne.fluid.grid import Array
+from flowborne.motion.inflow import Factor, FactorKeyframes, FactorSteady
+from flowborne.motion.tracks import Curve
 from flowborne.scenes.fields import triple
-from flowborne.scenes.inflow import Factor, FactorKeyframes, FactorSteady
 from flowborne.scenes.python_function import WindFunction, with_parameters
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import (
@@ -19,7 +20,6 @@ from flowborne.scenes.schema_solids import (
     WindStreamTable,
     WindTable,
 )
-from flowborne.scenes.tracks import Curve
 from flowborne.solids.wind import Wind, WindFaces, WindForce
 
 

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
-from flowborne.scenes.clip_following import Passage, trajectory_of_clip
-from flowborne.scenes.clip_motion import TrajectoryClip
-from flowborne.scenes.clip_reading import Capture, read_clip, with_still
+from flowborne.motion.clip_following import Passage, trajectory_of_clip
+from flowborne.motion.clip_motion import TrajectoryClip
+from flowborne.motion.clip_reading import Capture, Reading, read_clip, with_still
+from flowborne.motion.human.body import ELBOWS, human_mjcf
+from flowborne.motion.human.gait import gait_clip
+from flowborne.motion.human.skeleton import SIDES
+from flowborne.motion.human.standard import standard_skeleton
 from flowborne.scenes.earlier import earlier_joints
-from flowborne.scenes.human.body import ELBOWS, human_mjcf
-from flowborne.scenes.human.gait import gait_clip
-from flowborne.scenes.human.skeleton import SIDES
-from flowborne.scenes.human.standard import standard_skeleton
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_human import ClipTable, HumanTable
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
@@ -36,11 +37,26 @@ def capture_of(scene: Scene) -> Capture | None:
         assert scene.human is not None
         found = _walk(scene.human.height)
     else:
-        found = read_clip(scene)
+        found = read_clip(
+            scene.folder / table.file, _reading(scene, table), person=scene.human is not None
+        )
         named = _words(scene) if found.held else set()
         if still := tuple(joint for joint in found.held if joint in named):
             found = with_still(found, still)
     return replace(found, clip=found.clip.placed(offset, heading))
+
+
+def _reading(scene: Scene, table: ClipTable) -> Reading:
+    human = scene.human or HumanTable()
+    return Reading(
+        None if table.unit == "auto" else table.unit,
+        None if table.up == "auto" else table.up,
+        table.skip,
+        tuple(table.mapping.items()),
+        table.floor,
+        human.mass,
+        human.sex,
+    )
 
 
 def _words(scene: Scene) -> set[object]:

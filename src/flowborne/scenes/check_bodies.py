@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
+from flowborne.phrases import suggestion
 from flowborne.scenes.bodies import (
     BALL,
     FREE,
@@ -25,7 +26,7 @@ from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.python_function import with_parameters
 from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
-from flowborne.scenes.wording import Key, suggestion
+from flowborne.scenes.wording import Key
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.errors import SceneError
-from flowborne.io.clip import Clip
+from flowborne.motion.clip import Clip
 from flowborne.scenes.bodies import posed
 from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.check_bodies import check_initial, unknown_joint

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flowborne.errors import SceneError
+from flowborne.phrases import suggestion
 from flowborne.scenes.bodies import FREE, HINGE, JOINT_KINDS, SLIDE, joint_kind
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.check_bodies import out_of_plane, unknown_body, unknown_joint
@@ -25,7 +26,6 @@ from flowborne.scenes.schema_control import (
     PhaseMotionTable,
     RuleQuasiNewton,
 )
-from flowborne.scenes.wording import suggestion
 from flowborne.solids.model import SolidModel
 
 MOST_STEPS_PER_DECISION = 1_000_000

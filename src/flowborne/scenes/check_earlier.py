@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flowborne.errors import SceneError
+from flowborne.phrases import suggestion
 from flowborne.scenes.check_bodies import unknown_joint
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import Earlier, earlier_joints, earlier_of
-from flowborne.scenes.wording import suggestion
 from flowborne.solids.model import SolidModel
 
 

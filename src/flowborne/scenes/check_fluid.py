@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from flowborne.io.summary import machine_memory
+from flowborne.runs.summary import machine_memory
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.schema_fluid import BoundariesTable, Domain, DyeBands, InflowSide, NoSlipSide
 from flowborne.scenes.schema_solids import WindFacesTable, WindForceTable, WindStreamTable

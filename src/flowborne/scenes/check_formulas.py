@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flowborne.errors import SceneError
+from flowborne.motion.formula import RESERVED, Formula
+from flowborne.phrases import suggestion
 from flowborne.scenes.draft import Draft
-from flowborne.scenes.formula import RESERVED, Formula
 from flowborne.scenes.schema_solids import MotionFormulaTable
-from flowborne.scenes.wording import suggestion
 
 
 def check_formulas(draft: Draft) -> Iterator[str]:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.step import cut_at
 from flowborne.coupling.world import Setup
+from flowborne.phrases import listed
 from flowborne.scenes.bodies import displace_of, initial_state
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.wording import listed
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.geoms import solid_geoms
 from flowborne.solids.model import SolidModel

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flowborne.errors import SceneError
-from flowborne.given_files import read_json
-from flowborne.io.arrays_file import read_arrays, read_state
-from flowborne.io.run_folder import RunFolder, RunFolderError, reading
+from flowborne.files.arrays import read_arrays
+from flowborne.files.given import read_json
+from flowborne.motion.clip_curves import columns_of, row_of
+from flowborne.motion.clip_motion import TrajectoryClip
 from flowborne.quaternions import continuous
-from flowborne.scenes.clip_curves import columns_of, row_of
-from flowborne.scenes.clip_motion import TrajectoryClip
+from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
+from flowborne.runs.states import read_state
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model import SolidModel
 

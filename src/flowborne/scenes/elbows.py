@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flowborne.scenes.human.skeleton import SIDES
+from flowborne.motion.human.skeleton import SIDES
 
 
 def join_elbows(raw: dict[str, Any]) -> None:

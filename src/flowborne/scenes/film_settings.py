@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from flowborne.errors import SceneError
-from flowborne.io.run_folder import RunFolder
+from flowborne.runs.run_folder import RunFolder
 from flowborne.scenes.load import override
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.wording import explain

@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from flowborne.errors import SceneError
-from flowborne.given_files import read_file
+from flowborne.files.given import read_file
+from flowborne.phrases import suggestion
 from flowborne.scenes.fields import possible_name
-from flowborne.scenes.wording import place, suggestion
+from flowborne.scenes.wording import place
 
 
 def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:

@@ -14,8 +14,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from flowborne.errors import SceneError
-from flowborne.given_files import read_file
-from flowborne.io.run_folder import reading
+from flowborne.files.given import read_file
+from flowborne.phrases import suggestion
+from flowborne.runs.run_folder import reading
 from flowborne.scenes.check import cross_check
 from flowborne.scenes.contact_steps import with_steps
 from flowborne.scenes.draft import Draft
@@ -23,7 +24,7 @@ from flowborne.scenes.elbows import join_elbows
 from flowborne.scenes.keyframe_file import inline_keyframes
 from flowborne.scenes.plugins import load_plugins
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.wording import explain, keys_of, suggestion
+from flowborne.scenes.wording import explain, keys_of
 
 BUILT_IN = (
     "block-effort-wind",

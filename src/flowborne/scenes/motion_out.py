@@ -12,15 +12,15 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from flowborne.errors import SceneError
-from flowborne.io.arrays_file import read_state
-from flowborne.io.bvh import write_bvh, write_clip
-from flowborne.io.clip import Clip
-from flowborne.io.run_folder import STATE_NAME, RunFolder
+from flowborne.motion.bvh import write_bvh, write_clip
+from flowborne.motion.clip import Clip
+from flowborne.motion.clip_curves import UP
+from flowborne.motion.clip_reading import Capture
 from flowborne.quaternions import inverse, product, turned
+from flowborne.runs.run_folder import STATE_NAME, RunFolder
+from flowborne.runs.states import read_state
 from flowborne.scenes.bodies import FREE, joint_kind, load_model
 from flowborne.scenes.capture import capture_of, followers
-from flowborne.scenes.clip_curves import UP
-from flowborne.scenes.clip_reading import Capture
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics

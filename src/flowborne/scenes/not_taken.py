@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from flowborne.phrases import listed
 from flowborne.scenes.bodies import spec_of
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.wording import listed
 from flowborne.solids.geoms import floors
 from flowborne.solids.model import SolidModel
 

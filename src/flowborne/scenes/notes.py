@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.phrases import listed
 from flowborne.scenes.bodies import HINGE, SLIDE, joint_kind, joint_unit, own_pose, posed
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
@@ -13,7 +14,6 @@ from flowborne.scenes.not_taken import not_taken
 from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
-from flowborne.scenes.wording import listed
 from flowborne.solids.joined import joined_pairs
 from flowborne.solids.mending import mended_meshes
 from flowborne.solids.model import SolidModel

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.io.bvh import STILL
+from flowborne.motion.bvh import STILL
+from flowborne.motion.clip_scale import UPRIGHT, leg_length, named, standing_axis
+from flowborne.motion.human.clip_skeleton import lost_bones
+from flowborne.motion.human.skeleton import PARENTS
 from flowborne.scenes.capture import capture_of
-from flowborne.scenes.clip_scale import UPRIGHT, leg_length, named, standing_axis
-from flowborne.scenes.human.clip_skeleton import lost_bones
-from flowborne.scenes.human.skeleton import PARENTS
 from flowborne.scenes.schema import Scene
 
 

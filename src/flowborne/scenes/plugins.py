@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flowborne.errors import PartError, SceneError
-from flowborne.given_files import read_file
+from flowborne.files.given import read_file
 
 LOADED: dict[str, bytes] = {}
 """Module -> text of the file that it was made from."""

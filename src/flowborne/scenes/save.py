@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from flowborne.errors import SceneError
-from flowborne.given_files import read_file
-from flowborne.io.run_folder import OWN_NAMES
+from flowborne.files.given import read_file
+from flowborne.runs.run_folder import OWN_NAMES
 from flowborne.scenes.bodies import bones_of, packages_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.earlier import EARLIER_FILE, earlier_of
@@ -109,8 +109,8 @@ def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
 
 def _flesh_files(scene: Scene, names: _Names) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
     """The flesh's tables and the files that they name: every mesh, and the user's own surfaces."""
-    from flowborne.scenes.flesh.grow import meshed
-    from flowborne.scenes.flesh.mesh_file import mesh_bytes
+    from flowborne.scenes.build_flesh import meshed
+    from flowborne.solids.tissue.mesh_file import mesh_bytes
 
     spec, files, tables = bones_of(scene), {}, []
     for table in scene.flesh:

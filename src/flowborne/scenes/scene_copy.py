@@ -5,8 +5,8 @@ from __future__ import annotations
 import tomllib
 from typing import TYPE_CHECKING, Any
 
-from flowborne.io.atomic import write_atomically
-from flowborne.io.run_folder import RunFolder, RunFolderError, reading
+from flowborne.files.atomic import write_atomically
+from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene

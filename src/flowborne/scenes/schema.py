@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 import tomli_w
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
-from flowborne.io.exporters import EXPORTERS, can_write, endings
-from flowborne.io.run_folder import FIXED_NAMES
+from flowborne.runs.exporters import EXPORTERS, can_write, endings
+from flowborne.runs.run_folder import FIXED_NAMES
 from flowborne.scenes.fields import (
     Count,
     FileName,

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.coupling.world import Fluid, Setup
+from flowborne.phrases import and_more, rounded_down, rounded_up
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.wording import and_more, rounded_down, rounded_up
 from flowborne.solids.model import SolidModel
 
 LIGHT, HEAVY = 0.1, 10.0

@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 
 from flowborne.coupling.world import Setup
+from flowborne.phrases import listed
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.check_bodies import geom_boxes
 from flowborne.scenes.creature import counted_bodies, unmet_bodies
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.wording import listed
 from flowborne.solids.geoms import element_name, floors, kind_of, rest_poses
 
 LEAST_MASS = 0.01

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup
 from flowborne.fluid.transport import LASTING
+from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import initial_state, joint_unit
 from flowborne.scenes.fields import MOST_STEPS
 from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import InflowSide
-from flowborne.scenes.tracks import SPEED_SAMPLES
 from flowborne.solids.outline import Outline
 
 Array = NDArray[np.float64]

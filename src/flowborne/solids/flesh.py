@@ -23,7 +23,7 @@ from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import EDGES, measures, parts
 from flowborne.solids.geoms import rest_poses
 from flowborne.solids.scratch import Compiled, Scratch, scratch
-from flowborne.solids.tissue import Grown
+from flowborne.solids.tissue.growth import Grown
 from flowborne.solids.twists import cross, twists_about_origin
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.mjcf import NOTHING, Given
 from flowborne.solids.own_shapes import own_by_mesh
 from flowborne.solids.state import SolidState
-from flowborne.solids.tissue import Grown
+from flowborne.solids.tissue.growth import Grown
 from flowborne.solvers.cholesky import Ordering
 
 Array = NDArray[np.float64]

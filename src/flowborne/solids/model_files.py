@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element
 
 import mujoco
 
-from flowborne.given_files import read_file
+from flowborne.files.given import read_file
 from flowborne.solids.model_kinds import check_kind, check_mesh
 from flowborne.solids.model_text import with_attributes
 from flowborne.solids.packages import is_address, located

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flowborne.io.atomic import write_atomically
+from flowborne.files.atomic import write_atomically
 from flowborne.view import style
 from flowborne.view.run import Run
 from flowborne.view.strips import legend, strip_curves, strip_style

@@ -10,11 +10,11 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flowborne.files.given import read_json
 from flowborne.fluid.grid import Grid
-from flowborne.given_files import read_json
-from flowborne.io.arrays_file import read_state
-from flowborne.io.history import history_columns, history_rows
-from flowborne.io.run_folder import STATE_NAME, RunFolder, reading
+from flowborne.runs.history import history_columns, history_rows
+from flowborne.runs.run_folder import STATE_NAME, RunFolder, reading
+from flowborne.runs.states import read_state
 from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.shape import Shape
 from flowborne.solids.skins import skinned

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from flowborne.io.run_folder import RunFolder
+from flowborne.runs.run_folder import RunFolder
 from flowborne.view.browser.origins import is_own, only_own_requests
 from flowborne.view.browser.viewer import open_viewer
 

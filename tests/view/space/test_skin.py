@@ -18,13 +18,13 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
-from flowborne.io.history import History
-from flowborne.io.recorder import Recorder, write_model
-from flowborne.io.run_folder import RunFolder
+from flowborne.runs.history import History
+from flowborne.runs.recorder import Recorder, write_model
+from flowborne.runs.run_folder import RunFolder
 from flowborne.shapes.box import ShapeBox
 from flowborne.solids.flesh import surface_of
 from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue import Tissue, add_flesh
+from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.view import style
 from flowborne.view.pictures import Picture

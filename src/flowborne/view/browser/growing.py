@@ -9,8 +9,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.io.arrays_file import read_state
-from flowborne.io.run_folder import STATE_NAME, RunFolder, RunFolderError
+from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError
+from flowborne.runs.states import read_state
 from flowborne.view.run import Run
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
-from flowborne.io.optional import optional
-from flowborne.io.run_folder import RunFolder, RunFolderError
+from flowborne.runs.optional import optional
+from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.view.browser.camera_keys import CameraKeys
 from flowborne.view.browser.fluid import Fluid
 from flowborne.view.browser.growing import GrowingRun

@@ -1,0 +1,372 @@
+"""BVH in and out.
+
+A BVH is y up as a rule, its character facing +z, its left at +x; where z is up the left is at +x
+as well, so that it faces -y (Blender's way). Lengths have no unit, angles are degrees, and a
+joint's rotation is the product of its rotation channels in the file's order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.errors import SceneError
+from flowborne.files.atomic import write_atomically, write_text
+from flowborne.motion.bvh_file import BvhFile, BvhJoint, load_bvh
+from flowborne.motion.clip import Clip
+from flowborne.motion.euler import angles_of, quaternions_of
+from flowborne.quaternions import angle, inverse, product, turned
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_Z_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_OVER = np.diag([1.0, -1.0, -1.0])
+"""Half a turn about x."""
+
+TO_WORLD: dict[str, Array] = {"y": _Y_UP, "z": _Z_UP, "-y": _Y_UP @ _OVER, "-z": _Z_UP @ _OVER}
+"""Axis that is up in the file -> (3, 3) rotation of its axes to x forward, y left, z up."""
+
+RIGID = 0.2
+"""Of its distance from the joint above, what a joint moves to be no bone's end but a root."""
+
+STILL = 1e-3
+"""m; a bone whose length channels move less counts as rigid: exporters round and solve so far."""
+
+SAME = 1e-6
+"""rad; a rotation this near to the file's own keeps the file's numbers."""
+
+DEGREES_OF_FREEDOM = 0.01
+"""degrees that may be lost where a joint of the file has fewer than three rotation channels."""
+
+SHORTEST = 1e-6
+"""m of a bone that has a length: programs that read BVH drop or lengthen the others."""
+
+LONE = 0.1
+"""m of a bone that has no length by itself, and none above it."""
+
+ZXY = (2, 0, 1)
+"""Axes of the rotation channels in clips that have no file to take after."""
+
+
+def read_bvh(path: str | Path, unit: float = 1.0, up: str = "y", skip: int = 0) -> Clip:
+    """The motion of a BVH file.
+
+    unit    m per length of the file
+    up      axis of the file that is up, one of TO_WORLD
+    skip    frames left out at the start, such as a T-pose that an exporter put there
+    raises  SceneError when the file is missing, none, cut or not finite, when a bone changes its
+            length by more than 1 mm, and when `skip` leaves no frame
+    note    where the root has position channels they are its place and its OFFSET is not added. A
+            root with a single joint below it that moves in it is folded into that joint
+    """
+    bvh = load_bvh(Path(path))
+    clip = clip_of(bvh, unit, up, skip)
+    check_rigid(bvh, clip, clip.names)
+    return clip
+
+
+def clip_of(
+    bvh: BvhFile, unit: float = 1.0, up: str = "y", skip: int = 0, root: str | None = None
+) -> Clip:
+    """The motion of a BVH file that has been read, its bones made rigid.
+
+    root    joint with which the clip begins: those above are folded into it, and what hangs on
+            them beside it is left out. By default the file's own, or the first below it that does
+            not move in one that carries nothing else
+    raises  SceneError when `skip` leaves no frame
+    """
+    if not 0 <= skip < len(bvh.values):
+        raise SceneError(
+            f"{bvh.name} has {len(bvh.values)} frames, and {skip} of them are to be skipped. "
+            "Skip fewer."
+        )
+    values, world = bvh.values[skip:], TO_WORLD[up]
+    if root is None:
+        first = _first_at_rest(bvh, values)
+    else:
+        first = [joint.name for joint in bvh.joints].index(root)
+    kept, translation, rotation = [first], *_folded(bvh, first, values, world)
+    for number, joint in enumerate(bvh.joints):
+        if joint.parent in kept:
+            kept.append(number)
+    joints = [bvh.joints[number] for number in kept]
+    offsets, strays = [np.zeros(3)], {}
+    for joint in joints[1:]:
+        places, _ = _places(joint, values)
+        offsets.append((places.min(axis=0) + places.max(axis=0)) / 2.0)
+        away = unit * np.abs(places - offsets[-1]).max(axis=1)
+        strays[joint.name] = float(away.max()), int(away.argmax())
+    return Clip(
+        names=tuple(joint.name for joint in joints),
+        parents=np.array([-1] + [kept.index(joint.parent) for joint in joints[1:]], np.int64),
+        offsets=unit * np.array(offsets) @ world.T,
+        ends={j.name: unit * world @ j.end for j in joints if j.end is not None},
+        frame_time=bvh.frame_time,
+        rotations=np.stack(
+            [rotation, *(_rotations(joint, values, world) for joint in joints[1:])], axis=1
+        ),
+        translation=unit * translation,
+        strays={name: stray for name, stray in strays.items() if stray[0] > 0.0},
+    )
+
+
+def check_rigid(bvh: BvhFile, clip: Clip, joints: Iterable[str], most: float = STILL) -> None:
+    """Raise SceneError where one of some joints of a file moves by more than `most` (m) about where
+    a rigid bone has it."""
+    for joint in joints:
+        stray, frame = clip.strays.get(joint, (0.0, 0))
+        if stray > most:
+            raise SceneError(
+                f"{bvh.name}, line {bvh.lines[frame + len(bvh.values) - clip.frames]}: the "
+                f"position channels of joint '{joint}' move by {2.0 * stray:.3g} m, and bones are "
+                "rigid here. Export the clip without stretching bones, or skip frames that are "
+                "none of the motion."
+            )
+
+
+def write_bvh(
+    path: str | Path,
+    source: str | Path,
+    rotations: Mapping[str, Array],
+    *,
+    root: tuple[str, Array, Array] | None = None,
+    unit: float = 1.0,
+    up: str = "y",
+    first: int = 0,
+    last: int | None = None,
+) -> None:
+    """Write a BVH file anew with other rotations of some joints; all else stays as it came.
+
+    source     file whose skeleton, channels, frame time and numbers are taken over, verbatim
+    rotations  joint -> (frames, 4) unit quaternions relative to its parent in the file, in the
+               world's axes. Their angles go on from frame to frame without a turn of 360 degrees;
+               those of a rotation that is the file's own stay the file's
+    root       a joint with channels of position, and its (frames, 3) places, m, and (frames, 4)
+               rotations in the world
+    unit, up   as in `read_bvh`
+    first      frame of the file with which the new one begins, skipped ones counted
+    last       frame after the last one; the file's end by default
+    raises     SceneError when the file is bad, lacks a joint or a channel, or has no frame in the
+               range; OSError
+    """
+    bvh = load_bvh(Path(source))
+    span = slice(first, last)
+    rows, values = bvh.rows[span], bvh.values[span]
+    if not rows:
+        raise SceneError(
+            f"{bvh.name} has {len(bvh.rows)} frames, none of them from {first} to {last}. "
+            "Give a range that has frames."
+        )
+    joints = {joint.name: joint for joint in bvh.joints}
+    words = [row.split() for row in rows] if rotations or root is not None else []
+    if root is not None:
+        name, places, turns = root
+        columns, numbers, turns = _within(bvh, name, places / unit, turns, values, TO_WORLD[up])
+        rotations = {name: turns, **rotations}
+        for row, new in zip(words, numbers, strict=True):
+            for column, number in zip(columns, new, strict=True):
+                row[column] = f"{number:.6f}"
+    for name, wanted in rotations.items():
+        if name not in joints:
+            raise SceneError(f"{bvh.name} has no joint '{name}'. It has: {', '.join(joints)}.")
+        columns, angles, new = _replaced(bvh, joints[name], values, wanted, TO_WORLD[up])
+        for frame in np.flatnonzero(new):
+            for column, degrees in zip(columns, angles[frame], strict=True):
+                words[frame][column] = f"{degrees:.6f}"
+    lines = [" ".join(row) for row in words] or rows
+    text = f"{bvh.hierarchy}Frames: {len(rows)}\nFrame Time: {bvh.time_text}\n"
+    whole = (text + "\n".join(lines) + "\n").encode(bvh.encoding)
+    write_atomically(Path(path), lambda stream: stream.write(whole))
+
+
+def write_clip(
+    path: str | Path, clip: Clip, unit: float = 1.0, sliding: Mapping[str, Array] | None = None
+) -> None:
+    """Write a clip as a BVH file: y up, facing +z, channels Zrotation Xrotation Yrotation.
+
+    Every last bone gets an end site, and none of them has zero length (see `_tip`).
+
+    unit     m per length of the file
+    sliding  joint -> (frames, 3) m, places in the parent's axes of joints other than the root that
+             do not stay where their offset is
+    raises   OSError
+    """
+    back = TO_WORLD["y"].T
+    moving = {clip.names[0]: clip.translation} | dict(sliding or {})
+    columns = []
+    for joint, name in enumerate(clip.names):
+        if name in moving:
+            columns.append(moving[name] @ back.T / unit)
+        local = _in_axes(clip.rotations[:, joint], back)
+        columns.append(angles_of(local, ZXY, np.zeros(3)))
+    offsets = clip.offsets @ back.T / unit
+    inner = {clip.names[joint] for joint in clip.parents if joint >= 0}
+    tips = {n: end for n, end in clip.ends.items() if np.linalg.norm(end) >= SHORTEST}
+    tips |= {n: _tip(clip, k) for k, n in enumerate(clip.names) if n not in {*inner, *tips}}
+    ends = {name: back @ end / unit for name, end in tips.items()}
+    lines = [
+        "HIERARCHY",
+        *_block(clip, offsets, ends, set(moving), 0, 0),
+        "MOTION",
+        f"Frames: {clip.frames}",
+    ]
+    lines.append(f"Frame Time: {clip.frame_time:.10g}")
+    lines += [_spaced(row, 8) for row in np.concatenate(columns, axis=1)]
+    write_text(Path(path), "\n".join(lines) + "\n")
+
+
+def _places(joint: BvhJoint, values: Array) -> tuple[Array, bool]:
+    """(frames, 3) a joint's place in its parent's axes, in the file's unit, and whether channels
+    give it.
+
+    Of the root it is what the position channels say. Of others some tools write the whole place
+    into them, and others what comes on top of OFFSET: the numbers are nearer to OFFSET in the first
+    case and nearer to 0 in the second.
+    """
+    result = np.tile(joint.offset, (len(values), 1))
+    axes = [axis for axis, turns in joint.channels if not turns]
+    columns = [joint.first + n for n, (_, turns) in enumerate(joint.channels) if not turns]
+    result[:, axes] = values[:, columns]
+    middle = (result.min(axis=0) + result.max(axis=0)) / 2.0
+    if joint.parent >= 0 and np.linalg.norm(middle - joint.offset) > np.linalg.norm(middle):
+        result[:, axes] += joint.offset[axes]
+    return result, bool(axes)
+
+
+def _folded(bvh: BvhFile, joint: int, values: Array, world: Array) -> tuple[Array, Array]:
+    """(frames, 3) place, in the file's unit, and (frames, 4) rotation of a joint in the world."""
+    own = bvh.joints[joint]
+    place, rotation = _places(own, values)[0] @ world.T, _rotations(own, values, world)
+    if own.parent < 0:
+        return place, rotation
+    start, above = _folded(bvh, own.parent, values, world)
+    return start + turned(above, place), product(above, rotation)
+
+
+def _within(
+    bvh: BvhFile, name: str, places: Array, rotations: Array, values: Array, world: Array
+) -> tuple[list[int], Array, Array]:
+    """Columns of a joint's position channels, (frames, k) numbers for them, and (frames, 4) the
+    joint's rotations in its parent, of places in the file's unit and rotations in the world."""
+    joint = next(joint for joint in bvh.joints if joint.name == name)
+    if joint.parent >= 0:
+        start, above = _folded(bvh, joint.parent, values, world)
+        places = turned(inverse(above), places - start)
+        rotations = product(inverse(above), rotations)
+    numbered = [
+        (joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if not turns
+    ]
+    columns, axes = [column for column, _ in numbered], [axis for _, axis in numbered]
+    added = _places(joint, values)[0][:, axes] - values[:, columns]  # OFFSET, where that is added
+    return columns, (places @ world)[:, axes] - added, rotations
+
+
+def _first_at_rest(bvh: BvhFile, values: Array) -> int:
+    """The joint to begin with: each that moves within the only one above it takes its place."""
+    first = 0
+    while True:
+        below = [number for number, j in enumerate(bvh.joints) if j.parent == first]
+        if len(below) != 1:
+            return first
+        places, given = _places(bvh.joints[below[0]], values)
+        moved = np.ptp(places, axis=0).max()
+        if not given or moved <= RIGID * np.linalg.norm(places, axis=1).max():
+            return first
+        first = below[0]
+
+
+def _turning(joint: BvhJoint) -> tuple[list[int], list[int]]:
+    """Columns and axes of a joint's rotation channels."""
+    found = [(joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if turns]
+    return [column for column, _ in found], [axis for _, axis in found]
+
+
+def _rotations(joint: BvhJoint, values: Array, world: Array) -> Array:
+    """(frames, 4) relative to the parent, in the world's axes."""
+    columns, axes = _turning(joint)
+    return quaternions_of(values[:, columns], world.T[axes])
+
+
+def _in_axes(rotations: Array, axes: Array) -> Array:
+    """(frames, 4) the same rotations seen from axes turned by a (3, 3) rotation."""
+    return np.concatenate([rotations[:, :1], rotations[:, 1:] @ axes.T], axis=1)
+
+
+def _replaced(
+    bvh: BvhFile, joint: BvhJoint, values: Array, wanted: Array, world: Array
+) -> tuple[list[int], Array, Mask]:
+    """Columns, angles (frames, k) in degrees for them, and the frames where they are new."""
+    if wanted.shape != (len(values), 4):
+        raise ValueError(f"{wanted.shape} is not the shape of {len(values)} quaternions.")
+    columns, axes = _turning(joint)
+    if len(set(axes)) != len(axes):
+        raise SceneError(
+            f"{bvh.name}, line {joint.line}: joint '{joint.name}' turns twice about one axis. "
+            "Export the clip with three different rotation channels to have its motion out."
+        )
+    own = _rotations(joint, values, world)
+    new = angle(product(inverse(own), wanted)) > SAME
+    if not new.any():
+        return columns, values[:, columns], new
+    missing = [axis for axis in range(3) if axis not in axes]
+    i, j, k = axes + missing
+    start = np.concatenate([values[0, columns], np.zeros(len(missing))])
+    result = values[:, columns].copy()
+    for begin, end in _runs(new):
+        if begin > 0:
+            start[: len(columns)] = result[begin - 1]
+        angles = angles_of(_in_axes(wanted[begin:end], world.T), (i, j, k), start)
+        lost = np.abs(angles[:, len(columns) :]).max(initial=0.0)
+        if lost > DEGREES_OF_FREEDOM:
+            raise SceneError(
+                f"{bvh.name}, line {joint.line}: joint '{joint.name}' has {len(columns)} rotation "
+                f"channels, and its motion turns {lost:.3g} degrees about axes that have none. "
+                "Export the clip with three rotation channels to have its motion out."
+            )
+        result[begin:end] = angles[:, : len(columns)]
+    return columns, result, new
+
+
+def _runs(marked: Mask) -> list[tuple[int, int]]:
+    """Begin and end of each run of marked frames."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _tip(clip: Clip, joint: int) -> Array:
+    """(3,) m, end site of a last bone for which the clip has none, or one at the joint itself: it
+    goes straight on from the nearest bone above that has a length, as long as that."""
+    found = np.zeros(3)
+    while np.linalg.norm(found) < SHORTEST and joint >= 0:
+        found, joint = clip.offsets[joint], int(clip.parents[joint])
+    return found if np.linalg.norm(found) >= SHORTEST else np.array([0.0, 0.0, LONE])
+
+
+def _block(
+    clip: Clip, offsets: Array, ends: Mapping[str, Array], moving: set[str], joint: int, depth: int
+) -> list[str]:
+    """Lines of a joint and all below it; those in `moving` have position channels."""
+    name, inner = clip.names[joint], "\t" * (depth + 1)
+    places = "6 Xposition Yposition Zposition" if name in moving else "3"
+    lines = [
+        f"{'ROOT' if joint == 0 else 'JOINT'} {name}",
+        "{",
+        f"\tOFFSET {_spaced(offsets[joint], 8)}",
+        f"\tCHANNELS {places} Zrotation Xrotation Yrotation",
+    ]
+    lines = ["\t" * depth + line for line in lines]
+    for child in np.flatnonzero(clip.parents == joint):
+        lines += _block(clip, offsets, ends, moving, int(child), depth + 1)
+    if name in ends:
+        tip = f"{inner}\tOFFSET {_spaced(ends[name], 8)}"
+        lines += [f"{inner}End Site", f"{inner}{{", tip, f"{inner}}}"]
+    return [*lines, "\t" * depth + "}"]
+
+
+def _spaced(numbers: Array, digits: int) -> str:
+    return " ".join(f"{number:.{digits}f}" for number in numbers)

@@ -1,0 +1,192 @@
+"""What a clip says about the joints of a model, frame by frame.
+
+A model's bodies may be turned at rest. With B0 the world rotation of a joint's body at rest and L
+the clip's rotation of the mapped joint relative to the one mapped to the nearest mapped ancestor,
+a ball joint's quaternion is B0^-1 L B0: the body then stands in the world as the clip's bone does,
+turned from its rest as the bone is from its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from flowborne.errors import SceneError
+from flowborne.motion.clip import Clip
+from flowborne.phrases import suggestion
+from flowborne.quaternions import continuous, inverse, product, turned, twist
+from flowborne.solids import geoms
+from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Where things are in a row of numbers: quaternions, then places of free joints, then angles
+    and, of slides, ways.
+
+    names     of the joints, as the model numbers them
+    owners    joint, by its place in `names`, of each quaternion, place and angle
+    balls     how many quaternions
+    free      which of them are of free joints, in the order of the places
+    q         (m,) column of each entry of q of those joints, in MuJoCo's order
+    v         (k,) column of each entry of v in a row of velocities: 3 per quaternion, then places
+              and angles
+    dofs      (k,) ascending
+    """
+
+    names: tuple[str, ...]
+    owners: tuple[int, ...]
+    balls: int
+    free: Integers
+    q: Integers
+    v: Integers
+    dofs: Integers
+
+    def quaternions(self, rows: Array) -> Array:
+        """(..., balls, 4) view of the quaternions of rows."""
+        return rows[..., : 4 * self.balls].reshape(*rows.shape[:-1], self.balls, 4)
+
+    def places(self, rows: Array) -> Array:
+        """(..., free, 3) view of the places of rows."""
+        first, count = 4 * self.balls, len(self.free)
+        return rows[..., first : first + 3 * count].reshape(*rows.shape[:-1], count, 3)
+
+    def angles(self, rows: Array) -> Array:
+        """(..., hinges) view of the angles of rows."""
+        return rows[..., 4 * self.balls + 3 * len(self.free) :]
+
+    def moved(self, rows: Array, turn: Array, shift: Array) -> Array:
+        """Rows after a turn (4,) of free joints about the world's origin and a shift (..., 3)."""
+        result = rows.copy()
+        here = self.quaternions(result)
+        here[..., self.free, :] = product(turn, here[..., self.free, :])
+        self.places(result)[...] = turned(turn, self.places(rows)) + shift
+        return result
+
+
+def curves_of(
+    model: SolidModel, clip: Clip, mapping: Mapping[str, str], joints: Sequence[str]
+) -> tuple[Columns, Array]:
+    """Rows of joint positions, one per frame; signs of quaternions and angles go on steadily.
+
+    mapping  model joint -> clip joint; it may name joints that the model lacks
+    joints   model joints that follow
+    returns  where things are, and (frames, columns) rows
+    raises   SceneError when a joint cannot follow
+    """
+    followed = _sorted(model, mapping, joints)
+    bodies = _mapped_bodies(model, clip, mapping)
+    places, rotations = clip.places()
+    rest = Rotation.from_matrix(geoms.rest_poses(model.mj)[1]).as_quat(scalar_first=True)
+    quaternions, positions, angles = [], [], []
+    for joint in followed:
+        kind, body = int(model.mj.jnt_type[joint]), int(model.mj.jnt_bodyid[joint])
+        bone = bodies[body]
+        if kind == FREE:
+            quaternions.append(product(rotations[:, bone], rest[body]))
+            positions.append(places[:, bone])
+            continue
+        local = rotations[:, bone]
+        above = _ancestor(model, bodies, body)
+        if above is not None:
+            local = product(inverse(rotations[:, above]), local)
+        local = product(inverse(rest[body]), product(local, rest[body]))
+        if kind == BALL:
+            quaternions.append(local)
+        else:
+            turn = np.unwrap(twist(local, np.array(model.mj.jnt_axis[joint])))
+            angles.append(turn[:, None] + model.mj.qpos0[model.mj.jnt_qposadr[joint]])
+    rows = [*map(continuous, quaternions), *positions, *angles]
+    return columns_of(model, followed), np.concatenate(rows, axis=1)
+
+
+def row_of(columns: Columns, q: Array) -> Array:
+    """(columns,) row of the joints' entries of q, in MuJoCo's order."""
+    row = np.empty(len(columns.q))
+    row[columns.q] = q
+    return row
+
+
+def _sorted(model: SolidModel, mapping: Mapping[str, str], joints: Sequence[str]) -> list[int]:
+    """Numbers of the joints that follow."""
+    for name in joints:
+        if name not in model.joint_names:
+            end = suggestion(name, model.joint_names, "Its joints are")
+            raise SceneError(f"joint '{name}' is not in the model{end}")
+        if name not in mapping:
+            raise SceneError(
+                f"joint '{name}' is to follow the clip and is mapped to none of its joints. "
+                "Map it, or leave it out."
+            )
+        kind = int(model.mj.jnt_type[model.joint(name)])
+        if kind not in (FREE, BALL, HINGE):
+            raise SceneError(f"joint '{name}' slides, and a clip only turns bones. Leave it out.")
+    return sorted({model.joint(name) for name in joints})
+
+
+def _mapped_bodies(model: SolidModel, clip: Clip, mapping: Mapping[str, str]) -> dict[int, int]:
+    """Body -> number of the clip joint that one of its joints is mapped to."""
+    bodies: dict[int, int] = {}
+    names: dict[int, str] = {}
+    for name, bone in mapping.items():
+        if name not in model.joint_names:
+            continue
+        body = int(model.mj.jnt_bodyid[model.joint(name)])
+        if body in names:
+            raise SceneError(
+                f"joints '{names[body]}' and '{name}' are of one body. Map one of them: "
+                "a ball joint takes the whole rotation."
+            )
+        names[body] = name
+        bodies[body] = clip.names.index(bone)
+    return bodies
+
+
+def _ancestor(model: SolidModel, bodies: Mapping[int, int], body: int) -> int | None:
+    """Clip joint of the nearest mapped body above."""
+    while body > 0:
+        body = int(model.mj.body_parentid[body])
+        if body in bodies:
+            return bodies[body]
+    return None
+
+
+def columns_of(model: SolidModel, joints: Sequence[int]) -> Columns:
+    """Where the positions of joints, by their numbers in ascending order, are in a row."""
+    kinds = [int(model.mj.jnt_type[joint]) for joint in joints]
+    turning = [n for n, kind in enumerate(kinds) if kind in (FREE, BALL)]
+    free = [n for n, kind in enumerate(kinds) if kind == FREE]
+    scalars = [n for n, kind in enumerate(kinds) if kind in (HINGE, SLIDE)]
+    q: list[int] = []
+    v: list[int] = []
+    for n, kind in enumerate(kinds):
+        if kind in (HINGE, SLIDE):
+            after = 3 * len(free) + scalars.index(n)
+            q.append(4 * len(turning) + after)
+            v.append(3 * len(turning) + after)
+            continue
+        if kind == FREE:
+            place = 3 * free.index(n) + np.arange(3)
+            q += list(4 * len(turning) + place)
+            v += list(3 * len(turning) + place)
+        q += list(4 * turning.index(n) + np.arange(4))
+        v += list(3 * turning.index(n) + np.arange(3))
+    names = tuple(model.joint_names[joint] for joint in joints)
+    return Columns(
+        names=names,
+        owners=(*turning, *free, *scalars),
+        balls=len(turning),
+        free=np.array([turning.index(n) for n in free], dtype=np.int64),
+        q=np.array(q, dtype=np.int64),
+        v=np.array(v, dtype=np.int64),
+        dofs=np.concatenate([model.dofs_of(name) for name in names]),
+    )

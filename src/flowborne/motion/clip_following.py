@@ -1,0 +1,183 @@
+"""Making the motion of a model's joints from a clip: trim, low-pass, loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from flowborne.errors import SceneError
+from flowborne.motion.clip import Clip
+from flowborne.motion.clip_curves import UP, Columns, curves_of, row_of
+from flowborne.motion.clip_loop import CLOSED, Stride, mismatch, stride_between
+from flowborne.motion.clip_motion import TrajectoryClip, normalise
+from flowborne.motion.clip_seam import check_seam
+from flowborne.quaternions import about, continuous, inverse, product, twist
+from flowborne.solids.model import SolidModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What of a clip is followed, and how.
+
+    start, stop  s of the clip; None is its end
+    loop         begin anew at the end, from the place and heading that were reached
+    blend        s, at most half of what is between start and stop; see MotionClip. A clip that
+                 ends as it begins makes a loop as it is, any other is joined over `blend`
+    smooth       Hz at which a low-pass halves the power (two passes of a Butterworth filter of
+                 second order, forth and back, so that there is no lag), or None
+    source       Winter 2009, Biomechanics and Motor Control of Human Movement, section 3.4.4.2
+                 (what the cut-off of one pass is for two)
+    """
+
+    start: float = 0.0
+    stop: float | None = None
+    loop: bool = False
+    blend: float = 0.0
+    smooth: float | None = None
+
+
+WHOLE = Passage()
+"""All of a clip, once."""
+
+
+def trajectory_of_clip(
+    model: SolidModel,
+    clip: Clip,
+    mapping: Mapping[str, str],
+    passage: Passage = WHOLE,
+    *,
+    joints: Sequence[str] | None = None,
+    initial: Array | None = None,
+) -> TrajectoryClip:
+    """Motion of a model's joints along a clip.
+
+    mapping  model joint -> clip joint; names that the model lacks are passed over
+    joints   model joints that follow; all mapped ones by default
+    initial  (nq,) pose before the start, put where the clip starts; the model's rest by default
+    raises   SceneError when one of these does not fit the clip or the model
+    """
+    start, blend = passage.start, passage.blend
+    chosen = joints if joints is not None else [j for j in mapping if j in model.joint_names]
+    columns, rows = curves_of(model, clip, mapping, chosen)
+    stop = clip.duration if passage.stop is None else passage.stop
+    _check_times(clip, start, stop, blend)
+    times = clip.frame_time * np.arange(clip.frames)
+    length, overlap, stride = stop - start, 0.0, None
+    if passage.loop:
+        stride = _whole_cycle(columns, rows, start / clip.frame_time, stop / clip.frame_time)
+        if stride is not None:
+            times, rows = _repeated(columns, rows, clip.frame_time, (start, stop), stride)
+        else:
+            overlap = blend
+            length -= blend
+    if passage.smooth is not None:
+        rows = _smoothed(rows, clip.frame_time, passage.smooth)
+    spline = CubicSpline(times, rows)
+    if passage.loop and stride is None:
+        stride = _joined(columns, spline, start, length, overlap)
+    pose = model.rest().q if initial is None else initial
+    places = np.concatenate([model.positions_of(name) for name in columns.names])
+    before = _put(columns, row_of(columns, pose[places]), spline(start))
+    motion = TrajectoryClip(
+        columns.dofs, columns, spline, start, length, blend, before, stride, overlap
+    )
+    if overlap > 0.0:
+        check_seam(motion)
+    return motion
+
+
+def _check_times(clip: Clip, start: float, stop: float, blend: float) -> None:
+    if not 0.0 <= start < stop <= clip.duration * (1.0 + 1e-9):
+        raise SceneError(
+            f"it lasts {clip.duration:g} s, and is to go from {start:g} s to {stop:g} s. "
+            "Give a start before a stop within the clip."
+        )
+    if blend > (stop - start) / 2.0:
+        raise SceneError(
+            f"blend {blend:g} s is more than half of the {stop - start:g} s from start to "
+            "stop. Make it shorter."
+        )
+
+
+def _whole_cycle(columns: Columns, rows: Array, first: float, last: float) -> Stride | None:
+    """Stride of a loop between two frames where the clip ends as it begins; None where not."""
+    begin, end = round(first), round(last)
+    if max(abs(first - begin), abs(last - end)) > 1e-6:
+        return None
+    stride = stride_between(columns, rows[begin], rows[end])
+    return stride if mismatch(columns, rows[begin], rows[end], stride)[0] < CLOSED else None
+
+
+def _repeated(
+    columns: Columns, rows: Array, frame_time: float, span: tuple[float, float], stride: Stride
+) -> tuple[Array, Array]:
+    """Times and rows of a cycle with one before and one after it, so that its ends are smooth."""
+    begin, end = round(span[0] / frame_time), round(span[1] / frame_time)
+    cycle = rows[begin:end]
+    repeated = np.concatenate(
+        [columns.moved(cycle, *stride.times(n)) for n in (-1, 0, 1)]
+        + [columns.moved(cycle[:1], *stride.times(2))]
+    )
+    quaternions = columns.quaternions(repeated)
+    quaternions[...] = continuous(quaternions)
+    frames = np.arange(len(repeated), dtype=np.float64) + (2 * begin - end)
+    return frame_time * frames, repeated
+
+
+def _joined(
+    columns: Columns, spline: CubicSpline, start: float, length: float, overlap: float
+) -> Stride:
+    """Stride of a loop whose ends fade into each other, true in the middle of the fade."""
+    begin, end = spline(start + overlap / 2.0), spline(start + length + overlap / 2.0)
+    for row in (begin, end):
+        normalise(columns, row, np.zeros_like(row))
+    stride = stride_between(columns, begin, end)
+    if overlap == 0.0:
+        size, joint = mismatch(columns, begin, end, stride)
+        raise SceneError(
+            f"it is to loop without a blend, and joint '{joint}' ends {size:.3g} rad or m "
+            "from where it begins. Give a blend, or start and stop one whole cycle apart."
+        )
+    return stride
+
+
+SLOWEST = 0.1
+"""Least part of a period of the low-pass that a clip is long."""
+
+
+def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
+    """Rows after a low-pass of zero lag; `cut_off` (Hz) is that of both passes together."""
+    one_pass = cut_off / (np.sqrt(2.0) - 1.0) ** 0.25
+    if not 0.0 < one_pass < 0.5 / frame_time:
+        most = 0.5 / frame_time * (np.sqrt(2.0) - 1.0) ** 0.25
+        raise SceneError(
+            f"smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the most for a clip "
+            f"of {1.0 / frame_time:.4g} frames a second. Leave it out or lower it."
+        )
+    if cut_off * len(rows) * frame_time < SLOWEST:
+        raise SceneError(
+            f"smooth {cut_off:g} Hz keeps nothing of a clip of {len(rows) * frame_time:.3g} s. "
+            "Leave it out or raise it."
+        )
+    from scipy.signal import butter, sosfiltfilt  # a fifth of a second that most scenes save
+
+    filters = butter(2, one_pass, fs=1.0 / frame_time, output="sos")
+    edge = min(len(rows) - 1, int(np.ceil(1.0 / (one_pass * frame_time))))
+    return np.asarray(sosfiltfilt(filters, rows, axis=0, padlen=edge))
+
+
+def _put(columns: Columns, pose: Array, first: Array) -> Array:
+    """A pose with its free joints where a clip's first row has them, and headed like there."""
+    result = pose.copy()
+    columns.places(result)[...] = columns.places(first)
+    here, there = columns.quaternions(result), columns.quaternions(first)
+    for ball in columns.free:
+        heading = twist(product(there[ball], inverse(here[ball])), UP)
+        here[ball] = product(about(UP, heading), here[ball])
+    return result

@@ -1,0 +1,195 @@
+"""A walk, and standing, as clips of the human's own joints."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from flowborne.motion.clip import Clip
+from flowborne.motion.human.gait_curves import ANKLE, HIP, KNEE, PELVIS, curve
+from flowborne.motion.human.skeleton import BODIES, PARENTS, SIDES, TIPS, Array, Skeleton
+
+CYCLE = 1.05
+"""s from one heel strike to the next of the same foot."""
+
+RATE = 120.0
+"""Frames a second, about: a cycle is a whole number of frames."""
+
+NAMES = tuple(joint for _, joint, _ in BODIES)
+
+LEG = ("hip", "knee", "ankle", "toes")
+
+LATER = {"left": 0.5, "right": 0.0}
+"""Of a cycle, how much later a side does the same."""
+
+SHOULDER, SHOULDER_SWING, ELBOW, ELBOW_SWING = np.radians([-8.0, 16.0, 32.5, 12.5])
+"""Mean and amplitude of flexion: from 24 degrees back, where the heel of the same side strikes, to
+8 forward, and an elbow bent by 20 to 45 (Perry 1992, Gait Analysis, chapter 8)."""
+
+FLAT = np.radians(4.0)
+"""Tilts of the foot around level over which the toes begin to bend."""
+
+LIFTED = np.radians(25.0)
+"""Extension of the toes in swing and at heel strike (Perry 1992, chapter 4)."""
+
+SUPPORT = 0.003
+"""m: what is so much higher than the lowest point of the soles carries 1 / e of what that does."""
+
+SAMPLES = 1024
+"""Instants of a cycle at which the support is found, for its integral."""
+
+
+def standing_clip(skeleton: Skeleton) -> Clip:
+    """Two frames of standing still as at rest, the soles on the ground.
+
+    skeleton  upright at rest
+    """
+    still = {joint: np.zeros(2) for joint in NAMES}
+    place = np.zeros((2, 3))
+    place[:, 2] = skeleton["root"][2] - min(
+        float((skeleton.heel(side) + skeleton.to_sole(side))[2]) for side in SIDES
+    )
+    return _clip(skeleton, 1.0 / RATE, still, place)
+
+
+def gait_clip(skeleton: Skeleton, cycle: float = CYCLE) -> Clip:
+    """One cycle of a straight walk along x from the right heel's strike, at about 120 Hz.
+
+    The last frame is the first again, one stride on, and so are all derivatives: a loop that
+    leaves it out has no seam. Legs follow the curves of `gait_curves`, the left half a cycle after
+    the right. The trunk stays upright: the lower back takes back the pelvis' tilt. Toes stay flat
+    on the floor while the heel lifts. The root is where the soles touch the ground and do not
+    slide; where the support passes from one point of the soles to another, their heights and
+    speeds are mixed over `SUPPORT`, so that the root moves smoothly.
+
+    skeleton  upright at rest, arms down, feet forward
+    cycle     s
+    raises    ValueError when the cycle does not last
+    """
+    if not (np.isfinite(cycle) and cycle > 0.0):
+        raise ValueError(f"a walk cannot have a cycle of {cycle} s. Give a time above 0.")
+    frames = max(round(cycle * RATE), 2)
+    phase = np.arange(frames + 1) / frames
+    turns = joint_turns(phase)
+    return _clip(skeleton, cycle / frames, turns, root_path(skeleton, phase))
+
+
+def pelvis_tilt(phase: Array) -> Array:
+    """(n,) rad, forward; the mean over both sides, whose curves differ by 0.2 degrees."""
+    tilt = curve(PELVIS)
+    return np.asarray(0.5 * (tilt(phase % 1.0) + tilt((phase + 0.5) % 1.0)))
+
+
+def leg_turns(phase: Array) -> Array:
+    """(4, n) turns of hip, knee, ankle and toes at phases (n,) of the leg's own cycle, rad.
+
+    They are relative to the parent, about the axis that points left: a positive turn carries what
+    is below the joint backward.
+    """
+    phase = phase % 1.0
+    hip, knee, ankle = (curve(column)(phase) for column in (HIP, KNEE, ANKLE))
+    pitch = pelvis_tilt(phase) - hip + knee - ankle
+    flat = 0.5 * (pitch + np.hypot(pitch, FLAT))
+    swing = _rise(phase, 0.54, 0.74) + 1.0 - _rise(phase, 0.02, 0.1)
+    return np.array([-hip, knee, -ankle, -(flat + (LIFTED - flat) * swing)])
+
+
+def _rise(phase: Array, start: float, end: float) -> Array:
+    """(n,) from 0 at one phase to 1 at another, with two continuous derivatives."""
+    x = np.clip((phase - start) / (end - start), 0.0, 1.0)
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+
+
+def joint_turns(phase: Array) -> dict[str, Array]:
+    """Joint -> (n,) turn about the left-pointing axis, rad, of all 23 joints."""
+    tilt = pelvis_tilt(phase)
+    turns = {joint: np.zeros(len(phase)) for joint in NAMES}
+    turns["root"], turns["lower_back"] = tilt, -tilt
+    for side in SIDES:
+        own = phase - LATER[side]
+        turns |= {f"{side}_{name}": turn for name, turn in zip(LEG, leg_turns(own), strict=True)}
+        swing = np.cos(2.0 * np.pi * own)
+        turns[f"{side}_shoulder"] = -(SHOULDER - SHOULDER_SWING * swing)
+        turns[f"{side}_elbow"] = -(ELBOW - ELBOW_SWING * swing)
+    return turns
+
+
+def root_path(skeleton: Skeleton, phase: Array) -> Array:
+    """(n, 3) m, place of the root at phases (n,) from 0 on, by what carries it."""
+    instants = np.arange(SAMPLES) / SAMPLES
+    x, z = _soles(skeleton, instants)
+    weight = np.exp(-(z - z.min(axis=1, keepdims=True)) / SUPPORT)
+    weight /= weight.sum(axis=1, keepdims=True)
+    speed = -(weight * _rate(x)).sum(axis=1)
+    height = -(weight * z).sum(axis=1)
+    around = np.append(instants, 1.0)
+    distance = CubicSpline(around, np.append(speed, speed[0]), bc_type="periodic").antiderivative()
+    level = CubicSpline(around, np.append(height, height[0]), bc_type="periodic")
+    ahead = distance(phase % 1.0) + np.floor(phase) * distance(1.0)
+    return np.stack([ahead, np.zeros(len(phase)), level(phase % 1.0)], axis=1)
+
+
+def _rate(values: Array) -> Array:
+    """Derivative of a periodic function by phase, from equal samples along axis 0."""
+    around = np.concatenate([values, values[:1]])
+    spline = CubicSpline(np.arange(len(around)) / len(values), around, bc_type="periodic")
+    return np.asarray(spline(np.arange(len(values)) / len(values), 1))
+
+
+def _soles(skeleton: Skeleton, phase: Array) -> tuple[Array, Array]:
+    """x and z (n, 8) of points of both soles, from the root, m.
+
+    A foot has its heel and its ball, the toes their ball and their tip.
+    """
+    points = [_sole(skeleton, side, phase) for side in SIDES]
+    x, z = np.moveaxis(np.concatenate(points, axis=1), (0, 1, 2), (0, 2, 1))
+    return x, z
+
+
+def _sole(skeleton: Skeleton, side: str, phase: Array) -> Array:
+    """(2, 4, n) x and z of the points of one sole, from the root, m."""
+    turns = leg_turns(phase - LATER[side])
+    angles = np.cumsum([pelvis_tilt(phase), *turns], axis=0)
+    names = ("root", *(f"{side}_{name}" for name in LEG))
+    places = [skeleton[name] for name in names]
+    joints = np.cumsum(
+        [
+            _turned(end - start, angle)
+            for start, end, angle in zip(places, places[1:], angles, strict=False)
+        ],
+        axis=0,
+    )
+    down, ankle, toes = skeleton.to_sole(side), places[3], places[4]
+    points = [
+        joints[2] + _turned(skeleton.heel(side) + down - ankle, angles[3]),
+        joints[2] + _turned(toes + down - ankle, angles[3]),
+        joints[3] + _turned(down, angles[4]),
+        joints[3] + _turned(skeleton[f"{side}_toe_tip"] + down - toes, angles[4]),
+    ]
+    return np.stack(points, axis=1)
+
+
+def _turned(offset: Array, angle: Array) -> Array:
+    """(2, n) x and z of an offset (3,) turned about y by angles (n,)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([offset[0] * cosine + offset[2] * sine, offset[2] * cosine - offset[0] * sine])
+
+
+def _clip(skeleton: Skeleton, frame_time: float, turns: dict[str, Array], place: Array) -> Clip:
+    parents = [NAMES.index(PARENTS[joint]) if joint in PARENTS else -1 for joint in NAMES]
+    offsets = [
+        skeleton[joint] - skeleton[PARENTS[joint]] if joint in PARENTS else np.zeros(3)
+        for joint in NAMES
+    ]
+    axis = np.array([0.0, 1.0, 0.0])
+    turned = [Rotation.from_rotvec(turns[joint][:, None] * axis) for joint in NAMES]
+    return Clip(
+        names=NAMES,
+        parents=np.array(parents, dtype=np.int64),
+        offsets=np.array(offsets),
+        ends={joint: skeleton[tip] - skeleton[joint] for tip, joint in TIPS.items()},
+        frame_time=frame_time,
+        rotations=np.stack([turn.as_quat(scalar_first=True) for turn in turned], axis=1),
+        translation=place,
+    )

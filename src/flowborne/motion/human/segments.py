@@ -1,0 +1,117 @@
+"""Masses, centres of mass and radii of gyration of body segments (de Leva 1996)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from flowborne.motion.human.skeleton import SIDES, Array, Skeleton
+
+Sex = Literal["male", "female"]
+
+
+@dataclass(frozen=True)
+class Measures:
+    """A segment's inertia, in parts of the body's mass and of the segment's length.
+
+    mass          of the body's mass, one side
+    centre        of the length, centre of mass from the start of the segment
+    sagittal      of the length, radius of gyration about the axis from back to front
+    transverse    ... about the axis from right to left
+    longitudinal  ... about the segment's own axis
+    """
+
+    mass: float
+    centre: float
+    sagittal: float
+    transverse: float
+    longitudinal: float
+
+
+MEASURES: dict[Sex, dict[str, Measures]] = {
+    "male": {
+        "head": Measures(0.0694, 0.5002, 0.303, 0.315, 0.261),
+        "trunk": Measures(0.4346, 0.5138, 0.328, 0.306, 0.169),
+        "upper_arm": Measures(0.0271, 0.5772, 0.285, 0.269, 0.158),
+        "forearm": Measures(0.0162, 0.4574, 0.276, 0.265, 0.121),
+        "hand": Measures(0.0061, 0.7900, 0.628, 0.513, 0.401),
+        "thigh": Measures(0.1416, 0.4095, 0.329, 0.329, 0.149),
+        "shank": Measures(0.0433, 0.4459, 0.255, 0.249, 0.103),
+        "foot": Measures(0.0137, 0.4415, 0.257, 0.245, 0.124),
+    },
+    "female": {
+        "head": Measures(0.0669, 0.4841, 0.271, 0.295, 0.261),
+        "trunk": Measures(0.4257, 0.4964, 0.307, 0.292, 0.147),
+        "upper_arm": Measures(0.0255, 0.5754, 0.278, 0.260, 0.148),
+        "forearm": Measures(0.0138, 0.4559, 0.261, 0.257, 0.094),
+        "hand": Measures(0.0056, 0.7474, 0.531, 0.454, 0.335),
+        "thigh": Measures(0.1478, 0.3612, 0.369, 0.364, 0.162),
+        "shank": Measures(0.0481, 0.4416, 0.271, 0.267, 0.093),
+        "foot": Measures(0.0129, 0.4014, 0.299, 0.279, 0.124),
+    },
+}
+"""de Leva 1996, J. Biomechanics 29:1223, Table 4. Segments run from vertex to C7, C7 to mid hip,
+between joint centres, from heel to toe tip, and from wrist to the third knuckle (the hand's
+figures there are for that length). Women's head is 0.0668 in the paper; 0.0669 makes the sum 1.
+"""
+
+TRUNK: dict[Sex, dict[str, float]] = {
+    "male": {"upper": 0.1596, "middle": 0.1633, "lower": 0.1117},
+    "female": {"upper": 0.1545, "middle": 0.1465, "lower": 0.1247},
+}
+"""Parts of the trunk, of the body's mass; they meet at xiphoid and navel. Source as above."""
+
+CLAVICLE = 0.1
+"""Of the upper trunk's mass, what moves with one collar bone: our estimate, as are the next two."""
+
+NECK = 0.12
+"""Of the head segment's mass, each of the neck's two bodies: near 10 cm of a neck 12 cm thick."""
+
+TOES = 0.18
+"""Of the foot's mass: 27 % of its length, and thinner."""
+
+
+def segments() -> tuple[str, ...]:
+    """Names of the 14 segments: "head", "trunk", "left_upper_arm", ..."""
+    paired = [name for name in MEASURES["male"] if name not in ("head", "trunk")]
+    return ("head", "trunk", *(f"{side}_{name}" for side in SIDES for name in paired))
+
+
+def measures_of(segment: str, sex: Sex) -> Measures:
+    """The figures of a segment."""
+    return MEASURES[sex][segment.removeprefix("left_").removeprefix("right_")]
+
+
+def ends_of(segment: str, skeleton: Skeleton) -> tuple[Array, Array]:
+    """Start and end (3,) of a segment, m: where its length and its centre of mass are counted."""
+    if segment == "head":
+        return skeleton.tips["head_top"], skeleton.joints["lower_neck"]
+    if segment == "trunk":
+        return skeleton.joints["lower_neck"], skeleton.mid_hip
+    side, name = segment.split("_", 1)
+    if name == "foot":
+        return skeleton.heel(side), skeleton.tips[f"{side}_toe_tip"]
+    if name == "hand":
+        return skeleton.joints[f"{side}_wrist"], skeleton.knuckle(side)
+    return skeleton.bone(segment)
+
+
+def shares_of(segment: str, sex: Sex) -> dict[str, float]:
+    """Bodies that a segment is made of -> their part of its mass."""
+    if segment == "head":
+        return {"lower_neck": NECK, "upper_neck": NECK, "head": 1.0 - 2.0 * NECK}
+    if segment == "trunk":
+        whole = MEASURES[sex]["trunk"].mass
+        upper, middle, lower = (TRUNK[sex][part] / whole for part in ("upper", "middle", "lower"))
+        return {
+            "pelvis": lower,
+            "lower_back": 0.5 * middle,
+            "upper_back": 0.5 * middle,
+            "thorax": (1.0 - 2.0 * CLAVICLE) * upper,
+            "left_clavicle": CLAVICLE * upper,
+            "right_clavicle": CLAVICLE * upper,
+        }
+    if segment.endswith("_foot"):
+        side = segment.split("_")[0]
+        return {f"{side}_foot": 1.0 - TOES, f"{side}_toes": TOES}
+    return {segment: 1.0}

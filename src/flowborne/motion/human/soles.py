@@ -1,0 +1,103 @@
+"""Where the floor of a clip is: under the soles of its feet while they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.motion.clip import Clip
+from flowborne.motion.human.inertia import inertias
+from flowborne.motion.human.segments import Sex
+from flowborne.motion.human.shapes import shapes
+from flowborne.motion.human.skeleton import PARENTS, SIDES, Array, Skeleton, joint_of
+from flowborne.quaternions import turned
+
+STILL = 0.3
+"""m/s below which the lowest place of a foot stands. In a walk a foot swings by at 1 m/s and more,
+and rolls off at less than 0.1."""
+
+TREMOR = 1.0 / 30.0
+"""s over which that speed is taken, so that a capture's noise is none."""
+
+STEP = 0.25
+"""s, standard deviation of the weights by which the floor under neighbouring steps is one."""
+
+UNEVEN = 0.15
+"""m between the floor under two steps of a level floor. Floors of captures are off by 5 to 10 cm;
+where steps differ by more, the ground itself goes up or down, and is left as it is."""
+
+
+def on_the_floor(
+    clip: Clip, mapping: Mapping[str, str], skeleton: Skeleton, mass: float, sex: Sex
+) -> Clip:
+    """The clip, raised or lowered so that the soles that stand are at z = 0.
+
+    The floor of a capture is not at 0, and neither even nor level: it is found under every step,
+    and goes over smoothly from one to the next. Nothing but the height of the root changes; a clip
+    in which no foot stands is left as it is.
+
+    mapping  joint of the model -> joint of the clip
+    mass     kg, of the person: how broad the feet are
+    """
+    places = [_lowest(clip, mapping, skeleton, side, mass, sex) for side in SIDES]
+    stands = np.concatenate([_stands(place, clip.frame_time) for place in places])
+    if not stands.any():
+        return clip
+    heights = np.concatenate([place[:, 2] for place in places])[stands]
+    times = np.asarray(clip.frame_time * np.arange(clip.frames), np.float64)
+    floor = np.full(clip.frames, float(np.median(heights)))
+    low, high = np.percentile(heights, (2.0, 98.0))
+    if high - low <= UNEVEN:
+        floor = _smooth(times, np.concatenate([times, times])[stands], heights)
+    translation = clip.translation.copy()
+    translation[:, 2] -= floor
+    return replace(clip, translation=translation)
+
+
+def _lowest(
+    clip: Clip,
+    mapping: Mapping[str, str],
+    skeleton: Skeleton,
+    side: str,
+    mass: float,
+    sex: Sex,
+) -> Array:
+    """(frames, 3) m, the lowest corner of a foot and its toes."""
+    masses = {body: inertia.mass for body, inertia in inertias(skeleton, mass, sex).items()}
+    forms = shapes(skeleton, masses)
+    places, rotations = clip.places()
+    corners = []
+    for body in (f"{side}_foot", f"{side}_toes"):
+        joint = joint_of(body)
+        while joint not in mapping:
+            joint = PARENTS[joint]
+        number = clip.names.index(mapping[joint])
+        form = forms[body]
+        for signs in product((-1.0, 1.0), repeat=3):
+            corner = form.centre + form.axes @ (np.array(signs) * form.size)
+            arm = corner - skeleton.joints[joint]
+            corners.append(places[:, number] + turned(rotations[:, number], arm))
+    points = np.stack(corners, axis=1)
+    return np.asarray(points[np.arange(clip.frames), points[..., 2].argmin(axis=1)])
+
+
+def _stands(place: Array, frame_time: float) -> NDArray[np.bool_]:
+    """(frames,) whether the lowest place (frames, 3) of a foot is at rest."""
+    apart = max(1, round(0.5 * TREMOR / frame_time))
+    if len(place) <= 2 * apart:
+        return np.zeros(len(place), bool)
+    speed = np.linalg.norm(place[2 * apart :] - place[: -2 * apart], axis=1)
+    speed /= 2.0 * apart * frame_time
+    return np.pad(speed, apart, mode="edge") < STILL
+
+
+def _smooth(times: Array, standing: Array, heights: Array) -> Array:
+    """(frames,) m, weighted mean of the heights at the times (s) at which a foot stands."""
+    nearest = np.abs(times[:, None] - standing).min(axis=1, keepdims=True)
+    off = (times[:, None] - standing) ** 2 - nearest**2
+    weights = np.exp(-0.5 * off / STEP**2)
+    return np.asarray(weights @ heights / weights.sum(axis=1))

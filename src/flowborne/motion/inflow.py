@@ -1,0 +1,169 @@
+"""What enters through an inflow side: velocity profiles in space and time, and bands of dye."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.motion.formula import Formula
+from flowborne.motion.tracks import Curve
+
+Array = NDArray[np.float64]
+
+Span = tuple[int, float, float]
+"""Axis, and the two ends of a side along it in m."""
+
+
+class Factor(Protocol):
+    """How strong an inflow or a mouth is over time."""
+
+    def at(self, time: float) -> float:
+        """Part of the full velocity at `time` (s)."""
+        ...
+
+
+@dataclass(frozen=True)
+class FactorSteady:
+    """Always the full velocity."""
+
+    def at(self, time: float) -> float:
+        """1."""
+        return 1.0
+
+
+@dataclass(frozen=True)
+class FactorRamp:
+    """Rises from 0 to 1 within `duration` s, with zero slope at both ends."""
+
+    duration: float
+
+    def at(self, time: float) -> float:
+        """Half a cosine wave, then 1."""
+        if time >= self.duration:
+            return 1.0
+        return 0.5 - 0.5 * math.cos(math.pi * max(time, 0.0) / self.duration)
+
+
+@dataclass(frozen=True)
+class FactorKeyframes:
+    """Smooth curve through keyframes."""
+
+    curve: Curve
+
+    def at(self, time: float) -> float:
+        """The curve at `time`."""
+        return self.curve.value(time)
+
+
+@dataclass(frozen=True)
+class FactorPulse:
+    """Half a sine wave for `duration` s of every `period` s, the first from `start` s on."""
+
+    period: float
+    duration: float
+    start: float = 0.0
+
+    def at(self, time: float) -> float:
+        """Between 0 and 1."""
+        since = math.fmod(time - self.start, self.period)
+        if time < self.start or since >= self.duration:
+            return 0.0
+        return math.sin(math.pi * since / self.duration)
+
+
+@dataclass(frozen=True)
+class FactorFormula:
+    """A formula in time."""
+
+    formula: Formula
+
+    def at(self, time: float) -> float:
+        """Its value. Raises ArithmeticError where it is not finite."""
+        return self.formula.at(time).value
+
+
+@dataclass(frozen=True)
+class ProfileUniform:
+    """The same velocity (m/s) everywhere on the side, times a factor in time."""
+
+    velocity: tuple[float, float, float]
+    factor: Factor
+
+    def __call__(self, x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
+        """(u, v, w) in m/s at places in m and a time in s."""
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
+        strength = self.factor.at(time)
+        u, v, w = (np.full(shape, strength * component) for component in self.velocity)
+        return u, v, w
+
+
+@dataclass(frozen=True)
+class ProfileParabolic:
+    """Parabola along each span of the side: 0 at its ends, mean velocity `velocity` (m/s).
+
+    Along one span it is plane Poiseuille flow with 1.5 times the mean in the middle; along two it
+    is the product of two parabolas.
+    """
+
+    velocity: tuple[float, float, float]
+    spans: tuple[Span, ...]
+    factor: Factor
+
+    def __call__(self, x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
+        """(u, v, w) in m/s at places in m and a time in s."""
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
+        part = np.full(shape, self.factor.at(time))
+        for axis, low, high in self.spans:
+            s = ((x, y, z)[axis] - low) / (high - low)
+            part = part * (6.0 * s * (1.0 - s))
+        u, v, w = (part * component for component in self.velocity)
+        return u, v, w
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Bands of dye on a side.
+
+    axis   across which the bands follow each other
+    ends   (from, to) of each band in m
+    value  of the dye in a band; 0 beside it
+    times  (start, stop) in s
+    """
+
+    axis: int
+    ends: tuple[tuple[float, float], ...]
+    value: float
+    times: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class DyeBandsValue:
+    """Value of a dye that enters through a side: the largest of its bands'."""
+
+    groups: tuple[Bands, ...]
+
+    def __call__(self, x: Array, y: Array, z: Array, time: float) -> Array:
+        """Value at places in m and a time in s."""
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
+        values = np.zeros(shape)
+        for group in self.groups:
+            if not group.times[0] <= time < group.times[1]:
+                continue
+            s = (x, y, z)[group.axis]
+            for low, high in group.ends:
+                inside = (s >= low) & (s < high)
+                values = np.maximum(values, np.where(inside, group.value, 0.0))
+        return values
+
+
+def even_bands(
+    low: float, high: float, count: int, width: float
+) -> tuple[tuple[float, float], ...]:
+    """(from, to) of `count` bands of one width, evenly spread between `low` and `high` (m)."""
+    pitch = (high - low) / count
+    centres = (low + (index + 0.5) * pitch for index in range(count))
+    return tuple((centre - 0.5 * width, centre + 0.5 * width) for centre in centres)

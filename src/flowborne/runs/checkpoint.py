@@ -1,0 +1,79 @@
+"""checkpoint.npz: the whole world in double precision, to go on from bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.world import Setup, World
+from flowborne.files.arrays import read_arrays
+from flowborne.files.atomic import write_atomically
+
+
+def save_checkpoint(path: Path, world: World, frame: int) -> None:
+    """Write the state after `frame` frames; an earlier checkpoint is replaced in one go.
+
+    The file depends on the state and the frame alone: two runs that agree write the same bytes.
+    Since the history has a row per frame, `frame` is also its length.
+    """
+    arrays = world.arrays()
+    write_atomically(path, lambda file: np.savez(file, frame=np.int64(frame), **arrays))  # type: ignore[arg-type]
+
+
+def load_checkpoint(
+    path: Path, setup: Setup, memory: Mapping[str, tuple[int, ...]] | None = None
+) -> tuple[World, int]:
+    """World of `setup` as it was saved, and the number of frames that it had done.
+
+    memory  shapes of the controller's own arrays; none without a controller
+    raises  ValueError when the file is not a checkpoint, or is one of another setup
+    """
+    try:
+        arrays = read_arrays(path)
+        frame = arrays.pop("frame")
+        if frame.dtype != np.int64 or frame.shape != () or frame < 0:
+            raise ValueError("its 'frame' is no number of frames")
+        _check_arrays(arrays, setup, memory or {})
+        world = World.from_arrays(setup, arrays)
+    except KeyError as error:
+        raise ValueError(f"{path} is not a checkpoint of this scene (it lacks {error})") from error
+    except (OSError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is not a checkpoint of this scene ({error})") from error
+    return world, int(frame)
+
+
+def _check_arrays(
+    arrays: Mapping[str, NDArray[Any]], setup: Setup, memory: Mapping[str, tuple[int, ...]]
+) -> None:
+    """Raise KeyError or ValueError unless these are arrays of a world of `setup`."""
+    at_rest = World.at_rest(setup).arrays()
+    for name, like in at_rest.items():
+        shapes = {like.shape}
+        if setup.fluid is not None and like.size == 0:  # made by the first step
+            shapes |= {setup.fluid.grid.shape, (setup.solid.nq,)}
+        _check_array(name, arrays[name], shapes, like.dtype)
+    for own, shape in memory.items():
+        name = f"memory/{own}"
+        if name in arrays:
+            _check_array(name, arrays[name], {shape}, np.dtype(np.float64))
+
+
+def _check_array(
+    name: str, found: NDArray[Any], shapes: set[tuple[int, ...]], dtype: np.dtype[Any]
+) -> None:
+    if found.shape not in shapes or found.dtype != dtype:
+        wanted = " or ".join(str(list(shape)) for shape in sorted(shapes))
+        raise ValueError(
+            f"its '{name}' is {list(found.shape)} of {found.dtype} in place of {wanted} of {dtype}"
+        )
+    if not np.isfinite(found).all():
+        raise ValueError(f"its '{name}' has a number that is not finite")
+
+
+def state_bytes(world: World) -> int:
+    """Bytes of memory that one copy of the state takes."""
+    return sum(values.nbytes for values in world.arrays().values())

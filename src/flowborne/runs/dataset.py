@@ -1,0 +1,97 @@
+"""A run as an xarray data set that reads its states when their numbers are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from flowborne.fluid.grid import Grid
+from flowborne.runs.columns import HistoryArray
+from flowborne.runs.state_arrays import StateArray
+
+
+class LazyStates(BackendArray):
+    """A `StateArray` as xarray asks for it."""
+
+    def __init__(self, array: StateArray) -> None:
+        self._array = array
+        self.shape, self.dtype = array.shape, array.dtype
+
+    def __getitem__(self, key: Any) -> Any:
+        return indexing.explicit_indexing_adapter(
+            key, self.shape, indexing.IndexingSupport.BASIC, self._chosen
+        )
+
+    def _chosen(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        first, rest = key[0], key[1:]
+        if isinstance(first, slice):
+            return self._array[first][(slice(None), *rest)]
+        return np.asarray(self._array[int(first)][rest])
+
+
+def dataset_of(
+    arrays: Mapping[str, StateArray],
+    frames: Sequence[int],
+    history: Mapping[str, HistoryArray],
+    rows: NDArray[np.int64],
+    bodies: Sequence[str],
+    joints: Sequence[str],
+    grid: Grid | None,
+    about: Mapping[str, Any],
+) -> xarray.Dataset:
+    """The arrays of a run, see `OpenRun.dataset`.
+
+    frames   number of the frame of each state
+    history  name -> quantity of the history
+    rows     (k,) frame of each of its rows
+    bodies   names
+    joints   names
+    grid     of the fluid, None without
+    about    attributes of the whole
+    """
+    variables = {name: _of_history(array, rows, frames) for name, array in history.items()}
+    for name, array in arrays.items():
+        if name != "time":
+            data = indexing.LazilyIndexedArray(LazyStates(array))
+            meaning = {"units": array.quantity.unit, "long_name": array.quantity.meaning}
+            variables[name] = xarray.Variable(("time", *array.quantity.dimensions), data, meaning)
+    coordinates: dict[str, Any] = {
+        "time": ("time", np.asarray(arrays["time"]), {"units": "s"}),
+        "frame": ("time", np.array(frames)),
+        "body": ("body", list(bodies)),
+        "joint": ("joint", list(joints)),
+        "axis": ("axis", list("xyz")),
+    }
+    if grid is not None:
+        coordinates |= _places(grid)
+    return xarray.Dataset(variables, coordinates, about)
+
+
+def _of_history(
+    array: HistoryArray, rows: NDArray[np.int64], frames: Sequence[int]
+) -> xarray.Variable:
+    """A quantity of the history at the times of the states, nan where it has no row."""
+    values = np.full((len(frames), *array.values.shape[1:]), np.nan)
+    _, here, there = np.intersect1d(np.array(frames), rows, return_indices=True)
+    values[here] = array.values[there]
+    about = {"units": array.unit, "long_name": array.meaning}
+    return xarray.Variable(
+        ("time", *array.dimensions), values, {key: text for key, text in about.items() if text}
+    )
+
+
+def _places(grid: Grid) -> dict[str, Any]:
+    """Places of cells and faces along the axes on which there are some."""
+    found: dict[str, Any] = {}
+    for axis, name in enumerate("xyz"):
+        found[name] = (name, grid.cell_coordinates()[axis], {"units": "m"})
+        if axis in grid.axes:
+            face = f"{name}_face"
+            found[face] = (face, grid.face_coordinates(axis)[axis], {"units": "m"})
+    return found

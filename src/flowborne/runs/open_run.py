@@ -1,0 +1,164 @@
+"""A run folder opened for reading: what holds for all frames at once, and frames as asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.fluid.grid import Grid
+from flowborne.files.given import read_json
+from flowborne.runs.states import read_state
+from flowborne.runs.columns import history_arrays
+from flowborne.runs.history import history_columns, history_rows
+from flowborne.runs.optional import optional
+from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
+from flowborne.runs.state_arrays import DYE, StateArray, quantity
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+
+
+class OpenRun:
+    """What a run has left behind, read lazily and in its own units (SI, radians).
+
+    folder  of the run
+    raises  RunFolderError when it is none, or has no state yet
+
+    scene              the scene as run: its file as nested dictionaries
+    name               of the scene
+    bodies             names of the bodies, the world's first
+    joints             names of the joints
+    dyes               names of the dyes
+    frames             number of the frame of each state, 0 for the start
+    frames_per_second  of the run
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        files = RunFolder.existing(Path(folder))
+        self.folder = files.path
+        self._files = files
+        self.scene = files.read_scene()
+        with reading(self.folder):
+            self._model = read_json(files.model)
+            names = sorted(p.name for p in files.states.iterdir() if STATE_NAME.fullmatch(p.name))
+            self.name = str(self.scene.get("name", files.path.name))
+            self.bodies: tuple[str, ...] = tuple(self._model["bodies"])
+            self.joints: tuple[str, ...] = tuple(self._model["joints"])
+            self.frames_per_second = float(self._model["frames_per_second"])
+        if not names:
+            raise RunFolderError(f"{folder} has no frame yet; let the run go on with --resume")
+        self._states = tuple(files.states / name for name in names)
+        self.frames = tuple(int(path.stem) for path in self._states)
+
+    def __len__(self) -> int:
+        """Number of states: that of the frames, and the start."""
+        return len(self._states)
+
+    @property
+    def is_slab(self) -> bool:
+        """Whether it is a run in two dimensions, in which forces are per metre of depth."""
+        return bool(self._model["slab"])
+
+    @property
+    def dyes(self) -> tuple[str, ...]:
+        found = (DYE.fullmatch(name) for name in self.arrays)
+        return tuple(match[1] for match in found if match)
+
+    @cached_property
+    def grid(self) -> Grid | None:
+        """The fluid's grid; None without a fluid."""
+        entry = self._model["grid"]
+        if entry is None:
+            return None
+        nx, ny, nz = entry["shape"]
+        x, y, z = entry["origin"]
+        return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
+
+    @cached_property
+    def skin(self) -> NDArray[np.int64] | None:
+        """(m, 3) triangles of the `flesh_vertices` of a state, outward; None without flesh."""
+        entry = self._model.get("flesh")
+        return None if entry is None else np.asarray(entry["triangles"], np.int64)
+
+    @cached_property
+    def history(self) -> dict[str, Array]:
+        """column -> (frames,) numbers, as history.csv has them; the unit ends the name."""
+        with reading(self.folder):
+            columns = list(history_columns(self._files.history))
+            rows = np.array(list(history_rows(self._files.history, columns)), float)
+            return dict(zip(columns, rows.reshape(-1, len(columns)).T, strict=True))
+
+    @cached_property
+    def times(self) -> Array:
+        """(n,) s of every state."""
+        return self.every("time")
+
+    @cached_property
+    def arrays(self) -> Mapping[str, StateArray]:
+        """Name -> array of all states, lazily; see state_arrays.QUANTITIES for shapes and units."""
+        names = read_state(self._states[0])
+        return MappingProxyType(
+            {name: StateArray(self._states, name, quantity(name)) for name in names}
+        )
+
+    def state(self, number: int) -> dict[str, NDArray[Any]]:
+        """Arrays of a state by name, in single precision; negative numbers count from the end.
+
+        time, q, v, body_position (nb, 3), body_rotation (nb, 3, 3), geom_position, geom_rotation,
+        fluid_force (nb, 3), flesh_vertices (k, 3); of the fluid velocity_x, velocity_y, velocity_z
+        on the faces, pressure, scalar_<dye>, and open, the part of each cell that no body takes up.
+        """
+        return read_state(self._states[number])
+
+    def every(self, name: str) -> Array:
+        """(n, ...) one array of all states, such as "body_position".
+
+        raises  KeyError when the states have none of that name
+        """
+        return np.asarray(self.arrays[name], float)
+
+    def dataset(self) -> xarray.Dataset:
+        """All arrays and the history as an xarray data set; a state is read when its numbers are
+        asked for.
+
+        Each has its dimensions, and its unit and meaning as attributes; times, bodies, joints, and
+        places of cells and faces are coordinates. Of the history there are `torque`, `force`,
+        `power`, `angle`, `position`, `target_angle` and `target_position` of joints, `torque_xyz`
+        and `force_xyz` of ball and free joints, `body_force` and so on of the bodies that the scene
+        names, and all else under the name of its column without the unit; nan at the start, where
+        the history has no row.
+        raises  SceneError when xarray is not installed
+        """
+        optional("xarray", "xarray", "xarray", "data sets")
+        from flowborne.runs.dataset import dataset_of
+
+        about: dict[str, Any] = {"scene": self.name, "frames_per_second": self.frames_per_second}
+        about["slab"] = int(self.is_slab)
+        history, rows = self.history, self.history["frame"].astype(np.int64)
+        return dataset_of(
+            self.arrays,
+            self.frames,
+            history_arrays(history, self.bodies, self.joints),
+            rows,
+            self.bodies,
+            self.joints,
+            self.grid,
+            about,
+        )
+
+
+def open_run(folder: str | Path) -> OpenRun:
+    """What a run has left behind: times, poses, skin of flesh, fields and history, read lazily.
+
+    folder  of a run, which may still be going on
+    raises  RunFolderError when it is none, or has no state yet
+    """
+    return OpenRun(folder)

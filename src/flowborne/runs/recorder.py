@@ -1,0 +1,236 @@
+"""What is kept of each frame, so that any frame can be drawn without the solver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.world import Setup, World
+from flowborne.files.atomic import sync_files, write_atomically, write_json
+from flowborne.runs.run_folder import RunFolder
+from flowborne.shapes.mesh import ShapeMesh
+from flowborne.solids.dynamics import Kinematics, kinematics
+from flowborne.solids.flesh import Flesh
+from flowborne.solids.geoms import rest_poses
+from flowborne.solids.model import SolidModel
+from flowborne.solids.skins import clad_bodies, skins_of
+
+Array = NDArray[np.float64]
+
+BYTES_PER_MEMBER = 300
+"""What an array costs in an npz file besides its numbers: two headers and a name, twice."""
+
+
+class Recorder:
+    """Writes states/NNNNNN.npz of a run.
+
+    Each file holds, in single precision but for the time,
+
+      time                                       s
+      q (nq,), v (nv,)                           generalised coordinates
+      geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
+      fluid_force (nb, 3)                        N, what fluid and winds do to each body: mean over
+                                                 the frame, without the added-mass part
+      fluid_centre (nb, 3)                       m, where to draw it: the centroid of the body and
+                                                 the flesh that it carries
+      flesh_vertices (k, 3)                      m, the vertices of flesh that lie on its skin
+      velocity_x, velocity_y, velocity_z         m/s on the faces (no z in a slab)
+      pressure                                   Pa in the cells
+      scalar_<name>                              in the cells
+      open                                       part of each cell that no body takes up
+
+    A file is there whole or not at all when the process is killed. `sync` forces all of them to
+    the disc: one by one that would cost more than writing them.
+    """
+
+    def __init__(self, folder: RunFolder) -> None:
+        self.folder = folder
+        self._written: list[Path] = []
+
+    def write(self, frame: int, world: World, force: Array | None) -> None:
+        """Write the state after `frame` frames.
+
+        force   (nb, 3) N, to draw; None at the start
+        raises  OSError when the disc refuses; nothing is then left of the file
+        """
+        arrays = self.arrays(world, force)
+        path = self.folder.state(frame)
+        write_atomically(path, lambda file: np.savez(file, **arrays), durable=False)  # type: ignore[arg-type]
+        self._written.append(path)
+
+    def sync(self) -> None:
+        """Wait until every state that was written is on the disc."""
+        sync_files(self._written)
+        self._written.clear()
+
+    def bytes_per_frame(self, world: World) -> int:
+        """About the size of a state file."""
+        solid = world.setup.solid
+        numbers, members = 18 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
+        if solid.flesh is not None:
+            numbers += 3 * len(on_skin(solid.flesh))
+            members += 1
+        if world.fluid is not None and world.setup.fluid is not None:
+            moving = [world.fluid.velocity[axis] for axis in world.setup.fluid.grid.axes]
+            kept = [*moving, *world.fluid.scalars.values()]
+            numbers += sum(values.size for values in kept) + 2 * world.fluid.pressure.size
+            members += len(kept) + 2
+        return 4 * numbers + BYTES_PER_MEMBER * members
+
+    def arrays(self, world: World, force: Array | None) -> dict[str, NDArray[Any]]:
+        """What is kept of `world`."""
+        solid = world.setup.solid
+        pose = kinematics(solid, world.solid.q)
+        kept: dict[str, Array] = {
+            "q": world.solid.q,
+            "v": world.solid.v,
+            "geom_position": pose.geom_position,
+            "geom_rotation": pose.geom_rotation,
+            "body_position": pose.body_position,
+            "body_rotation": pose.body_rotation,
+            "fluid_centre": centres(solid, pose),
+            "fluid_force": np.zeros_like(pose.centroid) if force is None else force,
+        }
+        if solid.flesh is not None:
+            kept["flesh_vertices"] = pose.vertices[on_skin(solid.flesh)]
+        if world.fluid is not None and world.setup.fluid is not None:
+            named = world.fluid.arrays()
+            axes = [f"velocity_{'xyz'[axis]}" for axis in world.setup.fluid.grid.axes]
+            scalars = [name for name in named if name.startswith("scalar_")]
+            kept |= {name: named[name] for name in ("pressure", *axes, *scalars)}
+            kept["open"] = open_cells(world, pose)
+        single: dict[str, NDArray[Any]] = {k: v.astype(np.float32) for k, v in kept.items()}
+        return {"time": np.array(world.time)} | single
+
+
+def open_cells(world: World, pose: Kinematics) -> Array:
+    """(nx, ny, nz) open fraction of each cell, from the bodies' distance to its centre."""
+    from flowborne.coupling.step import cut_by_bodies
+
+    assert world.setup.fluid is not None
+    distance = cut_by_bodies(world, pose).distance
+    for _ in range(3):
+        # mean of neighbours along the first axis, which then becomes the last: all three in turn
+        distance = np.moveaxis(0.5 * (distance[1:] + distance[:-1]), 0, -1)
+    return np.clip(0.5 + distance / world.setup.fluid.grid.spacing, 0.0, 1.0)
+
+
+def centres(solid: SolidModel, pose: Kinematics) -> Array:
+    """(nb, 3) centroid of what each body and the flesh that it carries take up, m."""
+    flesh = solid.flesh
+    if flesh is None:
+        return pose.centroid
+    carried = flesh.carried * flesh.volumes[:, None]
+    volume = (solid.volume + carried.sum(axis=0))[:, None]
+    moment = solid.volume[:, None] * pose.centroid + carried.T @ pose.vertices
+    return np.where(volume > 0.0, moment / np.where(volume > 0.0, volume, 1.0), pose.centroid)
+
+
+def on_skin(flesh: Flesh) -> NDArray[np.int64]:
+    """(k,) vertices of flesh that a triangle of its surface has, ascending."""
+    return np.unique(flesh.surface)
+
+
+def write_model(
+    folder: RunFolder,
+    setup: Setup,
+    *,
+    controlled: list[str],
+    frames_per_second: float,
+    wind: list[list[float]],
+    taken: Sequence[str] = (),
+) -> None:
+    """Write model.json: what does not move, but is needed to draw the run or to go on from it.
+
+    controlled  names of the controlled joints
+    wind        directions and speeds of the streams, m/s, to draw as arrows
+    taken       names of the joints that did what they did in an earlier run
+    """
+    solid, fluid = setup.solid, setup.fluid
+    joint_bodies = solid.mj.jnt_bodyid
+    of_bones = np.flatnonzero(joint_bodies < solid.nbody)
+    names = [solid.joint_names[joint] for joint in of_bones]
+    grid = None
+    if fluid is not None:
+        grid = {
+            "shape": list(fluid.grid.shape),
+            "spacing": fluid.grid.spacing,
+            "origin": list(fluid.grid.origin),
+        }
+    write_json(
+        folder.model,
+        {
+            "slab": solid.slab,
+            "bodies": list(solid.body_names),
+            "joints": names,
+            "joint_bodies": joint_bodies[of_bones].tolist(),
+            "controlled": controlled,
+            "decided": [*taken, *controlled],
+            "places": {name: _places(solid, name) for name in names},
+            "grid": grid,
+            "geoms": _geoms(solid),
+            "flesh": None if solid.flesh is None else _flesh(solid.flesh),
+            "skins": [] if solid.slab else _skins(solid),
+            "frames_per_second": frames_per_second,
+            "wind": wind,
+        },
+    )
+
+
+def _places(solid: SolidModel, joint: str) -> list[int]:
+    """Where the entries of q of a joint begin and end."""
+    places = solid.positions_of(joint)
+    return [int(places[0]), int(places[-1]) + 1]
+
+
+def _geoms(solid: SolidModel) -> list[dict[str, Any]]:
+    """The geometries in the order of geom_position."""
+    listed = []
+    clad = np.zeros(solid.nbody, bool) if solid.slab else clad_bodies(solid.mj)[: solid.nbody]
+    for geom, shape in enumerate(solid.geom_shape):
+        entry: dict[str, Any] = {
+            "type": shape.kind,
+            "size": solid.geom_size[geom].tolist(),
+            "body": int(solid.geom_body[geom]),
+            "rgba": solid.geom_rgba[geom].tolist(),
+            "covered": bool(solid.geom_covered[geom] or clad[solid.geom_body[geom]]),
+        }
+        if isinstance(shape, ShapeMesh):
+            entry |= {"vertices": shape.vertices.tolist(), "faces": shape.faces.tolist()}
+        listed.append(entry)
+    return listed
+
+
+def _skins(solid: SolidModel) -> list[dict[str, Any]]:
+    """The model's skins in its own pose, and where the bodies that carry each are in it."""
+    listed = []
+    position, rotation, _, _ = rest_poses(solid.mj)
+    for skin in skins_of(solid.mj):
+        bodies = np.flatnonzero(skin.weights.any(axis=0))
+        listed.append(
+            {
+                "name": skin.name,
+                "rgba": skin.rgba.tolist(),
+                "vertices": skin.vertices.tolist(),
+                "triangles": skin.faces.tolist(),
+                "bodies": bodies.tolist(),
+                "weights": skin.weights[:, bodies].tolist(),
+                "body_position": position[bodies].tolist(),
+                "body_rotation": rotation[bodies].tolist(),
+            }
+        )
+    return listed
+
+
+def _flesh(flesh: Flesh) -> dict[str, Any]:
+    """The skin: triangles of the vertices that a frame has, and the bodies that carry flesh."""
+    return {
+        "names": list(flesh.names),
+        "triangles": np.searchsorted(on_skin(flesh), flesh.surface).tolist(),
+        "of_triangles": flesh.of_surface.tolist(),
+        "bodies": np.flatnonzero(flesh.carried.any(axis=0)).tolist(),
+    }

@@ -1,0 +1,132 @@
+"""What the bones fill at rest, as a signed distance in world axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.phrases import suggestion
+from flowborne.shapes.mesh import ShapeMesh
+from flowborne.shapes.shape import Mesh, Shape
+from flowborne.solids.geoms import (
+    displacing_geoms,
+    element_name,
+    geom_shape,
+    rest_poses,
+)
+from flowborne.solids.quiet import compiled_quietly
+from flowborne.solids.tissue.distance import signed_distance
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One geometry of a bone.
+
+    bone      number of the bone
+    shape     in its own frame
+    position  (3,) centre, m
+    rotation  (3, 3) geometry's frame to the world's
+    low, high (3,) corners of a box around it in world axes, m
+    thinnest  smallest half size, m
+    surface   the surface of a mesh, to search by its cells; None for other kinds
+    """
+
+    bone: int
+    shape: Shape
+    position: Array
+    rotation: Array
+    low: Array
+    high: Array
+    thinnest: float
+    surface: Mesh | None
+
+    def distance(self, points: Array) -> Array:
+        """(n,) signed distances of points (n, 3), negative inside, m."""
+        local = np.ascontiguousarray((points - self.position) @ self.rotation)
+        if self.surface is None:
+            return self.shape.distance(local)
+        return signed_distance(local, self.surface)
+
+
+@dataclass(frozen=True)
+class Bones:
+    """Some bodies of a model at rest.
+
+    names  of the bodies
+    parts  their geometries
+    """
+
+    names: tuple[str, ...]
+    parts: tuple[Part, ...]
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """(3,) lowest and highest corner around all of them, m."""
+        return (
+            np.min([part.low for part in self.parts], axis=0),
+            np.max([part.high for part in self.parts], axis=0),
+        )
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest half size among the geometries, m."""
+        return min(part.thinnest for part in self.parts)
+
+    def distance(self, points: Array) -> Array:
+        """(n,) signed distances of points (n, 3) to the nearest bone, negative inside, m."""
+        nearest = np.full(len(points), np.inf)
+        for part in self.parts:
+            np.minimum(nearest, part.distance(points), out=nearest)
+        return nearest
+
+    def distances(self, points: Array) -> Array:
+        """(n, number of bones) signed distances of points (n, 3) to each bone, m."""
+        each = np.full((len(points), len(self.names)), np.inf)
+        for part in self.parts:
+            each[:, part.bone] = np.minimum(each[:, part.bone], part.distance(points))
+        return each
+
+
+def bones_of(spec: mujoco.MjSpec, names: Sequence[str]) -> Bones:
+    """The bodies `names` of a model, as far as they displace fluid.
+
+    raises  ValueError for an unknown body and for one without such a geom
+    """
+    mj = compiled_quietly(spec.copy())
+    known = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, b) for b in range(mj.nbody)]
+    _, _, position, rotation = rest_poses(mj)
+    displacing = displacing_geoms(mj)
+    parts = []
+    for bone, name in enumerate(names):
+        if name not in known:
+            raise ValueError(f"there is no body '{name}'{suggestion(name, known, 'There are')}")
+        own = [g for g in displacing if mj.geom_bodyid[g] == known.index(name)]
+        if not own:
+            raise ValueError(
+                f"body '{name}' has no geom for flesh to grow on. "
+                "Give it one that displaces fluid, or leave it out of the bones."
+            )
+        parts += [_part(mj, g, bone, position[g], rotation[g]) for g in own]
+    return Bones(tuple(names), tuple(parts))
+
+
+def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: Array) -> Part:
+    shape = geom_shape(mj, geom)
+    middle, half = mj.geom_aabb[geom].reshape(2, 3)
+    centre, reach = position + rotation @ middle, np.abs(rotation) @ half
+    return Part(
+        bone,
+        shape,
+        position,
+        rotation,
+        centre - reach,
+        centre + reach,
+        float(half.min()),
+        shape.triangles() if isinstance(shape, ShapeMesh) else None,
+    )

@@ -1,0 +1,48 @@
+"""Tetrahedra inside surfaces, by fTetWild (Hu, Schneider, Wang, Zorin and Panozzo 2020)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.kernels.jit import numba_thread_count
+from flowborne.shapes.shape import Mesh
+from flowborne.solids.elements import oriented
+from flowborne.solids.tissue import mesh_run
+from flowborne.solids.tissue.apart import run_apart
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Array, Indices]:
+    """Points (n, 3) and right-handed tetrahedra (m, 4) of all that a surface encloses.
+
+    surface    closed, and turned outward: that of a hollow body has parts turned into the hollow
+    size       length of edges, m; shorter where the surface bends too much for it
+    tolerance  how far from the surface faces of the tetrahedra may be, m
+    raises     ValueError when the mesher fails
+
+    Two runs give different meshes of the same quality, even on one thread.
+    """
+    points, triangles = surface
+    with TemporaryDirectory(prefix="flowborne-flesh-") as folder:
+        np.savez(
+            Path(folder) / mesh_run.SURFACES,
+            points=points,
+            triangles=triangles.astype(np.int32),
+            size=size,
+            tolerance=tolerance / np.linalg.norm(np.ptp(points, axis=0)),
+            threads=numba_thread_count(),
+        )
+        why = run_apart(folder, mesh_run.TETRAHEDRA, "mesh")
+        if why is not None:
+            raise ValueError(
+                f"the flesh cannot be meshed with edges of {size:g} m: {why}. Try another size."
+            )
+        with np.load(Path(folder) / mesh_run.TETRAHEDRA) as mesh:
+            points, tetrahedra = mesh["points"], mesh["tetrahedra"].astype(np.int64)
+    return points, oriented(points, tetrahedra)

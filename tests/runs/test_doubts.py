@@ -1,0 +1,112 @@
+"""A run that left its domain or lost momentum does not end as if nothing had happened."""
+
+import pytest
+
+from flowborne import Grid
+from flowborne.boundaries import Boundaries, BoundaryPeriodic
+from flowborne.cli import BLAS_THREADS, main
+from flowborne.coupling.world import Fluid
+from flowborne.runs.doubts import doubts_of
+from flowborne.runs.history import History
+from flowborne.running import RunOutcome
+
+from ..made_runs import run, summary_of
+
+FLUID = Fluid(Grid.slab(10, 10, 0.1, (0.0, 0.0)), 1.0)
+
+SCENE = """
+name = "leaving"
+dimensions = 2
+
+[time]
+frames_per_second = 10.0
+frames = 2
+
+[domain]
+size = [1.0, 1.0]
+resolution = 12
+
+[fluid]
+density = 1.0
+
+[boundaries]
+x_min = "open"
+x_max = "open"
+
+[solids]
+model = "ball.xml"
+density = 1.0
+
+[[motion]]
+kind = "formula"
+joint = "along"
+position = "0.7 * t"
+"""
+
+MODEL = """
+<mujoco>
+  <worldbody>
+    <body name="ball" pos="0.7 0.5 0">
+      <joint name="along" type="slide" axis="1 0 0"/>
+      <geom type="sphere" size="0.15"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def history(path, places, errors=None):
+    """One body along x, and the budget's error in each frame."""
+    columns = ("frame", "ball_x_m", "ball_y_m", "momentum_budget_error")
+    rows = History.create(path, columns)
+    for frame, x in enumerate(places, 1):
+        error = errors[frame - 1] if errors else 1e-13
+        rows.append(dict(zip(columns, (frame, x, 0.5, error), strict=True)))
+    rows.close()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("places", "said"),
+    [
+        ((0.5, 0.9, 1.05), []),  # on its way out, still less than a cell beyond the side
+        ((1.5, 1.6, 1.7), ["body 'ball' left the fluid's domain in frame 1"]),
+        ((0.5, 0.9, 1.15, 0.5), ["body 'ball' left the fluid's domain in frame 3"]),
+        ((0.5, -0.15), ["body 'ball' left the fluid's domain in frame 2"]),
+    ],
+)
+def test_a_body_that_leaves_the_domain_is_named_with_the_frame(tmp_path, places, said):
+    found = doubts_of(history(tmp_path / "history.csv", places), ["ball"], FLUID)
+    assert [doubt.split(";")[0] for doubt in found] == said
+
+
+def test_no_body_leaves_through_periodic_sides(tmp_path):
+    sides = Boundaries(x_min=BoundaryPeriodic(), x_max=BoundaryPeriodic())
+    fluid = Fluid(FLUID.grid, 1.0, boundaries=sides)
+    assert not doubts_of(history(tmp_path / "history.csv", (0.5, 1.5)), ["ball"], fluid)
+
+
+def test_an_open_momentum_budget_is_told_with_its_worst_frame(tmp_path):
+    path = history(tmp_path / "history.csv", (0.5, 0.5, 0.5), (1e-13, 3e-4, 2e-5))
+    (said,) = doubts_of(path, ["ball"], FLUID)
+    assert "momentum_budget_error is 0.0003 in frame 2" in said
+
+
+def test_a_run_that_leaves_its_domain_is_not_done_when_resumed_either(
+    tmp_path, capsys, monkeypatch
+):
+    (tmp_path / "ball.xml").write_text(MODEL)
+    scene, out = tmp_path / "leaving.toml", tmp_path / "run"
+    scene.write_text(SCENE)
+    assert run(scene, out).outcome is RunOutcome.DONE
+    result = run(scene, out, resume=True, frames=8)
+    assert result.outcome is RunOutcome.DOUBTFUL
+    assert "body 'ball' left the fluid's domain in frame 6" in result.message
+    summary = summary_of(out)
+    assert (summary["outcome"], len(summary["doubts"])) == ("doubtful", 1)
+    for name in BLAS_THREADS:
+        monkeypatch.setenv(name, "1")
+    with pytest.raises(SystemExit) as left:
+        main(["run", str(scene), "--out", str(out), "--resume", "--frames", "9", "--no-film"])
+    assert left.value.code == 3
+    assert "left the fluid's domain in frame 6" in capsys.readouterr().err
