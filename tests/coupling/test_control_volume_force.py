@@ -12,8 +12,9 @@ from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import World
 from flowborne.fluid import transport
 from flowborne.fluid.grid import Array, Grid
-from flowborne.kernels.flux import GHOSTS, line_flux_reference, side_fluxes_reference
+from flowborne.kernels.flux import GHOSTS
 
+from ..kernels.references.flux import line_flux_reference, side_fluxes_reference
 from .test_flux_form import CUBE, SQUARE, channel, free
 
 DT = 1.0 / 256

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from flowborne.kernels.aggregates import (
-    OWN,
-    mark_interpolated,
-    mark_interpolated_reference,
-    mark_own,
-    mark_own_reference,
-)
+from flowborne.kernels.aggregates import OWN, mark_interpolated, mark_own
 from flowborne.kernels.levels import (
     S0,
     at_level,
@@ -18,15 +12,12 @@ from flowborne.kernels.levels import (
     weights_at,
     wrap_ghosts,
 )
-from flowborne.kernels.orphans import (
-    add_orphan_weights,
-    add_orphan_weights_reference,
-    assign_orphans,
-    assign_orphans_reference,
-)
+from flowborne.kernels.orphans import add_orphan_weights, assign_orphans
 from flowborne.kernels.vectors import cells_of
 from flowborne.solvers.pressure import PressureSystem
 
+from .references.aggregates import mark_interpolated_reference, mark_own_reference
+from .references.orphans import add_orphan_weights_reference, assign_orphans_reference
 from .test_multigrid import SHAPES, system_of
 
 LARGER = [((40, 30, 1), (True, True, False)), ((14, 13, 12), (True, False, True))]

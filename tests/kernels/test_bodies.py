@@ -6,21 +6,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from flowborne.kernels.crossings import crossings, crossings_reference
-from flowborne.kernels.momentum import (
-    about_origin,
-    about_origin_reference,
-    momentum_impulse,
-    momentum_impulse_reference,
-)
-from flowborne.kernels.thickness import (
-    any_within,
-    any_within_reference,
-    by_cells,
-    way_inward,
-    way_inward_reference,
-)
-from flowborne.kernels.wind import places, pushed, pushed_reference
+from flowborne.kernels.crossings import crossings
+from flowborne.kernels.momentum import about_origin, momentum_impulse
+from flowborne.kernels.thickness import any_within, by_cells, way_inward
+from flowborne.kernels.wind import places, pushed
+
+from .references.crossings import crossings_reference
+from .references.momentum import about_origin_reference, momentum_impulse_reference
+from .references.thickness import any_within_reference, way_inward_reference
+from .references.wind import pushed_reference
 
 
 @pytest.mark.parametrize("winds", [1, 40])

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, csr_array, eye_array, kron, random_array
 
-from flowborne.kernels.cholesky import lower_reference, solve_factored
+from flowborne.kernels.cholesky import solve_factored
 from flowborne.solvers.cholesky import WIDEST, cholesky, ordering_of
+
+from .references.cholesky import lower_reference
 
 
 def scattered(n: int, seed: int) -> csr_array:

@@ -10,18 +10,20 @@ from hypothesis import strategies as st
 from flowborne.kernels.closed_fractions import (
     CREASE,
     add_closed,
-    add_closed_reference,
     closed_fraction,
     count_beside,
-    count_beside_reference,
-    face_closed_reference,
     list_closed,
-    list_closed_reference,
     share_closed,
-    share_closed_reference,
 )
 
 from .cut_cells import SHAPES, cut, face_shape
+from .references.closed_fractions import (
+    add_closed_reference,
+    count_beside_reference,
+    face_closed_reference,
+    list_closed_reference,
+    share_closed_reference,
+)
 
 AXES = [(shape, axis) for shape in SHAPES for axis in range(3 if shape[2] > 1 else 2)]
 DISTANCE = st.one_of(st.just(0.0), st.floats(-2.0, 2.0, allow_subnormal=False))

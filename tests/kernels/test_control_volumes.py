@@ -10,28 +10,30 @@ import pytest
 
 from flowborne.kernels.control_volumes import (
     fill_empty,
-    fill_empty_reference,
     find_parts,
-    find_parts_reference,
     find_small,
-    find_small_reference,
     find_targets,
-    find_targets_reference,
     join_small,
-    join_small_reference,
     level,
-    level_reference,
     mark_cut,
-    mark_cut_reference,
     merge_small,
-    merge_small_reference,
     neighbour,
-    neighbours_reference,
     share_velocity,
-    share_velocity_reference,
 )
 
 from .cut_cells import face_shape
+from .references.control_volumes import (
+    fill_empty_reference,
+    find_parts_reference,
+    find_small_reference,
+    find_targets_reference,
+    join_small_reference,
+    level_reference,
+    mark_cut_reference,
+    merge_small_reference,
+    neighbours_reference,
+    share_velocity_reference,
+)
 
 CASES = [
     (shape, periodic, component)

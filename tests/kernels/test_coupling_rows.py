@@ -5,21 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.body_velocity import add_body_velocity, body_velocity_reference
+from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.coupling_rows import (
     COVERED,
     ENCLOSED,
     NARROW,
     WIDE,
     flesh_rows,
-    flesh_rows_reference,
     kinds_of_cells,
-    kinds_of_cells_reference,
     list_cells,
-    list_cells_reference,
 )
 
 from .cut_cells import ORIGIN, SHAPES, H, cut, face_shape
+from .references.body_velocity import body_velocity_reference
+from .references.coupling_rows import (
+    flesh_rows_reference,
+    kinds_of_cells_reference,
+    list_cells_reference,
+)
 
 WALLS = [np.zeros((3, 2), np.int64), np.array([[1, 0], [0, 1], [1, 1]])]
 

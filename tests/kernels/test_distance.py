@@ -17,22 +17,15 @@ from flowborne.kernels.distance import (
     SPHERE,
     distances,
     signed_distance,
-    signed_distance_reference,
 )
-from flowborne.kernels.mesh_distance import distances_to_mesh, distances_to_mesh_reference
-from flowborne.kernels.node_distance import (
-    BAND,
-    merge,
-    node_box,
-    node_box_reference,
-    sample_body,
-    sample_body_reference,
-)
-from flowborne.kernels.triangles import (
-    closest_on_triangle,
-    closest_on_triangle_reference,
-    squared_distance,
-)
+from flowborne.kernels.mesh_distance import distances_to_mesh
+from flowborne.kernels.node_distance import BAND, merge, node_box, sample_body
+from flowborne.kernels.triangles import closest_on_triangle, squared_distance
+
+from .references.distance import signed_distance_reference
+from .references.mesh_distance import distances_to_mesh_reference
+from .references.node_distance import node_box_reference, sample_body_reference
+from .references.triangles import closest_on_triangle_reference
 
 KINDS = (SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH)
 SIZE = np.array([0.5, 0.7, 0.4])

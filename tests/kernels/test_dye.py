@@ -5,18 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.cut_dye import (
-    CUT,
-    EMPTY,
-    WHOLE,
-    beside_reference,
-    list_flows,
-    pass_on,
-    pass_on_reference,
-    sort_cells,
-    sort_cells_reference,
-)
-from flowborne.kernels.dye import bend_reference, sweep, sweep_reference
+from flowborne.kernels.cut_dye import CUT, EMPTY, WHOLE, list_flows, pass_on, sort_cells
+from flowborne.kernels.dye import sweep
+
+from .references.cut_dye import beside_reference, pass_on_reference, sort_cells_reference
+from .references.dye import bend_reference, sweep_reference
 
 SHAPES = [(3, 9, 5), (1, 12, 80), (2, 4, 3)]
 ROOM = (5, 4, 6)

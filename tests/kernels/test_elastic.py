@@ -15,11 +15,11 @@ from flowborne.kernels.elastic import (
     elastic_energy,
     elastic_forces,
     singular_values,
-    stiffness_reference,
-    stress_reference,
     volume_ratios,
 )
 from flowborne.solids.elements import shape_gradients, with_middles
+
+from .references.elastic import stiffness_reference, stress_reference
 
 Array = NDArray[np.float64]
 LAWS = (SAINT_VENANT_KIRCHHOFF, STABLE_NEO_HOOKEAN)

@@ -7,9 +7,7 @@ import pytest
 
 from flowborne.kernels.faces import (
     accelerate,
-    accelerate_reference,
     face_means,
-    face_means_reference,
     fill_empty_faces,
     gained,
     largest_open,
@@ -21,6 +19,7 @@ from flowborne.kernels.faces import (
 )
 
 from .cut_cells import face_shape
+from .references.faces import accelerate_reference, face_means_reference
 
 Shape = tuple[int, int, int]
 

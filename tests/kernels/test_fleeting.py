@@ -7,13 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from flowborne.kernels.control_volumes import neighbours_reference
-from flowborne.kernels.fleeting import (
-    let_through,
-    let_through_reference,
-    what_leaves,
-    what_leaves_reference,
-)
+from flowborne.kernels.fleeting import let_through, what_leaves
+
+from .references.control_volumes import neighbours_reference
+from .references.fleeting import let_through_reference, what_leaves_reference
 
 NOTHING = 1e-9
 

@@ -12,16 +12,18 @@ from flowborne.kernels.flux import (
     GHOSTS,
     UPSTREAM,
     fade,
-    fade_reference,
     largest_crossing,
-    largest_crossing_reference,
     pad_field,
-    side_fluxes_reference,
     stage,
-    stage_reference,
 )
 
 from .cut_cells import face_shape
+from .references.flux import (
+    fade_reference,
+    largest_crossing_reference,
+    side_fluxes_reference,
+    stage_reference,
+)
 
 Shape = tuple[int, ...]
 

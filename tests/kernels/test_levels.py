@@ -7,38 +7,33 @@ import itertools
 import numpy as np
 import pytest
 
-from flowborne.kernels.centres import (
-    distance_ratio,
-    distance_ratio_reference,
-    interpolation_weights,
-    interpolation_weights_reference,
-)
+from flowborne.kernels.centres import distance_ratio, interpolation_weights
 from flowborne.kernels.levels import (
     N0,
     S0,
     at_level,
     coarse_sums,
-    coarse_sums_reference,
     coarse_weights,
-    coarse_weights_reference,
     finest_weights,
-    finest_weights_reference,
     inverse_diagonal,
-    inverse_diagonal_reference,
     orphans_at,
     weights_at,
 )
-from flowborne.kernels.regions import (
-    label_regions,
-    label_regions_reference,
-    region_loads,
-    region_loads_reference,
-    region_sums,
-    remove_null,
-    remove_null_reference,
-)
+from flowborne.kernels.regions import label_regions, region_loads, region_sums, remove_null
 from flowborne.kernels.vectors import cells_of
 
+from .references.centres import distance_ratio_reference, interpolation_weights_reference
+from .references.levels import (
+    coarse_sums_reference,
+    coarse_weights_reference,
+    finest_weights_reference,
+    inverse_diagonal_reference,
+)
+from .references.regions import (
+    label_regions_reference,
+    region_loads_reference,
+    remove_null_reference,
+)
 from .test_multigrid import SHAPES, system_of
 
 LENGTHS = list(itertools.product((5, 8, 13, 16), (1, 2, 4), (1, 2), (False, True)))

@@ -3,26 +3,20 @@
 import numpy as np
 import pytest
 
-from flowborne.kernels.deflation import deflated, deflated_reference
-from flowborne.kernels.laplacian import apply_laplacian, apply_laplacian_reference
+from flowborne.kernels.deflation import deflated
+from flowborne.kernels.laplacian import apply_laplacian
 from flowborne.kernels.levels import at_level, interpolation_at, orphans_at, weights_at, wrap_ghosts
-from flowborne.kernels.smoothing import (
-    STEPS,
-    defect,
-    defect_reference,
-    first_smooth,
-    smooth,
-    smooth_reference,
-)
-from flowborne.kernels.transfer import (
-    interpolate,
-    interpolate_reference,
-    restrict,
-    restrict_reference,
-)
-from flowborne.kernels.v_cycle import v_cycle, v_cycle_reference
+from flowborne.kernels.smoothing import STEPS, defect, first_smooth, smooth
+from flowborne.kernels.transfer import interpolate, restrict
+from flowborne.kernels.v_cycle import v_cycle
 from flowborne.kernels.vectors import cells_of
 from flowborne.solvers.pressure import PressureSystem
+
+from .references.deflation import deflated_reference
+from .references.laplacian import apply_laplacian_reference
+from .references.smoothing import defect_reference, smooth_reference
+from .references.transfer import interpolate_reference, restrict_reference
+from .references.v_cycle import v_cycle_reference
 
 SHAPES = [
     ((12, 9, 1), (False, False, False)),

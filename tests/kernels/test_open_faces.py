@@ -8,12 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flowborne.kernels.closed_fractions import closed_fraction
-from flowborne.kernels.open_faces import (
-    open_edge,
-    open_edge_reference,
-    open_polygon,
-    open_polygon_reference,
-)
+from flowborne.kernels.open_faces import open_edge, open_polygon
+
+from .references.open_faces import open_edge_reference, open_polygon_reference
 
 DISTANCE = st.one_of(st.just(0.0), st.floats(-2.0, 2.0, allow_subnormal=False))
 

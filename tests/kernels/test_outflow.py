@@ -7,9 +7,12 @@ import itertools
 import numpy as np
 import pytest
 
-from flowborne.kernels.outflow import net_out, outflow, outflow_reference
-from flowborne.kernels.pressure_gradient import subtract_gradient, subtract_gradient_reference
+from flowborne.kernels.outflow import net_out, outflow
+from flowborne.kernels.pressure_gradient import subtract_gradient
 from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
+
+from .references.outflow import outflow_reference
+from .references.pressure_gradient import subtract_gradient_reference
 
 SHAPES = [(5, 7, 6), (9, 8, 1), (1, 4, 3)]
 SIDES = [*itertools.product((CLOSED, OPEN), repeat=2), (PERIODIC, PERIODIC)]

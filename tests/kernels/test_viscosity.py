@@ -14,19 +14,22 @@ from flowborne.kernels.viscosity import (
     TIED,
     UNKNOWN,
     classify,
-    classify_reference,
     face_distances,
-    face_distances_reference,
     find_centres,
-    find_centres_reference,
     link_faces,
-    link_faces_reference,
     meet_walls,
-    meet_walls_reference,
 )
-from flowborne.kernels.viscous_operator import apply_component, apply_component_reference
+from flowborne.kernels.viscous_operator import apply_component
 
 from .cut_cells import SHAPES, cut, face_shape
+from .references.viscosity import (
+    classify_reference,
+    face_distances_reference,
+    find_centres_reference,
+    link_faces_reference,
+    meet_walls_reference,
+)
+from .references.viscous_operator import apply_component_reference
 
 CODES = [
     np.full((3, 2), CLOSED),

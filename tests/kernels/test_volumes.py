@@ -9,15 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flowborne.kernels.node_distance import allow_for_curvature, allow_for_curvature_reference
-from flowborne.kernels.volumes import (
-    closed_tetrahedron,
-    closed_tetrahedron_reference,
-    open_parts,
-    open_parts_reference,
-)
+from flowborne.kernels.node_distance import allow_for_curvature
+from flowborne.kernels.volumes import closed_tetrahedron, open_parts
 
 from .cut_cells import SHAPES, cut, face_shape
+from .references.node_distance import allow_for_curvature_reference
+from .references.volumes import closed_tetrahedron_reference, open_parts_reference
 
 PART = st.floats(-1.0, 1.0)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
@@ -54,23 +53,3 @@ def add_body_velocity(
         else:
             velocity = t[2] + t[3] * y - t[4] * x
         flat_out[f] += closed[n] * velocity
-
-
-def body_velocity_reference(
-    place: Array,
-    axis: Integers,
-    bodies: Integers,
-    corner: Integers,
-    weight: Array,
-    twist: Array,
-    flesh: Array,
-) -> Array:
-    """(n,) velocity along its face's axis of what closes each part, as `add_body_velocity` has it.
-
-    place  (n, 3) centres of the faces, m
-    """
-    rigid = axis.size - len(corner)
-    t = twist[bodies[:rigid]]
-    velocity = t[:, :3] + np.cross(t[:, 3:], place[:rigid])
-    skin = np.einsum("nc,ncd->nd", weight, flesh[corner])
-    return np.asarray(np.concatenate([velocity, skin])[np.arange(axis.size), axis])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Real
+from flowborne.kernels.arrays import Real
 from flowborne.kernels.jit import kernel
 
 
@@ -28,25 +28,6 @@ def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool
             if 0 <= c < count:
                 ratio[n] += min(size, cells - c * size)
     return float(ratio[0] / ratio[1])
-
-
-def cell_edges(size: int, cells: int) -> Array:
-    """Where cells of `size` finest cells each begin and end, in finest cells; the last is cut."""
-    return np.append(np.arange(0, cells, size), cells).astype(np.float64)
-
-
-def distance_ratio_reference(
-    face: int, factor: int, fine: int, cells: int, periodic: bool
-) -> float:
-    """`distance_ratio` in NumPy."""
-    distance = []
-    for size, at in ((fine, factor * face), (fine * factor, face)):
-        width = np.diff(cell_edges(size, cells))
-        beyond = (width[-1:], width[:1]) if periodic else ([0.0], [0.0])
-        width = np.concatenate([beyond[0], width, beyond[1]])
-        at = min(at, len(width) - 2)
-        distance.append(0.5 * (width[at] + width[at + 1]))
-    return float(distance[0] / distance[1])
 
 
 @kernel
@@ -80,23 +61,3 @@ def interpolation_weights(
         interpolation[i + 1] = -b / reach if i == first else a / reach
     if periodic:
         interpolation[0], interpolation[n + 1] = interpolation[n], interpolation[1]
-
-
-def interpolation_weights_reference(
-    n: int, factor: int, size: int, cells: int, periodic: bool
-) -> Array:
-    """`interpolation_weights` in NumPy: (n + 2,)."""
-    interpolation = np.zeros(n + 2)
-    if factor == 2:
-        fine, coarse = cell_edges(size, cells), cell_edges(2 * size, cells)
-        centre, over = 0.5 * (fine[1:] + fine[:-1]), 0.5 * (coarse[1:] + coarse[:-1])
-        width = np.diff(coarse)
-        beyond = (width[-1:], width[:1]) if periodic else ([0.0], [0.0])
-        width = np.concatenate([beyond[0], width, beyond[1]])
-        parent = np.arange(n) // 2
-        offset = centre - over[parent]
-        reach = 0.5 * (width[parent + 1] + width[parent + 1 + np.sign(offset).astype(int)])
-        interpolation[1:-1] = offset / reach
-    if periodic:
-        interpolation[0], interpolation[-1] = interpolation[-2], interpolation[1]
-    return interpolation

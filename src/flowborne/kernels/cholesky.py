@@ -194,16 +194,3 @@ def backwards(x: Array, begin: int, end: int, shared: Indices, block: Array, wor
         for r in range(c + 1, w):
             total -= own[r] * here[r]
         here[c] = total / own[c]
-
-
-def lower_reference(value: Array, blocks: Blocks) -> Array:
-    """(n, n) L of its blocks, dense."""
-    first, below, rows, at, owner = blocks
-    L = np.zeros((owner.size, owner.size))
-    for s in range(first.size - 1):
-        columns, shared = np.arange(first[s], first[s + 1]), rows[below[s] : below[s + 1]]
-        w = columns.size
-        own = value[at[s] : at[s] + w * w].reshape(w, w)
-        L[np.ix_(columns, columns)] = np.tril(own.T)
-        L[np.ix_(shared, columns)] = value[at[s] + w * w : at[s + 1]].reshape(w, -1).T
-    return L

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Marks
 
@@ -36,21 +35,6 @@ def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
     elif to < 0 or to >= shape[axis]:
         return -1
     return int(f + step * side)
-
-
-def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
-    """(6, n) `neighbour` of all control volumes: lower and upper one along each axis in turn."""
-    at, found = np.indices(tuple(shape)), []
-    for axis in range(3):
-        for side in (-1, 1):
-            to = at.copy()
-            to[axis] += side
-            if wraps[axis] > 0:
-                to[axis] %= wraps[axis]
-            inside = (to[axis] >= 0) & (to[axis] < shape[axis]) & (shape[axis] > 1)
-            flat = np.ravel_multi_index(tuple(to), tuple(shape), mode="clip")
-            found.append(np.where(inside, flat, -1).ravel())
-    return np.stack(found)
 
 
 @njit(nogil=True, cache=True)
@@ -128,54 +112,6 @@ def find_targets(
     return targets, parts
 
 
-def largest_reference(
-    candidates: Integers, worth: Array, least: float
-) -> tuple[Integers, NDArray[np.bool_]]:
-    """Of candidates (k, n) the first of largest worth (k, n), and whether that exceeds `least`."""
-    best = worth.argmax(axis=0)[None]
-    return np.take_along_axis(candidates, best, 0)[0], worth.max(axis=0) > least
-
-
-def find_targets_reference(
-    small: Integers,
-    opened: Array,
-    volumes: Array,
-    cells: Array,
-    component: int,
-    wraps: Integers,
-) -> tuple[Integers, Array]:
-    """`find_targets` in NumPy."""
-    beside = neighbours_reference(np.array(opened.shape), wraps)[:, small]
-    driven = (beside >= 0) & (opened.ravel()[beside] > 0.0)
-    ends = [(int(axis == component),) * 2 for axis in range(3)]
-    wide = np.pad(cells, ends, mode="wrap" if wraps[component] > 0 else "constant")
-    own = np.unravel_index(small, opened.shape)
-    cell = np.stack(
-        [
-            wide[tuple(at + side * (axis == component) for axis, at in enumerate(own))]
-            for side in (0, 1)
-        ]
-    )
-    opposite = slice(2 * component, 2 * component + 2)
-    held = np.where(driven[opposite], cell, 0.0)
-    targets = np.where(held > 0.0, beside[opposite], small)
-    parts = held / np.where(held.sum(axis=0) > 0.0, held.sum(axis=0), 1.0)
-    near, touched = largest_reference(beside, np.where(driven, volumes.ravel()[beside], 0.0), 0.0)
-    alone = touched & ~parts.any(axis=0)
-    targets[0, alone], parts[0, alone] = near[alone], 1.0
-    while True:
-        place = np.zeros(opened.size, np.int64)
-        place[small] = np.arange(small.size)
-        led = (beside >= 0) & np.isin(beside, small[parts.any(axis=0)])
-        after, joined = largest_reference(
-            place[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
-        )
-        new = joined & ~parts.any(axis=0)
-        if not new.any():
-            return targets.T, parts.T
-        targets[:, new], parts[:, new] = targets[:, after[new]], parts[:, after[new]]
-
-
 @njit(nogil=True, cache=True)
 def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array) -> None:
     """Give these shares (n, 2) of the amounts of small ones to their targets (n, 2), in place."""
@@ -186,17 +122,6 @@ def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array
             given = shares[n, m] * own
             flat[targets[n, m]] += given
             flat[small[n]] -= given
-
-
-def merge_small_reference(
-    amount: Array, small: Integers, targets: Integers, shares: Array
-) -> Array:
-    """`merge_small` in NumPy: the amounts after it."""
-    merged = amount.ravel().copy()
-    given = shares * merged[small][:, None]
-    np.add.at(merged, targets, given)
-    merged[small] -= given.sum(axis=1)
-    return merged.reshape(amount.shape)
 
 
 @njit(nogil=True, cache=True)
@@ -230,21 +155,6 @@ def join_small(
             flat[h] = amount / (volume[h] if volume[h] > nothing else 1.0)
 
 
-def join_small_reference(
-    field: Array,
-    volumes: Array,
-    small: Integers,
-    targets: Integers,
-    shares: Array,
-    nothing: float,
-) -> tuple[Array, Array]:
-    """`join_small` in NumPy: field, but for that of whole small ones, and volumes after it."""
-    amount = field * np.where(volumes > nothing, volumes, 1.0)
-    amount = merge_small_reference(amount, small, targets, shares)
-    merged = merge_small_reference(volumes, small, targets, shares)
-    return amount / np.where(merged > nothing, merged, 1.0), merged
-
-
 @njit(nogil=True, cache=True)
 def fill_empty(
     field: Array,
@@ -268,20 +178,6 @@ def fill_empty(
                 weight += volume[to]
         if weight > 0.0:
             flat[f] = total / weight
-
-
-def fill_empty_reference(
-    field: Array, volumes: Array, listed: Integers, nothing: float, wraps: Integers
-) -> Array:
-    """`fill_empty` in NumPy: the field after it."""
-    beside = neighbours_reference(np.array(field.shape), wraps)[:, listed]
-    volume = volumes.ravel()[beside]
-    weight = np.where((beside >= 0) & (volume > nothing), volume, 0.0)
-    total = weight.sum(axis=0)
-    mean = (weight * field.ravel()[beside]).sum(axis=0) / np.where(total > 0.0, total, 1.0)
-    filled, empty = field.ravel().copy(), (volumes.ravel()[listed] <= nothing) & (total > 0.0)
-    filled[listed[empty]] = mean[empty]
-    return filled.reshape(field.shape)
 
 
 @njit(nogil=True, cache=True)
@@ -328,32 +224,6 @@ def level(
         flat[best] -= own * exchange
 
 
-def level_reference(
-    field: Array,
-    before: Array,
-    volumes: Array,
-    listed: Integers,
-    tiny: float,
-    small: float,
-    held: float,
-    nothing: float,
-    wraps: Integers,
-) -> Array:
-    """`level` in NumPy: the field after it. One exchange comes after the other."""
-    levelled, volume = field.ravel().copy(), volumes.ravel()
-    beside = neighbours_reference(np.array(field.shape), wraps)
-    for f in listed[(volume[listed] > nothing) & (volume[listed] < small)]:
-        around = beside[:, f][beside[:, f] >= 0]
-        to = around[np.argmax(volume[around])]
-        if volume[to] > volume[f]:
-            left = volume[f] / max(volume[f], before.ravel()[f])
-            share = np.clip((small - volume[f]) / (small - tiny), 0.0, 1.0)
-            share *= 1.0 - min(held / (held + volume[f] ** 2), left)
-            mean = np.average(levelled[[f, to]], weights=volume[[f, to]])
-            levelled[[f, to]] += share * (mean - levelled[[f, to]])
-    return levelled.reshape(field.shape)
-
-
 @njit(nogil=True, cache=True)
 def share_velocity(field: Array, small: Integers, targets: Integers, shares: Array) -> None:
     """Give small ones the velocity of all that goes with them, in place: these shares (n, 2) of
@@ -364,16 +234,6 @@ def share_velocity(field: Array, small: Integers, targets: Integers, shares: Arr
         shared[n] += shares[n, 0] * flat[targets[n, 0]] + shares[n, 1] * flat[targets[n, 1]]
     for n in range(small.size):
         flat[small[n]] = shared[n]
-
-
-def share_velocity_reference(
-    field: Array, small: Integers, targets: Integers, shares: Array
-) -> Array:
-    """`share_velocity` in NumPy: the field after it."""
-    shared = field.ravel().copy()
-    others = (shares * shared[targets]).sum(axis=1)
-    shared[small] = (1.0 - shares.sum(axis=1)) * shared[small] + others
-    return shared.reshape(field.shape)
 
 
 @njit(nogil=True, cache=True)
@@ -393,23 +253,6 @@ def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -
                     if 0 <= place < shape[axis]:
                         to[axis] = place + depth
                         marks[to[0], to[1], to[2]] = 0
-
-
-def mark_cut_reference(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -> Marks:
-    """`mark_cut` in NumPy: the marks after it."""
-    cut, out = np.zeros(shape, bool), marks.copy()
-    cut.reshape(-1)[listed] = True
-    depth = (np.array(marks.shape) - shape) // 2
-    inner = out[tuple(slice(d, d + n) for d, n in zip(depth, shape, strict=True))]
-    for axis, d in enumerate(depth):
-        n, line = shape[axis], np.moveaxis(inner, axis, 0)
-        distinct = np.moveaxis(cut, axis, 0)[: wraps[axis] if wraps[axis] else n]
-        for at, here in enumerate(distinct):
-            for shift in range(-d, d + 1):
-                places = {at + shift + image * wraps[axis] for image in (-1, 0, 1)}
-                for place in places & set(range(n)):
-                    line[place][here] = 0
-    return out
 
 
 @njit(nogil=True, cache=True)
@@ -444,19 +287,6 @@ def find_parts(
                     found[count] = (i * n1 + j) * n2 + k
                     count += 1
     return found[:count].copy()
-
-
-def find_parts_reference(
-    before: Array, after: Array, whole: float, component: int, wraps: Integers
-) -> Integers:
-    """`find_parts` in NumPy."""
-    least = np.full(before.shape, whole)
-    ends = np.moveaxis(least, component, 0)
-    if wraps[component] > 0:
-        ends[-1] = 0.0
-    else:
-        ends[0], ends[-1] = 0.5 * whole, 0.5 * whole
-    return np.flatnonzero(np.minimum(before, after) < least)
 
 
 @njit(nogil=True, cache=True)
@@ -506,23 +336,3 @@ def find_small(
             elif (at == 0 and prescribed[0]) or (at == last and prescribed[1]):
                 mark[:] = 0
     return own[:count].copy(), part[:count].copy()
-
-
-def find_small_reference(
-    opened: Array,
-    volume: Array,
-    component: int,
-    prescribed: Marks,
-    periodic: bool,
-    narrow: float,
-    nothing: float,
-) -> tuple[Integers, Array, Array]:
-    """`find_small` in NumPy: small ones, parts, and which faces may be targets."""
-    pushed = np.where(volume > nothing, narrow * opened, 0.0)
-    small = (volume != 0.0) & ((pushed < volume) | (pushed == 0.0))
-    driven, counted = (pushed > 0.0) & ~small, small.copy()
-    for end, told in zip((0, -1), prescribed, strict=True):
-        np.moveaxis(driven, component, 0)[end] &= not told
-        np.moveaxis(counted, component, 0)[end] &= not told and not (periodic and end)
-    own = np.flatnonzero(counted)
-    return own, 1.0 - pushed.ravel()[own] / volume.ravel()[own], driven

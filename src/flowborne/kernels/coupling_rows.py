@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Rows
+from flowborne.kernels.arrays import Array, Integers, Rows
 
 Kinds = NDArray[np.int8]
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
@@ -41,23 +41,6 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
                     kind[i, j, k] = WIDE if widest >= 0.5 else NARROW
                 else:
                     kind[i, j, k] = ENCLOSED if at_side else COVERED
-    return kind
-
-
-def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
-    """`kinds_of_cells` in NumPy."""
-    slab = opened[0].shape[2] == 1
-    shape = opened[1].shape[0], *opened[0].shape[1:]
-    kind, widest = np.full(shape, COVERED, np.int8), np.zeros(shape)
-    for axis in range(2 if slab else 3):
-        passes, layers = np.moveaxis(opened[axis].copy(), axis, 0), np.moveaxis(kind, axis, 0)
-        for end in (0, -1):
-            if walls[axis, end]:
-                passes[end], layers[end] = 0.0, ENCLOSED
-        wider = np.moveaxis(np.maximum(passes[:-1], passes[1:]), 0, axis)
-        widest = np.maximum(widest, wider)
-    kind[widest > 0.0] = NARROW
-    kind[widest >= 0.5] = WIDE
     return kind
 
 
@@ -138,33 +121,6 @@ def list_cells(
     return at
 
 
-def list_cells_reference(
-    share: Faces,
-    listed: NDArray[np.bool_],
-    box: Integers,
-    body: int,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
-) -> tuple[Integers, Integers, Array]:
-    """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
-    inside = tuple(slice(low, high - 1) for low, high in box)
-    found = listed[inside]
-    force = np.zeros((*found.shape, 3))
-    for axis in range(2 if flat else 3):
-        ends = np.moveaxis(share[axis], axis, 0)
-        force[..., axis] = np.moveaxis(area * (ends[1:] - ends[:-1]), 0, axis)
-    found = found & force.any(axis=3)
-    place = np.stack(np.nonzero(found), axis=1) + box[:, 0]
-    centre = origin + h * (place + 0.5)
-    if flat:
-        centre[:, 2] = 0.0
-    values = np.concatenate([force[found], np.cross(centre, force[found])], axis=1)
-    cells = np.ravel_multi_index(tuple(place.T), listed.shape)
-    return cells, np.tile(6 * body + np.arange(6), cells.size), values.ravel()
-
-
 @njit(nogil=True, cache=True)
 def flesh_rows(
     axis: Integers,
@@ -207,26 +163,3 @@ def flesh_rows(
             rows += 1
     start = 3 * np.arange(rows + 1)
     return part[:rows], (cells[:rows], start, columns[: 3 * rows], values[: 3 * rows])
-
-
-def flesh_rows_reference(
-    axis: Integers,
-    at: Integers,
-    closed: Array,
-    corner: Integers,
-    weight: Array,
-    first_column: int,
-    area: float,
-    listed: NDArray[np.bool_],
-) -> tuple[Integers, Rows]:
-    """`flesh_rows` in NumPy."""
-    shape = np.array(listed.shape)
-    part, side = np.divmod(np.arange(2 * axis.size), 2)
-    cell = at[part] - (1 - side)[:, None] * np.eye(3, dtype=np.int64)[axis[part]]
-    inside = np.all((cell >= 0) & (cell < shape), axis=1)
-    inside[inside] = listed[tuple(cell[inside].T)]
-    part, side, cell = part[inside], side[inside], cell[inside]
-    columns = first_column + 3 * corner[part] + axis[part][:, None]
-    values = ((1.0 - 2.0 * side) * area * closed[part])[:, None] * weight[part]
-    cells = np.ravel_multi_index(tuple(cell.T), tuple(shape))
-    return part, (cells, 3 * np.arange(part.size + 1), columns.ravel(), values.ravel())

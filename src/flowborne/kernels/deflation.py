@@ -12,7 +12,6 @@ from numba import prange
 from flowborne.kernels.arrays import Array, Real, Rows
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.sparse_rows import sum_rows
-from flowborne.kernels.vectors import cells_of
 
 
 @kernel
@@ -54,10 +53,3 @@ def deflated(out: Array, z: Real, r: Array, scale: float, strength: Array, field
     for i in range(planes):
         total += parts[i]
     return total
-
-
-def deflated_reference(z: Real, scale: float, strength: Array, fields: Real) -> Array:
-    """`deflated` in NumPy, with ghosts 0."""
-    out, inside = np.zeros(z.shape), cells_of(z)
-    out[inside] = (scale * z - np.tensordot(strength, fields, 1))[inside]
-    return out

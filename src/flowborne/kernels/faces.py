@@ -43,13 +43,6 @@ def face_means(out: Array, cells: Array, axis: int, periodic: bool) -> None:
                 out[i, j, k] = first * one[k] + second * other[k]
 
 
-def face_means_reference(cells: Array, axis: int, periodic: bool) -> Array:
-    """`face_means` in NumPy."""
-    ends = [(int(a == axis),) * 2 for a in range(3)]
-    wide = np.moveaxis(np.pad(cells, ends, mode="wrap" if periodic else "constant"), axis, 0)
-    return np.moveaxis(0.5 * (wide[:-1] + wide[1:]), 0, axis)
-
-
 @njit(forceinline=True, nogil=True, cache=True)
 def flat(values: Array) -> Array:
     """The same field with its planes in line, so that a slab's rows are long as well."""
@@ -64,11 +57,6 @@ def accelerate(out: Array, opened: Array, mass: Array, area: float) -> None:
         for k in range(rate.shape[1]):
             m = masses[i, k]
             rate[i, k] = area * part[i, k] / m if m > 0.0 else 0.0
-
-
-def accelerate_reference(opened: Array, mass: Array, area: float) -> Array:
-    """`accelerate` in NumPy."""
-    return np.where(mass > 0.0, area * opened / np.where(mass > 0.0, mass, 1.0), 0.0)
 
 
 @kernel

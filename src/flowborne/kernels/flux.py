@@ -206,79 +206,6 @@ def stage(
                     below[n + k] = row[k]
 
 
-def line_flux_reference(
-    flux: Array, a: Array, b: Array, c: Array, d: Array, one: Marks, other: Marks
-) -> Array:
-    """`line_flux` in NumPy, of the fluxes g through the sides between b and c of a, b, c, d."""
-    forward = flux > 0.0
-    behind, upstream, downstream, ahead = np.where(forward, (a, b, c, d), (d, c, b, a))
-    bends = np.stack([behind - 2.0 * upstream + downstream, upstream - 2.0 * downstream + ahead])
-    room = np.where(bends.prod(axis=0) > 0.0, ROOM * np.abs(bends).min(axis=0), 0.0)
-    low, high = np.minimum(upstream, downstream) - room, np.maximum(upstream, downstream) + room
-    smooth = np.clip((5.0 * upstream + 2.0 * downstream - behind) / 6.0, low, high)
-    either = np.where(np.maximum(one, other) == UPSTREAM, upstream, 0.5 * (b + c))
-    return np.asarray(flux * np.where((one == CLEAR) & (other == CLEAR), smooth, either))
-
-
-def side_fluxes_reference(flux: Faces, component: int, place: Integers, share: Array) -> Faces:
-    """Volume per time through all sides of the control volumes across each axis."""
-    through = []
-    for axis, q in enumerate(flux):
-        own = int(axis == component)
-        count = q.shape[component] + 1
-        at, part = place[own, :count], share[own, :count]
-        q = np.moveaxis(q, component, -1)
-        mean = part[:, 0] * q[..., at[:, 0]] + part[:, 1] * q[..., at[:, 1]]
-        through.append(np.ascontiguousarray(np.moveaxis(mean, -1, component)))
-    return through[0], through[1], through[2]
-
-
-def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Array) -> Array:
-    """`net_flux` in NumPy, of the fluxes through the sides of the control volumes."""
-    shape = gz.shape[0], gz.shape[1], gz.shape[2] - 1
-    inner = [
-        slice(GHOSTS, -GHOSTS) if n < m else slice(None)
-        for n, m in zip(shape, field.shape, strict=True)
-    ]
-    net = np.zeros(shape)
-    for axis, flux in enumerate((gx, gy, gz)):
-        if field.shape[axis] == shape[axis]:
-            continue
-        along = list(inner)
-        along[axis] = slice(None)
-        f = np.moveaxis(field[tuple(along)], axis, 0)
-        m = np.moveaxis(marks[tuple(along)], axis, 0)
-        through = line_flux_reference(
-            np.moveaxis(flux, axis, 0), f[:-3], f[1:-2], f[2:-1], f[3:], m[1:-2], m[2:-1]
-        )
-        net += np.diff(np.moveaxis(through, 0, axis), axis=axis)
-    return net
-
-
-def stage_reference(
-    net: Array,
-    weight: float,
-    start: Array,
-    before: Array,
-    after: Array,
-    dt: float,
-    nothing: float,
-    field: Array,
-    marks: Marks,
-    q: Faces,
-    component: int,
-    place: Integers,
-    share: Array,
-) -> tuple[Array, Array]:
-    """`stage` in NumPy: the component after it, and the net amount that left it."""
-    through = side_fluxes_reference(q, component, place, share)
-    leaving = weight * net_flux_reference(field, marks, *through)
-    if weight < 1.0:
-        leaving += (1.0 - weight) * net
-    amount = before * start - dt * leaving
-    return amount / np.where(after > nothing, after, 1.0), leaving
-
-
 @kernel
 def pad_field(out: Array, values: Array, along: Array, time: float) -> None:
     """values + time along into the inside of an array padded by GHOSTS."""
@@ -312,11 +239,6 @@ def largest_crossing(qx: Array, qy: Array, qz: Array) -> float:
     return float(most.max())
 
 
-def largest_crossing_reference(q: Faces) -> float:
-    """`largest_crossing` in NumPy."""
-    return float(_crossing(q).max())
-
-
 @kernel
 def fade(out: Array, qx: Array, qy: Array, qz: Array, least: float, most: float) -> None:
     """In each cell 1 where its `crossing` is up to `least`, 0 from `most` on, and linear between
@@ -326,17 +248,3 @@ def fade(out: Array, qx: Array, qy: Array, qz: Array, least: float, most: float)
             for k in range(out.shape[2]):
                 rate = crossing(qx, qy, qz, i, j, k)
                 out[i, j, k] = min(max((most - rate) / (most - least), 0.0), 1.0)
-
-
-def fade_reference(q: Faces, least: float, most: float) -> Array:
-    """`fade` in NumPy."""
-    return np.clip((most - _crossing(q)) / (most - least), 0.0, 1.0)
-
-
-def _crossing(q: Faces) -> Array:
-    """(n0, n1, n2) `crossing` of all cells in NumPy."""
-    rates = []
-    for axis, flux in enumerate(q):
-        size = np.moveaxis(np.abs(flux), axis, 0)
-        rates.append(np.moveaxis(np.maximum(size[:-1], size[1:]), 0, axis))
-    return np.asarray(sum(rates))

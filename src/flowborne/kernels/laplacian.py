@@ -8,7 +8,7 @@ from numba import prange
 from flowborne.kernels.arrays import Array, Finest, Real, Triple
 from flowborne.kernels.blocks import BLOCK, reach
 from flowborne.kernels.jit import inlined, kernel
-from flowborne.kernels.vectors import cells_of, in_order
+from flowborne.kernels.vectors import in_order
 
 
 @kernel
@@ -84,12 +84,3 @@ def neighbour_sum(x: Real, w: Triple) -> Array:
             total += w[axis] * np.roll(x, 1, axis)
             total += np.roll(w[axis], -1, axis) * np.roll(x, -1, axis)
     return total
-
-
-def apply_laplacian_reference(p: Array, finest: Finest) -> Array:
-    """`apply_laplacian` in NumPy, K p with ghosts 0."""
-    *w, diagonal = finest
-    out = np.zeros_like(p)
-    inside = cells_of(p)
-    out[inside] = (diagonal * p - neighbour_sum(p, (w[0], w[1], w[2])))[inside]
-    return out

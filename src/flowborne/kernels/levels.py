@@ -24,8 +24,6 @@ from numpy.typing import NDArray
 from flowborne.kernels.aggregates import OWN, mark_interpolated, mark_own
 from flowborne.kernels.arrays import (
     Array,
-    Faces,
-    Finest,
     Hierarchy,
     Indices,
     Integers,
@@ -36,9 +34,7 @@ from flowborne.kernels.arrays import (
 )
 from flowborne.kernels.centres import distance_ratio, interpolation_weights
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.laplacian import neighbour_sum
 from flowborne.kernels.orphans import add_orphan_weights, assign_orphans
-from flowborne.kernels.vectors import cells_of
 
 OFFSET, N0, N1, N2, INTERPOLATION, S0, S1, S2, ORPHANS = range(9)
 """Columns of the table of levels: where it begins in the packed arrays, cells along each axis,
@@ -138,23 +134,6 @@ def finest_weights(
                     diagonal[m, j + 1, k + 1] = total
 
 
-def finest_weights_reference(faces: Faces) -> Finest:
-    """`finest_weights` in NumPy: padded weights and diagonal."""
-    shape = faces[1].shape[0], faces[1].shape[1] - 1, faces[1].shape[2]
-    if shape[0] == 1:
-        faces = np.zeros((2, *shape[1:])), faces[1], faces[2]
-    sides = [(int(n > 1),) * 2 for n in shape]
-    diagonal = np.zeros(shape)
-    w = []
-    for axis, values in enumerate(faces):
-        diagonal += np.delete(values, -1, axis) + np.delete(values, 0, axis)
-        ends = sides.copy()
-        ends[axis] = (sides[axis][0], 0)
-        padded = np.pad(values, ends)
-        w.append(padded if shape[axis] > 1 else np.delete(padded, -1, axis))
-    return w[0], w[1], w[2], np.pad(diagonal, sides)
-
-
 @kernel
 def coarse_weights(
     fine: Real, coarse: Real, marks: Marks, axis: int, factor: Integers, ratio: Array
@@ -194,29 +173,6 @@ def coarse_weights(
                 coarse[i + d, j + 1, k + 1] = total * shrink
 
 
-def coarse_weights_reference(
-    fine: Real, marks: Marks, axis: int, factor: Integers, ratio: Array
-) -> Array:
-    """`coarse_weights` in NumPy: weights of the faces across `axis`, without ghosts."""
-    own = (marks & np.roll(marks, 1, axis)) >= OWN
-    values = np.where(own, fine, 0.0)
-    for n in range(3):
-        ends = int(fine.shape[n] > 1)
-        inner = np.moveaxis(values, n, 0)[
-            ends : len(np.moveaxis(values, n, 0)) + (n == axis) - ends
-        ]
-        if n == axis:
-            chosen = np.minimum(
-                factor[n] * np.arange(-(-(len(inner) - 1) // factor[n]) + 1), len(inner) - 1
-            )
-            values = np.moveaxis(inner[chosen], 0, n)
-        else:
-            values = np.moveaxis(np.add.reduceat(inner, np.arange(0, len(inner), factor[n])), 0, n)
-    across = [1, 1, 1]
-    across[axis] = -1
-    return values * ratio[: values.shape[axis]].reshape(across)
-
-
 @kernel
 def inverse_diagonal(w: Triple, added: Real, inverse: Real) -> None:
     """1 / diagonal of K from padded weights and what is added to it; 0 in cells without an open
@@ -233,14 +189,6 @@ def inverse_diagonal(w: Triple, added: Real, inverse: Real) -> None:
                     total += w0[m, j, k] + w0[m + 1, j, k]
                 if total > 0.0:
                     inverse[m, j, k] = 1.0 / (total + added[m, j, k])
-
-
-def inverse_diagonal_reference(w: Triple, added: Real) -> Array:
-    """`inverse_diagonal` in NumPy."""
-    inside, out = cells_of(w[0]), np.zeros(w[0].shape)
-    total = neighbour_sum(np.ones_like(out), w)[inside]
-    out[inside] = np.divide(1.0, total + added[inside], np.zeros_like(total), where=total > 0.0)
-    return out
 
 
 @kernel
@@ -261,24 +209,6 @@ def coarse_sums(
     flat, wide, aggregate = fine.reshape(-1), coarse.reshape(-1), aggregates.reshape(-1)
     for g in range(orphans.size):
         wide[aggregate[orphans[g]]] += flat[orphans[g]]
-
-
-def coarse_sums_reference(
-    fine: Real,
-    marks: Marks,
-    factor: Integers,
-    orphans: Indices,
-    aggregates: Indices,
-    shape: Integers,
-) -> Array:
-    """`coarse_sums` in NumPy: a padded array of `shape`."""
-    out, inside = np.zeros(shape), cells_of(fine)
-    values = np.where(marks & OWN, fine, 0.0)[inside]
-    for n in range(3):
-        values = np.add.reduceat(values, np.arange(0, values.shape[n], factor[n]), axis=n)
-    out[cells_of(out)] = values
-    np.add.at(out.reshape(-1), aggregates.reshape(-1)[orphans], fine.reshape(-1)[orphans])
-    return out
 
 
 @kernel

@@ -8,7 +8,6 @@ from numba import njit
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.triangles import (
     closest_on_triangle,
-    closest_on_triangle_reference,
     squared_distance,
 )
 
@@ -38,20 +37,4 @@ def distances_to_mesh(points: Array, vertices: Array, faces: Integers) -> Array:
             angle += 2.0 * np.arctan2(triple, below)
         away = np.sqrt(nearest)
         distance[n] = -away if angle > 2.0 * np.pi else away
-    return distance
-
-
-def distances_to_mesh_reference(points: Array, vertices: Array, faces: Integers) -> Array:
-    """`distances_to_mesh` in NumPy."""
-    corners, distance = vertices[faces], np.empty(len(points))
-    for n, p in enumerate(points):
-        closest = [closest_on_triangle_reference(p, one) @ one for one in corners]
-        away = np.linalg.norm(np.array(closest) - p, axis=1).min()
-        u, v, w = np.moveaxis(corners - p, 1, 0)
-        lu, lv, lw = (np.linalg.norm(side, axis=1) for side in (u, v, w))
-        triple = np.einsum("td,td->t", u, np.cross(v, w))
-        below = lu * lv * lw
-        for one, other, length in ((u, v, lw), (v, w, lu), (w, u, lv)):
-            below += np.einsum("td,td->t", one, other) * length
-        distance[n] = -away if np.arctan2(triple, below).sum() > np.pi else away
     return distance

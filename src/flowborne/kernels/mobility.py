@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, MobilityArrays
-from flowborne.kernels.cholesky import lower_reference, solve_factored
+from flowborne.kernels.cholesky import solve_factored
 from flowborne.kernels.jit import kernel
 
 
@@ -42,14 +42,3 @@ def respond(load: Array, mobility: MobilityArrays) -> Array:
         for e in range(t_start[a], t_start[a + 1]):
             motion[a] += t_value[e] * answer[t_column[e]]
     return motion
-
-
-def respond_reference(load: Array, mobility: MobilityArrays) -> Array:
-    """`respond` in NumPy, by dense matrices."""
-    dense, t_start, t_column, t_value, value, blocks, order, taken = mobility
-    if t_start.size == 1:
-        return np.asarray(dense @ load)
-    T, L = np.zeros((load.size, order.size)), lower_reference(value, blocks)
-    np.add.at(T, (np.repeat(np.arange(load.size), np.diff(t_start)), t_column), t_value)
-    factored = (L @ L.T)[np.ix_(order, order)]
-    return np.asarray(T @ (np.linalg.inv(factored) - taken @ taken.T) @ T.T @ load)

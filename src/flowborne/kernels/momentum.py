@@ -25,11 +25,6 @@ def about_origin(vector: Array, moment: Array, centre: Array) -> Array:
     return screw
 
 
-def about_origin_reference(vector: Array, moment: Array, centre: Array) -> Array:
-    """`about_origin` in NumPy."""
-    return np.concatenate([vector, moment + np.cross(centre, vector)], axis=1)
-
-
 ROUNDING, OF_THE_WHOLE = 1e-14, 1e-15
 """Shares of the terms of an impulse, and of the largest impulse of all, that rounding may change: a
 hand's forces are sums in which those of the whole creature cancel."""
@@ -78,26 +73,3 @@ def momentum_impulse(
     for n in range(dofs):
         rounding[n] += OF_THE_WHOLE * largest
     return impulse, rounding
-
-
-def momentum_impulse_reference(
-    cdof: Array,
-    centre: Array,
-    given: Array,
-    later: Array,
-    body: NDArray[np.int64],
-    conserved: NDArray[np.bool_],
-    gained: Array,
-    still: Array,
-    bias: Array,
-    outer: Array,
-    dt: float,
-) -> tuple[Array, Array]:
-    """`momentum_impulse` in NumPy."""
-    turn, speed = cdof[:, :3], cdof[:, 3:]
-    S = np.concatenate([speed + np.cross(centre, turn), turn], axis=1)
-    change = gained + (S * (given - later)[body]).sum(axis=1)
-    impulse = still + np.where(conserved, change, -dt * bias) + dt * outer
-    scale = (np.abs(S) * (np.abs(given) + np.abs(later))[body]).sum(axis=1)
-    room = ROUNDING * (scale + dt * np.abs(outer)) + OF_THE_WHOLE * scale.max(initial=0.0)
-    return impulse, room

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.distance import signed_distance, signed_distance_reference
+from flowborne.kernels.distance import signed_distance
 from flowborne.kernels.jit import kernel
 
 BAND = 4.0
@@ -45,16 +45,6 @@ def node_box(
         box[axis, 0] = int(min(max(first, 0.0), shape[axis] + 1.0))
         box[axis, 1] = int(min(max(last, 0.0), shape[axis] + 1.0))
     return box
-
-
-def node_box_reference(
-    position: Array, rotation: Array, reach: Array, origin: Array, h: float, shape: Integers
-) -> Integers:
-    """`node_box` around all of the geometries in NumPy."""
-    extent = np.einsum("gam,gm->ga", np.abs(rotation), reach)
-    low, high = (position - extent).min(axis=0), (position + extent).max(axis=0)
-    first, last = np.floor((low - origin) / h - BAND), np.ceil((high - origin) / h + BAND) + 1.0
-    return np.clip(np.stack([first, last], axis=1), 0, shape[:, None] + 1).astype(np.int64)
 
 
 @njit(nogil=True, cache=True)
@@ -100,36 +90,6 @@ def sample_body(
                 phi[i - box[0, 0], j - box[1, 0], k - box[2, 0]] = value
 
 
-def sample_body_reference(
-    box: Integers,
-    geoms: Integers,
-    kind: Integers,
-    size: Array,
-    position: Array,
-    rotation: Array,
-    tables: Array,
-    table: Integers,
-    corner: Array,
-    pitch: Array,
-    origin: Array,
-    h: float,
-    flat: bool,
-) -> Array:
-    """`sample_body` in NumPy: the distances."""
-    shape = box[:, 1] - box[:, 0]
-    x = origin + h * (np.moveaxis(np.indices(tuple(shape)), 0, -1).reshape(-1, 3) + box[:, 0])
-    if flat:
-        x[:, 2] = 0.0
-    phi = np.full(len(x), BAND * h)
-    for g in geoms:
-        local = (x - position[g]) @ rotation[g]
-        own = signed_distance_reference(
-            kind[g], size[g], local, tables, table[g], corner[g], pitch[g]
-        )
-        phi = np.minimum(phi, own)
-    return phi.reshape(shape)
-
-
 @njit(nogil=True, cache=True)
 def gentlest(a: float, b: float, c: float) -> float:
     """The smallest of three numbers of one sign; 0 where their signs differ."""
@@ -172,19 +132,6 @@ def allow_for_curvature(phi: Array, h: float) -> Array:
                     total = bend(phi, i, j, k, 0) + bend(phi, i, j, k, 1) + bend(phi, i, j, k, 2)
                     out[i, j, k] -= FACET * total
     return out
-
-
-def allow_for_curvature_reference(phi: Array, h: float) -> Array:
-    """`allow_for_curvature` in NumPy."""
-    total = np.zeros_like(phi)
-    for axis in range(3) if phi.shape[2] > 2 else ():
-        along = np.moveaxis(phi, axis, 0)
-        second = along[:-2] - 2.0 * along[1:-1] + along[2:]
-        near = np.stack([second[:-2], second[1:-1], second[2:]])
-        same = np.abs(np.sign(near).sum(axis=0)) == 3.0
-        gentle = np.sign(near[0]) * np.abs(near).min(axis=0)
-        np.moveaxis(total, axis, 0)[2:-2] += np.where(same, gentle, 0.0)
-    return np.where(np.abs(phi) < NEAR * h, phi - FACET * total, phi)
 
 
 @njit(nogil=True, cache=True)

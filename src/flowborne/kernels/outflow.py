@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Array, Faces
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import kernel
 
 
@@ -23,12 +22,6 @@ def outflow(out: Array, u: Array, v: Array, w: Array, ax: Array, ay: Array, az: 
                     + az[i, j, k + 1] * w[i, j, k + 1]
                     - az[i, j, k] * w[i, j, k]
                 )
-
-
-def outflow_reference(velocity: Faces, opened: Faces) -> Array:
-    """`outflow` in NumPy."""
-    parts = [np.diff(a * u, axis=n) for n, (a, u) in enumerate(zip(opened, velocity, strict=True))]
-    return parts[0] + parts[1] + parts[2]
 
 
 @kernel

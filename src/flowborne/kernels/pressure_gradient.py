@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
+from flowborne.kernels.sides import CLOSED, PERIODIC
 
 
 @kernel
@@ -53,22 +53,3 @@ def subtract_gradient(
                             - pressure[i - di, j - dj, k - dk]
                         )
                 velocity[i, j, k] -= scale * rate[i, j, k] * difference
-
-
-def subtract_gradient_reference(
-    velocity: Array,
-    rate: Array,
-    pressure: Array,
-    axis: int,
-    scale: float,
-    codes: NDArray[np.int64],
-) -> Array:
-    """`subtract_gradient` in NumPy: the velocity after it.
-
-    Beyond a closed side lies the pressure inside, beyond an open one none.
-    """
-    p = np.moveaxis(pressure, axis, 0)
-    low = {CLOSED: p[:1], OPEN: 0.0 * p[:1], PERIODIC: p[-1:]}[int(codes[axis, 0])]
-    high = {CLOSED: p[-1:], OPEN: 0.0 * p[-1:], PERIODIC: p[:1]}[int(codes[axis, 1])]
-    difference = np.moveaxis(np.diff(np.concatenate([low, p, high]), axis=0), 0, axis)
-    return velocity - scale * rate * difference

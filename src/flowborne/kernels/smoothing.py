@@ -17,11 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Array, Real, Triple
+from flowborne.kernels.arrays import Real, Triple
 from flowborne.kernels.blocks import BLOCK, reach
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.laplacian import neighbour_sum
-from flowborne.kernels.vectors import cells_of
 
 STEPS = 3
 """Steps on the way down and on the way up, odd: they go from one array into the other and back."""
@@ -55,14 +53,6 @@ def smooth(out: Real, x: Real, b: Real, w: Triple, inverse: Real, step: int) -> 
     weight = WEIGHTS[step]
     for i in prange(x.shape[0] - 2 * d):
         smooth_plane(out, x, b, w, inverse, weight, i + d)
-
-
-def smooth_reference(x: Real, b: Real, w: Triple, inverse: Real, step: int) -> Array:
-    """`smooth` in NumPy: x after it, with its own ghosts."""
-    inside, out = cells_of(x), np.array(x, np.float64)
-    there = (b + neighbour_sum(x, w)) * inverse
-    out[inside] += WEIGHTS[step] * (there - x)[inside]
-    return out
 
 
 @kernel
@@ -160,12 +150,3 @@ def smooth_up(x: Real, r: Real, b: Real, w: Triple, inverse: Real) -> None:
             smooth_plane(r, x, b, w, inverse, WEIGHTS[1], m + d)
         for m in range(i - 2, i + 2):
             smooth_plane(x, r, b, w, inverse, WEIGHTS[0], m + d)
-
-
-def defect_reference(x: Real, b: Real, w: Triple, inverse: Real) -> Array:
-    """`defect` in NumPy, with ghosts 0."""
-    r, inside = np.zeros(x.shape), cells_of(x)
-    active = inverse > 0.0
-    K_x = x / np.where(active, inverse, 1.0) - neighbour_sum(x, w)
-    r[inside] = np.where(active, b - K_x, 0.0)[inside]
-    return r

@@ -100,14 +100,3 @@ def padded_rows(rows: Rows, diagonal: Array) -> Rows:
             count += 1
             starts[count] = used
     return kept[:count], starts[: count + 1], places[:used], entries[:used]
-
-
-def padded_rows_reference(rows: Rows, diagonal: Array) -> Rows:
-    """`padded_rows` in NumPy."""
-    cells, row_start, columns, values = rows
-    inside = tuple(slice(1, -1) if n > 1 else slice(None) for n in diagonal.shape)
-    padded = np.arange(diagonal.size).reshape(diagonal.shape)[inside].ravel()[cells]
-    active, count = diagonal.ravel()[padded] > 0.0, np.diff(row_start)
-    entries = np.repeat(active, count)
-    starts = np.append(0, np.cumsum(count[active]))
-    return padded[active], starts, columns[entries], values[entries]

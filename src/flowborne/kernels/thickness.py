@@ -12,7 +12,6 @@ from flowborne.kernels.arrays import Array, Integers, Point
 from flowborne.kernels.skin import ON_SKIN
 from flowborne.kernels.triangles import (
     closest_on_triangle,
-    closest_on_triangle_reference,
     squared_distance,
 )
 
@@ -153,17 +152,6 @@ def _any_within(
     return found
 
 
-def any_within_reference(
-    places: Array, radius: float, vertices: Array, triangles: Integers
-) -> NDArray[np.bool_]:
-    """`any_within` in NumPy, every place with every triangle."""
-    corners, found = vertices[triangles], np.zeros(len(places), np.bool_)
-    for n, p in enumerate(places):
-        closest = [closest_on_triangle_reference(p, one) @ one for one in corners]
-        found[n] = np.linalg.norm(np.array(closest) - p, axis=1).min() <= radius
-    return found
-
-
 @njit(nogil=True, cache=True)
 def _way_inward(
     vertices: Array,
@@ -230,21 +218,4 @@ def _way_inward(
             leaves[d] += through[d]
             if cell[d] < 0 or cell[d] >= counts[d]:
                 break
-    return way
-
-
-def way_inward_reference(vertices: Array, triangles: Integers) -> Array:
-    """`way_inward` in NumPy, triangle by triangle through the plane of every other one."""
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    middle, inward = (a + b + c) / 3.0, np.cross(c - a, b - a)
-    inward /= np.linalg.norm(inward, axis=1)[:, None]
-    normal, way = np.cross(b - a, c - a), np.full(len(a), np.inf)
-    for n in range(len(a)):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = np.einsum("td,td->t", a - middle[n], normal) / (normal @ inward[n])
-            hit = middle[n] + t[:, None] * inward[n]
-        sides = [np.cross(q - p, hit - p) for p, q in ((a, b), (b, c), (c, a))]
-        within = np.all([np.einsum("td,td->t", side, normal) >= 0.0 for side in sides], axis=0)
-        within &= (t > 0.0) & (np.arange(len(a)) != n)
-        way[n] = t[within].min(initial=np.inf)
     return way

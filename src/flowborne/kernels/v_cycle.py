@@ -6,9 +6,7 @@ definite operator.
 
 from __future__ import annotations
 
-import numpy as np
-
-from flowborne.kernels.arrays import Array, Hierarchy, Real
+from flowborne.kernels.arrays import Hierarchy, Real
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.levels import (
     OFFSET,
@@ -21,18 +19,14 @@ from flowborne.kernels.levels import (
 from flowborne.kernels.smoothing import (
     STEPS,
     defect,
-    defect_reference,
     first_smooth,
     smooth,
     smooth_down,
-    smooth_reference,
     smooth_up,
 )
 from flowborne.kernels.transfer import (
     interpolate,
-    interpolate_reference,
     restrict,
-    restrict_reference,
 )
 
 COARSEST = 15
@@ -109,32 +103,3 @@ def v_cycle(hierarchy: Hierarchy, x: Real, b: Real, r: Real) -> None:
             serial_leg(hierarchy, x, b, r, level, down)
         else:
             leg(hierarchy, x, b, r, level, down)
-
-
-def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
-    """`v_cycle` in NumPy: x of a level for its b, both padded, ghosts of x as the sides have it."""
-    table, periodic, weights, _, inverse, interpolation, marks, orphans, aggregates = hierarchy
-    w, a = weights_at(weights, table, level), at_level(inverse, table, level)
-    coarsest = level == table.shape[0] - 2
-    x = np.zeros(b.shape)
-    for step in [*range(STEPS)] * (COARSEST if coarsest else 1):
-        x = smooth_reference(x, b, w, a, step)
-        wrap_ghosts(x, periodic)
-    if coarsest:
-        return x
-    parts = (
-        at_level(marks, table, level),
-        interpolation_at(interpolation, table, level),
-        orphans_at(orphans, table, level),
-        at_level(aggregates, table, level),
-    )
-    r = defect_reference(x, b, w, a)
-    coarse = np.zeros(at_level(inverse, table, level + 1).shape)
-    wrap_ghosts(r, periodic)
-    coarse = restrict_reference(coarse, r, *parts, periodic)
-    x = interpolate_reference(x, v_cycle_reference(hierarchy, coarse, level + 1), *parts)
-    for step in reversed(range(STEPS)):
-        wrap_ghosts(x, periodic)
-        x = smooth_reference(x, b, w, a, step)
-    wrap_ghosts(x, periodic)
-    return x

@@ -34,14 +34,3 @@ def apply_component(out: Array, x: Array, scale: Array, links: Array, wraps: Int
                         g = f - steps[d] if at > 0 else f + around
                         total += link[d, g] * scale[g] * x[g]
                 out[f] = x[f] - scale[f] * total
-
-
-def apply_component_reference(x: Array, scale: Array, links: Array, wraps: Integers) -> Array:
-    """`apply_component` in NumPy."""
-    scaled = (scale * x).reshape(links.shape[1:])
-    pull = np.zeros(scaled.shape)
-    for d in range(3):
-        faces = int(wraps[d]) or scaled.shape[d]
-        k, y, total = (np.moveaxis(values, d, 0)[:faces] for values in (links[d], scaled, pull))
-        total += k * np.roll(y, -1, axis=0) + np.roll(k * y, 1, axis=0)
-    return x - scale * pull.ravel()

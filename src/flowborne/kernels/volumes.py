@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from flowborne.kernels.closed_fractions import closed_fraction, face_closed_reference
+from flowborne.kernels.closed_fractions import closed_fraction
 
 Array = NDArray[np.float64]
 
@@ -43,16 +43,6 @@ def closed_tetrahedron(a: float, b: float, c: float, d: float) -> float:
         return float(1.0 - d / (d - a) * (d / (d - b)) * (d / (d - c)))
     p, q, r, s = a / (a - c), a / (a - d), b / (b - c), b / (b - d)
     return float(p * q + (1.0 - p) * q * r + (1.0 - q) * r * s)
-
-
-def closed_tetrahedron_reference(corners: Array) -> Array:
-    """`closed_tetrahedron` in NumPy, of corner values (..., 4) that differ from each other.
-
-    The part below zero is a spline of third degree in the corner values (Curry and Schoenberg).
-    """
-    others = corners[..., None, :] - corners[..., :, None]
-    others[..., range(4), range(4)] = 1.0
-    return np.asarray((np.maximum(-corners, 0.0) ** 3 / others.prod(axis=-1)).sum(axis=-1))
 
 
 @njit(nogil=True, cache=True)
@@ -111,19 +101,3 @@ def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> 
                         t = TETRAHEDRA[n]
                         closed += closed_tetrahedron(phi[t[0]], phi[t[1]], phi[t[2]], phi[t[3]])
                     out[i, j, k] = 1.0 - closed / len(TETRAHEDRA)
-
-
-def open_parts_reference(distance: Array, ox: Array, oy: Array, oz: Array) -> Array:
-    """`open_parts` in NumPy; distances at the corners of a room's cells differ from each other."""
-    faces = ox[1:] + ox[:-1] + oy[:, 1:] + oy[:, :-1]
-    if distance.shape[2] == 2:
-        closed = face_closed_reference(distance[:, :, :1], 2)
-    else:
-        faces = faces + oz[:, :, 1:] + oz[:, :, :-1]
-        low, high = slice(None, -1), slice(1, None)
-        corner = np.stack(
-            [distance[x, y, z] for x in (low, high) for y in (low, high) for z in (low, high)],
-            axis=-1,
-        )
-        closed = closed_tetrahedron_reference(corner[..., TETRAHEDRA]).mean(axis=-1)
-    return np.where(faces == 0.0, 0.0, 1.0 - closed)

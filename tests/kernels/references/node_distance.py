@@ -1,0 +1,67 @@
+"""The kernels of `node_distance` in NumPy: slower, and nearer to what they mean."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.node_distance import (
+    BAND,
+    FACET,
+    NEAR,
+)
+
+from .distance import signed_distance_reference
+
+
+def node_box_reference(
+    position: Array, rotation: Array, reach: Array, origin: Array, h: float, shape: Integers
+) -> Integers:
+    """`node_box` around all of the geometries in NumPy."""
+    extent = np.einsum("gam,gm->ga", np.abs(rotation), reach)
+    low, high = (position - extent).min(axis=0), (position + extent).max(axis=0)
+    first, last = np.floor((low - origin) / h - BAND), np.ceil((high - origin) / h + BAND) + 1.0
+    return np.clip(np.stack([first, last], axis=1), 0, shape[:, None] + 1).astype(np.int64)
+
+
+def sample_body_reference(
+    box: Integers,
+    geoms: Integers,
+    kind: Integers,
+    size: Array,
+    position: Array,
+    rotation: Array,
+    tables: Array,
+    table: Integers,
+    corner: Array,
+    pitch: Array,
+    origin: Array,
+    h: float,
+    flat: bool,
+) -> Array:
+    """`sample_body` in NumPy: the distances."""
+    shape = box[:, 1] - box[:, 0]
+    x = origin + h * (np.moveaxis(np.indices(tuple(shape)), 0, -1).reshape(-1, 3) + box[:, 0])
+    if flat:
+        x[:, 2] = 0.0
+    phi = np.full(len(x), BAND * h)
+    for g in geoms:
+        local = (x - position[g]) @ rotation[g]
+        own = signed_distance_reference(
+            kind[g], size[g], local, tables, table[g], corner[g], pitch[g]
+        )
+        phi = np.minimum(phi, own)
+    return phi.reshape(shape)
+
+
+def allow_for_curvature_reference(phi: Array, h: float) -> Array:
+    """`allow_for_curvature` in NumPy."""
+    total = np.zeros_like(phi)
+    for axis in range(3) if phi.shape[2] > 2 else ():
+        along = np.moveaxis(phi, axis, 0)
+        second = along[:-2] - 2.0 * along[1:-1] + along[2:]
+        near = np.stack([second[:-2], second[1:-1], second[2:]])
+        same = np.abs(np.sign(near).sum(axis=0)) == 3.0
+        gentle = np.sign(near[0]) * np.abs(near).min(axis=0)
+        np.moveaxis(total, axis, 0)[2:-2] += np.where(same, gentle, 0.0)
+    return np.where(np.abs(phi) < NEAR * h, phi - FACET * total, phi)
