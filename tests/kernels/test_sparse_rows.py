@@ -10,19 +10,12 @@ from flowborne.kernels.arrays import Rows
 from flowborne.kernels.conjugate_gradients import apply_low_rank
 from flowborne.kernels.deflation import mode_strengths
 from flowborne.kernels.mobility import respond
-from flowborne.kernels.sparse_rows import (
-    add_rows,
-    dense_rows,
-    padded_rows,
-    row_gram,
-    row_gram_along,
-    sum_rows,
-)
+from flowborne.kernels.sparse_rows import add_rows, padded_rows, row_gram, row_gram_along, sum_rows
 from flowborne.solvers.cholesky import cholesky, ordering_of
 from flowborne.solvers.mobility import dense_mobility, factored_mobility
 
 from .references.mobility import respond_reference
-from .references.sparse_rows import padded_rows_reference
+from .references.sparse_rows import dense_rows, padded_rows_reference
 
 SHAPE, SIZE = (5, 4, 6), 7
 

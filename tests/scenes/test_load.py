@@ -19,8 +19,10 @@ from flowborne.scenes.load import (
     read_scene,
     scene_names,
 )
-from flowborne.scenes.save import save_scene, scene_files
+from flowborne.scenes.save import scene_files
 from flowborne.scenes.schema import Scene
+
+from .saved import save_scene
 
 Write = Callable[..., Path]
 

@@ -19,7 +19,7 @@ from flowborne.view.drawing import drawn_frames
 from flowborne.view.film import make_preview, write_film, write_shot
 from flowborne.view.map_slab import MapSlab
 from flowborne.view.pictures import Picture
-from flowborne.view.plots import ChainCost, plot_chain_cost, plot_history, straight_line
+from flowborne.view.plots import ChainCost, plot_chain_cost, straight_line
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 
@@ -102,15 +102,6 @@ def test_a_wide_and_a_high_run_have_even_sides(write_run: Write) -> None:
         box = picture.layout.map
         assert picture.layout.width % 2 == picture.layout.height % 2 == 0
         assert box.height / box.width == pytest.approx(shape[1] / shape[0], rel=0.02)
-
-
-def test_the_course_of_a_run_is_plotted(write_run: Write, tmp_path: Path) -> None:
-    folder = write_run(frames=5)
-    plot_history(folder, tmp_path / "course.png")
-    assert imageio.imread(tmp_path / "course.png").shape[0] > 300
-    with pytest.raises(ValueError, match=r"course\.gif has no known format"):
-        plot_history(folder, tmp_path / "course.gif")
-    assert not (tmp_path / "course.gif").exists()
 
 
 def test_the_cost_of_chains_is_plotted_with_its_line(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Array, Finest, Real, Triple
+from flowborne.kernels.arrays import Array, Finest, Real
 from flowborne.kernels.blocks import BLOCK, reach
 from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.vectors import in_order
@@ -74,13 +74,3 @@ def turn_and_apply(
         for m in range(i - 1, i + 1):
             parts[m] = apply_plane(out, p, finest, m + d)
     return in_order(parts)
-
-
-def neighbour_sum(x: Real, w: Triple) -> Array:
-    """Sum over the faces of every cell of w x_neighbour; right in cells, not in ghosts."""
-    total = np.zeros(x.shape)
-    for axis in range(3):
-        if x.shape[axis] > 1:
-            total += w[axis] * np.roll(x, 1, axis)
-            total += np.roll(w[axis], -1, axis) * np.roll(x, -1, axis)
-    return total

@@ -24,15 +24,6 @@ def sum_rows(p: Real, rows: Rows, size: int) -> Array:
     return load
 
 
-def dense_rows(rows: Rows, cells: int, size: int) -> Array:
-    """(cells, size) J, in which `sum_rows` is J^T p, `add_rows` p += J motion and `row_gram`
-    J^T D^-1 J."""
-    cell, row_start, columns, values = rows
-    J = np.zeros((cells, size))
-    np.add.at(J, (np.repeat(cell, np.diff(row_start)), columns), values)
-    return J
-
-
 @kernel
 def add_rows(p: Real, rows: Rows, motion: Array) -> None:
     """p += J motion on a field."""

@@ -40,18 +40,6 @@ class _Names:
         return name
 
 
-def save_scene(scene: Scene, folder: Path) -> Path:
-    """Write `scene_files` into `folder`, which is made when it is missing.
-
-    returns  the scene file; `load_scene` makes an identical scene of it
-    """
-    for name, content in scene_files(scene).items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    return folder / SCENE_FILE
-
-
 def scene_files(scene: Scene) -> dict[str, bytes]:
     """Everything that the scene is made of: name in its new folder -> content.
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from flowborne.files.atomic import write_atomically
 from flowborne.view import style
-from flowborne.view.run import Run
-from flowborne.view.strips import legend, strip_curves, strip_style
+from flowborne.view.strips import legend, strip_style
 
 Array = NDArray[np.float64]
 
@@ -127,31 +126,6 @@ def plot_courses(strips: dict[str, dict[str, tuple[Array, Array]]], path: Path) 
             for (name, (times, values)), colour in zip(curves.items(), style.CURVES, strict=False)
         ]
     legend(axes[0], lines)
-    axes[-1].set_xlabel("time (s)", fontsize=9, color=style.MUTED)
-    _save(figure, path)
-
-
-def plot_history(folder: Path, path: Path) -> None:
-    """Plot the objective and the joints of a run over time.
-
-    folder  of the run
-    path    .png, .svg or .pdf; made anew
-    raises  ValueError when the run has nothing to plot, or there is no such format
-    """
-    run = Run.read(folder)
-    strips = strip_curves(run)
-    if not strips:
-        raise ValueError(f"{folder} has no objective and no joint to plot; run a scene with bodies")
-    figure, axes = _figure(len(strips), (7.2, 0.6 + 2.0 * len(strips)))
-    times = run.history["time_s"]
-    for place, (title, curves) in zip(axes, strips, strict=True):
-        place.set_title(title, loc="left", fontsize=9, color=style.MUTED)
-        lines = [
-            place.plot(times, values, lw=1.6, color=colour, label=name)[0]
-            for (name, values), colour in zip(curves.items(), style.CURVES, strict=False)
-        ]
-        if len(lines) > 1:
-            legend(place, lines)
     axes[-1].set_xlabel("time (s)", fontsize=9, color=style.MUTED)
     _save(figure, path)
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from flowborne.kernels.aggregates import OWN
 from flowborne.kernels.arrays import Array, Faces, Finest, Indices, Integers, Marks, Real, Triple
-from flowborne.kernels.laplacian import neighbour_sum
 from flowborne.kernels.vectors import cells_of
+
+from .laplacian import neighbour_sum
 
 
 def finest_weights_reference(faces: Faces) -> Finest:

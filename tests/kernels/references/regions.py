@@ -6,8 +6,9 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Finest, Labels, Periodic, Rows
 from flowborne.kernels.regions import NULL
-from flowborne.kernels.sparse_rows import dense_rows
 from flowborne.kernels.vectors import cells_of
+
+from .sparse_rows import dense_rows
 
 
 def label_regions_reference(finest: Finest, periodic: Periodic) -> Labels:

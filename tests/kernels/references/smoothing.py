@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Real, Triple
-from flowborne.kernels.laplacian import neighbour_sum
 from flowborne.kernels.smoothing import WEIGHTS
 from flowborne.kernels.vectors import cells_of
+
+from .laplacian import neighbour_sum
 
 
 def smooth_reference(x: Real, b: Real, w: Triple, inverse: Real, step: int) -> Array:

@@ -16,3 +16,12 @@ def padded_rows_reference(rows: Rows, diagonal: Array) -> Rows:
     entries = np.repeat(active, count)
     starts = np.append(0, np.cumsum(count[active]))
     return padded[active], starts, columns[entries], values[entries]
+
+
+def dense_rows(rows: Rows, cells: int, size: int) -> Array:
+    """(cells, size) J, in which `sum_rows` is J^T p, `add_rows` p += J motion and `row_gram`
+    J^T D^-1 J."""
+    cell, row_start, columns, values = rows
+    J = np.zeros((cells, size))
+    np.add.at(J, (np.repeat(cell, np.diff(row_start)), columns), values)
+    return J

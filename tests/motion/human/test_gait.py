@@ -7,7 +7,7 @@ import pytest
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.clip_skeleton import skeleton_of
-from flowborne.motion.human.gait import CYCLE, NAMES, gait_clip, leg_turns, standing_clip
+from flowborne.motion.human.gait import CYCLE, NAMES, gait_clip, leg_turns
 from flowborne.motion.human.standard import standard_skeleton
 from flowborne.solids.model import SolidModel
 
@@ -212,14 +212,6 @@ def test_other_people_walk_too(height):
     walk = gait_clip(standard_skeleton(height))
     stride = (walk.translation[-1] - walk.translation[0])[0]
     assert stride == pytest.approx(1.364 * height / 1.741, rel=0.02)
-
-
-def test_standing_is_still_on_the_ground(model):
-    standing = standing_clip(standard_skeleton())
-    assert len(standing.translation) == 2
-    np.testing.assert_array_equal(standing.rotations[0], standing.rotations[1])
-    np.testing.assert_allclose(soles(model, standing)[..., 2], 0.0, atol=1e-9)
-    assert next(played(model, standing)).ncon == 0
 
 
 def test_a_cycle_lasts():

@@ -19,6 +19,8 @@ from flowborne.view.space.camera import (
     camera_of,
 )
 
+from .projecting import project
+
 Make = Callable[..., Run]
 
 BALL = ("sphere", (0.1, 0.0, 0.0))
@@ -33,7 +35,7 @@ def on_map(run: Run) -> np.ndarray:
     """(frames, n, 2) places on the map of what the bodies sweep."""
     camera = camera_of(run, run.shot)
     places = swept(run, range(len(run.geoms)))
-    return np.stack([camera.project(n, points) for n, points in enumerate(places)])
+    return np.stack([project(camera, n, points) for n, points in enumerate(places)])
 
 
 def walk(sway: float = 0.0) -> np.ndarray:
@@ -89,7 +91,7 @@ def test_a_fluid_is_seen_whole_unless_it_is_much_larger(run_of: Make, box_of_flu
     assert np.ptp(camera.focus, axis=0).max() == 0.0
     low, high = np.array(box_of_fluid.origin), np.array(box_of_fluid.upper)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-    places = camera.project(0, corners)
+    places = project(camera, 0, corners)
     assert np.ptp(places, axis=0).max() == pytest.approx(FILLED_BY_FLUID, abs=0.01)
     lake = Grid((50, 50, 50), 0.4, (-10.0, -10.0, -10.0))
     followed = seen_by_default(run_of([BALL], centres, grid=lake))
@@ -116,7 +118,7 @@ def test_a_camera_that_orbits_goes_around_at_its_pace(run_of: Make) -> None:
     azimuth = np.unwrap(np.arctan2(camera.away[:, 1], camera.away[:, 0]))
     np.testing.assert_allclose(np.degrees(np.gradient(azimuth, TIMES)), 30.0, rtol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(camera.away, axis=1), camera.distance)
-    places = np.stack([camera.project(n, points) for n, points in enumerate(walk())])
+    places = np.stack([project(camera, n, points) for n, points in enumerate(walk())])
     assert 0.05 < places.min() < places.max() < 0.95, "nothing leaves the map on the way round"
 
 
@@ -125,7 +127,7 @@ def test_a_camera_at_a_place_of_its_own_looks_at_what_it_follows(run_of: Make) -
     run = run_of([BALL, BALL], walk())
     camera = camera_of(run, shot_by(position=position, lens=40.0))
     np.testing.assert_allclose(camera.focus + camera.away, np.broadcast_to(position, (97, 3)))
-    middles = np.stack([camera.project(n, camera.focus[n, None])[0] for n in range(97)])
+    middles = np.stack([project(camera, n, camera.focus[n, None])[0] for n in range(97)])
     np.testing.assert_allclose(middles, 0.5)
     aimed = camera_of(run, shot_by(position=position, target=(1.0, 0.0, 1.0)))
     np.testing.assert_allclose(aimed.focus, np.broadcast_to((1.0, 0.0, 1.0), (97, 3)))
@@ -147,7 +149,7 @@ def test_one_body_is_followed_or_nothing(run_of: Make) -> None:
                                atol=1e-5)  # fmt: skip
     still = camera_of(run, shot_by(follow="nothing"))
     assert np.ptp(still.focus, axis=0).max() == 0.0
-    places = np.stack([still.project(n, points) for n, points in enumerate(centres)])
+    places = np.stack([project(still, n, points) for n, points in enumerate(centres)])
     assert 0.0 < places.min() < places.max() < 1.0
     with pytest.raises(ValueError, match="cannot follow body 'tail'; the bodies are world, body"):
         camera_of(run, shot_by(follow="tail"))
@@ -180,6 +182,6 @@ def test_a_source_of_dye_nearby_is_seen_where_dye_is(run_of: Make) -> None:
     run = run_of([ball], centres, grid=lake, sources=np.array([near, far]))
     still, dyed = (camera_of(run, Shot(field=field)) for field in ("speed", "dye"))
     corners = np.array(np.meshgrid(*zip(*near, strict=True))).reshape(3, -1).T
-    inside = dyed.project(0, corners)
+    inside = project(dyed, 0, corners)
     assert 0.0 < inside.min() < inside.max() < 1.0
     assert dyed.height < 2.0 * still.height

@@ -22,6 +22,8 @@ from flowborne.view.shot import CameraShot, Shot
 from flowborne.view.space.ground import stands
 from flowborne.view.space.map_space import MapSpace
 
+from .projecting import project
+
 Make = Callable[..., Run]
 Pixels = np.ndarray
 
@@ -46,7 +48,7 @@ def drawn(picture: Picture, number: int) -> Pixels:
 def pixel_of(picture: Picture, number: int, place: np.ndarray) -> tuple[int, int]:
     """(row, column) in the map of a place in m."""
     assert isinstance(picture.map, MapSpace)
-    x, y = picture.map.camera.project(number, np.asarray(place, float)[None])[0]
+    x, y = project(picture.map.camera, number, np.asarray(place, float)[None])[0]
     box = picture.layout.map
     return int((1.0 - y) * box.height), int(x * box.width)
 

@@ -38,6 +38,8 @@ from flowborne.view.space.outside import Outside
 from flowborne.view.space.shapes import mesh_of
 from flowborne.view.space.skin import SkinSurface, creased, normals, way_out
 
+from .projecting import project
+
 Make = Callable[..., Run]
 Pixels = np.ndarray
 
@@ -116,7 +118,7 @@ def up_of(picture: Picture) -> np.ndarray:
 def pixel_of(picture: Picture, number: int, place: np.ndarray) -> tuple[int, int]:
     """(row, column) in the map of a place in m."""
     assert isinstance(picture.map, MapSpace)
-    x, y = picture.map.camera.project(number, np.asarray(place, float)[None])[0]
+    x, y = project(picture.map.camera, number, np.asarray(place, float)[None])[0]
     box = picture.layout.map
     return int((1.0 - y) * box.height), int(x * box.width)
 
@@ -233,7 +235,7 @@ def test_the_camera_sees_all_of_the_skin(ball_of_flesh: Make) -> None:
     growing = np.array([places * [1.0, 1.0, 1.0 + 0.5 * n] for n in range(6)])
     run = ball_of_flesh(growing, triangles)
     camera = camera_of(run, run.shot)
-    seen = np.stack([camera.project(n, points) for n, points in enumerate(growing)])
+    seen = np.stack([project(camera, n, points) for n, points in enumerate(growing)])
     low, high = 0.5 - 0.5 * FILLED, 0.5 + 0.5 * FILLED
     assert low - 0.01 < seen.min() < low + 0.02
     assert high - 0.02 < seen.max() < high + 0.01

@@ -40,19 +40,6 @@ SAMPLES = 1024
 """Instants of a cycle at which the support is found, for its integral."""
 
 
-def standing_clip(skeleton: Skeleton) -> Clip:
-    """Two frames of standing still as at rest, the soles on the ground.
-
-    skeleton  upright at rest
-    """
-    still = {joint: np.zeros(2) for joint in NAMES}
-    place = np.zeros((2, 3))
-    place[:, 2] = skeleton["root"][2] - min(
-        float((skeleton.heel(side) + skeleton.to_sole(side))[2]) for side in SIDES
-    )
-    return _clip(skeleton, 1.0 / RATE, still, place)
-
-
 def gait_clip(skeleton: Skeleton, cycle: float = CYCLE) -> Clip:
     """One cycle of a straight walk along x from the right heel's strike, at about 120 Hz.
 

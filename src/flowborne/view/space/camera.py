@@ -68,17 +68,6 @@ class Camera:
         """(3, 3) axes of the map in the world: to the right, upwards, and towards the camera."""
         return np.asarray(_axes(self.away[number][None])[0])
 
-    def project(self, number: int, points: Array) -> Array:
-        """(n, 2) place of `points` (n, 3) on the map of a frame: 0 left and below, 1 right and
-        above."""
-        right, up, toward = self.axes(number)
-        offset = points - self.focus[number]
-        distance = np.linalg.norm(self.away[number])
-        height = 2.0 * distance * np.tan(0.5 * self.lens)
-        depth = 1.0 - offset @ toward / distance
-        on_map = np.stack([offset @ right * self.aspect / height, offset @ up / height], axis=-1)
-        return np.asarray(0.5 + on_map / depth[:, None])
-
 
 def camera_of(run: Run, shot: Shot, aspect: float | None = None) -> Camera:
     """The camera of a run; what it sees has the same size in all frames unless it stands still.
