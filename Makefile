@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing exporters fuzz messages strangers validation-page clean
+.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing exporters fuzz messages size strangers validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -48,6 +48,9 @@ fuzz: $(VENV)/installed-test
 
 strangers: $(VENV)/installed-test
 	$(BIN)/python tools/strangers.py
+
+size: $(VENV)/installed-test
+	$(BIN)/python tools/size.py
 
 messages: $(VENV)/installed-test
 	$(BIN)/python tools/messages.py

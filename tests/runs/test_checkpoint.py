@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.grid import Grid
-from flowborne.fluid.state import FluidState
 from flowborne.files import arrays as arrays_file
 from flowborne.files.arrays import read_arrays
+from flowborne.fluid.grid import Grid
+from flowborne.fluid.state import FluidState
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.solids.model import SolidModel
 

@@ -7,8 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
-from flowborne.runs.open_run import OpenRun
 from flowborne.registry import Registry
+from flowborne.runs.open_run import OpenRun
 
 Class = TypeVar("Class", bound=type)
 

@@ -10,8 +10,8 @@ from io import StringIO
 from pathlib import Path
 from typing import IO
 
-from flowborne.files.given import MOST_BYTES, check_file
 from flowborne.files.atomic import write_text
+from flowborne.files.given import MOST_BYTES, check_file
 
 
 class History:

@@ -24,8 +24,8 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from flowborne.errors import SceneError
-from flowborne.files.given import read_json, read_toml
 from flowborne.files.atomic import partial_name, write_json
+from flowborne.files.given import read_json, read_toml
 from flowborne.version import __version__
 
 MARK = "flowborne"
