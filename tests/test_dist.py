@@ -15,8 +15,7 @@ from dist import ROOT, SUPPORTED, build, environment, flowborne, install, interp
 
 DATA = {
     path.relative_to(ROOT / "src").as_posix()
-    for room in ("scenes", "validation")
-    for path in (ROOT / "src" / "flowborne" / room).rglob("*")
+    for path in (ROOT / "src" / "flowborne").rglob("*")
     if path.is_file() and path.suffix in (".toml", ".xml", ".vtu", ".json", ".gz")
 }
 """Scenes, models, meshes, references and measurements."""
