@@ -144,6 +144,15 @@ def test_what_of_the_file_has_no_effect_is_said_once(written: Written) -> None:
     )
 
 
+def test_what_the_file_itself_switches_off_is_said(written: Written) -> None:
+    flags = {'gravity="disable"': 'gravity="disable" contact="disable" limit="disable"'}
+    scene = load_scene(written(**flags))
+    said = list(notes_of(scene, build(scene).world.setup.solid))
+    assert "[solids]: robot.xml itself switches off its contact, limit by <flag>" in said
+    scene = load_scene(written())
+    assert not any("<flag>" in note for note in notes_of(scene, build(scene).world.setup.solid))
+
+
 def test_a_frame_has_steps_that_keep_contact_with_the_floor_stiff(written: Written) -> None:
     """Half of the time constant of 20 ms in frames of 40 ms."""
     assert load_scene(written()).time.steps_per_frame == 4

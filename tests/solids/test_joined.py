@@ -30,6 +30,12 @@ def test_a_hip_within_its_fixed_trunk_stays_at_rest() -> None:
     np.testing.assert_allclose(data.qpos, 0.0, atol=1e-12)
 
 
+def test_bodies_without_a_name_are_called_by_their_numbers() -> None:
+    text = MODEL.replace(' name="trunk"', "").replace(' name="hip"', "")
+    mj = compiled(text.format(joint=HINGE, root="", floor=""), False, (0.0, 0.0, 0.0))
+    assert joined_pairs(mj) == ["body1 and body2"]
+
+
 @pytest.mark.parametrize(
     "given",
     [

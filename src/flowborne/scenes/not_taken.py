@@ -1,4 +1,4 @@
-"""What of a model file a run does not take, said once."""
+"""What of a model file a run does not take, said once, and what the file itself switches off."""
 
 from __future__ import annotations
 
@@ -33,6 +33,23 @@ def not_taken(scene: Scene, model: SolidModel) -> str | None:
     if not said:
         return None
     return f"[solids]: of {scene.model_path.name} these have no effect: {'; '.join(said)}"
+
+
+COUNTING = ("constraint", "contact", "damper", "equality", "frictionloss", "limit", "spring")
+"""MuJoCo's flags that switch parts of a model off, and do so here."""
+
+
+def switched_off(scene: Scene) -> str | None:
+    """One sentence on what the model file itself switches off, None where it leaves all on."""
+    if scene.model_path is None:
+        return None
+    flags = spec_of(scene).option.disableflags
+    off = [
+        name for name in COUNTING if flags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")
+    ]
+    if not off:
+        return None
+    return f"[solids]: {scene.model_path.name} itself switches off its {listed(off)} by <flag>"
 
 
 def _options(scene: Scene, spec: mujoco.MjSpec, on_floors: bool) -> Iterator[str]:

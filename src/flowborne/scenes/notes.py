@@ -10,7 +10,7 @@ from flowborne.phrases import listed
 from flowborne.scenes.bodies import HINGE, SLIDE, joint_kind, joint_unit, own_pose, posed
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
-from flowborne.scenes.not_taken import not_taken
+from flowborne.scenes.not_taken import not_taken, switched_off
 from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
@@ -24,6 +24,9 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     left_out = not_taken(scene, model)
     if left_out is not None:
         yield left_out
+    off = switched_off(scene)
+    if off is not None:
+        yield off
     if mended := mended_meshes(model.mj):
         yield f"[solids]: open meshes: {mended}"
     if joined := joined_pairs(model.mj):

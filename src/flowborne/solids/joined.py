@@ -10,7 +10,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from flowborne.solids.geoms import floors
+from flowborne.solids.geoms import element_name, floors
 
 LEFT_OUT = "overlap at rest: "
 """What stands before the names of two bodies in the name of their <exclude>."""
@@ -20,8 +20,7 @@ TURNING = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
 
 def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
     """Leave out contact between fixed bodies and those that hinges and ball joints hold on them,
-    where they overlap at rest; whether any was left out. Bodies with a floor or without a name are
-    as they are."""
+    where they overlap at rest; whether any was left out. Bodies with a floor are as they are."""
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     mujoco.mj_comPos(mj, data)
@@ -29,16 +28,18 @@ def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
     with_floor = mj.geom_bodyid[floors(mj)]
     overlapping = mj.geom_bodyid[data.contact.geom[data.contact.dist < 0.0]]
     pairs = {(base, other) for ends in overlapping.tolist() for base, other in (ends, ends[::-1])}
+    bodies = {body.id: body for body in spec.bodies}
     excluded = False
     for base, other in sorted(pairs):
         if mj.body_weldid[base] or base in with_floor or not _hangs_on_the_world(mj, other):
             continue
-        names = [mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_BODY, body) for body in (base, other)]
-        if all(names):
-            spec.add_exclude(
-                name=LEFT_OUT + " and ".join(names), bodyname1=names[0], bodyname2=names[1]
-            )
-            excluded = True
+        names = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, body) for body in (base, other)]
+        for body, name in zip((base, other), names, strict=True):
+            bodies[body].name = name  # <exclude> knows bodies by their names alone
+        spec.add_exclude(
+            name=LEFT_OUT + " and ".join(names), bodyname1=names[0], bodyname2=names[1]
+        )
+        excluded = True
     return excluded
 
 
