@@ -83,6 +83,8 @@ def _smoothed(places: Array, calm: float) -> Array:
     good = np.flatnonzero(np.isfinite(middle).all(axis=1))
     if good.size == 0:
         return np.zeros_like(middle)
+    # the path goes on in periods of 2 n frames, of which exp(-5 calm^2 / n^2) is left
+    calm = min(calm, 2.0 * good.size)
     room = int(4.0 * calm) + 1
     padded = np.pad(middle[good], ((room, room), (0, 0)), mode="reflect", reflect_type="odd")
     smooth = gaussian_filter1d(padded, calm, axis=0)[room:-room]

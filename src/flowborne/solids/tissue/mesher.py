@@ -22,20 +22,21 @@ def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Arr
     """Points (n, 3) and right-handed tetrahedra (m, 4) of all that a surface encloses.
 
     surface    closed, and turned outward: that of a hollow body has parts turned into the hollow
-    size       length of edges, m; shorter where the surface bends too much for it
+    size       length of edges, m; shorter where the surface bends too much for it, or is smaller
     tolerance  how far from the surface faces of the tetrahedra may be, m
     raises     ValueError when the mesher fails
 
     Two runs give different meshes of the same quality, even on one thread.
     """
     points, triangles = surface
+    across = float(np.linalg.norm(np.ptp(points, axis=0)))
     with TemporaryDirectory(prefix="flowborne-flesh-") as folder:
         np.savez(
             Path(folder) / mesh_run.SURFACES,
             points=points,
             triangles=triangles.astype(np.int32),
-            size=size,
-            tolerance=tolerance / np.linalg.norm(np.ptp(points, axis=0)),
+            size=min(size, across),  # by which the mesher's box is larger than the surface
+            tolerance=tolerance / across,
             threads=numba_thread_count(),
         )
         why = run_apart(folder, mesh_run.TETRAHEDRA, "mesh")
