@@ -63,7 +63,7 @@ $(VENV)/bin/python:
 
 $(VENV)/installed: pyproject.toml $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable .
+	$(BIN)/python -m pip install --quiet --editable '.[film]'
 	touch $@
 
 $(VENV)/installed-test: pyproject.toml $(VENV)/bin/python

@@ -16,7 +16,7 @@ from dist import ROOT, SUPPORTED, build, environment, flowborne, install, interp
 DATA = {
     path.relative_to(ROOT / "src").as_posix()
     for path in (ROOT / "src" / "flowborne").rglob("*")
-    if path.is_file() and path.suffix in (".toml", ".xml", ".vtu", ".json", ".gz")
+    if path.is_file() and path.suffix in (".toml", ".xml", ".npz", ".json", ".gz")
 }
 """Scenes, models, meshes, references and measurements."""
 

@@ -41,9 +41,9 @@ def test_a_machine_that_runs_tests_is_well(capsys: pytest.CaptureFixture[str]) -
 def test_films_need_ffmpeg(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     finding = found("films")
-    assert finding.missing
-    assert "imageio_ffmpeg" in finding.found
-    assert "install imageio-ffmpeg again" in finding.remedy
+    assert not finding.missing
+    assert finding.found == "what draws films is not installed"
+    assert "pip install 'flowborne[film]'" in finding.remedy
 
 
 def test_a_film_is_read_again(monkeypatch: pytest.MonkeyPatch) -> None:

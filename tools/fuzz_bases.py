@@ -17,6 +17,7 @@ from flowborne.motion.bvh import write_clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.standard import standard_skeleton
 from flowborne.scenes.load import library
+from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh, recipe_of
 from fuzz_changes import OUTSIDE
 
 Files = dict[str, bytes]
@@ -317,6 +318,12 @@ def bases() -> dict[str, Files]:
             "fish.xml": (FISH / "fish.xml").read_bytes(),
             "fish.vtu": (FISH / "fish.vtu").read_bytes(),
         },
+    }
+    mesh = mesh_bytes(read_mesh(FISH / "fish.vtu"), recipe_of(FISH / "fish.vtu"))
+    found["fish-npz"] = {
+        "scene.toml": found["fish"]["scene.toml"].replace(b"fish.vtu", b"fish.npz"),
+        "fish.xml": found["fish"]["fish.xml"],
+        "fish.npz": mesh,
     }
     for ending in ("obj", "stl"):
         found[f"hull-{ending}"] = {

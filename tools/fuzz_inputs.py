@@ -275,6 +275,9 @@ def surface_bytes(rng: random.Random) -> Broken:
 
 def flesh_bytes(rng: random.Random) -> Broken:
     """Bytes, words, types and counts of the mesh of flesh are others."""
+    if rng.random() < 0.3:
+        files = bases()["fish-npz"]
+        return Broken(files | {"fish.npz": torn(rng, files["fish.npz"])})
     files = bases()["fish"]
     how = rng.choice((words, torn, _retyped, _retyped, _retyped))
     return Broken(files | {"fish.vtu": how(rng, files["fish.vtu"])})

@@ -61,6 +61,7 @@ LONGEST = 300
 ANSWERS = {
     'mend = "hull"': {"solids.mend": "hull"},
     "enlarge the domain": {"domain": "around the world's geoms too"},
+    "or enlarge the domain": {"room": "twice as much"},
     "enlarge [domain]": {"room": "twice as much"},
 }
 """What a message may propose -> what is then tried."""
@@ -250,11 +251,11 @@ def page(found: list[Stranger]) -> str:
     others = [one for one in found if one.mujoco]
     lines = [
         f"{len(loaded)} models that plain MuJoCo {mujoco.__version__} loads: "
-        f"{sum(one.runs for one in loaded)} run, of which "
-        f"{sum(one.runs and bool(one.edits) for one in loaded)} with a key that a message names, "
-        f"{sum(bool(one.refused) for one in loaded)} are refused in a message and "
-        f"{sum(bool(one.ran) for one in loaded)} fail after `check` accepted them. Of "
-        f"{len(others)} that it does not load, {sum(one.runs for one in others)} run here.\n",
+        f"{sum(one.runs for one in loaded)} run "
+        f"({sum(one.runs and bool(one.edits) for one in loaded)} of them with a key that a message "
+        f"proposes), {sum(bool(one.refused) for one in loaded)} refused in a message, "
+        f"{sum(bool(one.ran) for one in loaded)} failing after `check` accepted it. "
+        f"{len(others)} models that it does not load: {sum(one.runs for one in others)} run.\n",
         table(
             ["model", "loads", "edits", "warnings", "runs"],
             [row(one) for one in found if not one.mujoco or one.runs],

@@ -31,6 +31,7 @@ from flowborne.console import (
     sentence_of,
 )
 from flowborne.errors import PartError, SceneError
+from flowborne.extras import check_drawing, missing_to_draw, optional
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, make_folder
 from flowborne.version import __version__
 
@@ -145,6 +146,9 @@ def run(
 
     loaded = load_scene(scene, _overrides(settings or []))
     folder = Path("runs") / loaded.name if out is None else out
+    missing = missing_to_draw() if film else None
+    if missing is not None:
+        print(f"no film will be drawn: {missing}", flush=True)
     with ProgressDisplay() as progress:
         from flowborne.running import RunInterrupted, RunOutcome
         from flowborne.running import run as run_scene
@@ -230,6 +234,7 @@ def film(
 ) -> None:
     """Draw the picture and the film of a run again, as the table [film] of its scene says."""
     files = RunFolder.existing(folder)
+    check_drawing()
     from flowborne.progress import ProgressDisplay, RunProgress
     from flowborne.scenes.film_settings import film_settings
     from flowborne.view.film import make_preview, write_shot
@@ -264,6 +269,7 @@ def view(
     host: Annotated[str, typer.Option(help="0.0.0.0 lets other machines look, too.")] = "127.0.0.1",
 ) -> None:
     """Look at a run in a browser; docs/viewer.md says what can be seen."""
+    optional("pyvista", "PyVista", "view", "views in a browser")
     from flowborne.view.browser.viewer import open_viewer, serve
 
     try:
@@ -403,7 +409,10 @@ def figures(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
 ) -> None:
     """Our numbers for Figures 2, 7, 9b, 10 and 11 of the paper, as tables and pictures."""
+    from flowborne.extras import check_drawing
     from flowborne.simulation import BlowUpError
+
+    check_drawing()
     from flowborne.validation.figures import figure_names, make_figures
 
     chosen = _known(names or [], figure_names(), "figure", "NAME")

@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 
 from packaging.requirements import Requirement
 
+from flowborne.extras import missing_to_draw
 from flowborne.view.space.opengl import REMEDY
 
 FOR_DEVELOPERS = ("all", "browser", "test")
@@ -139,6 +140,8 @@ def memory() -> str:
 
 def films() -> str:
     """Films of two frames, written as those of a run and read again, in every kind of file."""
+    if missing_to_draw() is not None:
+        raise OSError("what draws films is not installed")
     import imageio_ffmpeg  # type: ignore[import-untyped]
     import numpy as np
 
@@ -160,6 +163,8 @@ def films() -> str:
 
 def opengl() -> str:
     """What draws three dimensions, after it has drawn a picture in a process of its own."""
+    if missing_to_draw() is not None:
+        raise OSError("what draws films is not installed")
     command = [sys.executable, "-c", DRAWING]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     if done.returncode < 0:
@@ -245,7 +250,12 @@ CHECKS = (
         needed=False,
     ),
     Check("memory", memory, "", needed=False),
-    Check("films", films, "install imageio-ffmpeg again; runs go without film by --no-film"),
+    Check(
+        "films",
+        films,
+        "install it with pip install 'flowborne[film]'; runs go without film",
+        needed=False,
+    ),
     Check("OpenGL", opengl, REMEDY, needed=False),
 )
 """What every machine is tried for."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from flowborne.coupling.seen import seen_bodies
 from flowborne.errors import PartError, SceneError, WorkerError
+from flowborne.extras import missing_to_draw
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
@@ -273,6 +274,9 @@ class _Run:
 
     def _draw(self) -> str:
         """Draw the picture and the film; what to tell when they are not, or not whole."""
+        missing = missing_to_draw()
+        if missing is not None:
+            return f"; no film: {missing}"
         from flowborne.view.film import make_preview
 
         try:

@@ -129,7 +129,7 @@ def test_flesh_in_two_dimensions_is_a_mesh_of_triangles(write: Write, tmp_path: 
     points, elements = flat_mesh((8, 2), (0.3, 0.2))
     held = np.abs(points[:, 1]) < 0.05
     mesh = FleshMesh(points, elements, tuple("upper" if h else "" for h in held))
-    (tmp_path / "fin.vtu").write_bytes(mesh_bytes(mesh, ""))
+    (tmp_path / "fin.npz").write_bytes(mesh_bytes(mesh, ""))
     path = write(
         ('figure = "none"', "dimensions = 2"),
         ("lower = [-0.6, -0.6, -0.6]", "lower = [-0.6, -0.6]"),
@@ -144,11 +144,11 @@ def test_flesh_in_two_dimensions_is_a_mesh_of_triangles(write: Write, tmp_path: 
     assert flesh.elements.shape[1] == 6
     assert Simulation(load_scene(path)).advance_frame()
     tetrahedra = FleshMesh(*bar_mesh((2, 1, 1), (0.3, 0.2, 0.2)), ("upper",) * 12)
-    (tmp_path / "fin.vtu").write_bytes(mesh_bytes(tetrahedra, ""))
+    (tmp_path / "fin.npz").write_bytes(mesh_bytes(tetrahedra, ""))
     assert any("triangles at z = 0" in problem for problem in check_scene(path))
 
 
-FIN = 'bones = ["upper"]\nmesh = "fin.vtu"'
+FIN = 'bones = ["upper"]\nmesh = "fin.npz"'
 
 
 def test_two_fleshes_have_names_and_one_damping(write: Write) -> None:
@@ -166,7 +166,7 @@ def test_a_run_folder_keeps_its_mesh(write: Write, tmp_path: Path, counted: list
     folder = RunFolder(tmp_path / "run")
     folder.path.mkdir()
     files = scene_files(scene)
-    assert set(files) == {"scene.toml", "arm.xml", "flesh-arm.vtu"}
+    assert set(files) == {"scene.toml", "arm.xml", "flesh-arm.npz"}
     write_scene(folder, files)
     rest = build(scene).world.setup.solid.flesh
     build_flesh._made.clear()
@@ -179,11 +179,11 @@ def test_a_run_folder_keeps_its_mesh(write: Write, tmp_path: Path, counted: list
     np.testing.assert_array_equal(found.rest, rest.rest)
     assert scene_files(again) == files
     # the user's scene, meshed anew, is still the same run
-    assert scene_to_resume(folder, scene).flesh[0].mesh == "flesh-arm.vtu"
+    assert scene_to_resume(folder, scene).flesh[0].mesh == "flesh-arm.npz"
     # and what is asked for otherwise is meshed otherwise
     other = load_scene(folder.scene, {"flesh.0.thickness": "0.09"})
     assert counted == ["upper lower"]
-    assert scene_files(other)["flesh-arm.vtu"] != files["flesh-arm.vtu"]
+    assert scene_files(other)["flesh-arm.npz"] != files["flesh-arm.npz"]
 
 
 def test_torn_flesh_stops_a_run_with_its_place(write: Write) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.frames import FRAMES, frame_times, told
 from flowborne.bench.result import Result, verdict
-from flowborne.pictures import straight_line
 
 NAME = "chain"
 JOINTS = (1, 2, 3, 4)
@@ -25,6 +24,8 @@ def measure() -> Iterator[Result]:
 
 def straightness(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     """Largest deviation of the quickest frames of scenes with 1, 2, ... joints from a line."""
+    from flowborne.pictures import straight_line
+
     with ExitStack() as stack:
         simulations = [stack.enter_context(Simulation(scene, 1, "serial")) for scene in scenes]
         times = frame_times(simulations, frames)

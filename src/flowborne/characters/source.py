@@ -7,7 +7,7 @@ from typing import Protocol
 
 from flowborne.characters.rig import Action, Rig, Surface
 from flowborne.errors import SceneError
-from flowborne.runs.optional import optional
+from flowborne.extras import optional
 
 GLTF, USD = (".glb", ".gltf"), (".usd", ".usda", ".usdc", ".usdz")
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole
 from flowborne.formats.creature import Creature
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.optional import optional
 
 
 @provided(".abc")

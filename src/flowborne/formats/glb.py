@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole
 from flowborne.formats.creature import Creature
 from flowborne.formats.morphs import morphed
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.optional import optional
 
 NEAR = 1e-6
 """Distance from the run at which flesh has enough morph targets, in sizes of the creature."""

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole, write_text
 from flowborne.runs.columns import unit_of
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.optional import optional
 
 COUNTS = ("frame", "solver_iterations", "contacts", "flesh_inside_out")
 """Columns of whole numbers."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole
 from flowborne.formats.creature import Creature
 from flowborne.formats.vdb import write_dye
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.optional import optional
 
 
 @provided(".usd")

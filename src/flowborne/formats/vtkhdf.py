@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.optional import optional
 
 
 @provided(".vtkhdf")

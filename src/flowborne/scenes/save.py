@@ -98,12 +98,13 @@ def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
 def _flesh_files(scene: Scene, names: _Names) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
     """The flesh's tables and the files that they name: every mesh, and the user's own surfaces."""
     from flowborne.scenes.build_flesh import meshed
-    from flowborne.solids.tissue.mesh_file import mesh_bytes
+    from flowborne.solids.tissue.mesh_file import ENDING, mesh_bytes
 
     spec, files, tables = bones_of(scene), {}, []
     for table in scene.flesh:
         mesh, recipe = meshed(spec, table, scene.folder)
-        changed = {"mesh": names.name(table.mesh or f"flesh-{table.name}.vtu")}
+        own = Path(table.mesh or f"flesh-{table.name}").with_suffix(ENDING)
+        changed = {"mesh": names.name(str(own))}
         files[changed["mesh"]] = mesh_bytes(mesh, recipe)
         if table.surface is not None:
             changed["surface"] = names.name(table.surface)

@@ -23,9 +23,9 @@ class FleshTable(Table):
                whatever else trimesh reads) in the axes of the model at rest; the flesh fills it
     size       m: length of the elements' edges. One element through its thickness is enough for
                flesh to bend as it should
-    mesh       file (.vtu) of elements that were made of all this before: made anew where it was
-               made otherwise. Without a thickness and a surface it is used as it is, in two
-               dimensions a mesh of triangles at z = 0
+    mesh       file (.npz as a run leaves it, or .vtu) of elements that were made of all this
+               before: made anew where it was made otherwise. Without a thickness and a surface it
+               is used as it is, in two dimensions a mesh of triangles at z = 0
     young      N/m^2, Young's modulus
     poisson    Poisson's ratio
     density    kg/m^3

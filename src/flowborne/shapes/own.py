@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from flowborne.errors import PartError
+from flowborne.extras import optional
 from flowborne.kernels.node_distance import BAND, allow_for_curvature
 from flowborne.registry import Registry
 from flowborne.shapes.kinds import PRIMITIVES
@@ -141,7 +142,7 @@ def triangulated(geometry: OwnGeometry) -> Mesh:
     What is thinner than a 48th of its longest side may be lost.
     raises  PartError when it is empty, or reaches beyond its half extents
     """
-    import pyvista as pv  # half a second that other shapes do not need
+    pv = optional("pyvista", "PyVista", "flesh", "surfaces of shapes of one's own")
 
     what = named(geometry)
     with PartError.guarding(what):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import imageio.v3 as imageio
 import numpy as np
 
 from flowborne import Array, Simulation, SolidModel, load_scene, run
@@ -107,6 +106,8 @@ def draw_frame(frame: int, path: Path) -> None:
 
     raises  ValueError when this machine cannot draw in three dimensions
     """
+    import imageio.v3 as imageio
+
     from flowborne.pictures import Picture, Run
 
     with TemporaryDirectory() as folder:

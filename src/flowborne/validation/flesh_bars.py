@@ -151,7 +151,7 @@ def grown_from(mesh: FleshMesh, tissue: FleshTable, beside: str, gravity: Vector
     slab = mesh.elements.shape[1] == 3
     spec = mujoco.MjSpec.from_string(CLAMP.format(beside=beside))
     with TemporaryDirectory() as folder:
-        (Path(folder) / "bar.vtu").write_bytes(mesh_bytes(mesh, ""))
+        (Path(folder) / "bar.npz").write_bytes(mesh_bytes(mesh, ""))
         grown = grow(spec, (tissue,), Path(folder))
     return SolidModel.with_flesh(spec, grown, slab=slab, gravity=gravity)
 
@@ -161,7 +161,7 @@ def tissue_table(young: float, poisson: float, density: float, damping: float = 
     return FleshTable(
         name="bar",
         bones=("clamp",),
-        mesh="bar.vtu",
+        mesh="bar.npz",
         young=young,
         poisson=poisson,
         density=density,

@@ -6,14 +6,10 @@ import io
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 from textwrap import fill
-from typing import Any
-
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from typing import TYPE_CHECKING, Any
 
 from flowborne.exporters import write_atomically
 from flowborne.validation.case import Curve, Plot
@@ -29,6 +25,9 @@ from flowborne.validation.report import (
     verdicts,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 PAGE = "index.html"
 
 DRAG = (
@@ -38,6 +37,9 @@ DRAG = (
     ("B6", "Cd mean", 200.0),
 )
 """Case, figure and Reynolds number of a cylinder's drag in open water."""
+
+NO_PLOT = "A plot is missing here: Matplotlib is not installed. pip install 'flowborne[film]'"
+"""What stands in the page where a plot cannot be drawn."""
 
 PUBLISHED = {"ls": "", "marker": "o", "mfc": "none"}
 """How published points look."""
@@ -166,8 +168,14 @@ def plots_of(findings: Iterable[dict[str, Any]]) -> list[tuple[str, Callable[[],
 def svg(draw: Callable[[Axes], None], title: str) -> str:
     """What is drawn on axes, with the legend below them, as SVG; equal data give equal text.
 
-    It is as wide as a telephone shows it without shrinking the letters much.
+    It is as wide as a telephone shows it without shrinking the letters much. Where Matplotlib is
+    not installed, it is a sentence that says so.
     """
+    if find_spec("matplotlib") is None:
+        return f"<p class=source>{NO_PLOT}</p>"
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
     with rc_context({"svg.hashsalt": "flowborne", "svg.fonttype": "none", "font.size": 9.0}):
         figure = Figure(layout="constrained")
         axes = figure.subplots()
@@ -192,6 +200,8 @@ def errors_of(drawn: Sequence[tuple[str, dict[str, Any]]]) -> str:
         for number, (quantity, series) in enumerate(drawn):
             look = LOOKS[number // COLOURS % len(LOOKS)]
             axes.loglog(series["cells"], series["errors"], look, ms=3, lw=1, label=quantity)
+        from matplotlib.ticker import NullLocator
+
         grids = sorted({cells for _, series in drawn for cells in series["cells"]})
         axes.set_xticks(grids, [f"{cells:g}" for cells in grids])
         axes.xaxis.set_minor_locator(NullLocator())

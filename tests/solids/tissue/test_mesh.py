@@ -13,6 +13,7 @@ import pytest
 import pyvista as pv
 from numpy.typing import NDArray
 
+from flowborne.files.arrays import read_arrays
 from flowborne.shapes.closing import is_closed
 from flowborne.solids.elements import measures, with_middles
 from flowborne.solids.flesh import outer_surface
@@ -33,6 +34,9 @@ from flowborne.solids.tissue.mesh import (
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh, recipe_of
 
 Array = NDArray[np.float64]
+
+FISH = Path(__file__).parents[2] / "formats" / "fish.vtu"
+"""A mesh as VTK writes it."""
 
 BALL = """<mujoco><worldbody><body name="ball" pos="1 2 3"><geom type="sphere" size=".5"/>
 </body></worldbody></mujoco>"""
@@ -238,7 +242,7 @@ def test_failure_of_the_mesher_is_told(tmp_path: Path, monkeypatch: pytest.Monke
 def test_file_gives_the_mesh_back_to_the_last_bit(arm: FleshMesh, tmp_path: Path) -> None:
     holders = tuple(name.replace("upper", "höher, 上") for name in arm.holders)
     mesh = FleshMesh(arm.points, arm.elements, holders)
-    path = tmp_path / "flesh.vtu"
+    path = tmp_path / "flesh.npz"
     path.write_bytes(mesh_bytes(mesh, '{"size": 0.1}'))
     back = read_mesh(path)
     assert recipe_of(path) == '{"size": 0.1}'
@@ -255,12 +259,42 @@ def test_other_files_are_no_mesh_of_flesh(tmp_path: Path) -> None:
         read_mesh(tmp_path / "other.vtu")
 
 
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"points": np.zeros((3, 2))}, "its points have no three coordinates each"),
+        (
+            {"elements_4": np.array([[0, 1, 2, 999]])},
+            "its elements have corners that are not",
+        ),
+        ({"elements_4": np.zeros((2, 3), int)}, "its elements have no 4 corners each"),
+        ({"elements_4": np.zeros((0, 4), int)}, "it has neither tetrahedra nor triangles"),
+        ({"holder": np.zeros(3, int)}, "its points are held by bones that it does not name"),
+        ({"bones": np.array("[")}, ""),
+        ({"bones": None}, "it has no 'bones'"),
+    ],
+)
+def test_arrays_that_make_no_mesh_are_named(
+    arm: FleshMesh, changed: dict[str, np.ndarray | None], said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "flesh.npz"
+    path.write_bytes(mesh_bytes(arm, ""))
+    arrays = read_arrays(path) | changed
+    np.savez(path, **{name: values for name, values in arrays.items() if values is not None})
+    with pytest.raises(ValueError, match="cannot be read as a mesh of flesh") as raised:
+        read_mesh(path)
+    assert said in str(raised.value)
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(ValueError, match="cannot be read as a mesh of flesh"):
+        read_mesh(path)
+
+
 @pytest.mark.parametrize(("array", "kind"), [("holder", "String"), ("connectivity", "Float64")])
 def test_arrays_of_another_type_end_a_process_and_not_this_one(
-    arm: FleshMesh, array: str, kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    array: str, kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "typed.vtu"
-    text = mesh_bytes(arm, "").decode()
+    text = FISH.read_text()
     lied, count = re.subn(rf'type="\w+"(?=[^>]*Name="{array}")', f'type="{kind}"', text)
     assert count == 1
     path.write_text(lied)

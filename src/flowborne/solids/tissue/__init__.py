@@ -7,6 +7,6 @@ symmetry             mirror planes that exchange bones, and what is meshed betwe
 mesher               tetrahedra inside a surface, by fTetWild
 mesh_run, apart      the process that meshes and reads meshes, and may die of them
 mesh                 flesh: what of the tetrahedra is elastic, and which points a bone holds
-mesh_file            the .vtu file in which a run keeps its flesh
+mesh_file            the file in which a run keeps its flesh
 growth               such a mesh as quadratic elements of a model
 """

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pyvista as pv
 
+from flowborne.extras import optional
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.tissue.bones import Bones
 
@@ -23,6 +23,7 @@ def contour(bones: Bones, level: float, pitch: float) -> Mesh:
 
     Sampled `pitch` m apart: edges that are sharper than that are cut off.
     """
+    pv = optional("pyvista", "PyVista", "flesh", "meshes of flesh")
     low, high = bones.box
     low, high = low - level, high + level
     pitch = max(pitch, finest(bones, level))

@@ -1,18 +1,22 @@
-"""The .vtu file in which a run keeps its flesh: another meshing would give another mesh."""
+"""The file in which a run keeps its flesh: another meshing would give another mesh.
+
+flowborne writes .npz. A mesh of the user's own may be a .vtu, which VTK reads.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 
+from flowborne.extras import optional
 from flowborne.files.arrays import read_arrays
 from flowborne.files.given import read_file
 from flowborne.solids.tissue.apart import run_apart
@@ -21,26 +25,29 @@ from flowborne.solids.tissue.mesh_run import READ
 
 HOLDER, BONES, RECIPE = "holder", "bones", "recipe"
 
-KINDS = {3: pv.CellType.TRIANGLE, 4: pv.CellType.TETRA}
-"""VTK's cells by their corners."""
+ENDING = ".npz"
+"""Of the files that flowborne writes."""
 
 
 def mesh_bytes(mesh: FleshMesh, recipe: str) -> bytes:
-    """Content of the file: the elements of flesh, exactly.
+    """Content of the file: arrays in an .npz, exactly.
 
-    Points have the number of their holder among the names in the field `bones`, or -1; the names
-    are a JSON list, as VTK has ASCII alone. `recipe` says what the mesh was made of.
+    `points` (n, 3) m; `elements_4` (m, 4) or `elements_3` (m, 3); `holder` (n,) the number of a
+    point's holder among the names in `bones`, a JSON list, or -1; `recipe` says what the mesh was
+    made of.
     """
     bones = sorted(set(mesh.holders) - {""})
     number = {"": -1} | {name: n for n, name in enumerate(bones)}
-    grid = pv.UnstructuredGrid({KINDS[mesh.elements.shape[1]]: mesh.elements}, mesh.points)
-    grid.point_data[HOLDER] = np.array([number[name] for name in mesh.holders])
-    grid.field_data[BONES] = json.dumps(bones)
-    grid.field_data[RECIPE] = [recipe]
-    with TemporaryDirectory() as folder:
-        whole = Path(folder) / "flesh.vtu"
-        grid.save(whole)
-        return whole.read_bytes()
+    content = BytesIO()
+    arrays = {
+        "points": mesh.points,
+        f"elements_{mesh.elements.shape[1]}": mesh.elements,
+        HOLDER: np.array([number[name] for name in mesh.holders]),
+        BONES: np.array(json.dumps(bones)),
+        RECIPE: np.array(recipe),
+    }
+    np.savez_compressed(content, allow_pickle=False, **arrays)
+    return content.getvalue()
 
 
 def recipe_of(path: Path) -> str:
@@ -59,6 +66,8 @@ def read_mesh(path: Path) -> FleshMesh:
         bones = [*map(str, json.loads(str(found[BONES]))), ""]
         elements, holders = _elements(found), found[HOLDER]
         points = found["points"].astype(np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError("its points have no three coordinates each")
         if elements.min() < 0 or elements.max() >= len(points):
             raise ValueError("its elements have corners that are not there")
         if not np.isfinite(points).all():
@@ -72,10 +81,12 @@ def read_mesh(path: Path) -> FleshMesh:
         raise _no_mesh(path, said) from error
 
 
-def _contents(path: Path) -> dict[str, NDArray[Any]]:
-    """What VTK reads of a file. Raises ValueError with the first thing that it stumbles over."""
+def _contents(path: Path) -> Mapping[str, NDArray[Any]]:
+    """The arrays of a file. Raises ValueError with what its reader stumbles over first."""
     try:
-        return _read(read_file(path))
+        if path.suffix.lower() == ENDING:
+            return read_arrays(path)
+        return _read_vtu(read_file(path))
     except FileNotFoundError:
         raise _no_mesh(path, "there is no such file") from None
     except (OSError, ValueError) as error:
@@ -83,7 +94,8 @@ def _contents(path: Path) -> dict[str, NDArray[Any]]:
 
 
 @lru_cache(maxsize=8)
-def _read(content: bytes) -> dict[str, NDArray[Any]]:
+def _read_vtu(content: bytes) -> Mapping[str, NDArray[Any]]:
+    optional("vtkmodules", "VTK", "flesh", ".vtu files", verb="read")
     with TemporaryDirectory(prefix="flowborne-flesh-") as folder:
         (Path(folder) / "flesh.vtu").write_bytes(content)
         why = run_apart(folder, READ, "read", "flesh.vtu")
@@ -101,7 +113,9 @@ def _no_mesh(path: Path, why: object) -> ValueError:
 def _elements(found: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
     """(m, 4) the tetrahedra of a file, (m, 3) its triangles when it has none."""
     for corners in (4, 3):
-        elements = found[f"elements_{corners}"]
+        elements = found.get(f"elements_{corners}", np.zeros((0, corners)))
         if len(elements):
+            if elements.ndim != 2 or elements.shape[1] != corners:
+                raise ValueError(f"its elements have no {corners} corners each")
             return elements.astype(np.int64)
     raise ValueError("it has neither tetrahedra nor triangles")

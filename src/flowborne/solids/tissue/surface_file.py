@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyvista as pv
 import trimesh
 from numpy.typing import NDArray
 from trimesh.exchange.load import mesh_formats
 
+from flowborne.extras import optional
 from flowborne.files.given import read_file
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.tissue.bones import Bones
 from flowborne.solids.tissue.contour import contour
 from flowborne.solids.tissue.distance import signed_distance
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 Array = NDArray[np.float64]
 
@@ -111,7 +115,8 @@ def _triangles(path: Path, content: bytes) -> pv.PolyData:
             f"flesh file {path} has a triangle of vertex {read.faces.max()}, and vertices "
             f"0 to {len(read.vertices) - 1}. Save the surface once more."
         )
-    surface = pv.PolyData.from_regular_faces(read.vertices, read.faces)
+    pyvista = optional("pyvista", "PyVista", "flesh", "meshes of flesh")
+    surface = pyvista.PolyData.from_regular_faces(read.vertices, read.faces)
     return surface.clean(tolerance=SAME)
 
 

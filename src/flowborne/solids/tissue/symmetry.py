@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from flowborne.extras import optional
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.flesh import surface_of
 from flowborne.solids.tissue.bones import Bones
@@ -51,6 +51,7 @@ class Chamber:
 
     def cut(self, surface: Mesh) -> Mesh:
         """What of a closed surface's inside lies in the chamber, as a closed surface."""
+        pv = optional("pyvista", "PyVista", "flesh", "meshes of flesh")
         left = pv.PolyData.from_regular_faces(*surface)
         for wall in self.walls:
             left = left.clip_closed_surface(normal=wall, origin=self.centre)

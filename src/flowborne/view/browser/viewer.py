@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
-from flowborne.runs.optional import optional
+from flowborne.extras import optional
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.view.browser.camera_keys import CameraKeys
 from flowborne.view.browser.fluid import Fluid
