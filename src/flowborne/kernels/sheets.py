@@ -16,6 +16,12 @@ def beyond(p: Point, q: Array, m: Array) -> float:
 
 
 @njit(nogil=True, cache=True)
+def squared(p: Point, q: Point) -> float:
+    """Square of the distance of two points, m^2."""
+    return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
+
+
+@njit(nogil=True, cache=True)
 def lower_to_sheets(
     values: Array,
     corner: Array,
@@ -56,6 +62,10 @@ def lower_to_sheets(
         b = (triangles[t, 1, 0], triangles[t, 1, 1], triangles[t, 1, 2])
         c = (triangles[t, 2, 0], triangles[t, 2, 1], triangles[t, 2, 2])
         n = normal[t]
+        centre = (
+            (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0,
+        )  # fmt: skip
+        radius = np.sqrt(max(squared(centre, a), squared(centre, b), squared(centre, c)))
         for i in range(first[0], last[0]):
             x = corner[0] + pitch * i
             for j in range(first[1], last[1]):
@@ -66,6 +76,9 @@ def lower_to_sheets(
                     if abs(above) - half >= values[i, j, k]:
                         continue
                     p = (x, y, z)
+                    nearer = values[i, j, k] + half + radius
+                    if squared(p, centre) >= nearer * nearer:
+                        continue
                     weight = closest_on_triangle(p, a, b, c)
                     value = np.sqrt(squared_distance(p, a, b, c, weight)) - half
                     for e in range(3):
