@@ -83,8 +83,8 @@ def test_what_the_creature_is_to_the_fluid(written: Written) -> None:
     assert (creature.displacing_geoms, creature.geoms) == (2, 4)
     assert creature.unmet == ("hand",)
     first, second, third = creature.lines()
-    assert first.startswith("creature: 51.1 kg, in place of 45.8 kg of fluid, ")
-    assert second.startswith("geoms that displace fluid: 2 of 4, of each body those that draw it")
+    assert first.startswith("creature: 51.1 kg, displaces 45.8 kg of fluid, ")
+    assert second.startswith("geoms that displace fluid: 2 of 4, of each body the visual ones")
     assert third == "moving bodies without one: hand"
 
 

@@ -106,7 +106,7 @@ def test_a_sound_scene_has_no_warning(warned: Warned) -> None:
 def test_thin_bodies_and_the_grid_that_gives_two_cells(warned: Warned, new: dict[str, str]) -> None:
     """0.2 m are two cells of 0.1 m, at 40 along 4 m."""
     (warning,) = warned({} if new else {"domain.resolution": "30"}, new)
-    assert warning.startswith("[domain]: arm is 0.2 m thick, 1.5 cells, and the flow")
+    assert warning.startswith("[domain]: arm is 0.2 m thick, 1.5 cells, and below 2 cells the flow")
     settings = proposed(warning)
     assert settings == ({"domain.cells": "[40, 40]"} if new else {"domain.resolution": "40"})
     assert warned(settings, new) == []
@@ -118,7 +118,7 @@ def test_bodies_that_are_thickened(warned: Warned) -> None:
     """The fluid meets the arm as thick as the diagonal of a cell, here of 5 m."""
     corners = {"domain.lower": "[-50.0, -50.0]", "domain.upper": "[50.0, 50.0]"}
     thin, *_ = warned(corners | {"domain.resolution": "20"})
-    assert "which the fluid meets as 7.14 m, 35.7 times as thick" in thin
+    assert "and 7.14 m on the grid, 35.7 times as thick" in thin
     assert proposed(thin) == {"domain.resolution": "1000"}
     assert not any("thick" in warning for warning in warned(corners | proposed(thin)))
 
@@ -145,7 +145,7 @@ def test_fluid_that_passes_through_a_body(warned: Warned, monkeypatch: pytest.Mo
     net = Seen("net", 0.04, 0.04, 0.8, False, 0.0, 0.0)
     monkeypatch.setattr(warn_size, "seen_bodies", lambda setup: [net])
     (warning,) = warned()
-    assert warning.startswith("[domain]: net is 0.04 m thick, 0.8 cells, and fluid passes through")
+    assert warning.startswith("[domain]: net is 0.04 m thick, 0.8 cells, and fluid passes through it")
     assert proposed(warning) == {"domain.resolution": "200"}
 
 

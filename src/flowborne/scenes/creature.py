@@ -49,7 +49,7 @@ class Creature:
         fluid = (
             ""
             if self.displaced_mass is None
-            else f", in place of {self.displaced_mass:.3g} {unit} of fluid"
+            else f", displaces {self.displaced_mass:.3g} {unit} of fluid"
         )
         without = listed(self.unmet) if self.unmet else "none"
         chosen = f"{self.displacing_geoms} of {self.geoms}, {self.rule}"
@@ -115,4 +115,4 @@ def creature_extent(scene: Scene, setup: Setup) -> Array:
 def _rule(scene: Scene) -> str:
     if scene.solids is not None and not displace_of(scene.solids).by_rule:
         return "those of [solids] displace"
-    return "of each body those that draw it, or those that collide where these are open or small"
+    return "of each body the visual ones, or the collision ones where those are open or small"

@@ -37,12 +37,12 @@ def thin_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
     least = LEAST_CELLS * h * (1.0 - 1e-9)
     thin = [body for body in seen if body.tight and body.thickness < least]
     for bodies, harm in (
-        (leaking, "fluid passes through"),
-        (thin, f"the flow around fewer than {LEAST_CELLS:g} is a guess"),
+        (leaking, "fluid passes through it"),
+        (thin, f"below {LEAST_CELLS:g} cells the flow is not reliable"),
     ):
         if bodies:
             worst = min(bodies, key=lambda body: body.thickness)
-            more = f" ({len(bodies) - 1} more as well)" if len(bodies) > 1 else ""
+            more = f" ({len(bodies) - 1} more too)" if len(bodies) > 1 else ""
             remedy = _remedy(scene, setup, worst.thickness)
             yield f"[domain]: {_size(worst, h)}, and {harm}{more}; {remedy}"
 
@@ -54,7 +54,7 @@ def _size(body: Seen, h: float) -> str:
     if not body.tight or not 0.0 < body.thickness < body.seen * (1.0 - 1e-9):
         return said
     times = body.seen / body.thickness
-    return f"{said}, which the fluid meets as {body.seen:.3g} m, {times:.3g} times as thick"
+    return f"{said}, and {body.seen:.3g} m on the grid, {times:.3g} times as thick"
 
 
 def _remedy(scene: Scene, setup: Setup, thickness: float) -> str:
