@@ -145,7 +145,9 @@ def test_fluid_that_passes_through_a_body(warned: Warned, monkeypatch: pytest.Mo
     net = Seen("net", 0.04, 0.04, 0.8, False, 0.0, 0.0)
     monkeypatch.setattr(warn_size, "seen_bodies", lambda setup: [net])
     (warning,) = warned()
-    assert warning.startswith("[domain]: net is 0.04 m thick, 0.8 cells, and fluid passes through it")
+    assert warning.startswith(
+        "[domain]: net is 0.04 m thick, 0.8 cells, and fluid passes through it"
+    )
     assert proposed(warning) == {"domain.resolution": "200"}
 
 
