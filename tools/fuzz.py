@@ -54,9 +54,9 @@ SECONDS = 300.0
 MEMORY = 8 << 30
 """Bytes that an input may ask for."""
 
-RESIDENT = 3 << 30
-"""Bytes of memory that it may fill, besides those of the process before it: 1,312 cells each way,
-which a scene may have, take 2 GB."""
+RESIDENT = 6 << 30
+"""Bytes of memory that it may fill, besides those of the process before it: 3,173 cells each way,
+which a scene may have, take 3 GB before MEMORY ends them with a message."""
 
 INPUTS_EACH = 500
 """Inputs that a process judges before another one takes its place."""

@@ -59,7 +59,8 @@ def test_somebody_elses_folder_is_refused_even_with_replace(tmp_path):
 def test_model_files_outside_the_folder_are_never_touched(tmp_path):
     (tmp_path / "outside.xml").write_text("mine")
     folder = finished_run(tmp_path / "run")
-    folder.mark(["../outside.xml", str(tmp_path / "outside.xml"), "block.xml"])
+    impossible = ["a" * 1000, "nul\0.xml", "b/" * 2000 + "c"]
+    folder.mark(["../outside.xml", str(tmp_path / "outside.xml"), "block.xml", *impossible])
     assert folder.model_files() == ["block.xml"]
     RunFolder.create(folder.path, replace=True)
     assert (tmp_path / "outside.xml").read_text() == "mine"

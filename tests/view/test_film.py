@@ -240,3 +240,18 @@ def test_a_field_that_the_run_lacks_is_said(write_run: Write) -> None:
     run = Run.read(write_run(frames=1, dyes=()))
     with pytest.raises(ValueError, match="the run has no dye to show; draw another field"):
         Picture(run)
+
+
+def test_a_model_that_is_not_that_of_the_states_is_refused(write_run: Write) -> None:
+    folder = write_run(frames=1)
+    file = folder / "model.json"
+    model = json.loads(file.read_text())
+    file.write_text(json.dumps(model | {"geoms": model["geoms"] * 2}))
+    run = Run.read(folder)
+    for draw in (lambda: run.state(0), lambda: run.every("geom_position")):
+        with pytest.raises(RunFolderError, match="geometries and its states"):
+            draw()
+    model["geoms"][0]["body"] = 10**30
+    file.write_text(json.dumps(model))
+    with pytest.raises(RunFolderError, match="cannot be read"):
+        Run.read(folder)

@@ -14,6 +14,13 @@ from typing import Any
 MOST_BYTES = 1 << 28
 """Bytes of a file that is read whole."""
 
+LONGEST_NAME = 200
+"""Most bytes of a name that files are called by: they add an ending and a mark of what is half
+written, and no system has file names of more than 255."""
+
+MOST_PATH = 2000
+"""Bytes of a file's name with its folders."""
+
 KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -31,6 +38,14 @@ class FileError(OSError):
 
     def __str__(self) -> str:
         return str(self.strerror)
+
+
+def possible_name(value: str) -> str:
+    """A name that a file can have, as it is. Raises ValueError for any other."""
+    lengths = [len(part.encode()) for part in Path(value).parts]
+    if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > LONGEST_NAME:
+        raise ValueError("is no name that a file can have. Shorten it, without letters of no width")
+    return value
 
 
 def check_file(path: Path, most: int | None = MOST_BYTES) -> None:

@@ -25,7 +25,7 @@ from filelock import FileLock, Timeout
 
 from flowborne.errors import SceneError
 from flowborne.files.atomic import partial_name, write_json
-from flowborne.files.given import read_json, read_toml
+from flowborne.files.given import possible_name, read_json, read_toml
 from flowborne.version import __version__
 
 MARK = "flowborne"
@@ -54,7 +54,15 @@ STATE_NAME = re.compile(r"\d{6,}\.npz")
 PARTIAL_STATE_NAME = re.compile(r"\.\d{6,}\.npz\.partial")
 
 
-UNREADABLE = (AttributeError, LookupError, OSError, SceneError, TypeError, ValueError)
+UNREADABLE = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    OSError,
+    SceneError,
+    TypeError,
+    ValueError,
+)
 """What reading a file raises that is not as a run has written it."""
 
 
@@ -217,7 +225,7 @@ class RunFolder:
         and none that no file can have."""
         copied = self.read_summary().get("model_files", []) if self.is_run() else []
         names = [str(name) for name in copied] if isinstance(copied, list) else []
-        paths = [Path(name) for name in names if "\0" not in name]
+        paths = [Path(name) for name in names if _is_possible(name)]
         return [str(path) for path in paths if not path.is_absolute() and ".." not in path.parts]
 
     def remove(self) -> None:
@@ -301,6 +309,14 @@ def reading(folder: Path) -> Iterator[None]:
         raise RunFolderError(
             f"the files of run {folder} cannot be read ({said}); start the run again with --replace"
         ) from error
+
+
+def _is_possible(name: str) -> bool:
+    """Whether a file can be called so."""
+    try:
+        return bool(possible_name(name))
+    except ValueError:
+        return False
 
 
 def check_name(path: Path) -> None:

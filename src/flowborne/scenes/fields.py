@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -18,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from flowborne.files.given import LONGEST_NAME, possible_name
 from flowborne.registry import Registry
 
 LARGEST, SMALLEST = 1e100, 1e-100
@@ -50,8 +50,6 @@ MOST_STEPS = 10_000
 Steps = Annotated[int, Strict(), Field(ge=1, le=MOST_STEPS)]
 StepsOrNone = Annotated[int, Strict(), Field(ge=0, le=MOST_STEPS)]
 
-MOST_PATH = 2000
-"""Bytes of a file's name with its folders."""
 
 Text = Annotated[str, Field(min_length=1)]
 
@@ -83,20 +81,8 @@ def _three(values: tuple[float, ...]) -> tuple[float, ...]:
     return _two_or_three(values) + (0.0,) * (3 - len(values))
 
 
-def possible_name(value: str) -> str:
-    """A name that a file can have, as it is. Raises ValueError for any other."""
-    lengths = [len(part.encode()) for part in Path(value).parts]
-    if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > LONGEST_NAME:
-        raise ValueError("is no name that a file can have. Shorten it, without letters of no width")
-    return value
-
-
 FileName = Annotated[Text, AfterValidator(possible_name)]
 """A file, found from the folder of the scene file."""
-
-LONGEST_NAME = 200
-"""Most bytes of a name that files are called by: they add an ending and a mark of what is half
-written, and no system has file names of more than 255."""
 
 
 def _plain_name(value: str) -> str:

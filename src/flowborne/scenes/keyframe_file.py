@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from flowborne.errors import SceneError
-from flowborne.files.given import read_file
+from flowborne.files.given import possible_name, read_file
 from flowborne.phrases import suggestion
-from flowborne.scenes.fields import possible_name
 from flowborne.scenes.wording import place
 
 

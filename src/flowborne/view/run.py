@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from flowborne.files.given import read_json
 from flowborne.fluid.grid import Grid
 from flowborne.runs.history import history_columns, history_rows
-from flowborne.runs.run_folder import STATE_NAME, RunFolder, reading
+from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.shapes.kinds import shape_of
 from flowborne.shapes.shape import Shape
@@ -204,7 +204,17 @@ class Run:
 
     def state(self, number: int) -> State:
         """Arrays of the `number`-th state; negative numbers count from the end."""
-        return read_state(self.states[number])
+        arrays = read_state(self.states[number])
+        self._check_geoms(arrays["geom_position"])
+        return arrays
+
+    def _check_geoms(self, places: Array) -> None:
+        """Raise RunFolderError unless there is a place for each of the geometries."""
+        if len(places) != len(self.geoms):
+            raise RunFolderError(
+                f"model.json of the run has {len(self.geoms)} geometries and its states "
+                f"{len(places)}; start the run again with --replace"
+            )
 
     def sampled(self, most: int) -> list[State]:
         """At most `most` states, evenly spread, the last one among them."""
@@ -213,7 +223,10 @@ class Run:
 
     def every(self, name: str) -> Array:
         """(n, ...) a small array of all states, such as "fluid_force"."""
-        return np.asarray([read_state(path, (name,))[name] for path in self.states], float)
+        values = np.asarray([read_state(path, (name,))[name] for path in self.states], float)
+        if name in ("geom_position", "geom_rotation"):
+            self._check_geoms(values[0])
+        return values
 
     @property
     def times(self) -> Array:
