@@ -399,3 +399,16 @@ def test_a_stray_point_that_makes_all_others_one_is_refused() -> None:
     surface = Surface(points, faces, np.ones((2000, 1)), np.zeros((666, 3)))
     with pytest.raises(SceneError, match=r"points within 100 m .*Look for stray points"):
         closed(surface, "cat.glb")
+
+
+def test_what_usd_prints_through_python_is_not_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    from flowborne.characters.usd_gate import reading_usd
+
+    def read() -> None:
+        with reading_usd("box.usdc"):
+            print("TypeError: No to_python converter", file=sys.stderr)
+            raise TypeError("no converter")
+
+    with pytest.raises(SceneError, match=r"box\.usdc cannot be read"):
+        read()
+    assert capsys.readouterr().err == ""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +71,11 @@ def reading_usd(name: str) -> Iterator[None]:
 
     raises  SceneError where it raises an error of its own
     """
-    with open(os.devnull, "wb") as nowhere, np.errstate(all="ignore"):
+    with (
+        open(os.devnull, "w", encoding="utf-8") as nowhere,
+        redirect_stderr(nowhere),  # what it prints through Python
+        np.errstate(all="ignore"),
+    ):
         kept = os.dup(2)
         os.dup2(nowhere.fileno(), 2)
         try:
