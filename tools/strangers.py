@@ -63,6 +63,7 @@ ANSWERS = {
     "enlarge the domain": {"domain": "around the world's geoms too"},
     "or enlarge the domain": {"room": "twice as much"},
     "enlarge [domain]": {"room": "twice as much"},
+    "refine the grid where": {"resolution": "a third more"},
 }
 """What a message may propose -> what is then tried."""
 
@@ -159,7 +160,7 @@ def scene_of(path: Path, edits: dict[str, Any]) -> dict[str, Any]:
         "domain": {
             "lower": (low - margin).round(6).tolist(),
             "upper": (high + margin).round(6).tolist(),
-            "resolution": RESOLUTION,
+            "resolution": RESOLUTION * 4 // 3 if "resolution" in edits else RESOLUTION,
         },
         "fluid": {"density": 1000.0, "viscosity": 1e-3},
         "solids": {"model": str(path)}

@@ -223,7 +223,8 @@ class Simulation:
         except BREAKDOWNS as error:
             raise SceneError(
                 f"scene {scene.name}, [initial]: {error}. Look for bodies that are in each other "
-                "or in a side of the domain, and for velocities that are too large."
+                "or in a side of the domain, for velocities that are too large, and refine the "
+                "grid where bodies close off a pocket of few cells."
             ) from error
         self._started = True
 
