@@ -8,7 +8,8 @@ from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
 from flowborne.runs.recorder import Recorder, centres, open_cells, write_model
-from flowborne.runs.run_folder import RunFolder
+from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.runs.states import read_state
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
@@ -179,3 +180,10 @@ def test_the_force_on_flesh_is_drawn_from_its_middle():
     np.testing.assert_allclose(middle[0], [0.4, 2.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(middle[1], [0.4, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(middle[2], pose.centroid[2])
+
+
+def test_a_state_of_times_in_place_of_places_is_refused(tmp_path):
+    path = tmp_path / "000001.npz"
+    np.savez(path, time=np.array(0.0), geom_position=np.zeros((1, 3), "datetime64[s]"))
+    with pytest.raises(RunFolderError, match="its 'geom_position' holds no numbers"):
+        read_state(path)

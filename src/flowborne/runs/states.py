@@ -16,14 +16,20 @@ from flowborne.runs.run_folder import RunFolder, RunFolderError
 IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
 """Arrays of a state that are drawn, whatever the scene has."""
 
+NUMBERS = "biuf"
+"""Kinds of NumPy's types that a state has."""
+
 
 def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
     """Arrays of a file of states/, all unless names are given; raises RunFolderError when it is
-    missing or cut, or has not what is drawn of every state."""
+    missing or cut, has arrays that hold no numbers, or has not what is drawn of every state."""
     try:
         arrays = read_arrays(path, names)
     except (OSError, ValueError) as error:
         raise _without(path, error) from error
+    for name, values in arrays.items():
+        if values.dtype.kind not in NUMBERS:
+            raise _without(path, ValueError(f"its '{name}' holds no numbers"))
     lacking = [] if names else [name for name in IN_EVERY_STATE if name not in arrays]
     if lacking:
         raise _without(path, ValueError(f"it lacks {', '.join(lacking)}"))
