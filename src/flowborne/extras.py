@@ -28,10 +28,25 @@ def optional(module: str, package: str, extra: str, what: str, verb: str = "made
     try:
         return import_module(module)
     except ImportError:
-        raise SceneError(
-            f"{what} are {verb} by {package}, which is not installed. "
-            f"Install it with: pip install 'flowborne[{extra}]'."
-        ) from None
+        raise _missing(package, extra, what, verb) from None
+
+
+def _missing(package: str, extra: str, what: str, verb: str) -> SceneError:
+    return SceneError(
+        f"{what} are {verb} by {package}, which is not installed. "
+        f"Install it with: pip install 'flowborne[{extra}]'."
+    )
+
+
+def flesh_library() -> Any:
+    """PyVista, by which flesh is meshed. Raises SceneError when it is not there."""
+    return optional("pyvista", "PyVista", "flesh", "meshes of flesh")
+
+
+def check_mesher() -> None:
+    """Raise SceneError where fTetWild is not installed; a process of its own imports it."""
+    if find_spec("pytetwild") is None:
+        raise _missing("pytetwild", "flesh", "meshes of flesh", "made")
 
 
 def missing_to_draw() -> str | None:

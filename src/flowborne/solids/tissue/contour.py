@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.extras import optional
+from flowborne.extras import flesh_library
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.tissue.bones import Bones
 
@@ -23,7 +23,7 @@ def contour(bones: Bones, level: float, pitch: float) -> Mesh:
 
     Sampled `pitch` m apart: edges that are sharper than that are cut off.
     """
-    pv = optional("pyvista", "PyVista", "flesh", "meshes of flesh")
+    pv = flesh_library()
     low, high = bones.box
     low, high = low - level, high + level
     pitch = max(pitch, finest(bones, level))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.extras import optional
+from flowborne.extras import flesh_library
 from flowborne.shapes.shape import Mesh
 
 Array = NDArray[np.float64]
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 def signed_distance(points: Array, surface: Mesh) -> Array:
     """(n,) signed distances of points (n, 3) to a closed surface, negative inside, m."""
-    pv = optional("pyvista", "PyVista", "flesh", "meshes of flesh")
+    pv = flesh_library()
     cloud = pv.PolyData(points)
     cloud.compute_implicit_distance(pv.PolyData.from_regular_faces(*surface), inplace=True)
     return np.asarray(cloud["implicit_distance"], dtype=np.float64)

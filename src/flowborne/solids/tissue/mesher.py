@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.extras import optional
+from flowborne.extras import check_mesher
 from flowborne.kernels.jit import numba_thread_count
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import oriented
@@ -29,7 +29,7 @@ def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Arr
 
     Two runs give different meshes of the same quality, even on one thread.
     """
-    optional("pytetwild", "pytetwild", "flesh", "meshes of flesh")
+    check_mesher()
     points, triangles = surface
     across = float(np.linalg.norm(np.ptp(points, axis=0)))
     with TemporaryDirectory(prefix="flowborne-flesh-") as folder:

@@ -11,7 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.exchange.load import mesh_formats
 
-from flowborne.extras import optional
+from flowborne.extras import flesh_library
 from flowborne.files.given import read_file
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.tissue.bones import Bones
@@ -115,7 +115,7 @@ def _triangles(path: Path, content: bytes) -> pv.PolyData:
             f"flesh file {path} has a triangle of vertex {read.faces.max()}, and vertices "
             f"0 to {len(read.vertices) - 1}. Save the surface once more."
         )
-    pyvista = optional("pyvista", "PyVista", "flesh", "meshes of flesh")
+    pyvista = flesh_library()
     surface = pyvista.PolyData.from_regular_faces(read.vertices, read.faces)
     return surface.clean(tolerance=SAME)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from flowborne.extras import optional
+from flowborne.extras import flesh_library
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.flesh import surface_of
 from flowborne.solids.tissue.bones import Bones
@@ -51,7 +51,7 @@ class Chamber:
 
     def cut(self, surface: Mesh) -> Mesh:
         """What of a closed surface's inside lies in the chamber, as a closed surface."""
-        pv = optional("pyvista", "PyVista", "flesh", "meshes of flesh")
+        pv = flesh_library()
         left = pv.PolyData.from_regular_faces(*surface)
         for wall in self.walls:
             left = left.clip_closed_surface(normal=wall, origin=self.centre)
