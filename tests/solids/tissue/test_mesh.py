@@ -191,6 +191,36 @@ def test_sizes_that_nothing_can_be_meshed_with_are_refused(
         skin_mesh(mujoco.MjSpec.from_string(ARM), BONES, thickness, size)
 
 
+@pytest.mark.parametrize(
+    ("size", "thickness"),
+    [("0.25 0.1 2e-7", "4e-07"), ("0.1 0.1 0.0034", "0.0068"), ("0.5 0.5 0.005", "0.01")],
+)
+def test_bone_too_thin_for_flesh_is_refused_with_a_thickness_that_will_do(
+    size: str, thickness: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def meshed(*_: object) -> None:
+        raise ValueError("meshed")
+
+    monkeypatch.setattr("flowborne.solids.tissue.mesh.tetrahedra_within", meshed)
+
+    arm = '<body name="stem"><geom type="capsule" size="0.05" fromto="0 0 -0.5 0 0 0"/></body>'
+    plate = '<body name="plate"><geom type="box" size="{}" mass="1"/></body>'
+
+    def grow(size: str) -> None:
+        spec = mujoco.MjSpec.from_string(
+            f"<mujoco><worldbody>{arm}{plate.format(size)}</worldbody></mujoco>"
+        )
+        skin_mesh(spec, ["stem", "plate"], 0.12, 0.25)
+
+    with pytest.raises(ValueError, match=rf"'plate' is {thickness} m thick, too thin.*") as error:
+        grow(size)
+    found = re.search(r"Make it (\S+) m thick at least", str(error.value))
+    assert found is not None
+    *broad, _ = size.split()
+    with pytest.raises(ValueError, match="meshed"):
+        grow(" ".join([*broad, str(0.5 * float(found[1]))]))
+
+
 def test_edges_as_long_as_one_likes_give_as_few_elements_as_there_can_be() -> None:
     spec = mujoco.MjSpec.from_string(BALL)
     long, longer = (skin_mesh(spec, ["ball"], 0.3, size) for size in (10.0, 1e12))

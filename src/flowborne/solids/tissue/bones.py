@@ -33,7 +33,7 @@ class Part:
     position  (3,) centre, m
     rotation  (3, 3) geometry's frame to the world's
     low, high (3,) corners of a box around it in world axes, m
-    thinnest  smallest half size, m
+    half      (3,) half sizes, m
     surface   the surface of a mesh, to search by its cells; None for other kinds
     """
 
@@ -43,8 +43,13 @@ class Part:
     rotation: Array
     low: Array
     high: Array
-    thinnest: float
+    half: Array
     surface: Mesh | None
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest half size, m."""
+        return float(self.half.min())
 
     def distance(self, points: Array) -> Array:
         """(n,) signed distances of points (n, 3), negative inside, m."""
@@ -127,6 +132,6 @@ def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: A
         rotation,
         centre - reach,
         centre + reach,
-        float(half.min()),
+        half,
         shape.triangles() if isinstance(shape, ShapeMesh) else None,
     )

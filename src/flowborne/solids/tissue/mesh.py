@@ -18,7 +18,7 @@ from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import with_middles
 from flowborne.solids.flesh import outer_surface
 from flowborne.solids.tissue.bones import Bones, bones_of
-from flowborne.solids.tissue.contour import contour, finest
+from flowborne.solids.tissue.contour import MOST_SAMPLES, contour, finest
 from flowborne.solids.tissue.distance import signed_distance
 from flowborne.solids.tissue.mesher import tetrahedra_within
 from flowborne.solids.tissue.surface_file import check_covers, place, read_surface
@@ -59,6 +59,13 @@ MOST_ELEMENTS = 100_000
 edges of 0.25 m take 13 s and 0.5 GB, and the built-in creatures with flesh ask for 7,000."""
 
 
+SEEN = 0.6
+"""Distance of samples at which the thinnest bone is not missed, in its half sizes."""
+
+PER_SQUARE = 24.0
+"""Elements around a plate, per square of its thickness: 24,000 for one of 0.5 m x 0.2 m x 1 cm."""
+
+
 @dataclass(frozen=True)
 class FleshMesh:
     """Elastic elements around bones, in world axes at rest.
@@ -83,11 +90,12 @@ def skin_mesh(
 
     bones   names of the bodies
     size    length of edges, m; shorter where the surface bends too much for it
-    raises  ValueError for an unknown body, for one without a geom, for a skin that is too thin for
-            its bones or too large for its edges, when the mesher fails and for a bone that holds
-            no point
+    raises  ValueError for an unknown body, for one without a geom, for a bone that is too thin, for
+            a skin that is too thin for its bones or too large for its edges, when the mesher fails
+            and for a bone that holds no point
     """
     chosen = bones_of(spec, bones)
+    _check_bones(chosen)
     low, high = chosen.box
     _check_elements(high - low + 2.0 * thickness, size)
     least = finest(chosen, thickness)
@@ -108,11 +116,33 @@ def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: fl
             the surface
     """
     chosen = bones_of(spec, bones)
+    _check_bones(chosen)
     tolerance = min(FIDELITY * size, THICKNESSES * chosen.thinnest)
     surface = read_surface(path)
     _check_elements(np.ptp(surface[0], axis=0), size)
     check_covers(path, surface, chosen, _pitch(chosen, size), tolerance)
     return _fleshed(surface, surface, chosen, size, tolerance)
+
+
+def _check_bones(bones: Bones) -> None:
+    """Raise ValueError for a bone that is too thin for flesh around it.
+
+    The samples miss it, or it is a plate that needs too many elements.
+    """
+    low, high = bones.box
+    for part in bones.parts:
+        # 8 prod((high - low) / 2 + t - thinnest) = MOST_SAMPLES (SEEN t)^3 at the least half size t
+        sampled = 8.0 * Polynomial.fromroots(part.thinnest - 0.5 * (high - low))
+        sampled -= Polynomial([0.0, 0.0, 0.0, MOST_SAMPLES * SEEN**3])
+        flat = 4.0 * np.prod(np.sort(part.half)[1:])
+        squares = MOST_ELEMENTS / PER_SQUARE
+        least = max(sampled.roots().real.max(), 0.5 * np.sqrt(flat / squares))
+        if part.thinnest < least:
+            raise ValueError(
+                f"bone '{bones.names[part.bone]}' is {2.0 * part.thinnest:.3g} m thick, too thin "
+                f"for flesh around it. Make it {rounded_up(2.0 * least)} m thick at least, or "
+                "leave it out of the bones."
+            )
 
 
 def _check_elements(extent: Array, size: float) -> None:
@@ -133,7 +163,7 @@ def _check_elements(extent: Array, size: float) -> None:
 
 def _pitch(bones: Bones, size: float) -> float:
     """Distance of samples at which neither edges nor the thinnest bone are missed, m."""
-    return min(0.3 * size, 0.6 * bones.thinnest)
+    return min(0.3 * size, SEEN * bones.thinnest)
 
 
 def _fleshed(
