@@ -12,8 +12,8 @@ import numpy as np
 
 from flowborne import Scene, Simulation, load_scene
 from flowborne.control.creature import away
+from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.scenes.build_control import input_motions
-from flowborne.scenes.schema_control import ObjectiveInputMotionTable
 
 SCENE = "human-wind-all"
 FACTORS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)

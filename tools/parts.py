@@ -8,13 +8,14 @@ from typing import Any
 
 from docstrings import prose
 from flowborne.control.gradients import GRADIENTS
+from flowborne.control.objective_kinds import ObjectiveTable
 from flowborne.control.objectives import OBJECTIVES
 from flowborne.control.rules import RULES
 from flowborne.registry import Registry
 from flowborne.runs.exporters import EXPORTERS, FORMATS
 from flowborne.scenes.load import library, scene_names
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_control import ControllerTable, ObjectiveTable
+from flowborne.scenes.schema_control import ControllerTable
 from flowborne.scenes.schema_fluid import BoundariesTable
 from flowborne.shapes.own import SHAPES
 from markdown_text import plain, table

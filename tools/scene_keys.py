@@ -12,9 +12,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from docstrings import meanings, prose
-from flowborne.scenes.fields import Corner, JointValues, OwnTable, Table, Vector
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_film import Pixels
+from flowborne.tables import Corner, JointValues, OwnTable, Table, Vector
 from markdown_text import plain, table
 
 NAMED = {

@@ -17,19 +17,21 @@ makes them large.
 from __future__ import annotations
 
 from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import (
-    OBJECTIVES,
-    Objective,
-    ObjectiveCallable,
+from flowborne.control.objective_kinds import (
     ObjectiveDistance,
     ObjectiveDrag,
     ObjectiveEffort,
     ObjectiveInputMotion,
     ObjectivePressureDrag,
     ObjectiveSpeed,
-    ObjectiveSum,
     ObjectiveVelocity,
     ObjectiveWindDrag,
+)
+from flowborne.control.objectives import (
+    OBJECTIVES,
+    Objective,
+    ObjectiveCallable,
+    ObjectiveSum,
     WeightedObjective,
 )
 from flowborne.control.phases import PhaseAlways, PhaseIntervals, Phases, PhaseTrack

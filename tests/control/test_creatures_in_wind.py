@@ -12,14 +12,12 @@ import pytest
 from flowborne.control.controller import Controller
 from flowborne.control.executors import Foreign, Mapper, Processes, Serial, Threads
 from flowborne.control.gradients import GradientCentral
-from flowborne.control.objectives import (
-    Objective,
+from flowborne.control.objective_kinds import (
     ObjectiveEffort,
     ObjectivePressureDrag,
-    ObjectiveSum,
     ObjectiveWindDrag,
-    WeightedObjective,
 )
+from flowborne.control.objectives import Objective, ObjectiveSum, WeightedObjective
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.servo import ServoExact
 from flowborne.coupling.step import step

@@ -8,19 +8,17 @@ import numpy as np
 import pytest
 
 from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import (
-    ObjectiveCallable,
+from flowborne.control.objective_kinds import (
     ObjectiveDistance,
     ObjectiveDrag,
     ObjectiveEffort,
     ObjectiveInputMotion,
     ObjectivePressureDrag,
     ObjectiveSpeed,
-    ObjectiveSum,
     ObjectiveVelocity,
     ObjectiveWindDrag,
-    WeightedObjective,
 )
+from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, WeightedObjective
 from flowborne.control.phases import PhaseIntervals
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World

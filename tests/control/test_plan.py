@@ -15,12 +15,8 @@ from flowborne.control.course import TrialError
 from flowborne.control.executors import Serial
 from flowborne.control.gradients import GradientCentral
 from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import (
-    ObjectiveCallable,
-    ObjectiveInputMotion,
-    ObjectiveSum,
-    WeightedObjective,
-)
+from flowborne.control.objective_kinds import ObjectiveInputMotion
+from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, WeightedObjective
 from flowborne.control.phases import PhaseIntervals
 from flowborne.control.plan import Horizon, PlanCourse
 from flowborne.control.rules import QuasiNewton

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from flowborne.control.gradients import GradientCentral, GradientOneSided
 from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import ObjectiveCallable, ObjectivePressureDrag
+from flowborne.control.objective_kinds import ObjectivePressureDrag
+from flowborne.control.objectives import ObjectiveCallable
 from flowborne.control.phases import PhaseIntervals, PhaseTrack
 from flowborne.control.rules import GoldenSection
 from flowborne.coupling.servo import ServoExact, ServoPD, TrajectoryServo

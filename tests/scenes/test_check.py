@@ -167,7 +167,7 @@ ONE_FAULT = {
     ),
     "a frame that is no body": (
         {'kind = "effort"': 'kind = "pressure-lift"\ndirection = [0.0, 1.0]\nframe = "hnad"'},
-        "scene swim.toml, [[objectives]] 1, frame: body 'hnad' is not in model squid.xml; "
+        "scene swim.toml, [[objectives]] 1: body 'hnad' is not in model squid.xml; "
         "did you mean 'hand'?",
     ),
     "a phase that ends before it starts": (

@@ -2,12 +2,10 @@
 
 import pytest
 
+from flowborne.control.objective_kinds import ObjectiveInputMotionTable
+from flowborne.control.phases import PhaseIntervalsTable
 from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema_control import (
-    ControllerTable,
-    ObjectiveInputMotionTable,
-    PhaseIntervalsTable,
-)
+from flowborne.scenes.schema_control import ControllerTable
 from flowborne.scenes.settling import can_settle
 
 

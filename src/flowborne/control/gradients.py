@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Annotated, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, Tag
 
 from flowborne.registry import Registry
+from flowborne.tables import BUILT_IN, OWN, OwnTable, Table, by_kind_or_own
 
 Array = NDArray[np.float64]
 
@@ -174,3 +176,54 @@ class GradientOneSided(FiniteDifference):
         size = float(np.max(np.abs(values)))
         rise = (values[1:] - values[0]) * np.sign(travel)
         return Estimate(float(values[0]), self.slope(rise, np.abs(travel), size))
+
+
+class GradientTable(Table):
+    """What every gradient has."""
+
+    def trials(self, dofs: int) -> int:
+        """Trials of a gradient over some dofs."""
+        return 2 * dofs
+
+    def build(self, displacement: tuple[float, ...]) -> Gradient:
+        """The gradient that the table describes, with d of each dof in rad or m."""
+        raise NotImplementedError
+
+
+class GradientCentralTable(GradientTable):
+    """Central differences: two trials a dof."""
+
+    kind: Literal["central"]
+
+    def build(self, displacement: tuple[float, ...]) -> GradientCentral:
+        return GradientCentral(displacement)
+
+
+class GradientOneSidedTable(GradientTable):
+    """One-sided differences: a trial a dof and one of the present pose."""
+
+    kind: Literal["one-sided"]
+
+    def trials(self, dofs: int) -> int:
+        return dofs + 1
+
+    def build(self, displacement: tuple[float, ...]) -> GradientOneSided:
+        return GradientOneSided(displacement)
+
+
+class GradientOwnTable(GradientTable, OwnTable):
+    """A gradient of the user's own; every further key is a parameter of it."""
+
+    registry = GRADIENTS
+
+    def build(self, displacement: tuple[float, ...]) -> Gradient:
+        return GRADIENTS.make(self.kind, self.parameters, displacement=displacement)
+
+
+AnyGradient = Annotated[
+    Annotated[
+        GradientCentralTable | GradientOneSidedTable, Field(discriminator="kind"), Tag(BUILT_IN)
+    ]
+    | Annotated[GradientOwnTable, Tag(OWN)],
+    *by_kind_or_own(GRADIENTS),
+]

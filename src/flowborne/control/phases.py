@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Annotated, Literal, Protocol, Self
 
+from pydantic import Field, model_validator
+
+from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
+from flowborne.tables import ByKind, Number, Positive, Table, Text
 
 SLACK = 1e-9
 """s; a time that rounding has left this far before a boundary counts as having reached it."""
@@ -91,3 +96,70 @@ class PhaseTrack:
         read = self.track.position if self.quantity == "position" else self.track.velocity
         above = float(read(time)[self.column]) >= self.threshold
         return above == (self.sign > 0)
+
+
+class PhaseIntervalsTable(Table):
+    """On during intervals.
+
+    intervals  [start, stop] of each, s; it is on at start and no longer at stop
+    period     s after which they come again; they come once unless given
+    """
+
+    kind: Literal["intervals"]
+    intervals: Annotated[tuple[tuple[Number, Number], ...], Field(min_length=1)]
+    period: Positive | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for start, stop in self.intervals:
+            if stop <= start:
+                raise ValueError(
+                    f"has the interval [{start:g}, {stop:g}] s. Put the smaller time first"
+                )
+            if self.period is not None and stop - start > self.period:
+                raise ValueError(
+                    f"has the interval [{start:g}, {stop:g}] s, longer than its period of "
+                    f"{self.period:g} s. Shorten it"
+                )
+        return self
+
+    def check(self, around: Surroundings) -> Iterator[str]:
+        """Everything that does not fit the scene around it."""
+        yield from ()
+
+    def build(self, around: Surroundings) -> PhaseIntervals:
+        """The phases that the table describes."""
+        return PhaseIntervals(self.intervals, self.period)
+
+
+class PhaseMotionTable(Table):
+    """On while a prescribed motion moves, or is, on one side of a threshold.
+
+    joint      whose [[motion]] it follows
+    quantity   "velocity" (degrees/s or m/s) or "position" (degrees or m)
+    side       "above" (threshold included) or "below"
+    threshold  in the unit of the quantity
+    """
+
+    kind: Literal["motion"]
+    joint: Text
+    quantity: Literal["velocity", "position"] = "velocity"
+    side: Literal["above", "below"] = "above"
+    threshold: Number = 0.0
+
+    def check(self, around: Surroundings) -> Iterator[str]:
+        """Everything that does not fit the scene around it."""
+        if self.joint not in around.followed and around.read("motion"):
+            yield (
+                f"joint '{self.joint}' has no [[motion]] to follow. "
+                "Add one, or give phases as intervals."
+            )
+
+    def build(self, around: Surroundings) -> PhaseTrack:
+        """The phases that the table describes."""
+        sign = 1 if self.side == "above" else -1
+        threshold = around.unit(self.joint) * self.threshold
+        return PhaseTrack(around.motion_of(self.joint), self.quantity, sign, threshold)
+
+
+PhaseTable = Annotated[PhaseIntervalsTable | PhaseMotionTable, *ByKind]

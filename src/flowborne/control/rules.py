@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, Tag
 
 from flowborne.control.gradients import Poses
+from flowborne.control.surroundings import Surroundings
 from flowborne.registry import Registry
+from flowborne.tables import BUILT_IN, OWN, OwnTable, Positive, Steps, Table, by_kind_or_own
 
 Array = NDArray[np.float64]
 
@@ -224,3 +227,95 @@ class _Search:
         self._left -= 1
         gradient = self._poses.gradient(displacement) if share.any() else self._gradient
         return value / self._steepest, gradient * self._limit / self._steepest
+
+
+class RuleTable(Table):
+    """What every rule has.
+
+    estimates  gradients in a decision, at most
+    """
+
+    @property
+    def estimates(self) -> int:
+        return 1
+
+    def build(self, around: Surroundings) -> Rule:
+        """The rule that the table describes."""
+        raise NotImplementedError
+
+
+class RuleFixed(RuleTable):
+    """The largest step down the gradient that strength allows."""
+
+    kind: Literal["fixed"]
+
+    def build(self, around: Surroundings) -> FixedStep:
+        return FixedStep()
+
+
+class RuleResilient(RuleTable):
+    """Steps and probes that halve where the descent turns back, and grow again where it goes on.
+
+    least  part of strength and probe below which nothing shortens. In a fluid a probe that moves a
+           body by less than a cell or so feels the grid
+    """
+
+    kind: Literal["resilient"]
+    least: Annotated[float, Field(gt=0, le=1)] = 1.0 / 64.0
+
+    def build(self, around: Surroundings) -> ResilientStep:
+        return ResilientStep(least=self.least)
+
+
+class RuleGoldenSection(RuleTable):
+    """Golden-section search along the gradient.
+
+    reach      degrees or m that the joint that moves most may travel in the search; what strength
+               allows unless given
+    tolerance  part of the bracket at which the search ends
+    """
+
+    kind: Literal["golden-section"]
+    reach: Positive | None = None
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.02
+
+    def build(self, around: Surroundings) -> GoldenSection:
+        unit = around.unit(around.controlled[0])
+        return GoldenSection(None if self.reach is None else unit * self.reach, self.tolerance)
+
+
+class RuleQuasiNewton(RuleTable):
+    """Limited-memory BFGS over all joints that want the same.
+
+    gradients  most in a decision, in as many poses
+    """
+
+    kind: Literal["quasi-newton"]
+    gradients: Steps = 8
+
+    @property
+    def estimates(self) -> int:
+        return self.gradients
+
+    def build(self, around: Surroundings) -> QuasiNewton:
+        return QuasiNewton(self.gradients)
+
+
+class RuleOwn(RuleTable, OwnTable):
+    """A rule of the user's own; every further key is a parameter of it."""
+
+    registry = RULES
+
+    def build(self, around: Surroundings) -> Rule:
+        return RULES.make(self.kind, self.parameters)
+
+
+AnyRule = Annotated[
+    Annotated[
+        RuleFixed | RuleResilient | RuleGoldenSection | RuleQuasiNewton,
+        Field(discriminator="kind"),
+        Tag(BUILT_IN),
+    ]
+    | Annotated[RuleOwn, Tag(OWN)],
+    *by_kind_or_own(RULES),
+]

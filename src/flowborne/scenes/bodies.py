@@ -37,6 +37,7 @@ from flowborne.solids import mjcf
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import element_name
+from flowborne.solids.joint_kinds import FREE, HINGE, SLIDE, joint_kind, joint_unit
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 from flowborne.solids.quiet import compiled_quietly
@@ -44,12 +45,6 @@ from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 
 Array = NDArray[np.float64]
-
-HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
-BALL = int(mujoco.mjtJoint.mjJNT_BALL)
-FREE = int(mujoco.mjtJoint.mjJNT_FREE)
-JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free joint"}
 
 
 def load_model(scene: Scene) -> SolidModel:
@@ -142,16 +137,6 @@ def fleshed(scene: Scene) -> tuple[mujoco.MjSpec, list[Grown]]:
 def _sentence(text: str) -> str:
     text = " ".join(text.split())
     return text if text.endswith(".") else f"{text}."
-
-
-def joint_kind(model: SolidModel, joint: str) -> int:
-    """MuJoCo's number of the joint's kind."""
-    return int(model.mj.jnt_type[model.joint(joint)])
-
-
-def joint_unit(model: SolidModel, joint: str) -> float:
-    """What one unit of a scene's number is for a scalar joint: a degree in rad, or 1 m."""
-    return 1.0 if joint_kind(model, joint) == SLIDE else math.pi / 180.0
 
 
 def trajectory_of(

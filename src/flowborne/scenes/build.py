@@ -58,7 +58,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
         _set_velocity(world.fluid, scene)
     controller = None
     if scene.control:
-        controller = controller_of(scene, model, motions, executor or Serial())
+        controller = controller_of(scene, model, executor or Serial())
     time = scene.time
     return Built(scene, world, controller, scene.frame_time, time.steps_per_frame, time.frames)
 

@@ -31,7 +31,6 @@ from flowborne.motion.inflow import (
 )
 from flowborne.motion.tracks import Curve
 from flowborne.scenes.check_fluid import band_axis
-from flowborne.scenes.fields import as_interval, triple
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import (
     BoundarySide,
@@ -44,6 +43,7 @@ from flowborne.scenes.schema_fluid import (
     OpenSide,
     SourceTable,
 )
+from flowborne.tables import as_interval, triple
 
 DyeValue = Callable[[Array, Array, Array, float], Array]
 

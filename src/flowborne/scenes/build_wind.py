@@ -10,8 +10,7 @@ from flowborne.coupling.stream import WindStream
 from flowborne.fluid.grid import Array
 from flowborne.motion.inflow import Factor, FactorKeyframes, FactorSteady
 from flowborne.motion.tracks import Curve
-from flowborne.scenes.fields import triple
-from flowborne.scenes.python_function import WindFunction, with_parameters
+from flowborne.python_function import WindFunction, with_parameters
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import (
     WindFacesTable,
@@ -21,6 +20,7 @@ from flowborne.scenes.schema_solids import (
     WindTable,
 )
 from flowborne.solids.wind import Wind, WindFaces, WindForce
+from flowborne.tables import triple
 
 
 @dataclass(frozen=True)

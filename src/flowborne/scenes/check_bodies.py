@@ -9,25 +9,24 @@ from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.phrases import suggestion
-from flowborne.scenes.bodies import (
+from flowborne.python_function import with_parameters
+from flowborne.scenes.bodies import initial_state, keyframes
+from flowborne.scenes.check_flesh import check_flesh_places
+from flowborne.scenes.check_formulas import check_formulas
+from flowborne.scenes.draft import Draft
+from flowborne.scenes.earlier import earlier_joints
+from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
+from flowborne.scenes.wording import Key
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.joint_kinds import (
     BALL,
     FREE,
     HINGE,
     JOINT_KINDS,
     SLIDE,
-    initial_state,
     joint_kind,
     joint_unit,
-    keyframes,
 )
-from flowborne.scenes.check_flesh import check_flesh_places
-from flowborne.scenes.check_formulas import check_formulas
-from flowborne.scenes.draft import Draft
-from flowborne.scenes.earlier import earlier_joints
-from flowborne.scenes.python_function import with_parameters
-from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
-from flowborne.scenes.wording import Key
-from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]

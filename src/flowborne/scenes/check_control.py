@@ -4,28 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flowborne.errors import SceneError
+from flowborne.control.surroundings import Surroundings
 from flowborne.phrases import suggestion
-from flowborne.scenes.bodies import FREE, HINGE, JOINT_KINDS, SLIDE, joint_kind
-from flowborne.scenes.capture import capture_of, followers
-from flowborne.scenes.check_bodies import out_of_plane, unknown_body, unknown_joint
+from flowborne.scenes.build_control import surroundings_of
+from flowborne.scenes.check_bodies import out_of_plane, unknown_joint
 from flowborne.scenes.draft import Draft
-from flowborne.scenes.earlier import earlier_joints
-from flowborne.scenes.python_function import with_parameters
-from flowborne.scenes.schema_control import (
-    ObjectiveDistanceTable,
-    ObjectiveDragTable,
-    ObjectiveEffortTable,
-    ObjectiveInputMotionTable,
-    ObjectivePressureTable,
-    ObjectivePythonTable,
-    ObjectiveSpeedTable,
-    ObjectiveVelocityTable,
-    ObjectiveWindDragTable,
-    PhaseIntervalsTable,
-    PhaseMotionTable,
-    RuleQuasiNewton,
-)
+from flowborne.solids.joint_kinds import FREE, joint_kind
 from flowborne.solids.model import SolidModel
 
 MOST_STEPS_PER_DECISION = 1_000_000
@@ -38,7 +22,8 @@ WHOLE = 1e-3
 def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
     """Controlled joints and objectives against the model."""
     scene = draft.scene
-    yield from _check_joints(draft, model)
+    around = surroundings_of(scene, model, draft.broken)
+    yield from _check_joints(draft, around)
     if scene.control and not scene.objectives and draft.sound("objectives"):
         yield (
             f"{draft.at('control', 0)}: joints are controlled, but nothing is wanted of them. "
@@ -49,8 +34,11 @@ def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
             f"{draft.at('objectives', 0)}: something is wanted, but no joint is controlled. "
             "Add [[control]], or drop [[objectives]]."
         )
-    for index in range(len(scene.objectives)):
-        yield from _check_objective(draft, model, index)
+    for index, table in enumerate(scene.objectives):
+        where = draft.at("objectives", index)
+        yield from (f"{where}: {problem}" for problem in table.check(around))
+        for problem in table.phases.check(around) if table.phases else ():
+            yield f"{where}, phases: {problem}"
     yield from _check_wishes(draft)
     if draft.sound("controller", "time"):
         yield from _check_horizon(draft) or _check_work(draft, model)
@@ -64,8 +52,7 @@ def _check_work(draft: Draft, model: SolidModel) -> list[str]:
     if able.knots is not None:
         dofs *= able.knots
         steps = able.knots * round(able.steps_between(scene.frame_time))
-    trials = dofs + 1 if able.gradient.kind == "one-sided" else 2 * dofs
-    gradients = able.rule.gradients if isinstance(able.rule, RuleQuasiNewton) else 1
+    trials, gradients = able.gradient.trials(dofs), able.rule.estimates
     asked = able.iterations * gradients * trials * steps
     if asked <= MOST_STEPS_PER_DECISION:
         return []
@@ -116,14 +103,15 @@ def _check_wishes(draft: Draft) -> Iterator[str]:
             )
 
 
-def _check_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
-    scene = draft.scene
+def _check_joints(draft: Draft, around: Surroundings) -> Iterator[str]:
+    scene, model = draft.scene, around.model
     moved = {table.joint for table in scene.motion}
     seen: set[str] = set()
     for index, table in enumerate(scene.control):
         where = draft.at("control", index)
         for number, other in enumerate(table.in_phases, start=1):
-            yield from _check_phases(draft, f"{where}, in_phases {number}", other.phases)
+            for problem in other.phases.check(around):
+                yield f"{where}, in_phases {number}, phases: {problem}"
         for joint in table.joints:
             unknown = unknown_joint(draft, model, joint, "control", index)
             yield from unknown
@@ -144,80 +132,3 @@ def _check_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
                 )
             else:
                 yield from out_of_plane(draft, model, joint, "control", index)
-
-
-def _check_objective(draft: Draft, model: SolidModel, index: int) -> Iterator[str]:
-    scene, table = draft.scene, draft.scene.objectives[index]
-    where = draft.at("objectives", index)
-    driven = {*scene.told_joints(), *earlier_joints(scene)}
-    capture = capture_of(scene)
-    if capture is not None:
-        driven |= set(followers(scene, capture, model))
-    whole = draft.sound("control", "motion")
-    if isinstance(table, ObjectiveEffortTable):
-        for joint in table.joints or ():
-            unknown = unknown_joint(draft, model, joint, "objectives", index)
-            yield from unknown
-            if not unknown and joint not in driven and whole:
-                yield (
-                    f"{where}: joint '{joint}' makes no effort, being free. "
-                    "Name joints of [[control]], [[motion]], [clip] or [earlier]."
-                )
-    directed = ObjectiveWindDragTable | ObjectiveDragTable | ObjectivePressureTable
-    if isinstance(table, directed):
-        for body in table.bodies or ():
-            yield from unknown_body(draft, model, body, "objectives", index)
-    if isinstance(table, directed | ObjectiveSpeedTable) and not any(table.direction):
-        yield f"{where}: direction is 0. Give a direction such as [1.0, 0.0, 0.0]."
-    if isinstance(table, ObjectiveWindDragTable) and not scene.wind and draft.sound("wind"):
-        yield f"{where}: there is no wind to drag. Add a [[wind]], or use 'pressure-drag'."
-    if isinstance(table, ObjectivePressureTable):
-        if not scene.has_fluid and draft.sound("domain", "fluid"):
-            yield f"{where}: there is no fluid to press. Add a [domain], or use 'wind-drag'."
-        if table.frame is not None:
-            yield from unknown_body(draft, model, table.frame, "objectives", index, "frame")
-    if isinstance(table, ObjectiveInputMotionTable):
-        unknown = unknown_joint(draft, model, table.joint, "objectives", index)
-        yield from unknown
-        if not unknown and table.values is None:
-            if capture is None or table.joint not in capture.mapping:
-                yield (
-                    f"{where}: there is no clip from which joint '{table.joint}' has a motion. "
-                    "Give times and values."
-                )
-        elif not unknown and joint_kind(model, table.joint) not in (HINGE, SLIDE):
-            kind = JOINT_KINDS[joint_kind(model, table.joint)]
-            yield (
-                f"{where}: joint '{table.joint}' is a {kind}, for which a table of values is too "
-                "little. Name a hinge or a slide, or drop values to take the clip's motion."
-            )
-        if not unknown and table.joint not in scene.controlled_joints() and whole:
-            yield (
-                f"{where}: joint '{table.joint}' is not controlled. "
-                "Add it to [[control]], or drop the objective."
-            )
-    of_body = ObjectiveVelocityTable | ObjectiveSpeedTable | ObjectiveDistanceTable
-    if isinstance(table, of_body) and table.body is not None:
-        yield from unknown_body(draft, model, table.body, "objectives", index)
-    if isinstance(table, ObjectivePythonTable) and draft.sound("plugins"):
-        try:
-            with_parameters(table.function, table.parameters)
-        except SceneError as error:
-            yield f"{where}: {error}"
-    yield from _check_phases(draft, where, table.phases)
-
-
-def _check_phases(
-    draft: Draft, where: str, phases: PhaseIntervalsTable | PhaseMotionTable | None
-) -> Iterator[str]:
-    """A motion that phases follow is there."""
-    followed = {motion.joint for motion in draft.scene.motion}
-    if (
-        isinstance(phases, PhaseMotionTable)
-        and draft.sound("motion")
-        and phases.joint not in followed
-    ):
-        yield (
-            f"{where}, phases: joint '{phases.joint}' has no [[motion]] to follow. "
-            "Add one, or give phases as intervals."
-        )

@@ -19,11 +19,12 @@ from flowborne.motion.clip_reading import Capture
 from flowborne.quaternions import inverse, product, turned
 from flowborne.runs.run_folder import STATE_NAME, RunFolder
 from flowborne.runs.states import read_state
-from flowborne.scenes.bodies import FREE, joint_kind, load_model
+from flowborne.scenes.bodies import load_model
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.joint_kinds import FREE, joint_kind
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]

@@ -6,15 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.control.rules import RuleFixed
 from flowborne.phrases import listed
-from flowborne.scenes.bodies import HINGE, SLIDE, joint_kind, joint_unit, own_pose, posed
+from flowborne.scenes.bodies import own_pose, posed
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.not_taken import not_taken, switched_off
 from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_control import RuleFixed
 from flowborne.solids.joined import joined_pairs
+from flowborne.solids.joint_kinds import HINGE, SLIDE, joint_kind, joint_unit
 from flowborne.solids.mending import mended_meshes
 from flowborne.solids.model import SolidModel
 

@@ -9,22 +9,10 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 import tomli_w
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
+from flowborne.control.objective_kinds import AnyObjective
 from flowborne.runs.exporters import EXPORTERS, can_write, endings
 from flowborne.runs.run_folder import FIXED_NAMES
-from flowborne.scenes.fields import (
-    Count,
-    FileName,
-    Number,
-    PlainName,
-    Positive,
-    Steps,
-    SwitchOrNames,
-    Table,
-    Text,
-    Vector,
-    filled,
-)
-from flowborne.scenes.schema_control import AnyObjective, ControllerTable, ControlTable
+from flowborne.scenes.schema_control import ControllerTable, ControlTable
 from flowborne.scenes.schema_earlier import EarlierTable
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.schema_flesh import FleshTable
@@ -47,6 +35,19 @@ from flowborne.scenes.schema_solids import (
     WindForceTable,
     WindStreamTable,
     WindTable,
+)
+from flowborne.tables import (
+    Count,
+    FileName,
+    Number,
+    PlainName,
+    Positive,
+    Steps,
+    SwitchOrNames,
+    Table,
+    Text,
+    Vector,
+    filled,
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from flowborne.scenes.fields import ByKind, Positive, Table
+from flowborne.tables import ByKind, Positive, Table
 
 
 class ServoExact(Table):

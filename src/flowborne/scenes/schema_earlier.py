@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from flowborne.scenes.fields import FileName, Table, Text
+from flowborne.tables import FileName, Table, Text
 
 
 class EarlierTable(Table):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
-from flowborne.scenes.fields import Number, Positive, Table, Text, Vector
+from flowborne.tables import Number, Positive, Table, Text, Vector
 
 Pixels = Annotated[int, Strict(), Field(ge=64)]
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.fields import FileName, NotNegative, PlainName, Positive, Table, Text
+from flowborne.tables import FileName, NotNegative, PlainName, Positive, Table, Text
 
 
 class FleshTable(Table):

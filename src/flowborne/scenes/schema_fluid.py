@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
-from flowborne.scenes.fields import (
+from flowborne.tables import (
     ByKind,
     Corner,
     Count,

@@ -6,7 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.fields import (
+from flowborne.scenes.schema_fluid import check_interval
+from flowborne.tables import (
     FileName,
     NotNegative,
     Number,
@@ -16,7 +17,6 @@ from flowborne.scenes.fields import (
     Vector,
     WholeNumber,
 )
-from flowborne.scenes.schema_fluid import check_interval
 
 
 class HumanTable(Table):

@@ -6,8 +6,8 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.fields import Number, Positive, Table, Text, Vector
 from flowborne.scenes.schema_fluid import check_table
+from flowborne.tables import Number, Positive, Table, Text, Vector
 
 
 class PulseTable(Table):

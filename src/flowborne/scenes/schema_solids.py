@@ -10,7 +10,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from flowborne.scenes.fields import (
+from flowborne.scenes.schema_drives import EXACT, ServoTable
+from flowborne.scenes.schema_fluid import check_table
+from flowborne.shapes.own import SHAPES
+from flowborne.tables import (
     FUNCTION,
     ByKind,
     FileName,
@@ -25,9 +28,6 @@ from flowborne.scenes.fields import (
     Text,
     Vector,
 )
-from flowborne.scenes.schema_drives import EXACT, ServoTable
-from flowborne.scenes.schema_fluid import check_table
-from flowborne.shapes.own import SHAPES
 
 
 class DisplaceTable(Table):

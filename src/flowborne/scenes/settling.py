@@ -3,12 +3,6 @@
 from __future__ import annotations
 
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_control import (
-    AnyObjective,
-    ObjectiveInputMotionTable,
-    ObjectiveSpeedTable,
-    ObjectiveVelocityTable,
-)
 from flowborne.scenes.schema_solids import MotionConstantTable
 
 
@@ -24,12 +18,6 @@ def can_settle(scene: Scene) -> bool:
     )
     planned = scene.controller.knots is not None
     phased = any(table.in_phases for table in scene.control)
-    return not (moved or planned or phased) and all(map(_rests, scene.objectives))
-
-
-def _rests(objective: AnyObjective) -> bool:
-    if objective.phases is not None:
-        return False
-    if isinstance(objective, ObjectiveInputMotionTable):
-        return objective.values is not None and len(set(objective.values)) == 1
-    return not isinstance(objective, ObjectiveSpeedTable | ObjectiveVelocityTable)
+    return not (moved or planned or phased) and all(
+        table.rests and table.phases is None for table in scene.objectives
+    )

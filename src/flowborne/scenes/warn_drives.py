@@ -7,15 +7,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import HYPOTHETICAL, Setup
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.phrases import listed, rounded_up
-from flowborne.scenes.bodies import SLIDE, joint_kind, joint_unit
 from flowborne.scenes.build_control import input_motions
 from flowborne.scenes.holding import undriven
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_control import ObjectiveInputMotionTable
 from flowborne.scenes.schema_drives import ServoPD
+from flowborne.solids.joint_kinds import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
 """Degrees/s. Whoever types radians for anything up to a turn a second types less than this; in

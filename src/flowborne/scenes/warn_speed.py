@@ -14,12 +14,13 @@ from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup
 from flowborne.fluid.transport import LASTING
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.scenes.bodies import initial_state, joint_unit
-from flowborne.scenes.fields import MOST_STEPS
+from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import InflowSide
+from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.outline import Outline
+from flowborne.tables import MOST_STEPS
 
 Array = NDArray[np.float64]
 

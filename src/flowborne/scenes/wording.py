@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic_core import ErrorDetails
 
 from flowborne.phrases import suggestion
-from flowborne.scenes.fields import BUILT_IN, OWN, OwnTable, Table
 from flowborne.scenes.schema import Scene
+from flowborne.tables import BUILT_IN, OWN, OwnTable, Table
 
 Key = str | int
 

@@ -1,4 +1,4 @@
-"""The kinds of values that the tables of a scene are made of."""
+"""Tables of a scene: their base, and the kinds of values in them."""
 
 from __future__ import annotations
 

@@ -1,0 +1,85 @@
+"""What a scene has around its objectives, phases and rules."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.coupling.motion import Trajectory
+from flowborne.phrases import suggestion
+from flowborne.solids.joint_kinds import joint_unit
+from flowborne.solids.model import SolidModel
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a scene has around its objectives, phases and rules.
+
+    model       the bodies
+    source      where they are from, for messages: "model swim.xml"
+    controlled  joints that the controller moves
+    driven      joints with a drive: controlled, or with a prescribed motion
+    followed    joints whose [[motion]] phases may follow
+    in_clip     joints that have a motion in the clip
+    motion_of   joint in `followed` -> its motion
+    clip_of     joint in `in_clip` -> its motion in the clip
+    has_wind    whether there is a simple wind
+    has_fluid   whether a fluid is simulated
+    unread      tables that could not be read whole: what they should have is not called missing
+    """
+
+    model: SolidModel
+    source: str
+    controlled: tuple[str, ...]
+    driven: frozenset[str]
+    followed: tuple[str, ...]
+    in_clip: frozenset[str]
+    motion_of: Callable[[str], Trajectory]
+    clip_of: Callable[[str], Trajectory]
+    has_wind: bool
+    has_fluid: bool
+    unread: frozenset[str] = frozenset()
+
+    def read(self, *tables: str) -> bool:
+        """Whether these tables could be read whole."""
+        return not self.unread & set(tables)
+
+    def unknown_joints(self, joints: Iterable[str]) -> Iterator[str]:
+        """A complaint for each joint that the model lacks."""
+        carried = zip(self.model.joint_names, self.model.mj.jnt_bodyid, strict=True)
+        bones = [name for name, body in carried if body < self.model.nbody]  # others are of flesh
+        return self._unknown(joints, bones, "joint", "Its joints are")
+
+    def unknown_bodies(self, bodies: Iterable[str]) -> Iterator[str]:
+        """A complaint for each body that the model lacks."""
+        return self._unknown(bodies, self.model.body_names, "body", "Its bodies are")
+
+    def _unknown(
+        self, names: Iterable[str], known: Iterable[str], what: str, listed: str
+    ) -> Iterator[str]:
+        known = tuple(known)
+        for name in names:
+            if name not in known:
+                end = suggestion(name, known, listed)
+                yield f"{what} '{name}' is not in {self.source}{end}"
+
+    def bodies(self, names: tuple[str, ...] | None) -> Integers:
+        """(k,) numbers of the named bodies, or of all that can move."""
+        if names is None:
+            return np.flatnonzero(self.model.moving)
+        return np.array([self.model.body(name) for name in names], dtype=np.int64)
+
+    def dofs(self, joints: Iterable[str]) -> Integers:
+        """(k,) dofs of joints that a slab does not lock."""
+        model = self.model
+        found = [dof for joint in joints for dof in model.dofs_of(joint) if not model.locked[dof]]
+        return np.array(found, dtype=np.int64)
+
+    def unit(self, joint: str) -> float:
+        """SI value of one unit of the joint's position in a scene."""
+        return joint_unit(self.model, joint)
