@@ -23,8 +23,8 @@ from flowborne.coupling.stream import WindStream
 from flowborne.fluid.boundary import BoundaryInflow, BoundaryNoSlip
 from flowborne.motion.inflow import FactorSteady
 from flowborne.scenes.build import Built, build
-from flowborne.scenes.build_wind import Gusts
 from flowborne.scenes.load import load_scene
+from flowborne.scenes.wind import Gusts
 from flowborne.simulation import Simulation
 from flowborne.solids.wind import WindFaces, WindForce
 

@@ -1,4 +1,4 @@
-"""What a scene has around its objectives, phases and rules."""
+"""What a scene has around its objectives, phases, rules and winds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a scene has around its objectives, phases and rules.
+    """What a scene has around its objectives, phases, rules and winds.
 
     model       the bodies
     source      where they are from, for messages: "model swim.xml"
@@ -30,6 +30,8 @@ class Surroundings:
     clip_of     joint in `in_clip` -> its motion in the clip
     has_wind    whether there is a simple wind
     has_fluid   whether a fluid is simulated
+    is_one_way  whether that fluid flows as if there were no bodies
+    is_slab     whether the scene has 2 dimensions
     unread      tables that could not be read whole: what they should have is not called missing
     """
 
@@ -43,6 +45,8 @@ class Surroundings:
     clip_of: Callable[[str], Trajectory]
     has_wind: bool
     has_fluid: bool
+    is_one_way: bool
+    is_slab: bool
     unread: frozenset[str] = frozenset()
 
     def read(self, *tables: str) -> bool:

@@ -15,8 +15,8 @@ from flowborne.scenes.bodies import initial_state, load_model, posed, trajectori
 from flowborne.scenes.build_control import controller_of
 from flowborne.scenes.build_fluid import fluid_of
 from flowborne.scenes.build_mouths import mouths_of
-from flowborne.scenes.build_wind import winds_of
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.surroundings import surroundings_of
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
@@ -50,15 +50,16 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     """
     model = load_model(scene) if scene.has_bodies else SolidModel.empty()
     motions = trajectories_of(scene, model, posed(scene, model).q)
-    fluid = fluid_of(scene)
-    setup = Setup(model, fluid, motions, winds_of(scene), mouths_of(scene, model), splits=True)
+    fluid, around = fluid_of(scene), surroundings_of(scene, model)
+    winds = tuple(wind for table in scene.wind if (wind := table.build(around)) is not None)
+    setup = Setup(model, fluid, motions, winds, mouths_of(scene, model), splits=True)
     world = World.at_rest(setup)
     world.solid = initial_state(scene, model)
     if world.fluid is not None:
         _set_velocity(world.fluid, scene)
     controller = None
     if scene.control:
-        controller = controller_of(scene, model, executor or Serial())
+        controller = controller_of(scene, around, executor or Serial())
     time = scene.time
     return Built(scene, world, controller, scene.frame_time, time.steps_per_frame, time.frames)
 

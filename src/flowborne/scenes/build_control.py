@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,59 +16,20 @@ from flowborne.control.plan import Horizon
 from flowborne.control.surroundings import Surroundings
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Trajectory
-from flowborne.motion.clip_motion import TrajectoryClip, TrajectoryPart
-from flowborne.scenes.bodies import posed, trajectory_of
 from flowborne.scenes.build_drives import servo_of
-from flowborne.scenes.capture import capture_of, clip_motion, followers
-from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import ControllerTable
+from flowborne.scenes.surroundings import surroundings_of
 from flowborne.solids.model import SolidModel
 
 Integers = NDArray[np.int64]
 
 
-def surroundings_of(
-    scene: Scene, model: SolidModel, unread: frozenset[str] = frozenset()
-) -> Surroundings:
-    """What the scene has around its objectives, phases and rules.
-
-    unread  tables of which something was left out because it was wrong
-    """
-    capture, path = capture_of(scene), scene.model_path
-    driven = {*scene.told_joints(), *earlier_joints(scene)}
-    driven |= set() if capture is None else set(followers(scene, capture, model))
-    tables = {table.joint: table for table in scene.motion}
-
-    @cache
-    def clip() -> TrajectoryClip:
-        wanted = [t for t in scene.objectives if isinstance(t, ObjectiveInputMotionTable)]
-        joints = tuple(dict.fromkeys(table.joint for table in wanted if table.values is None))
-        found = clip_motion(scene, model, posed(scene, model).q, joints)
-        assert found is not None
-        return found
-
-    return Surroundings(
-        model=model,
-        source="the human" if path is None else f"model {path.name}",
-        controlled=scene.controlled_joints(),
-        driven=frozenset(driven),
-        followed=tuple(tables),
-        in_clip=frozenset(() if capture is None else capture.mapping),
-        motion_of=lambda joint: trajectory_of(tables[joint], model, scene.constants),
-        clip_of=lambda joint: TrajectoryPart.of(clip(), model, model.dofs_of(joint)),
-        has_wind=bool(scene.wind),
-        has_fluid=scene.has_fluid,
-        unread=unread,
-    )
-
-
-def controller_of(scene: Scene, model: SolidModel, executor: Mapper) -> Controller:
+def controller_of(scene: Scene, around: Surroundings, executor: Mapper) -> Controller:
     """The controller that the scene's tables describe.
 
     executor  runs the trials
     """
-    around = surroundings_of(scene, model)
     dofs: list[int] = []
     strength: list[float] = []
     probe: list[float] = []

@@ -12,6 +12,7 @@ from flowborne.scenes.check_flesh import check_flesh
 from flowborne.scenes.check_fluid import check_dimensions, check_fluid
 from flowborne.scenes.check_mouths import check_mouth_cells, check_mouths
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.surroundings import surroundings_of
 
 
 def cross_check(draft: Draft) -> list[str]:
@@ -34,6 +35,7 @@ def cross_check(draft: Draft) -> list[str]:
     lost = [*check_earlier_joints(draft, model), *check_followers(draft, model)]
     if lost:
         return problems + lost
-    problems += [*check_bodies(draft, model), *check_mouths(draft, model)]
-    problems += check_control(draft, model)
+    around = surroundings_of(scene, model, draft.broken)
+    problems += [*check_bodies(draft, around), *check_mouths(draft, model)]
+    problems += check_control(draft, around)
     return problems or [*check_mouth_cells(draft, model)]

@@ -7,15 +7,13 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.errors import SceneError
+from flowborne.control.surroundings import Surroundings
 from flowborne.phrases import suggestion
-from flowborne.python_function import with_parameters
 from flowborne.scenes.bodies import initial_state, keyframes
 from flowborne.scenes.check_flesh import check_flesh_places
 from flowborne.scenes.check_formulas import check_formulas
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints
-from flowborne.scenes.schema_solids import WindFacesTable, WindPythonTable
 from flowborne.scenes.wording import Key
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.joint_kinds import (
@@ -93,9 +91,9 @@ PLACED = "Place the clip by offset and heading in [clip]"
 """What to do about a creature outside the domain that a clip moves."""
 
 
-def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
     """Names, initial state, motions and winds against the model."""
-    scene = draft.scene
+    scene, model = draft.scene, around.model
     if scene.shapes and scene.solids is None:
         yield (
             f"{draft.at('shapes')}: they are on bodies of a model file. "
@@ -113,18 +111,7 @@ def check_bodies(draft: Draft, model: SolidModel) -> Iterator[str]:
     if scene.film.camera.follow not in ("bodies", "nothing"):
         named += unknown_body(draft, model, scene.film.camera.follow, "film", "camera", "follow")
     for index, wind in enumerate(scene.wind):
-        for body in wind.bodies or ():
-            named += unknown_body(draft, model, body, "wind", index)
-        if isinstance(wind, WindPythonTable) and draft.sound("plugins"):
-            try:
-                with_parameters(wind.function, wind.parameters)
-            except SceneError as error:
-                named.append(f"{draft.at('wind', index)}: {error}")
-        if isinstance(wind, WindFacesTable) and wind.exponent > 0.0 and scene.is_slab:
-            named.append(
-                f"{draft.at('wind', index)}: an exponent makes the wind grow with z, which a scene "
-                "of 2 dimensions does not have. Drop it."
-            )
+        named += [f"{draft.at('wind', index)}: {problem}" for problem in wind.check(around)]
     yield from named
     state = [
         *check_initial(draft, model),

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from flowborne.control.surroundings import Surroundings
 from flowborne.phrases import suggestion
-from flowborne.scenes.build_control import surroundings_of
 from flowborne.scenes.check_bodies import out_of_plane, unknown_joint
 from flowborne.scenes.draft import Draft
 from flowborne.solids.joint_kinds import FREE, joint_kind
@@ -19,10 +18,9 @@ WHOLE = 1e-3
 """Part by which a number of steps may miss a whole one: times are written with a few digits."""
 
 
-def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_control(draft: Draft, around: Surroundings) -> Iterator[str]:
     """Controlled joints and objectives against the model."""
     scene = draft.scene
-    around = surroundings_of(scene, model, draft.broken)
     yield from _check_joints(draft, around)
     if scene.control and not scene.objectives and draft.sound("objectives"):
         yield (
@@ -41,7 +39,7 @@ def check_control(draft: Draft, model: SolidModel) -> Iterator[str]:
             yield f"{where}, phases: {problem}"
     yield from _check_wishes(draft)
     if draft.sound("controller", "time"):
-        yield from _check_horizon(draft) or _check_work(draft, model)
+        yield from _check_horizon(draft) or _check_work(draft, around.model)
 
 
 def _check_work(draft: Draft, model: SolidModel) -> list[str]:

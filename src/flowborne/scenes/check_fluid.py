@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from flowborne.runs.summary import machine_memory
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.schema_fluid import BoundariesTable, Domain, DyeBands, InflowSide, NoSlipSide
-from flowborne.scenes.schema_solids import WindFacesTable, WindForceTable, WindStreamTable
 from flowborne.scenes.wording import Key
 
 BYTES_PER_CELL = 700
@@ -54,10 +53,9 @@ def _vectors(draft: Draft) -> Iterator[tuple[tuple[Key, ...], tuple[float, ...]]
         yield ("mouths", index, "position"), mouth.position
         yield ("mouths", index, "direction"), mouth.direction
     for index, wind in enumerate(scene.wind):
-        if isinstance(wind, WindFacesTable | WindStreamTable):
-            yield ("wind", index, "velocity"), wind.velocity
-        elif isinstance(wind, WindForceTable):
-            yield ("wind", index, "force"), wind.force
+        for key in ("velocity", "force"):
+            if hasattr(wind, key):
+                yield ("wind", index, key), getattr(wind, key)
 
 
 def check_fluid(draft: Draft) -> Iterator[str]:

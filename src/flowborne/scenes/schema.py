@@ -31,11 +31,8 @@ from flowborne.scenes.schema_solids import (
     MotionTable,
     ShapeTable,
     SolidsTable,
-    WindFacesTable,
-    WindForceTable,
-    WindStreamTable,
-    WindTable,
 )
+from flowborne.scenes.wind import WindTable
 from flowborne.tables import (
     Count,
     FileName,
@@ -261,9 +258,8 @@ class Scene(Table):
         """
         sides = [] if self.boundaries is None else [side for _, side in self.boundaries]
         found = [side.velocity for side in sides if isinstance(side, InflowSide)]
-        blowing = WindFacesTable | WindStreamTable
-        found += [wind.velocity for wind in self.wind if isinstance(wind, blowing)]
-        found += [wind.force for wind in self.wind if isinstance(wind, WindForceTable)]
+        for key in ("velocity", "force"):
+            found += [getattr(wind, key) for wind in self.wind if hasattr(wind, key)]
         found += [] if self.fluid is None else [self.fluid.velocity]
         return next((vector for vector in found if any(vector)), None)
 

@@ -14,14 +14,11 @@ from flowborne.scenes.schema_drives import EXACT, ServoTable
 from flowborne.scenes.schema_fluid import check_table
 from flowborne.shapes.own import SHAPES
 from flowborne.tables import (
-    FUNCTION,
     ByKind,
     FileName,
     JointValues,
-    NotNegative,
     Number,
     OwnTable,
-    Parameters,
     Positive,
     SwitchOrNames,
     Table,
@@ -211,80 +208,3 @@ class MotionFormulaTable(DrivenTable):
 MotionTable = Annotated[
     MotionConstantTable | MotionSinusoidTable | MotionKeyframesTable | MotionFormulaTable, *ByKind
 ]
-
-
-class WindFacesTable(Table):
-    """Simple wind of the paper's eq. (2): every face is pushed by its own exposure.
-
-    velocity  of the wind, m/s; with an exponent, at `height`
-    density   kg/m^3
-    bodies    that it blows on; every body unless given
-    exponent  of the wind over the ground: it grows as (z / height)^exponent; 0 is uniform
-    height    m
-    times     s, keyframes of gusts between which `factors` of the velocity change smoothly
-    factors   of the velocity at these times
-    """
-
-    kind: Literal["faces"]
-    velocity: Vector
-    density: Positive = 1.2
-    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
-    exponent: NotNegative = 0.0
-    height: Positive = 10.0
-    times: tuple[Number, ...] | None = None
-    factors: tuple[Number, ...] | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.times is not None or self.factors is not None:
-            check_table(self.times, self.factors, "times", "factors")
-        return self
-
-
-class WindStreamTable(Table):
-    """The fluid as a simple wind of eq. (2), for a fluid that does not feel the bodies.
-
-    It blows with the fluid's own velocity where fluid.coupling is "one-way", with `velocity` where
-    it is "none" or there is no fluid. Where it is "two-way" the fluid itself pushes and it does not
-    blow at all.
-
-    velocity  m/s
-    density   kg/m^3
-    bodies    that it blows on; every body unless given
-    """
-
-    kind: Literal["stream"]
-    velocity: Vector
-    density: Positive = 1.2
-    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
-
-
-class WindPythonTable(Table):
-    """Simple wind of eq. (2) from a Python function "module:name".
-
-    function    takes places (n, 3) in m and a time in s, and gives velocities (n, 3) in m/s
-    parameters  further arguments of the function, by name
-    density     kg/m^3
-    bodies      that it blows on; every body unless given
-    """
-
-    kind: Literal["python"]
-    function: Annotated[str, Field(pattern=FUNCTION)]
-    parameters: Parameters = Field(default_factory=dict)
-    density: Positive = 1.2
-    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
-
-
-class WindForceTable(Table):
-    """The same force at each body's centre of mass.
-
-    force   N, or N per unit depth in two dimensions
-    bodies  that it pushes; every body unless given
-    """
-
-    kind: Literal["force"]
-    force: Vector
-    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
-
-
-WindTable = Annotated[WindFacesTable | WindStreamTable | WindPythonTable | WindForceTable, *ByKind]

@@ -1,0 +1,174 @@
+"""The simple winds of a scene: their tables, checks and winds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from flowborne.control.surroundings import Surroundings
+from flowborne.coupling.stream import WindStream
+from flowborne.errors import SceneError
+from flowborne.fluid.grid import Array
+from flowborne.motion.inflow import Factor, FactorKeyframes, FactorSteady
+from flowborne.motion.tracks import Curve
+from flowborne.python_function import WindFunction, with_parameters
+from flowborne.scenes.schema_fluid import check_table
+from flowborne.solids.wind import Wind, WindFaces, WindForce
+from flowborne.tables import (
+    FUNCTION,
+    ByKind,
+    NotNegative,
+    Number,
+    Parameters,
+    Positive,
+    Table,
+    Text,
+    Vector,
+    triple,
+)
+
+
+@dataclass(frozen=True)
+class Gusts:
+    """Wind over the ground: velocity (z / height)^exponent times a factor in time.
+
+    velocity  (3,) m/s at `height` (m)
+    """
+
+    velocity: tuple[float, float, float]
+    exponent: float
+    height: float
+    factor: Factor
+
+    def __call__(self, x: Array, time: float) -> Array:
+        """(n, 3) velocity in m/s at the places x (n, 3)."""
+        share = np.maximum(x[:, 2] / self.height, 0.0) ** self.exponent
+        return self.factor.at(time) * share[:, None] * np.array(self.velocity)
+
+
+class AnyWindTable(Table):
+    """What every wind has.
+
+    bodies  on which it acts; every body unless given
+    """
+
+    bodies: tuple[Text, ...] | None = Field(default=None, min_length=1)
+
+    def check(self, around: Surroundings) -> Iterator[str]:
+        """Everything that does not fit the scene around it."""
+        yield from around.unknown_bodies(self.bodies or ())
+
+    def build(self, around: Surroundings) -> Wind | None:
+        """The wind, where `check` finds nothing; None where the fluid itself acts on the bodies."""
+        raise NotImplementedError
+
+
+class WindFacesTable(AnyWindTable):
+    """Simple wind of the paper's eq. (2): every face is pushed by its own exposure.
+
+    velocity  of the wind, m/s; with an exponent, at `height`
+    density   kg/m^3
+    exponent  of the wind over the ground: it grows as (z / height)^exponent; 0 is uniform
+    height    m
+    times     s, keyframes of gusts between which `factors` of the velocity change smoothly
+    factors   of the velocity at these times
+    """
+
+    kind: Literal["faces"]
+    velocity: Vector
+    density: Positive = 1.2
+    exponent: NotNegative = 0.0
+    height: Positive = 10.0
+    times: tuple[Number, ...] | None = None
+    factors: tuple[Number, ...] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.times is not None or self.factors is not None:
+            check_table(self.times, self.factors, "times", "factors")
+        return self
+
+    def check(self, around: Surroundings) -> Iterator[str]:
+        yield from super().check(around)
+        if self.exponent > 0.0 and around.is_slab:
+            yield (
+                "an exponent makes the wind grow with z, which a scene of 2 dimensions does not "
+                "have. Drop it."
+            )
+
+    def build(self, around: Surroundings) -> WindFaces:
+        velocity = triple(self.velocity)
+        if self.exponent == 0.0 and self.times is None:
+            return WindFaces(velocity, self.density, self.bodies)
+        factor: Factor = FactorSteady()
+        if self.times is not None and self.factors is not None:
+            factor = FactorKeyframes(Curve(self.times, self.factors))
+        gusts = Gusts(velocity, self.exponent, self.height, factor)
+        return WindFaces(gusts, self.density, self.bodies)
+
+
+class WindStreamTable(AnyWindTable):
+    """The fluid as a simple wind of eq. (2), for a fluid that does not feel the bodies.
+
+    It blows with the fluid's own velocity where fluid.coupling is "one-way", with `velocity` where
+    it is "none" or there is no fluid. Where it is "two-way" the fluid itself pushes and it does not
+    blow at all.
+
+    velocity  m/s
+    density   kg/m^3
+    """
+
+    kind: Literal["stream"]
+    velocity: Vector
+    density: Positive = 1.2
+
+    def build(self, around: Surroundings) -> Wind | None:
+        if not around.has_fluid:
+            return WindFaces(triple(self.velocity), self.density, self.bodies)
+        return WindStream(self.density, self.bodies) if around.is_one_way else None
+
+
+class WindPythonTable(AnyWindTable):
+    """Simple wind of eq. (2) from a Python function "module:name".
+
+    function    takes places (n, 3) in m and a time in s, and gives velocities (n, 3) in m/s
+    parameters  further arguments of the function, by name
+    density     kg/m^3
+    """
+
+    kind: Literal["python"]
+    function: Annotated[str, Field(pattern=FUNCTION)]
+    parameters: Parameters = Field(default_factory=dict)
+    density: Positive = 1.2
+
+    def check(self, around: Surroundings) -> Iterator[str]:
+        yield from super().check(around)
+        if around.read("plugins"):
+            try:
+                with_parameters(self.function, self.parameters)
+            except SceneError as error:
+                yield str(error)
+
+    def build(self, around: Surroundings) -> WindFaces:
+        function = with_parameters(self.function, self.parameters)
+        return WindFaces(WindFunction(function, self.function), self.density, self.bodies)
+
+
+class WindForceTable(AnyWindTable):
+    """The same force at each body's centre of mass.
+
+    force   N, or N per unit depth in two dimensions
+    """
+
+    kind: Literal["force"]
+    force: Vector
+
+    def build(self, around: Surroundings) -> WindForce:
+        return WindForce(triple(self.force), self.bodies)
+
+
+WindTable = Annotated[WindFacesTable | WindStreamTable | WindPythonTable | WindForceTable, *ByKind]
