@@ -13,7 +13,8 @@ import numpy as np
 from flowborne import Scene, Simulation, load_scene
 from flowborne.control.creature import away
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
-from flowborne.scenes.build_control import input_motions
+from flowborne.scenes.control import input_motions
+from flowborne.scenes.surroundings import surroundings_of
 
 SCENE = "human-wind-all"
 FACTORS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
@@ -37,7 +38,7 @@ def walked(scene: Scene) -> tuple[float, float]:
     torques of all joints together, N m."""
     angles, torques = [], []
     with Simulation(scene, workers=1) as simulation:
-        wanted = input_motions(scene, simulation.setup.solid).values()
+        wanted = input_motions(scene, surroundings_of(scene, simulation.setup.solid)).values()
         for frame in range(FRAMES):
             actuator = simulation.advance_frame().step.actuator
             if frame < FIRST:

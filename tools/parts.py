@@ -13,10 +13,10 @@ from flowborne.control.objectives import OBJECTIVES
 from flowborne.control.rules import RULES
 from flowborne.registry import Registry
 from flowborne.runs.exporters import EXPORTERS, FORMATS
+from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.load import library, scene_names
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_control import ControllerTable
-from flowborne.scenes.schema_fluid import BoundariesTable
+from flowborne.scenes.sides import BoundariesTable
 from flowborne.shapes.own import SHAPES
 from markdown_text import plain, table
 from scene_keys import hints_of, kind_of, tables_in

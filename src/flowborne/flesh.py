@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from flowborne.scenes.build_flesh import grow
-from flowborne.scenes.schema_flesh import FleshTable
+from flowborne.scenes.flesh import FleshTable, grow
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh
 

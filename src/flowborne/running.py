@@ -33,7 +33,6 @@ from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
-from flowborne.scenes.settling import can_settle
 from flowborne.scenes.warn import warnings_of
 from flowborne.simulation import BlowUpError, Simulation
 
@@ -365,7 +364,7 @@ class _Run:
         simulation = self.simulation
         world = simulation.world
         strength = simulation.measures.strength_steps(simulation.frame_time)
-        every = simulation.scene.controller.every if can_settle(simulation.scene) else None
+        every = simulation.scene.controller.every if simulation.scene.can_settle else None
         cells = None if world.setup.fluid is None else prod(world.setup.fluid.grid.shape)
         return {
             "scene": simulation.scene.name,

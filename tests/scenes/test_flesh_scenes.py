@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flowborne.runs.run_folder import RunFolder
-from flowborne.scenes import build_flesh
+from flowborne.scenes import flesh as flesh_room
 from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.save import scene_files
@@ -77,13 +77,13 @@ def write(tmp_path: Path) -> Write:
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Bones of what is meshed during a test."""
     made: list[str] = []
-    skin = build_flesh.skin_mesh
+    skin = flesh_room.skin_mesh
 
     def counting(spec, bones, thickness, size):  # type: ignore[no-untyped-def]
         made.append(" ".join(bones))
         return skin(spec, bones, thickness, size)
 
-    monkeypatch.setattr(build_flesh, "skin_mesh", counting)
+    monkeypatch.setattr(flesh_room, "skin_mesh", counting)
     return made
 
 
@@ -169,7 +169,7 @@ def test_a_run_folder_keeps_its_mesh(write: Write, tmp_path: Path, counted: list
     assert set(files) == {"scene.toml", "arm.xml", "flesh-arm.npz"}
     write_scene(folder, files)
     rest = build(scene).world.setup.solid.flesh
-    build_flesh._made.clear()
+    flesh_room._made.clear()
     counted.clear()
     again = load_scene(folder.scene)
     found = build(again).world.setup.solid.flesh

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from flowborne.scenes.load import check_scene, load_scene
-from flowborne.scenes.schema_solids import MotionKeyframesTable
+from flowborne.scenes.motions import MotionKeyframesTable
 
 Write = Callable[..., Path]
 

@@ -4,9 +4,8 @@ import pytest
 
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.control.phases import PhaseIntervalsTable
+from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.load import load_scene
-from flowborne.scenes.schema_control import ControllerTable
-from flowborne.scenes.settling import can_settle
 
 
 @pytest.mark.parametrize(
@@ -20,7 +19,7 @@ from flowborne.scenes.settling import can_settle
     ],
 )
 def test_creatures_that_walk_swim_or_fly_never_come_to_rest(name, rests):
-    assert can_settle(load_scene(name)) == rests
+    assert load_scene(name).can_settle == rests
 
 
 def test_plans_phases_and_moving_targets_never_come_to_rest():
@@ -39,5 +38,5 @@ def test_plans_phases_and_moving_targets_never_come_to_rest():
         "moving": {"objectives": (effort, moving)},
         "still": {"objectives": (effort, still)},
     }
-    found = {key: can_settle(scene.model_copy(update=change)) for key, change in changes.items()}
+    found = {key: scene.model_copy(update=change).can_settle for key, change in changes.items()}
     assert found == {"knots": False, "phases": False, "moving": False, "still": True}

@@ -55,22 +55,11 @@ class Surroundings:
 
     def unknown_joints(self, joints: Iterable[str]) -> Iterator[str]:
         """A complaint for each joint that the model lacks."""
-        carried = zip(self.model.joint_names, self.model.mj.jnt_bodyid, strict=True)
-        bones = [name for name, body in carried if body < self.model.nbody]  # others are of flesh
-        return self._unknown(joints, bones, "joint", "Its joints are")
+        return unknown_joints(self.model, self.source, joints)
 
     def unknown_bodies(self, bodies: Iterable[str]) -> Iterator[str]:
         """A complaint for each body that the model lacks."""
-        return self._unknown(bodies, self.model.body_names, "body", "Its bodies are")
-
-    def _unknown(
-        self, names: Iterable[str], known: Iterable[str], what: str, listed: str
-    ) -> Iterator[str]:
-        known = tuple(known)
-        for name in names:
-            if name not in known:
-                end = suggestion(name, known, listed)
-                yield f"{what} '{name}' is not in {self.source}{end}"
+        return unknown_bodies(self.model, self.source, bodies)
 
     def bodies(self, names: tuple[str, ...] | None) -> Integers:
         """(k,) numbers of the named bodies, or of all that can move."""
@@ -87,3 +76,20 @@ class Surroundings:
     def unit(self, joint: str) -> float:
         """SI value of one unit of the joint's position in a scene."""
         return joint_unit(self.model, joint)
+
+
+def unknown_joints(model: SolidModel, source: str, joints: Iterable[str]) -> Iterator[str]:
+    """A complaint for each joint that a model lacks; `source` is where the model is from."""
+    carried = zip(model.joint_names, model.mj.jnt_bodyid, strict=True)
+    bones = [name for name, body in carried if body < model.nbody]  # the others are of flesh
+    for joint in joints:
+        if joint not in bones:
+            yield f"joint '{joint}' is not in {source}{suggestion(joint, bones, 'Its joints are')}"
+
+
+def unknown_bodies(model: SolidModel, source: str, bodies: Iterable[str]) -> Iterator[str]:
+    """A complaint for each body that a model lacks; `source` is where the model is from."""
+    known = model.body_names
+    for body in bodies:
+        if body not in known:
+            yield f"body '{body}' is not in {source}{suggestion(body, known, 'Its bodies are')}"

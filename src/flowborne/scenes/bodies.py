@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from pathlib import Path
 
 import mujoco
@@ -12,27 +10,11 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
-from flowborne.motion.formula import Formula
-from flowborne.motion.tracks import (
-    Curve,
-    TrajectoryConstant,
-    TrajectoryFormula,
-    TrajectoryKeyframes,
-    TrajectorySinusoid,
-)
-from flowborne.scenes.build_drives import driven, servo_of
-from flowborne.scenes.build_shapes import placed_shapes
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.earlier import earlier_motion
 from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_solids import (
-    MotionConstantTable,
-    MotionFormulaTable,
-    MotionSinusoidTable,
-    MotionTable,
-    SolidsTable,
-)
+from flowborne.scenes.schema_solids import SolidsTable
 from flowborne.solids import mjcf
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
@@ -78,7 +60,7 @@ def _loaded(scene: Scene) -> SolidModel:
                 grown,
                 slab=scene.is_slab,
                 gravity=(x, y, z),
-                shapes=placed_shapes(scene),
+                shapes=tuple(table.build() for table in scene.shapes),
             )
         return SolidModel.from_file(
             path, slab=scene.is_slab, gravity=(x, y, z), given=given_of(scene)
@@ -99,7 +81,7 @@ def given_of(scene: Scene) -> Given:
     return Given(
         solids.density,
         solids.densities,
-        placed_shapes(scene),
+        tuple(table.build() for table in scene.shapes),
         solids.floating,
         displace_of(solids),
         packages_of(scene),
@@ -128,7 +110,7 @@ def packages_of(scene: Scene) -> list[Path]:
 
 def fleshed(scene: Scene) -> tuple[mujoco.MjSpec, list[Grown]]:
     """The model of a scene with its flesh. Raises ValueError when it cannot be made."""
-    from flowborne.scenes.build_flesh import grow
+    from flowborne.scenes.flesh import grow
 
     spec = bones_of(scene)
     return spec, grow(spec, scene.flesh, scene.folder)
@@ -139,31 +121,6 @@ def _sentence(text: str) -> str:
     return text if text.endswith(".") else f"{text}."
 
 
-def trajectory_of(
-    table: MotionTable, model: SolidModel, constants: Mapping[str, float]
-) -> Trajectory:
-    """A prescribed motion of the scene in radians or metres, with its servo.
-
-    constants  of its formula
-    """
-    limit = math.inf if table.torque_limit is None else table.torque_limit
-    return driven(_told(table, model, constants), servo_of(table.servo, limit))
-
-
-def _told(table: MotionTable, model: SolidModel, constants: Mapping[str, float]) -> Trajectory:
-    unit = joint_unit(model, table.joint)
-    dofs = model.dofs_of(table.joint)
-    if isinstance(table, MotionConstantTable):
-        return TrajectoryConstant(dofs, unit * table.position, unit * table.rate)
-    if isinstance(table, MotionSinusoidTable):
-        return TrajectorySinusoid(
-            dofs, unit * table.amplitude, table.period, unit * table.mean, math.radians(table.phase)
-        )
-    if isinstance(table, MotionFormulaTable):
-        return TrajectoryFormula(dofs, Formula(table.position, constants), unit)
-    return TrajectoryKeyframes(dofs, Curve(table.times, tuple(unit * v for v in table.values)))
-
-
 def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Trajectory, ...]:
     """All prescribed motions: those of [[motion]] in their order, then that of [clip], then that of
     [earlier], then joints that are held.
@@ -171,9 +128,7 @@ def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Traj
     start   (nq,) pose from which a clip is entered
     raises  SceneError when the clip or the earlier run cannot be used
     """
-    motions: list[Trajectory] = [
-        trajectory_of(table, model, scene.constants) for table in scene.motion
-    ]
+    motions: list[Trajectory] = [table.build(model, scene.constants) for table in scene.motion]
     found = clip_motion(scene, model, start), earlier_motion(scene, model)
     motions += [motion for motion in found if motion is not None]
     return (*motions, *held(scene, model, motions, start))

@@ -12,9 +12,9 @@ from flowborne.control.executors import Mapper, Serial
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import FluidState
 from flowborne.scenes.bodies import initial_state, load_model, posed, trajectories_of
-from flowborne.scenes.build_control import controller_of
-from flowborne.scenes.build_fluid import fluid_of
-from flowborne.scenes.build_mouths import mouths_of
+from flowborne.scenes.control import controller_of
+from flowborne.scenes.fluid import fluid_of
+from flowborne.scenes.mouths import mouths_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.surroundings import surroundings_of
 from flowborne.solids.model import SolidModel

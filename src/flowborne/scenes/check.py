@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from flowborne.errors import SceneError
-from flowborne.scenes.bodies import load_model
+from flowborne.scenes.bodies import initial_state, load_model
 from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
 from flowborne.scenes.check_clip import check_clip, check_followers
-from flowborne.scenes.check_control import check_control
-from flowborne.scenes.check_earlier import check_earlier, check_earlier_joints
-from flowborne.scenes.check_flesh import check_flesh
-from flowborne.scenes.check_fluid import check_dimensions, check_fluid
-from flowborne.scenes.check_mouths import check_mouth_cells, check_mouths
+from flowborne.scenes.control import check_control
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.earlier import check_earlier, check_earlier_joints
+from flowborne.scenes.flesh import check_flesh
+from flowborne.scenes.fluid import check_dimensions, check_fluid, fluid_of
+from flowborne.scenes.mouths import check_mouth_cells, check_mouths
 from flowborne.scenes.surroundings import surroundings_of
 
 
@@ -36,6 +36,8 @@ def cross_check(draft: Draft) -> list[str]:
     if lost:
         return problems + lost
     around = surroundings_of(scene, model, draft.broken)
-    problems += [*check_bodies(draft, around), *check_mouths(draft, model)]
+    problems += [*check_bodies(draft, around), *check_mouths(draft, around)]
     problems += check_control(draft, around)
-    return problems or [*check_mouth_cells(draft, model)]
+    if problems or not scene.mouths or draft.broken:
+        return problems
+    return [*check_mouth_cells(draft, model, fluid_of(scene), initial_state(scene, model))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from flowborne.control.surroundings import Surroundings
 from flowborne.phrases import suggestion
 from flowborne.scenes.bodies import initial_state, keyframes
-from flowborne.scenes.check_flesh import check_flesh_places
-from flowborne.scenes.check_formulas import check_formulas
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints
-from flowborne.scenes.wording import Key
+from flowborne.scenes.flesh import check_flesh_places
+from flowborne.scenes.motions import check_formulas, check_motions
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.joint_kinds import (
     BALL,
@@ -64,29 +63,6 @@ def check_without_bodies(draft: Draft) -> Iterator[str]:
             )
 
 
-def unknown_joint(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> list[str]:
-    """The problem when `joint` is not in the model."""
-    carried = zip(model.joint_names, model.mj.jnt_bodyid, strict=True)
-    bones = [name for name, body in carried if body < model.nbody]  # the others are of flesh
-    return _unknown(draft, joint, bones, "joint", "Its joints are", keys)
-
-
-def unknown_body(draft: Draft, model: SolidModel, body: str, *keys: Key) -> list[str]:
-    """The problem when `body` is not in the model."""
-    return _unknown(draft, body, model.body_names, "body", "Its bodies are", keys)
-
-
-def _unknown(
-    draft: Draft, name: str, known: Iterable[str], what: str, listed: str, keys: tuple[Key, ...]
-) -> list[str]:
-    if name in known:
-        return []
-    end = suggestion(name, known, listed)
-    path = draft.scene.model_path
-    model = "the human" if path is None else f"model {path.name}"
-    return [f"{draft.at(*keys)}: {what} '{name}' is not in {model}{end}"]
-
-
 PLACED = "Place the clip by offset and heading in [clip]"
 """What to do about a creature outside the domain that a clip moves."""
 
@@ -101,21 +77,21 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         )
     named = []
     for body in () if scene.solids is None else scene.solids.densities:
-        named += unknown_body(draft, model, body, "solids", "densities")
+        named += draft.unknown_body(model, body, "solids", "densities")
     named += _unheld(draft, model)
     for body in scene.output.bodies:
-        named += unknown_body(draft, model, body, "output", "bodies")
+        named += draft.unknown_body(model, body, "output", "bodies")
     joints = scene.output.joints
     for joint in () if isinstance(joints, bool) else joints:
-        named += unknown_joint(draft, model, joint, "output", "joints")
+        named += draft.unknown_joint(model, joint, "output", "joints")
     if scene.film.camera.follow not in ("bodies", "nothing"):
-        named += unknown_body(draft, model, scene.film.camera.follow, "film", "camera", "follow")
+        named += draft.unknown_body(model, scene.film.camera.follow, "film", "camera", "follow")
     for index, wind in enumerate(scene.wind):
         named += [f"{draft.at('wind', index)}: {problem}" for problem in wind.check(around)]
     yield from named
     state = [
         *check_initial(draft, model),
-        *_check_motions(draft, model),
+        *check_motions(draft, model),
         *check_formulas(draft),
     ]
     yield from state
@@ -132,7 +108,7 @@ def _unheld(draft: Draft, model: SolidModel) -> list[str]:
     moved = {table.joint: "a [[motion]]" for table in scene.motion}
     moved |= dict.fromkeys(scene.controlled_joints(), "[[control]]")
     for joint in hold:
-        unknown = unknown_joint(draft, model, joint, "solids", "hold")
+        unknown = draft.unknown_joint(model, joint, "solids", "hold")
         problems += unknown
         if not unknown and joint_kind(model, joint) == FREE:
             problems.append(f"{where}: '{joint}' is a free joint, by which a body floats. Drop it.")
@@ -169,7 +145,7 @@ def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
     for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
         for joint, numbers in values.items():
             where = draft.at("initial", key)
-            unknown = unknown_joint(draft, model, joint, "initial", key)
+            unknown = draft.unknown_joint(model, joint, "initial", key)
             yield from unknown
             if unknown:
                 continue
@@ -187,35 +163,6 @@ def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
                 )
             elif key == "positions" and kind in (BALL, FREE) and not any(numbers[-4:]):
                 yield f"{where}: the quaternion of joint '{joint}' is 0. Give (1, 0, 0, 0) or so."
-
-
-def _check_motions(draft: Draft, model: SolidModel) -> Iterator[str]:
-    seen: set[str] = set()
-    for index, table in enumerate(draft.scene.motion):
-        unknown = unknown_joint(draft, model, table.joint, "motion", index)
-        yield from unknown
-        where = draft.at("motion", index)
-        if table.joint in seen:
-            yield f"{where}: joint '{table.joint}' has another [[motion]] above. Keep one of them."
-        seen.add(table.joint)
-        if unknown:
-            continue
-        kind = joint_kind(model, table.joint)
-        if kind not in (HINGE, SLIDE):
-            yield (
-                f"{where}: joint '{table.joint}' is a {JOINT_KINDS[kind]}, and only hinges and "
-                "slides follow a motion. Replace it by hinges in the model."
-            )
-        yield from out_of_plane(draft, model, table.joint, "motion", index)
-
-
-def out_of_plane(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> Iterator[str]:
-    """The problem when a joint of a slab has no motion within the plane."""
-    if model.locked[model.dofs_of(joint)].all():
-        yield (
-            f"{draft.at(*keys)}: joint '{joint}' moves out of the plane of a scene of 2 "
-            "dimensions. Turn its axis, or choose another joint."
-        )
 
 
 def _check_ranges(draft: Draft, model: SolidModel) -> Iterator[str]:

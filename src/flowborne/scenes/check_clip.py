@@ -10,7 +10,7 @@ from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.scenes.bodies import posed
 from flowborne.scenes.capture import capture_of, clip_motion
-from flowborne.scenes.check_bodies import check_initial, unknown_joint
+from flowborne.scenes.check_bodies import check_initial
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema_human import ClipTable
@@ -80,7 +80,7 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
     others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
     found = False
     for joint in (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free):
-        unknown = unknown_joint(draft, model, joint, "clip")
+        unknown = draft.unknown_joint(model, joint, "clip")
         yield from unknown
         found |= bool(unknown)
     for joint in scene.clip.joints or ():

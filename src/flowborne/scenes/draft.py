@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flowborne.control.surroundings import unknown_bodies, unknown_joints
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import Key, place
+from flowborne.solids.model import SolidModel
 
 
 @dataclass(frozen=True)
@@ -35,3 +37,17 @@ class Draft:
         """Whether the file says anything in this table, right or wrong."""
         default = Scene.model_fields[table].get_default(call_default_factory=True)
         return table in self.broken or getattr(self.scene, table) != default
+
+    @property
+    def source(self) -> str:
+        """Where the model is from, for messages."""
+        path = self.scene.model_path
+        return "the human" if path is None else f"model {path.name}"
+
+    def unknown_joint(self, model: SolidModel, joint: str, *keys: Key) -> list[str]:
+        """The problem when `joint` is not in the model."""
+        return [f"{self.at(*keys)}: {said}" for said in unknown_joints(model, self.source, [joint])]
+
+    def unknown_body(self, model: SolidModel, body: str, *keys: Key) -> list[str]:
+        """The problem when `body` is not in the model."""
+        return [f"{self.at(*keys)}: {said}" for said in unknown_bodies(model, self.source, [body])]

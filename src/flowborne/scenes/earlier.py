@@ -1,18 +1,17 @@
-"""Passes: joints that do again what they did in an earlier run, while others are decided.
-
-Paper: section 8 names a design in several passes as future work.
-"""
+"""What an earlier run decided, as prescribed motions of the next run."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy.interpolate import CubicSpline
 
 from flowborne.errors import SceneError
@@ -20,11 +19,30 @@ from flowborne.files.arrays import read_arrays
 from flowborne.files.given import read_json
 from flowborne.motion.clip_curves import columns_of, row_of
 from flowborne.motion.clip_motion import TrajectoryClip
+from flowborne.phrases import suggestion
 from flowborne.quaternions import continuous
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
-from flowborne.scenes.schema import Scene
 from flowborne.solids.model import SolidModel
+from flowborne.tables import FileName, Table, Text
+
+if TYPE_CHECKING:
+    from flowborne.scenes.draft import Draft
+    from flowborne.scenes.schema import Scene
+
+
+class EarlierTable(Table):
+    """[earlier]: the run of the pass before this one, whose joints do again what they did there.
+
+    run     its folder, found from the folder of the scene file; in the folder of a run the file of
+            what was taken from it
+    joints  those that do; unless given all that were controlled there, or taken from a run before
+            that, and that are neither controlled nor moved by a [[motion]] here
+    """
+
+    run: FileName
+    joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+
 
 Array = NDArray[np.float64]
 
@@ -154,3 +172,49 @@ def _whole(path: Path, earlier: Earlier) -> Earlier:
 
 def _finite(values: Array) -> bool:
     return bool(np.isfinite(values).all())
+
+
+def check_earlier(draft: Draft) -> Iterator[str]:
+    """The earlier run itself, before there is a model."""
+    try:
+        earlier_of(draft.scene)
+    except SceneError as error:
+        yield from (f"{draft.at('earlier')}: {problem}" for problem in error.problems)
+
+
+def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
+    """Joints of the earlier run against the model, and against what else moves them."""
+    scene, earlier = draft.scene, earlier_of(draft.scene)
+    if earlier is None:
+        return
+    others, joints = scene.told_joints(), earlier_joints(scene)
+    if not joints:
+        yield (
+            f"{draft.at('earlier')}: what was controlled there is so here, or has a [[motion]]: "
+            f"{', '.join(earlier.poses)}. Take a joint out of [[control]], or the table away."
+        )
+    for joint in joints:
+        where = draft.at("earlier", "joints")
+        unknown = draft.unknown_joint(model, joint, "earlier")
+        yield from unknown
+        if joint in others:
+            yield (
+                f"{where}: joint '{joint}' is {others[joint]} as well. Take it out of one of the "
+                "two."
+            )
+        if unknown:
+            continue
+        if joint not in earlier.poses:
+            end = suggestion(joint, earlier.poses, "They are")
+            yield f"{where}: joint '{joint}' was not controlled in the earlier run{end}"
+        else:
+            yield from _check_width(where, earlier, model, joint)
+
+
+def _check_width(where: str, earlier: Earlier, model: SolidModel, joint: str) -> Iterator[str]:
+    there, here = earlier.poses[joint].shape[1], len(model.positions_of(joint))
+    if there != here:
+        yield (
+            f"{where}: joint '{joint}' has {there} numbers in the earlier run and {here} in this "
+            "model. Take the same model, or leave the joint out."
+        )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.servo import Servo, ServoExact, ServoPD
-from flowborne.scenes.build_drives import driven
+from flowborne.scenes.motions import driven
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model import BALL, HINGE, SLIDE, SolidModel
 

@@ -15,16 +15,38 @@ from pydantic import ValidationError
 
 from flowborne.errors import SceneError
 from flowborne.files.given import read_file
+from flowborne.motion.human.skeleton import SIDES
 from flowborne.phrases import suggestion
 from flowborne.runs.run_folder import reading
 from flowborne.scenes.check import cross_check
 from flowborne.scenes.contact_steps import with_steps
 from flowborne.scenes.draft import Draft
-from flowborne.scenes.elbows import join_elbows
 from flowborne.scenes.keyframe_file import inline_keyframes
 from flowborne.scenes.plugins import load_plugins
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.wording import explain, keys_of
+
+
+def join_elbows(raw: dict[str, Any]) -> None:
+    """Name each elbow beside its shoulder wherever joints are named, in a scene as read, in place.
+
+    It is then controlled as strongly, wants what the shoulder wants, and counts in its effort.
+    """
+    human = raw.get("human")
+    if not (isinstance(human, dict) and human.get("elbows") is True):
+        return
+    for table, keys in (("control", ("joints",)), ("objectives", ("joints", "wanted_by"))):
+        entries = raw.get(table)
+        for entry in entries if isinstance(entries, list) else []:
+            for key in keys:
+                if isinstance(entry, dict) and isinstance(entry.get(key), list):
+                    entry[key] = _joined(entry[key])
+
+
+def _joined(joints: list[Any]) -> list[Any]:
+    added = [f"{s}_elbow" for s in SIDES if f"{s}_shoulder" in joints]
+    return [*joints, *(elbow for elbow in added if elbow not in joints)]
+
 
 BUILT_IN = (
     "block-effort-wind",

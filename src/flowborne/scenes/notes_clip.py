@@ -1,4 +1,4 @@
-"""What was found out about a clip's file and its person, for notes."""
+"""Notes and a warning on how the file of a clip was read."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.coupling.world import Setup
 from flowborne.motion.bvh import STILL
 from flowborne.motion.clip_scale import UPRIGHT, leg_length, named, standing_axis
 from flowborne.motion.human.clip_skeleton import lost_bones
@@ -67,4 +68,17 @@ def _lost_bones(scene: Scene) -> Iterator[str]:
             f"[clip]: {scene.clip.file} has no bone above '{capture.mapping[joint]}', as BVH files "
             f"of the CMU database; one of {length:.2g} cm is put in, so that head and shoulders "
             "are where anatomy has them, higher than in the file"
+        )
+
+
+def lying(scene: Scene, setup: Setup) -> Iterator[str]:
+    """A person who would stand with another axis of the file up."""
+    capture = capture_of(scene)
+    if scene.clip is None or capture is None or capture.posture is None:
+        return
+    other = standing_axis(capture.posture, capture.up)
+    if capture.posture[2] < UPRIGHT and other is not None:
+        yield (
+            f"[clip]: with up = '{capture.up}' the person of {scene.clip.file} lies; "
+            f"up = '{other}' makes it stand"
         )

@@ -11,8 +11,8 @@ from flowborne.runs.run_folder import OWN_NAMES
 from flowborne.scenes.bodies import bones_of, packages_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.earlier import EARLIER_FILE, earlier_of
+from flowborne.scenes.flesh import FleshTable
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_flesh import FleshTable
 from flowborne.solids.model_files import ASSETS, gathered
 
 SCENE_FILE = "scene.toml"
@@ -97,7 +97,7 @@ def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
 
 def _flesh_files(scene: Scene, names: _Names) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
     """The flesh's tables and the files that they name: every mesh, and the user's own surfaces."""
-    from flowborne.scenes.build_flesh import meshed
+    from flowborne.scenes.flesh import meshed
     from flowborne.solids.tissue.mesh_file import ENDING, mesh_bytes
 
     spec, files, tables = bones_of(scene), {}, []

@@ -12,26 +12,22 @@ from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_vali
 from flowborne.control.objective_kinds import AnyObjective
 from flowborne.runs.exporters import EXPORTERS, can_write, endings
 from flowborne.runs.run_folder import FIXED_NAMES
-from flowborne.scenes.schema_control import ControllerTable, ControlTable
-from flowborne.scenes.schema_earlier import EarlierTable
+from flowborne.scenes.control import ControllerTable, ControlTable
+from flowborne.scenes.domain import Domain
+from flowborne.scenes.dye import DyeTable, SourceTable
+from flowborne.scenes.earlier import EarlierTable
+from flowborne.scenes.flesh import FleshTable
+from flowborne.scenes.fluid import FluidTable
+from flowborne.scenes.motions import MotionTable
+from flowborne.scenes.mouths import MouthTable
 from flowborne.scenes.schema_film import FilmTable
-from flowborne.scenes.schema_flesh import FleshTable
-from flowborne.scenes.schema_fluid import (
-    BoundariesTable,
-    Domain,
-    DyeTable,
-    FluidTable,
-    InflowSide,
-    SourceTable,
-)
 from flowborne.scenes.schema_human import ClipTable, HumanTable
-from flowborne.scenes.schema_mouths import MouthTable
 from flowborne.scenes.schema_solids import (
     InitialTable,
-    MotionTable,
     ShapeTable,
     SolidsTable,
 )
+from flowborne.scenes.sides import BoundariesTable, InflowSide
 from flowborne.scenes.wind import WindTable
 from flowborne.tables import (
     Count,
@@ -237,6 +233,21 @@ class Scene(Table):
     def controlled_joints(self) -> tuple[str, ...]:
         """Names of the controlled joints in the order of the controller."""
         return tuple(joint for table in self.control for joint in table.joints)
+
+    @property
+    def can_settle(self) -> bool:
+        """Whether nothing keeps the optimum of the objectives moving.
+
+        A clip, an earlier run, a moving joint, a mouth, a plan of several knots, phases, and an
+        objective that asks for a motion each do.
+        """
+        moved = self.clip is not None or self.earlier is not None or bool(self.mouths)
+        moved |= not all(table.rests for table in self.motion)
+        planned = self.controller.knots is not None
+        phased = any(table.in_phases for table in self.control)
+        return not (moved or planned or phased) and all(
+            table.rests and table.phases is None for table in self.objectives
+        )
 
     def told_joints(self) -> dict[str, str]:
         """Joints that [[control]] and [[motion]] move -> which of them does, in words."""

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.schema_fluid import check_interval
+from flowborne.scenes.factors import check_interval
 from flowborne.tables import (
     FileName,
     NotNegative,

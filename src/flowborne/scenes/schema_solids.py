@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, field_validator, model_validator
+from scipy.spatial.transform import Rotation
 
-from flowborne.scenes.schema_drives import EXACT, ServoTable
-from flowborne.scenes.schema_fluid import check_table
-from flowborne.shapes.own import SHAPES
+from flowborne.shapes.own import SHAPES, PlacedShape
 from flowborne.tables import (
-    ByKind,
     FileName,
     JointValues,
-    Number,
     OwnTable,
     Positive,
     SwitchOrNames,
@@ -25,6 +24,8 @@ from flowborne.tables import (
     Text,
     Vector,
 )
+
+Array = NDArray[np.float64]
 
 
 class DisplaceTable(Table):
@@ -110,6 +111,24 @@ class ShapeTable(Table, OwnTable):
             raise ValueError("has an axis of no length. Give its direction")
         return self
 
+    def build(self) -> PlacedShape:
+        """The geometry on its body."""
+        geometry = SHAPES.make(self.kind, self.parameters)
+        return PlacedShape(
+            geometry, self.body, np.array(self.position), self._rotation(), self.density
+        )
+
+    def _rotation(self) -> Array:
+        """(3, 3) the shape's frame to the body's; along an axis the least turn of its z."""
+        if self.axis is None:
+            turn = Rotation.from_euler("XYZ", self.euler or (0.0, 0.0, 0.0), degrees=True)
+            return np.asarray(turn.as_matrix())
+        z = np.array(self.axis) / np.linalg.norm(self.axis)
+        across = np.cross([0.0, 0.0, 1.0], z)
+        sine = float(np.linalg.norm(across))
+        normal = across / sine if sine > 0.0 else np.array([1.0, 0.0, 0.0])
+        return np.asarray(Rotation.from_rotvec(np.arctan2(sine, z[2]) * normal).as_matrix())
+
 
 class InitialTable(Table):
     """[initial]: where the joints start. What is not named starts as in the model, at rest; a hinge
@@ -129,82 +148,3 @@ class InitialTable(Table):
     positions: dict[str, JointValues] = Field(default_factory=dict)
     velocities: dict[str, JointValues] = Field(default_factory=dict)
     impulse: Literal["given", "none"] = "given"
-
-
-class DrivenTable(Table):
-    """What every motion has.
-
-    joint         that it moves
-    servo         how the joint's drive follows: "exact", or "pd" with its frequency, which follows
-                  a steady motion 1 / (pi frequency) s late
-    torque_limit  largest torque (N m) or force (N) of the drive, per m in a slab; unlimited unless
-                  given
-    """
-
-    joint: Text
-    servo: ServoTable = EXACT
-    torque_limit: Positive | None = None
-
-
-class MotionConstantTable(DrivenTable):
-    """Joint that keeps its place or its rate: position + rate * time.
-
-    position  degrees or m
-    rate      degrees/s or m/s
-    """
-
-    kind: Literal["constant"]
-    position: Number = 0.0
-    rate: Number = 0.0
-
-
-class MotionSinusoidTable(DrivenTable):
-    """mean + amplitude * sin(360 degrees * time / period + phase).
-
-    amplitude  degrees or m
-    period     s
-    mean       degrees or m
-    phase      degrees
-    """
-
-    kind: Literal["sinusoid"]
-    amplitude: Number
-    period: Positive
-    mean: Number = 0.0
-    phase: Number = 0.0
-
-
-class MotionKeyframesTable(DrivenTable):
-    """Smooth curve through keyframes, still before the first and after the last.
-
-    times   s, increasing
-    values  degrees or m
-
-    In a file, `file = "walk.csv"` (and `column`) may stand for times and values; see keyframe_file.
-    """
-
-    kind: Literal["keyframes"]
-    times: tuple[Number, ...]
-    values: tuple[Number, ...]
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        check_table(self.times, self.values, "times", "values")
-        return self
-
-
-class MotionFormulaTable(DrivenTable):
-    """A formula in t (s), pi and the scene's [constants]; see `formula`.
-
-    position  such as "amplitude * ramp(t) * sin(2*pi*t)", degrees or m. ramp(x, length) rises
-              smoothly from 0 at x = 0 to 1 at x = length, which is 1 unless given; angles within a
-              formula are radians
-    """
-
-    kind: Literal["formula"]
-    position: Text
-
-
-MotionTable = Annotated[
-    MotionConstantTable | MotionSinusoidTable | MotionKeyframesTable | MotionFormulaTable, *ByKind
-]

@@ -7,7 +7,7 @@ from functools import cache
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.control.surroundings import Surroundings
 from flowborne.motion.clip_motion import TrajectoryClip, TrajectoryPart
-from flowborne.scenes.bodies import posed, trajectory_of
+from flowborne.scenes.bodies import posed
 from flowborne.scenes.capture import capture_of, clip_motion, followers
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
@@ -41,7 +41,7 @@ def surroundings_of(
         driven=frozenset(driven),
         followed=tuple(tables),
         in_clip=frozenset(() if capture is None else capture.mapping),
-        motion_of=lambda joint: trajectory_of(tables[joint], model, scene.constants),
+        motion_of=lambda joint: tables[joint].build(model, scene.constants),
         clip_of=lambda joint: TrajectoryPart.of(clip(), model, model.dofs_of(joint)),
         has_wind=bool(scene.wind),
         has_fluid=scene.has_fluid,

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from flowborne.coupling.world import Setup
+from flowborne.scenes.notes_clip import lying
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.warn_clip import lying
 from flowborne.scenes.warn_drives import angles_in_radians, limp_joints, too_slow
 from flowborne.scenes.warn_mass import implausible_density, mass_apart
 from flowborne.scenes.warn_model import bodies_not_met, fixed_outside, floors_in_fluid

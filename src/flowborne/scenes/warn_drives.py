@@ -11,10 +11,11 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import HYPOTHETICAL, Setup
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.phrases import listed, rounded_up
-from flowborne.scenes.build_control import input_motions
+from flowborne.scenes.control import input_motions
 from flowborne.scenes.holding import undriven
+from flowborne.scenes.motions import ServoPDTable
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_drives import ServoPD
+from flowborne.scenes.surroundings import surroundings_of
 from flowborne.solids.joint_kinds import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -64,10 +65,10 @@ def too_slow(scene: Scene, setup: Setup) -> Iterator[str]:
     """
     able, time, model = scene.controller, scene.controller.every * scene.frame_time, setup.solid
     share = 1.0
-    if isinstance(able.servo, ServoPD):
+    if isinstance(able.servo, ServoPDTable):
         share = min(1.0, np.pi * able.servo.frequency * time)
     times = np.linspace(0.0, scene.time.frames * scene.frame_time, SPEED_SAMPLES)
-    for number, motion in input_motions(scene, model).items():
+    for number, motion in input_motions(scene, surroundings_of(scene, model)).items():
         table = scene.objectives[number]
         assert isinstance(table, ObjectiveInputMotionTable)
         unit = joint_unit(model, table.joint)

@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from flowborne.coupling.seen import Seen, seen_bodies
 from flowborne.coupling.world import Setup
 from flowborne.phrases import rounded_down, rounded_up
-from flowborne.scenes.check_fluid import fits_memory
 from flowborne.scenes.creature import creature_extent
+from flowborne.scenes.domain import Domain, fits_memory
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_fluid import Domain
 
 LEAST_CELLS = 2.0
 """Cells across the thinnest part of a body. A sheet of two cells holds a whole cell wherever it

@@ -17,7 +17,7 @@ from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_fluid import InflowSide
+from flowborne.scenes.sides import InflowSide
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.outline import Outline
 from flowborne.tables import MOST_STEPS

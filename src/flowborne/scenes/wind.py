@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.stream import WindStream
 from flowborne.errors import SceneError
 from flowborne.fluid.grid import Array
-from flowborne.motion.inflow import Factor, FactorKeyframes, FactorSteady
-from flowborne.motion.tracks import Curve
+from flowborne.motion.inflow import Factor, FactorSteady
 from flowborne.python_function import WindFunction, with_parameters
-from flowborne.scenes.schema_fluid import check_table
+from flowborne.scenes.factors import FactorsTable
 from flowborne.solids.wind import Wind, WindFaces, WindForce
 from flowborne.tables import (
     FUNCTION,
     ByKind,
     NotNegative,
-    Number,
     Parameters,
     Positive,
     Table,
@@ -67,7 +65,7 @@ class AnyWindTable(Table):
         raise NotImplementedError
 
 
-class WindFacesTable(AnyWindTable):
+class WindFacesTable(AnyWindTable, FactorsTable):
     """Simple wind of the paper's eq. (2): every face is pushed by its own exposure.
 
     velocity  of the wind, m/s; with an exponent, at `height`
@@ -83,14 +81,6 @@ class WindFacesTable(AnyWindTable):
     density: Positive = 1.2
     exponent: NotNegative = 0.0
     height: Positive = 10.0
-    times: tuple[Number, ...] | None = None
-    factors: tuple[Number, ...] | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.times is not None or self.factors is not None:
-            check_table(self.times, self.factors, "times", "factors")
-        return self
 
     def check(self, around: Surroundings) -> Iterator[str]:
         yield from super().check(around)
@@ -104,10 +94,7 @@ class WindFacesTable(AnyWindTable):
         velocity = triple(self.velocity)
         if self.exponent == 0.0 and self.times is None:
             return WindFaces(velocity, self.density, self.bodies)
-        factor: Factor = FactorSteady()
-        if self.times is not None and self.factors is not None:
-            factor = FactorKeyframes(Curve(self.times, self.factors))
-        gusts = Gusts(velocity, self.exponent, self.height, factor)
+        gusts = Gusts(velocity, self.exponent, self.height, self.keyframes() or FactorSteady())
         return WindFaces(gusts, self.density, self.bodies)
 
 

@@ -1,0 +1,205 @@
+"""Sources and dye of a scene's fluid: their tables, checks and builders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+from pydantic import Field, Strict, model_validator
+
+from flowborne.fluid.boundary import Source
+from flowborne.fluid.grid import Grid
+from flowborne.motion.inflow import Bands, even_bands
+from flowborne.scenes.domain import Domain
+from flowborne.scenes.factors import check_interval
+from flowborne.scenes.sides import BoundariesTable, Side
+from flowborne.tables import ByKind, Number, Positive, Table, Text, Vector, as_interval, triple
+
+if TYPE_CHECKING:
+    from flowborne.scenes.draft import Draft
+
+MOST_BANDS = 1000
+"""Bands of dye through a side."""
+
+
+def _check_box(lower: tuple[float, ...], upper: tuple[float, ...]) -> None:
+    """Raise ValueError unless the box has an inside."""
+    for axis, low, high in zip("xyz", lower, upper, strict=False):
+        if high <= low and not (axis == "z" and low == high == 0.0):
+            raise ValueError(
+                f"is a box from {low:g} to {high:g} m in {axis}. Make upper larger than lower"
+            )
+
+
+class SourceTable(Table):
+    """[[sources]]: a box inside the domain where fluid appears or is driven.
+
+    lower, upper  corners, m
+    volume_rate   m^3/s (m^2/s in two dimensions) that appears; negative drains
+    velocity      instead: m/s that the fluid has in the box
+    dye           name -> value that a dye has in the box
+    start, stop   s
+    """
+
+    lower: Vector
+    upper: Vector
+    volume_rate: Number | None = None
+    velocity: Vector | None = None
+    dye: dict[str, Number] = Field(default_factory=dict)
+    start: Number = 0.0
+    stop: Number | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_box(self.lower, self.upper)
+        check_interval(self.start, self.stop)
+        if (self.volume_rate is None) == (self.velocity is None):
+            raise ValueError("needs one of volume_rate and velocity. Give exactly one of them")
+        return self
+
+    def build(self) -> Source:
+        """The source."""
+        return Source(
+            triple(self.lower),
+            triple(self.upper),
+            self.volume_rate,
+            None if self.velocity is None else triple(self.velocity),
+            dict(self.dye),
+            as_interval(self.start, self.stop),
+        )
+
+
+class DyeBands(Table):
+    """Dye that enters in bands through an inflow side.
+
+    name         of the dye
+    side         the inflow side
+    count        number of bands, evenly spread over the side
+    width        m, of each of them
+    bands        instead of count: [from, to] of each band in m
+    across       axis along which the bands follow each other: the first free one unless given
+    value        that the dye has in them
+    start, stop  s between which it enters
+    """
+
+    kind: Literal["bands"]
+    name: Text = "dye"
+    side: Side
+    count: Annotated[int, Strict(), Field(ge=1, le=MOST_BANDS)] | None = None
+    width: Positive | None = None
+    bands: tuple[tuple[Number, Number], ...] | None = None
+    across: Literal["x", "y", "z"] | None = None
+    value: Number = 1.0
+    start: Number = 0.0
+    stop: Number | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_interval(self.start, self.stop)
+        if (self.bands is None) == (self.count is None or self.width is None):
+            raise ValueError(
+                "needs its places. Give count and width, or bands = a list of [from, to]"
+            )
+        for low, high in self.bands or ():
+            if high <= low:
+                raise ValueError(
+                    f"has a band from {low:g} to {high:g} m. Put the smaller number first"
+                )
+        if self.across == self.side[0]:
+            raise ValueError(
+                f"has across = '{self.across}', but side {self.side} is at right angles to it. "
+                "Choose another axis"
+            )
+        return self
+
+    @property
+    def axis(self) -> int:
+        """Axis across which the bands follow each other."""
+        return "xyz".index(self.across or ("x" if self.side[0] == "y" else "y"))
+
+    def build(self, grid: Grid) -> Bands:
+        """The bands on the side of a grid's domain."""
+        low, high = grid.origin[self.axis], grid.upper[self.axis]
+        ends = self.bands
+        if ends is None:
+            assert self.count is not None
+            assert self.width is not None
+            ends = even_bands(low, high, self.count, self.width)
+        return Bands(self.axis, ends, self.value, as_interval(self.start, self.stop))
+
+
+class DyeBox(Table):
+    """Dye that is always present in a box inside the domain.
+
+    name          of the dye
+    lower, upper  corners, m
+    value         that it has there
+    start, stop   s between which it is kept there
+    """
+
+    kind: Literal["box"]
+    name: Text = "dye"
+    lower: Vector
+    upper: Vector
+    value: Number = 1.0
+    start: Number = 0.0
+    stop: Number | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_box(self.lower, self.upper)
+        check_interval(self.start, self.stop)
+        return self
+
+    def build(self) -> Source:
+        """The source that keeps the dye's value."""
+        return Source(
+            triple(self.lower),
+            triple(self.upper),
+            scalars={self.name: self.value},
+            times=as_interval(self.start, self.stop),
+        )
+
+
+DyeTable = Annotated[DyeBands | DyeBox, *ByKind]
+
+
+def check_bands(draft: Draft, boundaries: BoundariesTable, domain: Domain) -> Iterator[str]:
+    sides = dict(boundaries)
+    for index, dye in enumerate(draft.scene.dye):
+        if not isinstance(dye, DyeBands):
+            continue
+        where = draft.at("dye", index)
+        if sides[dye.side].kind != "inflow":
+            yield (
+                f"{where}: side {dye.side} is {sides[dye.side].kind}, and dye enters with an "
+                "inflow. Choose an inflow side, or use a dye of kind 'box'."
+            )
+        axis = dye.axis
+        if axis >= len(domain.lower):
+            yield f"{where} has across = 'z' in a scene of 2 dimensions. Choose another axis."
+            continue
+        low, high = domain.lower[axis], domain.upper[axis]
+        for number, (start, stop) in enumerate(dye.bands or (), start=1):
+            if stop <= low or start >= high:
+                yield (
+                    f"{where}, bands, entry {number}: [{start:g}, {stop:g}] m is beside the side, "
+                    f"which reaches from {low:g} to {high:g} m. Move it."
+                )
+
+
+def check_boxes(draft: Draft, domain: Domain) -> Iterator[str]:
+    boxes = [(("sources", i), s.lower, s.upper) for i, s in enumerate(draft.scene.sources)]
+    boxes += [
+        (("dye", i), d.lower, d.upper)
+        for i, d in enumerate(draft.scene.dye)
+        if not isinstance(d, DyeBands)
+    ]
+    for keys, lower, upper in boxes:
+        for axis, low, high in zip("xyz", domain.lower, domain.upper, strict=False):
+            i = "xyz".index(axis)
+            if upper[i] <= low or lower[i] >= high:
+                yield (
+                    f"{draft.at(*keys)}: the box reaches from {lower[i]:g} to {upper[i]:g} m in "
+                    f"{axis}, outside the domain from {low:g} to {high:g} m. Move it."
+                )

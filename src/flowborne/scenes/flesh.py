@@ -1,0 +1,220 @@
+"""The flesh of a scene: its tables, checks, and meshes around the bones."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+import mujoco
+import numpy as np
+from pydantic import Field, model_validator
+
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.model import SolidModel
+from flowborne.solids.quiet import compiled_quietly
+from flowborne.solids.state import SolidState
+from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
+from flowborne.solids.tissue.mesh import (
+    ASTRAY,
+    FIDELITY,
+    HELD,
+    JOINT,
+    JOINT_EDGES,
+    THICKNESSES,
+    FleshMesh,
+    skin_mesh,
+    surface_mesh,
+)
+from flowborne.solids.tissue.mesh_file import read_mesh, recipe_of
+from flowborne.solids.tissue.surface_file import surface_bytes
+from flowborne.solids.tissue.symmetry import SAME
+from flowborne.tables import FileName, NotNegative, PlainName, Positive, Table, Text
+
+if TYPE_CHECKING:
+    from flowborne.scenes.draft import Draft
+
+
+class FleshTable(Table):
+    """[[flesh]]: an elastic body that bones hold, meshed with tetrahedra.
+
+    Where it is thinner with its bones than 1.75 cells of the fluid's grid, the fluid sees all of it
+    thicker by what is missing there, so that it does not leak. Where a mirror plane exchanges
+    bones, as left and right ones, the elements are each other's mirror images too.
+
+    name       the flesh's own
+    bones      bodies of the model that lie inside and hold it
+    thickness  m: it is a skin as thick as this around the bones
+    surface    instead of a thickness: file of a closed surface (.obj, .stl, .ply, .off, .glb, and
+               whatever else trimesh reads) in the axes of the model at rest; the flesh fills it
+    size       m: length of the elements' edges. One element through its thickness is enough for
+               flesh to bend as it should
+    mesh       file (.npz as a run leaves it, or .vtu) of elements that were made of all this
+               before: made anew where it was made otherwise. Without a thickness and a surface it
+               is used as it is, in two dimensions a mesh of triangles at z = 0
+    young      N/m^2, Young's modulus
+    poisson    Poisson's ratio
+    density    kg/m^3
+    damping    s, Rayleigh's: the damping matrix is this times the stiffness matrix
+    law        "neo-hookean" comes back when it is turned inside out, "st-venant-kirchhoff" does not
+    """
+
+    name: PlainName
+    bones: Annotated[tuple[Text, ...], Field(min_length=1)]
+    thickness: Positive | None = None
+    surface: FileName | None = None
+    size: Positive | None = None
+    mesh: FileName | None = None
+    young: Positive
+    poisson: Annotated[float, Field(ge=0.0, lt=0.5)] = 0.4
+    density: Positive = 1000.0
+    damping: NotNegative = 0.01
+    law: Literal["neo-hookean", "st-venant-kirchhoff"] = "neo-hookean"
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.thickness is not None and self.surface is not None:
+            raise ValueError("has both a thickness and a surface. Keep one of them")
+        made = self.thickness is not None or self.surface is not None
+        if not made and self.mesh is None:
+            raise ValueError("has neither a thickness nor a surface. Give one of them")
+        if made and self.size is None:
+            raise ValueError("has no size of elements. Give it, in m")
+        return self
+
+
+LAWS = {
+    "neo-hookean": Law.STABLE_NEO_HOOKEAN,
+    "st-venant-kirchhoff": Law.SAINT_VENANT_KIRCHHOFF,
+}
+
+
+def grow(spec: mujoco.MjSpec, tables: tuple[FleshTable, ...], folder: Path) -> list[Grown]:
+    """Add the flesh of `tables` to a model; their files are found from `folder`.
+
+    returns what `SolidModel.with_flesh` asks for
+    raises  ValueError for flesh that cannot be meshed, or read
+    """
+    meshes = [meshed(spec, table, folder) for table in tables]
+    return [
+        add_flesh(spec, table.name, mesh.points, mesh.elements, tissue_of(table), mesh.holders)
+        for table, (mesh, _) in zip(tables, meshes, strict=True)
+    ]
+
+
+def tissue_of(table: FleshTable) -> Tissue:
+    """What the flesh of a table is made of."""
+    return Tissue(table.young, table.poisson, table.density, table.damping, LAWS[table.law])
+
+
+def meshed(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, str]:
+    """The mesh of a flesh around the bones of a model without any, and its recipe.
+
+    The mesher never makes the same mesh twice, so a file's mesh is taken where its recipe is the
+    same, and within a process a recipe is followed once.
+    raises  ValueError as `grow`
+    """
+    recipe = _recipe(spec, table, folder)
+    if table.mesh is not None:
+        path = folder / table.mesh
+        as_it_is = table.thickness is None and table.surface is None
+        if as_it_is or (path.exists() and recipe_of(path) == recipe):
+            return _read(path, path.stat().st_mtime_ns if path.exists() else 0), recipe
+    if recipe not in _made:
+        _made[recipe] = _mesh(spec, table, folder)
+    return _made[recipe], recipe
+
+
+_made: dict[str, FleshMesh] = {}
+"""What this process has meshed, by recipe."""
+
+
+def _mesh(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
+    assert table.size is not None
+    if table.surface is not None:
+        return surface_mesh(folder / table.surface, spec, table.bones, table.size)
+    assert table.thickness is not None
+    return skin_mesh(spec, table.bones, table.thickness, table.size)
+
+
+def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
+    """What decides a mesh, as JSON: the bones' shapes and places at rest, and how it is made."""
+    mj = compiled_quietly(spec.copy())
+    data = mujoco.MjData(mj)
+    mujoco.mj_kinematics(mj, data)
+    shapes = hashlib.sha256()
+    for name in table.bones:
+        body = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name)
+        for geom in np.flatnonzero(mj.geom_bodyid == body) if body >= 0 else ():
+            for values in (mj.geom_size[geom], data.geom_xpos[geom], data.geom_xmat[geom]):
+                shapes.update(np.round(values, 9).tobytes())
+            shapes.update(bytes([mj.geom_type[geom]]))
+            mesh = mj.geom_dataid[geom]
+            if mesh >= 0:
+                first = mj.mesh_vertadr[mesh]
+                shapes.update(mj.mesh_vert[first : first + mj.mesh_vertnum[mesh]].tobytes())
+    recipe = {
+        "bones": list(table.bones),
+        "shapes": shapes.hexdigest(),
+        "thickness": table.thickness,
+        "size": table.size,
+        "rules": [FIDELITY, THICKNESSES, HELD, JOINT, JOINT_EDGES, ASTRAY, SAME],
+    }
+    if table.surface is not None:
+        recipe["surface"] = hashlib.sha256(surface_bytes(folder / table.surface)).hexdigest()
+    return json.dumps(recipe)
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, _changed: int) -> FleshMesh:
+    return read_mesh(path)
+
+
+def check_flesh(draft: Draft) -> Iterator[str]:
+    """What can be said before the flesh is meshed."""
+    scene = draft.scene
+    if not scene.flesh:
+        return
+    for index, table in enumerate(scene.flesh):
+        if scene.is_slab and (table.thickness is not None or table.surface is not None):
+            yield (
+                f"{draft.at('flesh', index)}: flesh is meshed in 3 dimensions alone. Set "
+                "dimensions = 3, or give a mesh of triangles at z = 0 in place of its thickness "
+                "or surface."
+            )
+    if scene.solids is None:
+        yield (
+            f"{draft.at('flesh')}: flesh grows on the bodies of a model file. "
+            "Add [solids] with a model, or drop [[flesh]]."
+        )
+    names = [table.name for table in scene.flesh]
+    for index, table in enumerate(scene.flesh):
+        if table.name in names[:index]:
+            yield f"{draft.at('flesh', index)}: another flesh is called '{table.name}'. Rename one."
+        if table.damping != scene.flesh[0].damping:
+            yield (
+                f"{draft.at('flesh', index)}: its damping is {table.damping:g} s, that of "
+                f"'{names[0]}' {scene.flesh[0].damping:g} s. Give all flesh the same."
+            )
+
+
+def check_flesh_places(draft: Draft, model: SolidModel, start: SolidState) -> Iterator[str]:
+    """No flesh may start outside the domain."""
+    domain = draft.scene.domain
+    if model.flesh is None or domain is None or not draft.scene.has_fluid:
+        return
+    vertices = kinematics(model, start.q).vertices
+    for flesh, name in enumerate(model.flesh.names):
+        own = vertices[model.flesh.surface[model.flesh.of_surface == flesh]].reshape(-1, 3)
+        for axis in range(len(domain.lower)):
+            low, high = own[:, axis].min(), own[:, axis].max()
+            first, last = domain.lower[axis], domain.upper[axis]
+            if low < first or high > last:
+                yield (
+                    f"{draft.at('flesh', flesh)}: '{name}' reaches from {low:g} to {high:g} m in "
+                    f"{'xyz'[axis]} at the start, outside the domain from {first:g} to {last:g} m. "
+                    "Move the body or enlarge the domain."
+                )

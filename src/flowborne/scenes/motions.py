@@ -1,0 +1,244 @@
+"""Prescribed motions of joints: their tables, checks, trajectories and servos."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
+from flowborne.errors import SceneError
+from flowborne.motion.formula import RESERVED, Formula
+from flowborne.motion.tracks import (
+    Curve,
+    TrajectoryConstant,
+    TrajectoryFormula,
+    TrajectoryKeyframes,
+    TrajectorySinusoid,
+)
+from flowborne.phrases import suggestion
+from flowborne.scenes.factors import check_table
+from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind, joint_unit
+from flowborne.solids.model import SolidModel
+from flowborne.tables import ByKind, Number, Positive, Table, Text
+
+if TYPE_CHECKING:
+    from flowborne.scenes.draft import Draft
+    from flowborne.scenes.wording import Key
+
+Indices = NDArray[np.int64]
+
+
+class ServoExactTable(Table):
+    """The drive reaches every target exactly when it is due."""
+
+    kind: Literal["exact"]
+
+    def build(self, limit: float | tuple[float, ...]) -> ServoExact:
+        """The servo, with drives of at most `limit`, N m or N; one for all dofs or one each."""
+        return ServoExact(limit)
+
+
+class ServoPDTable(Table):
+    """Critically damped drive.
+
+    frequency  Hz, its natural frequency
+    """
+
+    kind: Literal["pd"]
+    frequency: Positive
+
+    def build(self, limit: float | tuple[float, ...]) -> ServoPD:
+        """The servo, with drives of at most `limit`, N m or N; one for all dofs or one each."""
+        return ServoPD(2.0 * math.pi * self.frequency, limit)
+
+
+ServoTable = Annotated[ServoExactTable | ServoPDTable, *ByKind]
+
+EXACT = ServoExactTable(kind="exact")
+
+
+def driven(motion: Trajectory, servo: Servo) -> Trajectory:
+    """The motion as a servo follows it; itself where the servo keeps every promise."""
+    exact = isinstance(servo, ServoExact) and bool(np.all(np.isinf(servo.torque_limit)))
+    return motion if exact else TrajectoryServo(motion, servo)
+
+
+class DrivenTable(Table):
+    """What every motion has.
+
+    joint         that it moves
+    servo         how the joint's drive follows: "exact", or "pd" with its frequency, which follows
+                  a steady motion 1 / (pi frequency) s late
+    torque_limit  largest torque (N m) or force (N) of the drive, per m in a slab; unlimited unless
+                  given
+    """
+
+    joint: Text
+    servo: ServoTable = EXACT
+    torque_limit: Positive | None = None
+
+    def build(self, model: SolidModel, constants: Mapping[str, float]) -> Trajectory:
+        """The motion in rad or m, with its servo; `constants` of its formula."""
+        limit = math.inf if self.torque_limit is None else self.torque_limit
+        unit, dofs = joint_unit(model, self.joint), model.dofs_of(self.joint)
+        return driven(self._track(dofs, unit, constants), self.servo.build(limit))
+
+    @property
+    def rests(self) -> bool:
+        """Whether the joint does not move."""
+        return False
+
+    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+        raise NotImplementedError
+
+
+class MotionConstantTable(DrivenTable):
+    """Joint that keeps its place or its rate: position + rate * time.
+
+    position  degrees or m
+    rate      degrees/s or m/s
+    """
+
+    kind: Literal["constant"]
+    position: Number = 0.0
+    rate: Number = 0.0
+
+    @property
+    def rests(self) -> bool:
+        return self.rate == 0.0
+
+    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+        return TrajectoryConstant(dofs, unit * self.position, unit * self.rate)
+
+
+class MotionSinusoidTable(DrivenTable):
+    """mean + amplitude * sin(360 degrees * time / period + phase).
+
+    amplitude  degrees or m
+    period     s
+    mean       degrees or m
+    phase      degrees
+    """
+
+    kind: Literal["sinusoid"]
+    amplitude: Number
+    period: Positive
+    mean: Number = 0.0
+    phase: Number = 0.0
+
+    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+        phase = math.radians(self.phase)
+        return TrajectorySinusoid(dofs, unit * self.amplitude, self.period, unit * self.mean, phase)
+
+
+class MotionKeyframesTable(DrivenTable):
+    """Smooth curve through keyframes, still before the first and after the last.
+
+    times   s, increasing
+    values  degrees or m
+
+    In a file, `file = "walk.csv"` (and `column`) may stand for times and values; see keyframe_file.
+    """
+
+    kind: Literal["keyframes"]
+    times: tuple[Number, ...]
+    values: tuple[Number, ...]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_table(self.times, self.values, "times", "values")
+        return self
+
+    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+        return TrajectoryKeyframes(dofs, Curve(self.times, tuple(unit * v for v in self.values)))
+
+
+class MotionFormulaTable(DrivenTable):
+    """A formula in t (s), pi and the scene's [constants]; see `formula`.
+
+    position  such as "amplitude * ramp(t) * sin(2*pi*t)", degrees or m. ramp(x, length) rises
+              smoothly from 0 at x = 0 to 1 at x = length, which is 1 unless given; angles within a
+              formula are radians
+    """
+
+    kind: Literal["formula"]
+    position: Text
+
+    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+        return TrajectoryFormula(dofs, Formula(self.position, constants), unit)
+
+
+MotionTable = Annotated[
+    MotionConstantTable | MotionSinusoidTable | MotionKeyframesTable | MotionFormulaTable, *ByKind
+]
+
+
+def check_motions(draft: Draft, model: SolidModel) -> Iterator[str]:
+    seen: set[str] = set()
+    for index, table in enumerate(draft.scene.motion):
+        unknown = draft.unknown_joint(model, table.joint, "motion", index)
+        yield from unknown
+        where = draft.at("motion", index)
+        if table.joint in seen:
+            yield f"{where}: joint '{table.joint}' has another [[motion]] above. Keep one of them."
+        seen.add(table.joint)
+        if unknown:
+            continue
+        kind = joint_kind(model, table.joint)
+        if kind not in (HINGE, SLIDE):
+            yield (
+                f"{where}: joint '{table.joint}' is a {JOINT_KINDS[kind]}, and only hinges and "
+                "slides follow a motion. Replace it by hinges in the model."
+            )
+        yield from out_of_plane(draft, model, table.joint, "motion", index)
+
+
+def out_of_plane(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> Iterator[str]:
+    """The problem when a joint of a slab has no motion within the plane."""
+    if model.locked[model.dofs_of(joint)].all():
+        yield (
+            f"{draft.at(*keys)}: joint '{joint}' moves out of the plane of a scene of 2 "
+            "dimensions. Turn its axis, or choose another joint."
+        )
+
+
+def check_formulas(draft: Draft) -> Iterator[str]:
+    """Names of constants, and formulas that are wrong, or not finite in a frame of the run."""
+    scene = draft.scene
+    if not draft.sound("constants"):
+        return
+    used: set[str] = set()
+    wrong = []
+    for where, text in _formulas(draft):
+        try:
+            formula = Formula(text, scene.constants)
+            used |= formula.names()
+            for frame in range(scene.time.frames + 1):
+                formula.at(frame * scene.frame_time)
+        except SceneError as error:
+            wrong.append(f"{where}: {error}")
+        except ArithmeticError as error:
+            wrong.append(f"{where}: {error}. Change it, or end the run before.")
+    yield from wrong
+    for name in scene.constants:
+        if name in RESERVED or not name.isidentifier():
+            yield f"{draft.at('constants')}: '{name}' cannot be a constant's name. Change it."
+        elif not (wrong or name in used) and draft.sound("motion", "mouths"):
+            end = suggestion(name, used, "They use")
+            yield f"{draft.at('constants')}: no formula uses '{name}'{end}"
+
+
+def _formulas(draft: Draft) -> Iterator[tuple[str, str]]:
+    """Where a formula is, for a message, and its text."""
+    for index, motion in enumerate(draft.scene.motion):
+        if isinstance(motion, MotionFormulaTable):
+            yield draft.at("motion", index, "position"), motion.position
+    for index, mouth in enumerate(draft.scene.mouths):
+        if mouth.factor is not None:
+            yield draft.at("mouths", index, "factor"), mouth.factor

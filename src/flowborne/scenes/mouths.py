@@ -1,0 +1,158 @@
+"""The mouths of a scene's bodies: their tables, checks and builder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Self
+
+from pydantic import Field, model_validator
+
+from flowborne.control.surroundings import Surroundings
+from flowborne.coupling.mouths import Mouth, Strength
+from flowborne.coupling.step import cut_by_bodies, jets_at
+from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.motion.formula import Formula
+from flowborne.motion.inflow import FactorFormula, FactorPulse, FactorSteady
+from flowborne.scenes.factors import FactorsTable
+from flowborne.solids.model import SolidModel
+from flowborne.solids.state import SolidState
+from flowborne.tables import Number, Positive, Table, Text, Vector
+
+if TYPE_CHECKING:
+    from flowborne.scenes.draft import Draft
+    from flowborne.scenes.schema import Scene
+
+
+class PulseTable(Table):
+    """Half a sine wave that comes again every period.
+
+    period    s
+    duration  s for which it lasts in each period
+    start     s at which the first one begins
+    """
+
+    period: Positive
+    duration: Positive
+    start: Number = 0.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.duration > self.period:
+            raise ValueError(
+                f"lasts for {self.duration:g} s of every {self.period:g} s. "
+                "Make the duration no longer than the period"
+            )
+        return self
+
+
+class MouthTable(FactorsTable):
+    """[[mouths]]: a patch of a body's skin through which fluid is expelled, or taken in.
+
+    body         the body
+    position     centre of the patch in the body's frame, m
+    direction    out of the body, in its frame; of any length
+    radius       m; half the width of a slit in two dimensions
+    volume_rate  m^3/s (m^2/s in two dimensions); negative is taken in
+    times        s, keyframes between which `factors` of the volume rate change smoothly
+    factors      of the volume rate at these times
+    pulse        instead of keyframes: a pulse with volume_rate at its height
+    factor       instead of both: a formula of the factor; negative turns the flow about
+    dye          name -> value of a dye in what is expelled; what is taken in has the fluid's own
+    """
+
+    body: Text
+    position: Vector
+    direction: Vector
+    radius: Positive
+    volume_rate: Number
+    pulse: PulseTable | None = None
+    factor: Text | None = None
+    dye: dict[str, Number] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not any(self.direction):
+            raise ValueError("has a direction of length 0. Point it out of the body")
+        keyframed = self.times is not None or self.factors is not None
+        given = {
+            "keyframes": keyframed,
+            "a pulse": self.pulse is not None,
+            "a formula": self.factor is not None,
+        }
+        found = [what for what, there in given.items() if there]
+        if len(found) > 1:
+            raise ValueError(f"has {' and '.join(found)}. Keep one of them")
+        return self
+
+    def build(self, model: SolidModel, number: int, constants: Mapping[str, float]) -> Mouth:
+        """The mouth, `number` from 1 in messages; `constants` of its formula."""
+        x, y, z = self.position
+        length = math.hypot(*self.direction)
+        a, b, c = (component / length for component in self.direction)
+        return Mouth(
+            f"mouth {number} of body '{self.body}'",
+            model.body_names.index(self.body),
+            (x, y, z),
+            (a, b, c),
+            self.radius,
+            self.volume_rate,
+            self._strength(constants),
+            dict(self.dye),
+        )
+
+    def _strength(self, constants: Mapping[str, float]) -> Strength:
+        if self.factor is not None:
+            return FactorFormula(Formula(self.factor, constants))
+        if self.pulse is not None:
+            return FactorPulse(self.pulse.period, self.pulse.duration, self.pulse.start)
+        return self.keyframes() or FactorSteady()
+
+
+def mouths_of(scene: Scene, model: SolidModel) -> tuple[Mouth, ...]:
+    """The mouths, in the order of the file; none where the fluid is left out."""
+    if not scene.has_fluid:
+        return ()
+    return tuple(
+        table.build(model, number, scene.constants)
+        for number, table in enumerate(scene.mouths, start=1)
+    )
+
+
+def check_mouths(draft: Draft, around: Surroundings) -> Iterator[str]:
+    """Bodies that are there, in a fluid that feels them and can give way."""
+    scene = draft.scene
+    if not scene.mouths or scene.fluid is None or scene.boundaries is None:
+        return
+    unknown = []
+    for index, mouth in enumerate(scene.mouths):
+        where = draft.at("mouths", index)
+        unknown += [f"{where}: {problem}" for problem in around.unknown_bodies([mouth.body])]
+    yield from unknown
+    if scene.fluid.coupling != "two-way" and draft.sound("fluid"):
+        yield (
+            f"{draft.at('fluid', 'coupling')}: the fluid does not feel bodies with mouths when it "
+            f"is '{scene.fluid.coupling}'. Make it 'two-way', or drop [[mouths]]."
+        )
+        return
+    if draft.sound("boundaries") and "open" not in {side.kind for _, side in scene.boundaries}:
+        yield (
+            f"{draft.at('boundaries')}: what a mouth expels has nowhere to go, as no side is "
+            "open. Make a side open."
+        )
+
+
+def check_mouth_cells(
+    draft: Draft, model: SolidModel, fluid: Fluid | None, start: SolidState
+) -> Iterator[str]:
+    """Every mouth must cover cells of the grid at the start; for a scene with no other fault."""
+    scene = draft.scene
+    world = World.at_rest(Setup(model, fluid))
+    world.solid = start
+    cut = cut_by_bodies(world)
+    for index, mouth in enumerate(mouths_of(scene, model)):
+        world.setup = Setup(model, fluid, mouths=(mouth,))
+        try:
+            jets_at(world, cut, 0.0)
+        except ValueError as error:
+            yield f"{draft.at('mouths', index)}: {error}."
