@@ -13,7 +13,7 @@ import numpy as np
 from flowborne import Scene, Simulation, load_scene
 from flowborne.control.creature import away
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
-from flowborne.scenes.control import input_motions
+from flowborne.scenes.controller import input_motions
 from flowborne.scenes.surroundings import surroundings_of
 
 SCENE = "human-wind-all"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 from pydantic import (
     AfterValidator,
@@ -127,6 +127,18 @@ class Table(BaseModel):
     """A table of a scene file: unknown keys, nan and inf are refused, nothing changes later."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class Places(Protocol):
+    """Where the tables of a scene under inspection are, for messages."""
+
+    def at(self, *keys: str | int) -> str:
+        """Where something is; entries of lists count from 0."""
+        ...
+
+    def sound(self, *tables: str) -> bool:
+        """Whether these tables could be read whole."""
+        ...
 
 
 def _named_kind(value: Any) -> Any:

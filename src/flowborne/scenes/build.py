@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from flowborne.control.controller import Controller
 from flowborne.control.executors import Mapper, Serial
+from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import FluidState
 from flowborne.scenes.bodies import initial_state, load_model, posed, trajectories_of
-from flowborne.scenes.control import controller_of
+from flowborne.scenes.controller import controller_of
 from flowborne.scenes.fluid import fluid_of
-from flowborne.scenes.mouths import mouths_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.surroundings import surroundings_of
 from flowborne.solids.model import SolidModel
@@ -70,3 +70,13 @@ def _set_velocity(state: FluidState, scene: Scene) -> None:
     for faces in (state.velocity, state.advecting_velocity):
         for values, component in zip(faces, scene.fluid.velocity, strict=True):
             values.fill(component)
+
+
+def mouths_of(scene: Scene, model: SolidModel) -> tuple[Mouth, ...]:
+    """The mouths, in the order of the file; none where the fluid is left out."""
+    if not scene.has_fluid:
+        return ()
+    return tuple(
+        table.build(model, number, scene.constants)
+        for number, table in enumerate(scene.mouths, start=1)
+    )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from flowborne.coupling.world import Setup
 from flowborne.errors import SceneError
 from flowborne.scenes.bodies import initial_state, load_model
+from flowborne.scenes.build import mouths_of
 from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
 from flowborne.scenes.check_clip import check_clip, check_followers
-from flowborne.scenes.control import check_control
+from flowborne.scenes.controller import check_control
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import check_earlier, check_earlier_joints
 from flowborne.scenes.flesh import check_flesh
@@ -18,7 +20,10 @@ from flowborne.scenes.surroundings import surroundings_of
 def cross_check(draft: Draft) -> list[str]:
     """Everything that is wrong with a scene that the schema accepts."""
     problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
-    unusable = [*check_earlier(draft), *check_clip(draft), *check_flesh(draft)]
+    flesh = check_flesh(
+        draft, draft.scene.flesh, slab=draft.scene.is_slab, has_model=draft.scene.solids is not None
+    )
+    unusable = [*check_earlier(draft), *check_clip(draft), *flesh]
     problems += unusable
     scene = draft.scene
     if (
@@ -36,8 +41,17 @@ def cross_check(draft: Draft) -> list[str]:
     if lost:
         return problems + lost
     around = surroundings_of(scene, model, draft.broken)
-    problems += [*check_bodies(draft, around), *check_mouths(draft, around)]
+    coupling = scene.fluid.coupling if scene.fluid is not None else "two-way"
+    mouths = check_mouths(draft, scene.mouths, coupling, around)
+    problems += [*check_bodies(draft, around), *mouths]
     problems += check_control(draft, around)
     if problems or not scene.mouths or draft.broken:
         return problems
-    return [*check_mouth_cells(draft, model, fluid_of(scene), initial_state(scene, model))]
+    return [
+        *check_mouth_cells(
+            draft,
+            mouths_of(scene, model),
+            Setup(model, fluid_of(scene)),
+            initial_state(scene, model),
+        )
+    ]

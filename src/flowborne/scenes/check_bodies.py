@@ -13,7 +13,7 @@ from flowborne.scenes.bodies import initial_state, keyframes
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.flesh import check_flesh_places
-from flowborne.scenes.motions import check_formulas, check_motions
+from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.joint_kinds import (
     BALL,
@@ -91,8 +91,8 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
     yield from named
     state = [
         *check_initial(draft, model),
-        *check_motions(draft, model),
-        *check_formulas(draft),
+        *check_motions(draft, draft.scene.motion, around),
+        *check_formulas(draft, _formulas(draft), scene.constants, scene.frame_times()),
     ]
     yield from state
     if not named and not state and draft.sound("initial", "motion", "constants"):
@@ -188,7 +188,7 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
     if domain is None or not scene.has_fluid or not draft.sound("domain", "solids"):
         return
     start = initial_state(scene, model)
-    yield from check_flesh_places(draft, model, start)
+    yield from check_flesh_places(draft, model, start, domain)
     low, high = geom_boxes(model, start.q)
     axes = min(len(domain.lower), scene.dimensions)
     moving = model.moving[model.geom_body] & np.isfinite(low).all(axis=1)
@@ -218,3 +218,15 @@ def geom_boxes(model: SolidModel, q: Array) -> tuple[Array, Array]:
     centre = pose.geom_position + np.einsum("gij,gj->gi", pose.geom_rotation, reach[:, :3])
     half = np.einsum("gij,gj->gi", np.abs(pose.geom_rotation), reach[:, 3:])
     return centre - half, centre + half
+
+
+def _formulas(draft: Draft) -> dict[str, str]:
+    """Where each formula is, for a message -> its text."""
+    found = {}
+    for index, motion in enumerate(draft.scene.motion):
+        if isinstance(motion, MotionFormulaTable):
+            found[draft.at("motion", index, "position")] = motion.position
+    for index, mouth in enumerate(draft.scene.mouths):
+        if mouth.factor is not None:
+            found[draft.at("mouths", index, "factor")] = mouth.factor
+    return found

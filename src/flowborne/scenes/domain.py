@@ -1,19 +1,16 @@
-"""The domain of a scene's fluid: its table, its grid, and whether memory holds it."""
+"""The domain of a scene and its fluid: their tables, the grid, and whether memory holds it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from flowborne.fluid.grid import Grid
 from flowborne.runs.summary import machine_memory
-from flowborne.tables import Corner, Count, Table
-
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
+from flowborne.tables import Corner, Count, NotNegative, Places, Positive, Table, Vector
 
 FEWEST_CELLS = 4
 """Cells that a domain has at least along each axis."""
@@ -125,16 +122,41 @@ class Domain(Table):
         return Grid((counts[0], counts[1], counts[2]), h, (x, y, z))
 
 
+class FluidTable(Table):
+    """[fluid]: what fills the domain.
+
+    density     kg/m^3
+    viscosity   dynamic, Pa s; 0 is inviscid
+    velocity    initial velocity everywhere, m/s
+    body_force  uniform force per mass besides gravity, m/s^2
+    advection   scheme that carries the velocity: "flux" keeps its momentum exactly, the paper's
+                "semi-lagrangian" does not
+    tolerance   relative residual at which the pressure solve stops
+    coupling    "two-way": fluid and bodies push each other. "one-way": the fluid does not feel the
+                bodies, and pushes them by winds of kind "stream". "none": it is left out, and those
+                winds blow with their own velocity
+    """
+
+    density: Positive = 1000.0
+    viscosity: NotNegative = 0.0
+    velocity: Vector = (0.0, 0.0, 0.0)
+    body_force: Vector = (0.0, 0.0, 0.0)
+    advection: Literal["flux", "semi-lagrangian"] = "flux"
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
+    coupling: Literal["two-way", "one-way", "none"] = "two-way"
+
+
 def fits_memory(counts: list[int]) -> bool:
     """Whether this machine holds a grid of so many cells along each axis, as far as is known."""
     has = machine_memory()
     return has is None or math.prod(counts) * BYTES_PER_CELL <= has
 
 
-def check_memory(draft: Draft, domain: Domain) -> Iterator[str]:
+def check_memory(places: Places, domain: Domain) -> Iterator[str]:
     cells, has = math.prod(domain.counts()), machine_memory()
     if has is not None and not fits_memory(domain.counts()):
         yield (
-            f"{draft.at('domain')}: {cells:.3g} cells take {cells * BYTES_PER_CELL / 2**30:.3g} GB "
-            f"of memory or more, and this machine has {has / 2**30:.3g} GB. Make the grid coarser."
+            f"{places.at('domain')}: {cells:.3g} cells take {cells * BYTES_PER_CELL / 2**30:.3g} "
+            f"GB of memory or more, and this machine has {has / 2**30:.3g} GB. Make the grid "
+            "coarser."
         )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
@@ -13,10 +13,17 @@ from flowborne.motion.inflow import Bands, even_bands
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.factors import check_interval
 from flowborne.scenes.sides import BoundariesTable, Side
-from flowborne.tables import ByKind, Number, Positive, Table, Text, Vector, as_interval, triple
-
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
+from flowborne.tables import (
+    ByKind,
+    Number,
+    Places,
+    Positive,
+    Table,
+    Text,
+    Vector,
+    as_interval,
+    triple,
+)
 
 MOST_BANDS = 1000
 """Bands of dye through a side."""
@@ -164,12 +171,14 @@ class DyeBox(Table):
 DyeTable = Annotated[DyeBands | DyeBox, *ByKind]
 
 
-def check_bands(draft: Draft, boundaries: BoundariesTable, domain: Domain) -> Iterator[str]:
+def check_bands(
+    places: Places, dyes: Iterable[DyeTable], boundaries: BoundariesTable, domain: Domain
+) -> Iterator[str]:
     sides = dict(boundaries)
-    for index, dye in enumerate(draft.scene.dye):
+    for index, dye in enumerate(dyes):
         if not isinstance(dye, DyeBands):
             continue
-        where = draft.at("dye", index)
+        where = places.at("dye", index)
         if sides[dye.side].kind != "inflow":
             yield (
                 f"{where}: side {dye.side} is {sides[dye.side].kind}, and dye enters with an "
@@ -188,18 +197,18 @@ def check_bands(draft: Draft, boundaries: BoundariesTable, domain: Domain) -> It
                 )
 
 
-def check_boxes(draft: Draft, domain: Domain) -> Iterator[str]:
-    boxes = [(("sources", i), s.lower, s.upper) for i, s in enumerate(draft.scene.sources)]
+def check_boxes(
+    places: Places, sources: Iterable[SourceTable], dyes: Iterable[DyeTable], domain: Domain
+) -> Iterator[str]:
+    boxes = [(("sources", i), s.lower, s.upper) for i, s in enumerate(sources)]
     boxes += [
-        (("dye", i), d.lower, d.upper)
-        for i, d in enumerate(draft.scene.dye)
-        if not isinstance(d, DyeBands)
+        (("dye", i), d.lower, d.upper) for i, d in enumerate(dyes) if not isinstance(d, DyeBands)
     ]
     for keys, lower, upper in boxes:
         for axis, low, high in zip("xyz", domain.lower, domain.upper, strict=False):
             i = "xyz".index(axis)
             if upper[i] <= low or lower[i] >= high:
                 yield (
-                    f"{draft.at(*keys)}: the box reaches from {lower[i]:g} to {upper[i]:g} m in "
+                    f"{places.at(*keys)}: the box reaches from {lower[i]:g} to {upper[i]:g} m in "
                     f"{axis}, outside the domain from {low:g} to {high:g} m. Move it."
                 )

@@ -7,11 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 from scipy.interpolate import CubicSpline
 
 from flowborne.errors import SceneError
@@ -23,26 +21,9 @@ from flowborne.phrases import suggestion
 from flowborne.quaternions import continuous
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
+from flowborne.scenes.draft import Draft
+from flowborne.scenes.schema import Scene
 from flowborne.solids.model import SolidModel
-from flowborne.tables import FileName, Table, Text
-
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
-    from flowborne.scenes.schema import Scene
-
-
-class EarlierTable(Table):
-    """[earlier]: the run of the pass before this one, whose joints do again what they did there.
-
-    run     its folder, found from the folder of the scene file; in the folder of a run the file of
-            what was taken from it
-    joints  those that do; unless given all that were controlled there, or taken from a run before
-            that, and that are neither controlled nor moved by a [[motion]] here
-    """
-
-    run: FileName
-    joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
-
 
 Array = NDArray[np.float64]
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 import mujoco
 import numpy as np
 from pydantic import Field, model_validator
 
+from flowborne.scenes.domain import Domain
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.quiet import compiled_quietly
@@ -32,10 +33,7 @@ from flowborne.solids.tissue.mesh import (
 from flowborne.solids.tissue.mesh_file import read_mesh, recipe_of
 from flowborne.solids.tissue.surface_file import surface_bytes
 from flowborne.solids.tissue.symmetry import SAME
-from flowborne.tables import FileName, NotNegative, PlainName, Positive, Table, Text
-
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
+from flowborne.tables import FileName, NotNegative, Places, PlainName, Positive, Table, Text
 
 
 class FleshTable(Table):
@@ -173,38 +171,40 @@ def _read(path: Path, _changed: int) -> FleshMesh:
     return read_mesh(path)
 
 
-def check_flesh(draft: Draft) -> Iterator[str]:
+def check_flesh(
+    places: Places, tables: Sequence[FleshTable], *, slab: bool, has_model: bool
+) -> Iterator[str]:
     """What can be said before the flesh is meshed."""
-    scene = draft.scene
-    if not scene.flesh:
-        return
-    for index, table in enumerate(scene.flesh):
-        if scene.is_slab and (table.thickness is not None or table.surface is not None):
+    for index, table in enumerate(tables):
+        if slab and (table.thickness is not None or table.surface is not None):
             yield (
-                f"{draft.at('flesh', index)}: flesh is meshed in 3 dimensions alone. Set "
+                f"{places.at('flesh', index)}: flesh is meshed in 3 dimensions alone. Set "
                 "dimensions = 3, or give a mesh of triangles at z = 0 in place of its thickness "
                 "or surface."
             )
-    if scene.solids is None:
+    if tables and not has_model:
         yield (
-            f"{draft.at('flesh')}: flesh grows on the bodies of a model file. "
+            f"{places.at('flesh')}: flesh grows on the bodies of a model file. "
             "Add [solids] with a model, or drop [[flesh]]."
         )
-    names = [table.name for table in scene.flesh]
-    for index, table in enumerate(scene.flesh):
+    names = [table.name for table in tables]
+    for index, table in enumerate(tables):
         if table.name in names[:index]:
-            yield f"{draft.at('flesh', index)}: another flesh is called '{table.name}'. Rename one."
-        if table.damping != scene.flesh[0].damping:
             yield (
-                f"{draft.at('flesh', index)}: its damping is {table.damping:g} s, that of "
-                f"'{names[0]}' {scene.flesh[0].damping:g} s. Give all flesh the same."
+                f"{places.at('flesh', index)}: another flesh is called '{table.name}'. Rename one."
+            )
+        if table.damping != tables[0].damping:
+            yield (
+                f"{places.at('flesh', index)}: its damping is {table.damping:g} s, that of "
+                f"'{names[0]}' {tables[0].damping:g} s. Give all flesh the same."
             )
 
 
-def check_flesh_places(draft: Draft, model: SolidModel, start: SolidState) -> Iterator[str]:
+def check_flesh_places(
+    places: Places, model: SolidModel, start: SolidState, domain: Domain
+) -> Iterator[str]:
     """No flesh may start outside the domain."""
-    domain = draft.scene.domain
-    if model.flesh is None or domain is None or not draft.scene.has_fluid:
+    if model.flesh is None:
         return
     vertices = kinematics(model, start.q).vertices
     for flesh, name in enumerate(model.flesh.names):
@@ -214,7 +214,7 @@ def check_flesh_places(draft: Draft, model: SolidModel, start: SolidState) -> It
             first, last = domain.lower[axis], domain.upper[axis]
             if low < first or high > last:
                 yield (
-                    f"{draft.at('flesh', flesh)}: '{name}' reaches from {low:g} to {high:g} m in "
+                    f"{places.at('flesh', flesh)}: '{name}' reaches from {low:g} to {high:g} m in "
                     f"{'xyz'[axis]} at the start, outside the domain from {first:g} to {last:g} m. "
                     "Move the body or enlarge the domain."
                 )

@@ -1,51 +1,22 @@
-"""The fluid of a scene: its table, the checks of all that belongs to it, and its builder."""
+"""The fluid of a scene: the checks of all that belongs to it, and its builder."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Literal
-
-from pydantic import Field
 
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
 from flowborne.motion.inflow import Bands, DyeBandsValue
 from flowborne.scenes.domain import check_memory
+from flowborne.scenes.draft import Draft
 from flowborne.scenes.dye import DyeBands, DyeBox, check_bands, check_boxes
+from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import DyeValue, check_outlet, check_sides
-from flowborne.tables import NotNegative, Positive, Table, Vector, triple
-
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
-    from flowborne.scenes.schema import Scene
-    from flowborne.scenes.wording import Key
+from flowborne.scenes.wording import Key
+from flowborne.tables import triple
 
 NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")
-
-
-class FluidTable(Table):
-    """[fluid]: what fills the domain.
-
-    density     kg/m^3
-    viscosity   dynamic, Pa s; 0 is inviscid
-    velocity    initial velocity everywhere, m/s
-    body_force  uniform force per mass besides gravity, m/s^2
-    advection   scheme that carries the velocity: "flux" keeps its momentum exactly, the paper's
-                "semi-lagrangian" does not
-    tolerance   relative residual at which the pressure solve stops
-    coupling    "two-way": fluid and bodies push each other. "one-way": the fluid does not feel the
-                bodies, and pushes them by winds of kind "stream". "none": it is left out, and those
-                winds blow with their own velocity
-    """
-
-    density: Positive = 1000.0
-    viscosity: NotNegative = 0.0
-    velocity: Vector = (0.0, 0.0, 0.0)
-    body_force: Vector = (0.0, 0.0, 0.0)
-    advection: Literal["flux", "semi-lagrangian"] = "flux"
-    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
-    coupling: Literal["two-way", "one-way", "none"] = "two-way"
 
 
 def fluid_of(scene: Scene) -> Fluid | None:
@@ -147,11 +118,18 @@ def check_fluid(draft: Draft) -> Iterator[str]:
         return
     yield from check_memory(draft, scene.domain)
     if scene.boundaries is not None and draft.sound("boundaries"):
-        yield from check_sides(draft, scene.boundaries)
+        yield from check_sides(draft, scene.boundaries, slab=scene.is_slab)
+        kinds = {side.kind for _, side in scene.boundaries}
+        if scene.mouths and scene.is_two_way and "open" not in kinds:
+            yield (
+                f"{draft.at('boundaries')}: what a mouth expels has nowhere to go, as no side is "
+                "open. Make a side open."
+            )
+        rates = [source.volume_rate or 0.0 for source in scene.sources]
         if draft.sound("sources"):
-            yield from check_outlet(draft, scene.boundaries, scene.domain)
-        yield from check_bands(draft, scene.boundaries, scene.domain)
-    yield from check_boxes(draft, scene.domain)
+            yield from check_outlet(draft, scene.boundaries, scene.domain, rates)
+        yield from check_bands(draft, scene.dye, scene.boundaries, scene.domain)
+    yield from check_boxes(draft, scene.sources, scene.dye, scene.domain)
     if scene.film.field == "dye" and not scene.scalars() and draft.sound("film", "dye", "mouths"):
         yield (
             f"{draft.at('film', 'field')}: there is no dye to show. Add [[dye]], or show "

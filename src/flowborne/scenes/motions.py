@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
+from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
 from flowborne.errors import SceneError
@@ -25,12 +26,9 @@ from flowborne.phrases import suggestion
 from flowborne.scenes.factors import check_table
 from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind, joint_unit
 from flowborne.solids.model import SolidModel
-from flowborne.tables import ByKind, Number, Positive, Table, Text
+from flowborne.tables import ByKind, FileName, Number, Places, Positive, Table, Text
 
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
-    from flowborne.scenes.wording import Key
-
+Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
@@ -174,17 +172,34 @@ class MotionFormulaTable(DrivenTable):
         return TrajectoryFormula(dofs, Formula(self.position, constants), unit)
 
 
+class EarlierTable(Table):
+    """[earlier]: the run of the pass before this one, whose joints do again what they did there.
+
+    run     its folder, found from the folder of the scene file; in the folder of a run the file of
+            what was taken from it
+    joints  those that do; unless given all that were controlled there, or taken from a run before
+            that, and that are neither controlled nor moved by a [[motion]] here
+    """
+
+    run: FileName
+    joints: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+
+
 MotionTable = Annotated[
     MotionConstantTable | MotionSinusoidTable | MotionKeyframesTable | MotionFormulaTable, *ByKind
 ]
 
 
-def check_motions(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_motions(
+    places: Places, tables: Sequence[MotionTable], around: Surroundings
+) -> Iterator[str]:
+    """Every motion moves a hinge or a slide of the model, and no other one moves it."""
+    model = around.model
     seen: set[str] = set()
-    for index, table in enumerate(draft.scene.motion):
-        unknown = draft.unknown_joint(model, table.joint, "motion", index)
+    for index, table in enumerate(tables):
+        where = places.at("motion", index)
+        unknown = [f"{where}: {problem}" for problem in around.unknown_joints([table.joint])]
         yield from unknown
-        where = draft.at("motion", index)
         if table.joint in seen:
             yield f"{where}: joint '{table.joint}' has another [[motion]] above. Keep one of them."
         seen.add(table.joint)
@@ -196,49 +211,44 @@ def check_motions(draft: Draft, model: SolidModel) -> Iterator[str]:
                 f"{where}: joint '{table.joint}' is a {JOINT_KINDS[kind]}, and only hinges and "
                 "slides follow a motion. Replace it by hinges in the model."
             )
-        yield from out_of_plane(draft, model, table.joint, "motion", index)
+        yield from (f"{where}: {problem}" for problem in out_of_plane(model, table.joint))
 
 
-def out_of_plane(draft: Draft, model: SolidModel, joint: str, *keys: Key) -> Iterator[str]:
+def out_of_plane(model: SolidModel, joint: str) -> Iterator[str]:
     """The problem when a joint of a slab has no motion within the plane."""
     if model.locked[model.dofs_of(joint)].all():
         yield (
-            f"{draft.at(*keys)}: joint '{joint}' moves out of the plane of a scene of 2 "
+            f"joint '{joint}' moves out of the plane of a scene of 2 "
             "dimensions. Turn its axis, or choose another joint."
         )
 
 
-def check_formulas(draft: Draft) -> Iterator[str]:
-    """Names of constants, and formulas that are wrong, or not finite in a frame of the run."""
-    scene = draft.scene
-    if not draft.sound("constants"):
+def check_formulas(
+    places: Places, formulas: Mapping[str, str], constants: Mapping[str, float], times: Array
+) -> Iterator[str]:
+    """Names of constants, and formulas that are wrong, or not finite in a frame of the run.
+
+    formulas  where each is, for messages -> its text
+    times     (n,) of the frames, s
+    """
+    if not places.sound("constants"):
         return
     used: set[str] = set()
     wrong = []
-    for where, text in _formulas(draft):
+    for where, text in formulas.items():
         try:
-            formula = Formula(text, scene.constants)
+            formula = Formula(text, constants)
             used |= formula.names()
-            for frame in range(scene.time.frames + 1):
-                formula.at(frame * scene.frame_time)
+            for time in times:
+                formula.at(float(time))
         except SceneError as error:
             wrong.append(f"{where}: {error}")
         except ArithmeticError as error:
             wrong.append(f"{where}: {error}. Change it, or end the run before.")
     yield from wrong
-    for name in scene.constants:
+    for name in constants:
         if name in RESERVED or not name.isidentifier():
-            yield f"{draft.at('constants')}: '{name}' cannot be a constant's name. Change it."
-        elif not (wrong or name in used) and draft.sound("motion", "mouths"):
+            yield f"{places.at('constants')}: '{name}' cannot be a constant's name. Change it."
+        elif not (wrong or name in used) and places.sound("motion", "mouths"):
             end = suggestion(name, used, "They use")
-            yield f"{draft.at('constants')}: no formula uses '{name}'{end}"
-
-
-def _formulas(draft: Draft) -> Iterator[tuple[str, str]]:
-    """Where a formula is, for a message, and its text."""
-    for index, motion in enumerate(draft.scene.motion):
-        if isinstance(motion, MotionFormulaTable):
-            yield draft.at("motion", index, "position"), motion.position
-    for index, mouth in enumerate(draft.scene.mouths):
-        if mouth.factor is not None:
-            yield draft.at("mouths", index, "factor"), mouth.factor
+            yield f"{places.at('constants')}: no formula uses '{name}'{end}"

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Self
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.mouths import Mouth, Strength
 from flowborne.coupling.step import cut_by_bodies, jets_at
-from flowborne.coupling.world import Fluid, Setup, World
+from flowborne.coupling.world import Setup, World
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorPulse, FactorSteady
 from flowborne.scenes.factors import FactorsTable
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-from flowborne.tables import Number, Positive, Table, Text, Vector
-
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
-    from flowborne.scenes.schema import Scene
+from flowborne.tables import Number, Places, Positive, Table, Text, Vector
 
 
 class PulseTable(Table):
@@ -109,50 +105,32 @@ class MouthTable(FactorsTable):
         return self.keyframes() or FactorSteady()
 
 
-def mouths_of(scene: Scene, model: SolidModel) -> tuple[Mouth, ...]:
-    """The mouths, in the order of the file; none where the fluid is left out."""
-    if not scene.has_fluid:
-        return ()
-    return tuple(
-        table.build(model, number, scene.constants)
-        for number, table in enumerate(scene.mouths, start=1)
-    )
-
-
-def check_mouths(draft: Draft, around: Surroundings) -> Iterator[str]:
+def check_mouths(
+    places: Places, mouths: Sequence[MouthTable], coupling: str, around: Surroundings
+) -> Iterator[str]:
     """Bodies that are there, in a fluid that feels them and can give way."""
-    scene = draft.scene
-    if not scene.mouths or scene.fluid is None or scene.boundaries is None:
-        return
     unknown = []
-    for index, mouth in enumerate(scene.mouths):
-        where = draft.at("mouths", index)
+    for index, mouth in enumerate(mouths):
+        where = places.at("mouths", index)
         unknown += [f"{where}: {problem}" for problem in around.unknown_bodies([mouth.body])]
     yield from unknown
-    if scene.fluid.coupling != "two-way" and draft.sound("fluid"):
+    if mouths and coupling != "two-way" and places.sound("fluid"):
         yield (
-            f"{draft.at('fluid', 'coupling')}: the fluid does not feel bodies with mouths when it "
-            f"is '{scene.fluid.coupling}'. Make it 'two-way', or drop [[mouths]]."
-        )
-        return
-    if draft.sound("boundaries") and "open" not in {side.kind for _, side in scene.boundaries}:
-        yield (
-            f"{draft.at('boundaries')}: what a mouth expels has nowhere to go, as no side is "
-            "open. Make a side open."
+            f"{places.at('fluid', 'coupling')}: the fluid does not feel bodies with mouths when it "
+            f"is '{coupling}'. Make it 'two-way', or drop [[mouths]]."
         )
 
 
 def check_mouth_cells(
-    draft: Draft, model: SolidModel, fluid: Fluid | None, start: SolidState
+    places: Places, mouths: Sequence[Mouth], setup: Setup, start: SolidState
 ) -> Iterator[str]:
     """Every mouth must cover cells of the grid at the start; for a scene with no other fault."""
-    scene = draft.scene
-    world = World.at_rest(Setup(model, fluid))
+    world = World.at_rest(setup)
     world.solid = start
     cut = cut_by_bodies(world)
-    for index, mouth in enumerate(mouths_of(scene, model)):
-        world.setup = Setup(model, fluid, mouths=(mouth,))
+    for index, mouth in enumerate(mouths):
+        world.setup = Setup(setup.solid, setup.fluid, mouths=(mouth,))
         try:
             jets_at(world, cut, 0.0)
         except ValueError as error:
-            yield f"{draft.at('mouths', index)}: {error}."
+            yield f"{places.at('mouths', index)}: {error}."

@@ -6,19 +6,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
+import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
 from flowborne.control.objective_kinds import AnyObjective
 from flowborne.runs.exporters import EXPORTERS, can_write, endings
 from flowborne.runs.run_folder import FIXED_NAMES
 from flowborne.scenes.control import ControllerTable, ControlTable
-from flowborne.scenes.domain import Domain
+from flowborne.scenes.domain import Domain, FluidTable
 from flowborne.scenes.dye import DyeTable, SourceTable
-from flowborne.scenes.earlier import EarlierTable
 from flowborne.scenes.flesh import FleshTable
-from flowborne.scenes.fluid import FluidTable
-from flowborne.scenes.motions import MotionTable
+from flowborne.scenes.motions import EarlierTable, MotionTable
 from flowborne.scenes.mouths import MouthTable
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.schema_human import ClipTable, HumanTable
@@ -202,6 +202,11 @@ class Scene(Table):
         return self.fluid is not None and self.fluid.coupling != "none"
 
     @property
+    def is_two_way(self) -> bool:
+        """Whether fluid and bodies move each other."""
+        return self.fluid is not None and self.fluid.coupling == "two-way"
+
+    @property
     def is_slab(self) -> bool:
         return self.dimensions == 2
 
@@ -223,6 +228,10 @@ class Scene(Table):
     def frame_time(self) -> float:
         """s between frames."""
         return 1.0 / self.time.frames_per_second
+
+    def frame_times(self) -> NDArray[np.float64]:
+        """(frames + 1,) times of all frames and of the start, s."""
+        return self.frame_time * np.arange(self.time.frames + 1, dtype=np.float64)
 
     def in_folder(self, folder: Path) -> Scene:
         """The same scene with its files found from `folder`."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from collections.abc import Callable, Iterable, Iterator
+from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
@@ -20,10 +20,7 @@ from flowborne.fluid.grid import Array, Grid
 from flowborne.motion.inflow import FactorRamp, FactorSteady, ProfileParabolic, ProfileUniform
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.factors import FactorsTable
-from flowborne.tables import ByKind, NotNegative, Table, Vector, triple
-
-if TYPE_CHECKING:
-    from flowborne.scenes.draft import Draft
+from flowborne.tables import ByKind, NotNegative, Places, Table, Vector, triple
 
 DyeValue = Callable[[Array, Array, Array, float], Array]
 Side = Literal["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
@@ -133,31 +130,35 @@ def _half_periodic(low: str, high: str) -> bool:
     return (low == "periodic") != (high == "periodic")
 
 
-def check_sides(draft: Draft, boundaries: BoundariesTable) -> Iterator[str]:
+def check_sides(places: Places, boundaries: BoundariesTable, *, slab: bool) -> Iterator[str]:
     sides = dict(boundaries)
     for axis, name in enumerate("xyz"):
         low, high = sides[f"{name}_min"], sides[f"{name}_max"]
         if _half_periodic(low.kind, high.kind):
             yield (
-                f"{draft.at('boundaries')}: {name}_min is {low.kind} and {name}_max is "
+                f"{places.at('boundaries')}: {name}_min is {low.kind} and {name}_max is "
                 f"{high.kind}. Make both of them periodic or neither."
             )
         for side, table in ((f"{name}_min", low), (f"{name}_max", high)):
-            if axis == 2 and draft.scene.is_slab and table.kind != "closed":
+            if axis == 2 and slab and table.kind != "closed":
                 yield (
-                    f"{draft.at('boundaries', side)} is {table.kind}, but a scene of 2 dimensions "
+                    f"{places.at('boundaries', side)} is {table.kind}, but a scene of 2 dimensions "
                     "has no sides in z. Drop it."
                 )
             if isinstance(table, NoSlipSide) and table.velocity[axis] != 0.0:
                 yield (
-                    f"{draft.at('boundaries', side)}: velocity {list(table.velocity)} moves the "
+                    f"{places.at('boundaries', side)}: velocity {list(table.velocity)} moves the "
                     f"wall out of its place. Make its {name} component 0."
                 )
 
 
-def check_outlet(draft: Draft, boundaries: BoundariesTable, domain: Domain) -> Iterator[str]:
-    """Fluid that comes in must be able to leave: it does not give way."""
-    scene = draft.scene
+def check_outlet(
+    places: Places, boundaries: BoundariesTable, domain: Domain, rates: Iterable[float]
+) -> Iterator[str]:
+    """Fluid that comes in must be able to leave.
+
+    rates  volume rates of the sources, m^3/s
+    """
     kinds = {name: side.kind for name, side in boundaries}
     unclear = any(_half_periodic(kinds[f"{a}_min"], kinds[f"{a}_max"]) for a in "xyz")
     if unclear or "open" in kinds.values():
@@ -170,11 +171,10 @@ def check_outlet(draft: Draft, boundaries: BoundariesTable, domain: Domain) -> I
             inward = 1.0 if name.endswith("min") else -1.0
             flux = inward * side.velocity[axis] * math.prod(others)
             total, largest = total + flux, max(largest, abs(flux))
-    for source in scene.sources:
-        rate = source.volume_rate or 0.0
+    for rate in rates:
         total, largest = total + rate, max(largest, abs(rate))
     if abs(total) > 1e-9 * largest:
         yield (
-            f"{draft.at('boundaries')}: {total:+g} m^{scene.dimensions}/s enters through inflow "
+            f"{places.at('boundaries')}: {total:+g} m^{len(domain.lower)}/s enters through inflow "
             "sides and sources, and no side is open for as much to leave. Make a side open."
         )

@@ -11,7 +11,7 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import HYPOTHETICAL, Setup
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.phrases import listed, rounded_up
-from flowborne.scenes.control import input_motions
+from flowborne.scenes.controller import input_motions
 from flowborne.scenes.holding import undriven
 from flowborne.scenes.motions import ServoPDTable
 from flowborne.scenes.schema import Scene
