@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from flowborne import Simulation, load_scene
-from flowborne.bench.frames import frame_times
+from flowborne.bench.timing import frame_times
 from flowborne.exporters import write_atomically
 from flowborne.machine import cores
 from flowborne.pictures import ChainCost, plot_chain_cost, plot_courses, plot_forces
