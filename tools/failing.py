@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from pathlib import Path
 
-from flowborne.validation.reference import entry
+from flowborne.validation.case import entry
 from flowborne.validation.report import failures, read_report, verdicts
 from marked import with_part
 

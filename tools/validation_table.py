@@ -9,7 +9,7 @@ from typing import Any
 
 from failing import REPORT, ROOT
 from failing import number as shown
-from flowborne.validation.reference import entry
+from flowborne.validation.case import entry
 from flowborne.validation.report import (
     code,
     failures,

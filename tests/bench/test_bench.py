@@ -8,12 +8,13 @@ import pytest
 
 from flowborne import bench
 from flowborne.bench import pressure
-from flowborne.bench.result import Result, timed, verdict
+from flowborne.bench.timing import Result, timed, verdict
 
 
 @pytest.mark.parametrize("name", bench.bench_names())
 def test_every_bench_can_be_measured(name):
-    assert callable(import_module(f"flowborne.bench.{bench.MODULES[name]}").measure)
+    module = import_module(f"flowborne.bench.{bench.MODULES[name]}")
+    assert callable(getattr(module, name.replace("-", "_")))
 
 
 def test_results_are_handed_on_as_they_come(monkeypatch):
@@ -21,7 +22,7 @@ def test_results_are_handed_on_as_they_come(monkeypatch):
         Result("pressure", "one", 2.0, "at least 1", "pass"),
         Result("pressure", "two", 0, "", "info"),
     ]
-    monkeypatch.setattr(pressure, "measure", lambda: iter(rows))
+    monkeypatch.setattr(pressure, "pressure", lambda: iter(rows))
     seen = []
     found = bench.run_benches(["pressure"], seen.append)
     assert found == seen

@@ -6,19 +6,8 @@ import numpy as np
 import pytest
 
 from flowborne import Simulation, load_scene
-from flowborne.bench import (
-    chain,
-    first_run,
-    human,
-    memory,
-    parts,
-    realtime,
-    size,
-    start,
-    threads,
-    workers,
-)
-from flowborne.bench.frames import frame_times
+from flowborne.bench import frame_costs, scaling, speed, startup
+from flowborne.bench.timing import frame_times
 from flowborne.machine import PARTS, cores
 
 COARSE = {"domain.resolution": "16", "controller.settle_steps": "0"}
@@ -44,12 +33,12 @@ def test_simulations_take_turns_and_the_first_frame_is_not_timed(scene):
 
 
 def test_workers_are_compared_in_threads_and_in_processes(scene):
-    result = workers.compare(scene, frames=2)
+    result = scaling.compare_workers(scene, frames=2)
     assert [line.split()[:2] for line in result.lines[1:]] == [
-        ["two", e] for e in workers.EXECUTORS
+        ["two", e] for e in scaling.EXECUTORS
     ]
-    assert result.title.endswith(workers.EXECUTORS)
-    assert judged(result, result.value >= workers.FASTER)
+    assert result.title.endswith(scaling.EXECUTORS)
+    assert judged(result, result.value >= scaling.FASTER)
 
 
 @pytest.mark.parametrize(
@@ -64,22 +53,22 @@ def test_chain_is_judged_by_how_far_its_quickest_frames_are_from_a_line(
     scene, monkeypatch, times, off, line
 ):
     rows = np.array(times)[:, None] + [[0.0, 9.0]]
-    monkeypatch.setattr(chain, "frame_times", lambda simulations, frames: rows)
-    result = chain.straightness([scene] * 4)
+    monkeypatch.setattr(scaling, "frame_times", lambda simulations, frames: rows)
+    result = scaling.straightness([scene] * 4)
     assert result.value == pytest.approx(off, abs=1e-12)
-    assert judged(result, off <= chain.DEVIATION)
+    assert judged(result, off <= scaling.DEVIATION)
     assert result.lines[-1] == line
 
 
 def test_speed_is_frames_a_second_over_those_shown():
-    result = realtime.speed(load_scene(realtime.SCENE, COARSE), seconds=0.1)
+    result = speed.default_speed(load_scene(speed.BLOCK, COARSE), seconds=0.1)
     assert result.value > 0.0
     assert "16 x 16 cells" in result.title
     assert judged(result, result.value >= 1.0)
 
 
 def test_parts_of_a_frame_add_up():
-    result = parts.shares(load_scene(parts.SCENES[0], COARSE), frames=2)
+    result = frame_costs.shares(load_scene(frame_costs.BLOCK, COARSE), frames=2)
     assert [line.split()[0] for line in result.lines] == [*PARTS, "rest"]
     spent = [float(line.split()[1]) for line in result.lines]
     assert min(spent) >= 0.0
@@ -87,14 +76,14 @@ def test_parts_of_a_frame_add_up():
 
 
 def test_memory_of_a_run_does_not_grow():
-    per_cell, growth = memory.footprint(load_scene(memory.SCENE, COARSE), early=3, late=9)
+    per_cell, growth = frame_costs.footprint(load_scene(frame_costs.BLOCK, COARSE), early=3, late=9)
     assert 100.0 < per_cell.value < 100_000.0
     assert growth.verdict == "pass", growth
     assert growth.value > 0.0
 
 
 def test_first_run_keeps_its_kernels_apart(small_scene, tmp_path):
-    assert first_run.run_once(str(small_scene), tmp_path) > 0.0
+    assert startup.run_once(str(small_scene), tmp_path) > 0.0
     assert os.listdir(tmp_path / "run")
     assert list((tmp_path / "kernels").rglob("*.nbi"))
 
@@ -102,23 +91,23 @@ def test_first_run_keeps_its_kernels_apart(small_scene, tmp_path):
 def test_first_run_and_a_later_one_are_judged(monkeypatch):
     seconds, folders = iter([50.0, 6.0]), []
     monkeypatch.setattr(
-        first_run, "run_once", lambda _, folder: folders.append(folder) or next(seconds)
+        startup, "run_once", lambda _, folder: folders.append(folder) or next(seconds)
     )
-    first, later = first_run.measure()
+    first, later = startup.first_run()
     assert judged(first, met=True)
     assert judged(later, met=False)
     assert folders[0] == folders[1]
 
 
 def test_start_is_that_of_the_command():
-    result = start.help_told(repeats=1)
+    result = startup.help_time(repeats=1)
     assert result.value > 0.0
-    assert judged(result, result.value < start.ALLOWED)
+    assert judged(result, result.value < startup.HELP)
 
 
 def test_growth_names_time_and_memory_of_every_size():
     scenes = [load_scene("flyer-base", {"domain.resolution": str(n)}) for n in (10, 12)]
-    result = size.growth(scenes, frames=1)
+    result = frame_costs.growth(scenes, frames=1)
     assert result.verdict == "info"
     assert np.isfinite(result.value)
     assert "10 x 10 x 9 cells" in result.lines[0]
@@ -129,13 +118,15 @@ def test_growth_names_time_and_memory_of_every_size():
 
 
 def test_a_human_is_timed_in_every_way():
-    result = human.speed(load_scene("human-gravity-back"), frames=1)
+    result = speed.best_speed(load_scene("human-gravity-back"), frames=1)
     assert judged(result, result.value >= 1.0)
     assert [line.split()[1] for line in result.lines] == ["serial", "threads", "processes"]
 
 
 def test_threads_change_no_bit():
     """On 16 cells no kernel starts a thread: what is tested is the comparison."""
-    result = threads.compare(load_scene("flyer-base", {"domain.resolution": "16"}), frames=1)
+    result = scaling.compare_threads(
+        load_scene("flyer-base", {"domain.resolution": "16"}), frames=1
+    )
     assert judged(result, True)
     assert result.value == 0

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from flowborne.characters.closing import SAME
-from flowborne.characters.division import LEAST, divided
+from flowborne.characters.division import MIN_VOLUME, WELD_DISTANCE, divided
 from flowborne.characters.model import model_files
 from flowborne.characters.rig import Rig, Surface
 from flowborne.characters.source import read_source
@@ -75,7 +74,7 @@ def test_pieces_fill_the_whole_whatever_the_weights(seed: int) -> None:
     weights /= weights.sum(axis=1, keepdims=True)
     found = volumes(Surface(vertices, faces, weights, GREY), rig(parents))
     whole = rigged.WIDTH * rigged.HEIGHT * rigged.LENGTH
-    assert sum(found.values()) == pytest.approx(whole, rel=100 * SAME)
+    assert sum(found.values()) == pytest.approx(whole, rel=100 * WELD_DISTANCE)
 
 
 def test_no_crack_opens_at_a_joint_that_turns() -> None:
@@ -150,5 +149,5 @@ def test_creatures_are_divided_without_loss(name: str) -> None:
     division = divided(source.rig, source.surface, name)
     parts = np.array([ShapeMesh(*piece).volume for piece in division.pieces.values()])
     assert parts.sum() == pytest.approx(division.volume, rel=1e-6)
-    assert parts.min() > LEAST * division.volume
+    assert parts.min() > MIN_VOLUME * division.volume
     assert all(is_closed(piece) for piece in division.pieces.values())

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import flowborne as fb
 from flowborne import cli
 from flowborne.characters.gltf import GltfSource
-from flowborne.characters.pose import as_cycle, posed
+from flowborne.characters.model import as_cycle, posed
 from flowborne.characters.rig import Z_UP, Action, Rig, Surface
 from flowborne.characters.source import read_source
 from flowborne.colours import to_linear

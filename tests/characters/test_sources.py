@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from flowborne.characters.colours import MOST_COLOURS, few_colours
+from flowborne.characters.model import MAX_COLOURS, few_colours
 from flowborne.characters.rig import Z_UP
 from flowborne.characters.source import Source, clip_number, read_source
 from flowborne.colours import to_srgb
@@ -64,7 +64,7 @@ def test_a_texture_has_its_colour_on_each_face(tmp_path: Path) -> None:
     assert len(few) == 2
     assert_allclose(few[which], surface.colours, atol=0.5 / 255.0)
     many, which = few_colours(np.random.default_rng(1).random((500, 3)))
-    assert len(many) <= MOST_COLOURS
+    assert len(many) <= MAX_COLOURS
     assert which.max() < len(many)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from flowborne import Grid
 from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.validation.fixed_bodies import cylinder
-from flowborne.validation.fluid_cases import Uniform
+from flowborne.validation.shedding import cylinder
+from flowborne.validation.worlds import Uniform
 from flowborne.worlds import advance, make_world, set_velocity
 
 

@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 
 import flowborne as fb
 from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.validation.fluid_cases import Uniform
-from flowborne.validation.worlds import RING, mjcf
+from flowborne.validation.worlds import RING, Uniform, mjcf
 from flowborne.worlds import (
     advance,
     kinetic_energy,

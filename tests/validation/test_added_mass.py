@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.validation import added_mass as case
-from flowborne.validation.reference import table
+from flowborne.validation.case import table
 
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5])

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from flowborne.validation import controller_in_flow, figures
-from flowborne.validation.blocked_arms import blocked_rows
+from flowborne.validation.figures import blocked_rows
 
 
 def test_figures_are_written_and_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

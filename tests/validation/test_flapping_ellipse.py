@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.validation.case import reference
 from flowborne.validation.flapping_ellipse import (
     FASTEST,
     LIFT,
@@ -13,7 +14,6 @@ from flowborne.validation.flapping_ellipse import (
     hover,
     largest_quasi_steady,
 )
-from flowborne.validation.reference import reference
 
 
 def test_S3_starts_upright_at_the_end_of_its_way():

@@ -1,9 +1,12 @@
-"""F1, F6, F7: flows without obstacles, on coarse grids."""
+"""F1, F3, F6, F7: flows without obstacles, on coarse grids; of F3 the first second."""
 
+from __future__ import annotations
+
+import numpy as np
 import pytest
 
 from flowborne.validation import case
-from flowborne.validation.fluid_cases import carried_body
+from flowborne.validation.fluid_cases import DISSIPATION, ENERGY, carried_body, decay
 
 
 @pytest.fixture(scope="module")
@@ -39,3 +42,15 @@ def test_F6_a_slower_body_leaves_one():
     wrong, slip = carried_body(True, 2, pace=0.9)
     assert 1e-2 < wrong < 1.0
     assert slip == pytest.approx(0.1)
+
+
+def test_F3_begins_with_its_energy_and_its_dissipation():
+    """On 24 cells a side the scheme dissipates, too: half as much on 32."""
+    energies, times, rates = decay(24, 1.0)
+    _, _, finer = decay(32, 0.25)
+    assert energies[0] == pytest.approx(ENERGY, rel=1e-12)
+    assert np.all(np.diff(energies) < 0.0)
+    assert pytest.approx(4.6875e-4) == DISSIPATION
+    assert DISSIPATION < rates[0] < 1.5 * DISSIPATION
+    assert finer[0] - DISSIPATION < 0.5 * (rates[0] - DISSIPATION)
+    assert energies[1] - energies[-1] == pytest.approx(rates.sum() * (times[1] - times[0]))

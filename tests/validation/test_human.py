@@ -7,7 +7,7 @@ import pytest
 
 from flowborne import load_scene
 from flowborne.validation import case
-from flowborne.validation.standing import BACK, SPREAD, G, Load, human, settled, standing
+from flowborne.validation.human import BACK, SPREAD, G, Load, human, settled, standing
 
 
 @pytest.mark.parametrize("name", ["K8", "K9", "K10"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.validation import pendulums
-from flowborne.validation.reference import table
+from flowborne.validation.case import table
 
 
 @pytest.mark.parametrize("degrees", [10.0, 90.0, 170.0])

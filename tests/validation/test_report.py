@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 from flowborne.cli import app
 from flowborne.validation import case, case_ids, report
-from flowborne.validation.case import THE_RUN, Curve, GridSeries, Plot, Result, Tier, Verdict
+from flowborne.validation.case import THE_RUN, Result, Tier
+from flowborne.validation.findings import Curve, GridSeries, Plot, Verdict
 from flowborne.validation.page import PAGE, write_page
 from flowborne.validation.report import (
     DATA,

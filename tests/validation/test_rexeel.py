@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flowborne.validation import rexeel
-from flowborne.validation.eel_runs import (
-    LENGTH,
+from flowborne.validation.rexeel import (
+    LINK_LENGTH,
     MASS,
     TIMES,
     mass_centre,
@@ -44,7 +44,7 @@ def test_R1_errors_of_known_trajectories(amplitude: int, count: int) -> None:
 
 
 def test_mass_centre_of_a_straight_and_of_a_bent_robot() -> None:
-    middles = np.cumsum(LENGTH) - 0.5 * LENGTH - 6.0
+    middles = np.cumsum(LINK_LENGTH) - 0.5 * LINK_LENGTH - 6.0
     straight = MASS @ middles / MASS.sum()
     head, joints = np.array([[1.0, 2.0, -90.0]]), np.zeros((1, 5))
     np.testing.assert_allclose(mass_centre(head, joints), [[1.0, 2.0 - straight]], atol=1e-12)

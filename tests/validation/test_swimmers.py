@@ -1,8 +1,12 @@
-"""Case S5, short."""
+"""Case S5, short; S1: the eel's outline and midline, and its first beat on a coarse grid."""
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
 from flowborne.validation import swimmers
+from flowborne.validation.swimmers import LINKS, direction, half_width, swim, tank
 
 
 def test_S5_what_the_creature_gains_the_fluid_loses() -> None:
@@ -14,3 +18,33 @@ def test_S5_what_the_creature_gains_the_fluid_loses() -> None:
 def test_S5_a_scallop_drifts_by_less_than_a_thousandth_in_its_first_cycle() -> None:
     """To the tolerance of the source; the case itself goes on to a second cycle and finer grids."""
     assert swimmers.scallop(48, 48, 1) < 1e-3
+
+
+def test_S1_outline_and_weight():
+    edges = (0.0, 0.04, 0.95, 1.0)
+    assert [half_width(s) for s in edges] == pytest.approx([0.0, 0.04, 0.01, 0.0])
+    s = np.linspace(0.0, 1.0, 10_001)
+    area = 2.0 * np.trapezoid([half_width(x) for x in s], s)
+    assert tank(16).setup.solid.body_mass.sum() == pytest.approx(area, rel=0.02)
+
+
+@pytest.mark.parametrize("time", [0.3, 0.7, 2.4])
+def test_S1_hinges_turn_at_the_rate_of_their_angles(time):
+    step = 1e-5
+    for bend in tank(16).setup.motions:
+        slope = (bend.position(time + step) - bend.position(time - step)) / (2.0 * step)
+        np.testing.assert_allclose(bend.velocity(time), slope, atol=1e-7)
+    assert len(tank(16).setup.motions) == LINKS - 1
+
+
+def test_S1_the_midline_is_the_integral_of_its_direction():
+    """After the first second y = 0.125 (s + 0.03125) / 1.03125 sin 2 pi (s - t)."""
+    s = np.linspace(0.0, 1.0, 2001)
+    slopes = np.tan([direction(x, 1.3)[0] for x in s])
+    y = 0.125 * (s + 0.03125) / 1.03125 * np.sin(2.0 * np.pi * (s - 1.3))
+    assert np.trapezoid(slopes, s) == pytest.approx(y[-1] - y[0], abs=1e-6)
+
+
+def test_S1_repeats_its_own_way_in_the_first_beat_on_20_cells():
+    path = swim(20, 1)
+    assert path[-1, 1] - path[0, 1] == pytest.approx(0.0713, rel=0.02)

@@ -1,4 +1,4 @@
-"""How fast it is: each bench a module here with `measure()`, which yields its results as they come.
+"""How fast it is: each bench is a generator of results, a function of its name in a module here.
 
 Speeds are ratios within one run wherever there is something to compare with, so that they mean the
 same on every machine.
@@ -13,22 +13,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from flowborne.bench.result import Result
+    from flowborne.bench.timing import Result
 
 MODULES = {
     "pressure": "pressure",
-    "workers": "workers",
-    "chain": "chain",
-    "realtime": "realtime",
-    "human": "human",
-    "parts": "parts",
-    "size": "size",
-    "memory": "memory",
-    "threads": "threads",
-    "first-run": "first_run",
-    "start": "start",
+    "workers": "scaling",
+    "chain": "scaling",
+    "realtime": "speed",
+    "human": "speed",
+    "parts": "frame_costs",
+    "size": "frame_costs",
+    "memory": "frame_costs",
+    "threads": "scaling",
+    "first-run": "startup",
+    "start": "startup",
 }
-"""Name of each bench and the module here that holds it, in the order in which they run."""
+"""Bench -> the module here that has it, in the order in which they run."""
 
 
 def bench_names() -> Sequence[str]:
@@ -48,7 +48,8 @@ def run_benches(
     results = []
     for name in bench_names() if names is None else names:
         start = time.perf_counter()
-        found: Iterator[Result] = import_module(f"flowborne.bench.{MODULES[name]}").measure()
+        module = import_module(f"flowborne.bench.{MODULES[name]}")
+        found: Iterator[Result] = getattr(module, name.replace("-", "_"))()
         for result in found:
             now = time.perf_counter()
             results.append(replace(result, seconds=now - start))

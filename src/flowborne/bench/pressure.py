@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from flowborne import Array, Faces
-from flowborne.bench.result import Result, timed, verdict
+from flowborne.bench.timing import Result, timed, verdict
 from flowborne.machine import cores, kernel_threads
 from flowborne.operators import PressureSolution, PressureSystem
 
-NAME = "pressure"
 TOLERANCE = 1e-5
-"""True residual over that of zero pressure, of both solvers."""
+"""True residual of both solvers, over that of zero pressure."""
 
 THREADS = 2
 FASTER = 30.0
-"""Times that we must be faster than pyamg."""
+"""Least ratio of pyamg's time to ours."""
 
 COMPARED = (64, 128)
 REFINED = (32, 64, 128, 256)
@@ -28,7 +27,7 @@ GROWTH = 1.5
 """Iterations on the finest of REFINED over those on the coarsest, at most."""
 
 
-def measure() -> Iterator[Result]:
+def pressure() -> Iterator[Result]:
     """Ratios of time to pyamg's, then iteration counts."""
     for cells in COMPARED:
         yield compare(cells)
@@ -42,11 +41,11 @@ def compare(cells: int) -> Result:
     ours, seconds = timed(lambda: solved(weights, rhs), repeats=15)
     matrix, active = assemble(weights)
     b = rhs.ravel()[active]
-    pressure, theirs = timed(lambda: algebraic(matrix, b), repeats=2)
+    solution, theirs = timed(lambda: algebraic(matrix, b), repeats=2)
     mine = residual(matrix, b, ours.pressure.ravel()[active])
-    other = residual(matrix, b, pressure)
+    other = residual(matrix, b, solution)
     return Result(
-        NAME,
+        "pressure",
         f"{cells}^3 with cut cells, {min(THREADS, cores())} threads: pyamg's time over ours",
         theirs / seconds,
         f"at least {FASTER:g}",
@@ -71,7 +70,7 @@ def refine() -> Result:
         )
     growth = counts[-1] / counts[0]
     return Result(
-        NAME,
+        "pressure",
         f"iterations at {REFINED[-1]}^3 over those at {REFINED[0]}^3",
         growth,
         f"at most {GROWTH:g}",
@@ -105,13 +104,13 @@ def sphere_in_stream(cells: int) -> tuple[Faces, Array]:
 
 
 def solved(weights: Faces, rhs: Array) -> PressureSolution:
-    """Set-up and solve from nothing, on THREADS threads."""
+    """Set-up and solve on THREADS threads."""
     with kernel_threads(THREADS):
         return PressureSystem(weights).solve(rhs, tolerance=TOLERANCE)
 
 
 def assemble(weights: Faces) -> tuple[Any, NDArray[np.intp]]:
-    """Sparse matrix over the active cells, and which cells they are."""
+    """Sparse matrix over the active cells, and their numbers."""
     shape = weights[1].shape[0], weights[0].shape[1], weights[0].shape[2]
     index = np.arange(np.prod(shape)).reshape(shape)
     diagonal = np.zeros(shape)

@@ -1,12 +1,12 @@
-"""Which joints of a character become bodies, and the closed piece of its surface that each gets.
+"""The joints of a character that become bodies, and the closed piece of the surface of each.
 
-A point of the surface lies beyond a joint where that joint and all below it have more than half of
-the weight, and belongs to the last joint beyond which it lies. Weights being linear in a triangle,
-triangles are cut there. What lies beyond a joint is never partly beyond another one, so that every
-rim is between two bodies alone. The fan that closes it, about its middle, is the same on both
-sides: the pieces fill the whole. As rigid pieces turn, a crack would open between them, and fluid
-would enter it a hundred times as fast as they move: the shapes that the fluid meets have a dome
-about the joint in place of the fan, inside the body above.
+The surface is closed first. A point lies beyond a joint where that joint and all below it have more
+than half of the weight, and belongs to the last joint beyond which it lies. Weights are linear in a
+triangle, so triangles are cut at these lines. The regions beyond two joints are nested or disjoint,
+so that every rim lies between two bodies only. Both sides close it by the same fan about its
+middle: the pieces fill the whole. As rigid pieces turn, a crack would open between them, and fluid
+would enter it a hundred times as fast as they move. The shapes in the fluid therefore have a dome
+about the joint instead of the fan, inside the body above.
 """
 
 from __future__ import annotations
@@ -14,34 +14,47 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
-from flowborne.characters.closing import closed, domes, volume_of, weld
-from flowborne.characters.rig import Array, Integers, Rig, Surface
+from flowborne.characters.rig import PLAIN, Array, Integers, Rig, Surface
 from flowborne.errors import SceneError
-from flowborne.shapes.closing import fans, loops_of, rims_of
+from flowborne.shapes.closing import SMALL_HOLE, across_of, fans, loops_of, rims_of, wound
+from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh
 
-HALF = 0.5 + 1e-7
-"""Weight with which a point lies beyond a joint; above a half, so that no point lies beyond two."""
+WELD_DISTANCE = 1e-7
+"""Distance below which points are welded, relative to the size of the surface."""
 
-LEAST = 2e-3
+MAX_COINCIDENT = 50
+"""Points within that distance of a point, on average."""
+
+DOME_RINGS = 6
+"""Rings of triangles of a dome, 15 degrees each in a half ball."""
+
+BEYOND_WEIGHT = 0.5 + 1e-7
+"""Weight above which a point lies beyond a joint; more than a half, so that no point lies beyond
+two disjoint ones."""
+
+MIN_VOLUME = 2e-3
 """Part of the character's volume below which a joint is rigid with the one above it."""
 
-TRUNK = 0.05
+MIN_ROOT_VOLUME = 0.05
 """Part of the volume below which the topmost joint is rigid with the largest below it: a root that
-is a handle has no mass, and moves with the hips."""
+is only a handle has no mass, and moves with the hips."""
 
 
 @dataclass(frozen=True, eq=False)
 class Division:
     """A character as rigid bodies.
 
-    owners  (n,) number of the joint that each joint is rigid with, itself where it moves
-    leader  joint of the topmost body whose motion is that of the body
-    pieces  joint that moves -> its closed part of the surface, m, where the rig has it at rest
+    owners  (n,) for each joint the moving joint that it is rigid with, or itself
+    leader  joint of the topmost body from which the body takes its motion
+    pieces  moving joint -> its closed part of the surface at rest, m
     shapes  the same with domes about the joints
     volume  m^3 within the whole surface
-    filled  m across each hole of the surface that was closed
+    filled  m across each closed hole of the surface
     """
 
     owners: Integers
@@ -54,20 +67,15 @@ class Division:
     @property
     def bodies(self) -> tuple[int, ...]:
         """Joints that move, parents before children."""
-        return tuple(int(joint) for joint in np.flatnonzero(self.owners == np.arange(self.count)))
-
-    @property
-    def count(self) -> int:
-        """Number of joints."""
-        return len(self.owners)
+        return tuple(np.flatnonzero(self.owners == np.arange(len(self.owners))).tolist())
 
 
 def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Division:
     """The bodies of a character.
 
     name    of its file, for messages
-    fill    whether holes of any size are closed, and not only small ones
-    raises  SceneError when the surface is not closed, or has no inside
+    fill    whether to close holes of any size, and not only small ones
+    raises  SceneError when the surface remains open, or has no inside
     """
     whole, filled = closed(surface, name, fill)
     volume = volume_of((whole.vertices, whole.faces))
@@ -85,19 +93,121 @@ def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Divisi
     return Division(owners, leader, pieces, shapes, volume, filled)
 
 
-def _merged(rig: Rig, parts: Array) -> tuple[Integers, int]:
-    """Joint that each joint is rigid with, and the leader of the topmost.
+def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tuple[float, ...]]:
+    """A closed surface: coincident points are welded, triangles without area are removed, all
+    triangles of a part are wound alike, and holes are closed by fans about their middles.
 
-    parts  (n,) of the volume that each joint has
+    fill     whether to close holes wider than SMALL_HOLE of the surface's size, too
+    returns  the surface, and m across each closed hole
+    raises   SceneError where a hole remains open
+    """
+    first, welded = weld(surface.vertices)
+    weights = np.zeros((len(first), surface.weights.shape[1]))
+    np.add.at(weights, welded, surface.weights)
+    weights /= weights.sum(axis=1, keepdims=True)
+    points, faces = surface.vertices[first], welded[surface.faces]
+    kept = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    faces = wound(faces[kept])
+    rims = rims_of(faces)
+    loops = loops_of(rims)
+    across = [across_of(points[loop]) for loop in loops]
+    size = float(np.ptp(points, axis=0).max())
+    every, lids = fans(points, loops)
+    whole = np.concatenate([faces, lids])
+    wide = [n for n, width in enumerate(across) if width > SMALL_HOLE * size]
+    if wide and not fill:
+        widest = max(wide, key=lambda n: across[n])
+        x, y, z = points[loops[widest]].mean(axis=0)
+        ways = "Close them by --fill, or" if volume_of((every, whole)) > 0.0 else "Close them"
+        raise SceneError(
+            f"{name}: the surface is not watertight: {len(rims)} edges have a triangle on one side "
+            f"alone. Holes wider than {SMALL_HOLE:.0%} of it: {len(wide)}, the widest "
+            f"{across[widest]:.3g} m across, at ({x:.4g}, {y:.4g}, {z:.4g}) m. {ways} in Blender "
+            "(Mesh, Clean Up, Fill Holes), or leave out meshes that have no inside."
+        )
+    means = [weights[loop].mean(axis=0, keepdims=True) for loop in loops]
+    colours = np.concatenate([surface.colours[kept], np.full((len(lids), 3), PLAIN)])
+    return Surface(every, whole, np.concatenate([weights, *means]), colours), tuple(across)
+
+
+def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
+    """`fans`, with a dome instead of a fan in each rim around a joint.
+
+    The dome is centred on the joint, so that no gap opens between the two bodies as it turns.
+
+    centre  (3,) of the joint, m
+    """
+    flat, lids = fans(points, loops)
+    corners, faces, count = [flat], [np.zeros((0, 3), np.int64)], len(flat)
+    triangles = np.split(lids, np.cumsum([len(rim) for rim in loops], dtype=int))[:-1]
+    for rim, fan in zip(loops, triangles, strict=True):
+        start, middle = points[rim], flat[fan[0, 2]]
+        normal = np.cross(*np.moveaxis(flat[fan[:, :2]] - middle, 1, 0)).sum(axis=0)
+        width = np.linalg.norm(start - middle, axis=1).mean()
+        if np.linalg.norm(centre - middle) > width or not normal.any():
+            faces.append(fan)
+            continue
+        normal /= np.linalg.norm(normal)
+        about = centre + min(float(((start - centre) @ normal).mean()), 0.0) * normal
+        away = start - about
+        height, radius = away @ normal, np.linalg.norm(away, axis=1)
+        side = away - height[:, None] * normal
+        side /= np.maximum(np.linalg.norm(side, axis=1), np.finfo(float).tiny)[:, None]
+        tilt = np.arccos(np.clip(height / np.maximum(radius, np.finfo(float).tiny), -1.0, 1.0))
+        ring = rim
+        for share in np.arange(1, DOME_RINGS) / DOME_RINGS:
+            angle, far = ((1.0 - share) * tilt)[:, None], (1.0 - share) * radius[:, None]
+            far = far + share * radius.mean()
+            corners.append(about + far * (np.sin(angle) * side + np.cos(angle) * normal))
+            above = count + np.arange(len(rim))
+            count += len(rim)
+            a, b, c, d = np.roll(ring, -1), ring, above, np.roll(above, -1)
+            faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+            ring = above
+        corners.append((about + radius.mean() * normal)[None])
+        tip = np.full(len(rim), count)
+        count += 1
+        faces.append(np.stack([np.roll(ring, -1), ring, tip], axis=1))
+    return np.concatenate(corners), np.concatenate(faces)
+
+
+def weld(points: Array) -> tuple[Integers, Integers]:
+    """Numbers of the points that differ from all earlier ones, and for every point its number
+    among them."""
+    near = WELD_DISTANCE * float(np.ptp(points, axis=0).max())
+    single, of_point = np.unique(points, axis=0, return_inverse=True)
+    tree = cKDTree(single)
+    crowd = tree.count_neighbors(tree, near)
+    if crowd > MAX_COINCIDENT * len(points):
+        raise SceneError(
+            f"the surface has {crowd / len(points):.3g} points within {near:.3g} m of each other, "
+            f"and {MAX_COINCIDENT} are the most: most of it is tiny for its size. Look for stray "
+            "points."
+        )
+    pairs = tree.query_pairs(near, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(single), len(single)))
+    number = np.asarray(connected_components(links, directed=False)[1])[of_point.ravel()]
+    return np.unique(number, return_index=True)[1], number
+
+
+def volume_of(mesh: Mesh) -> float:
+    """m^3 inside; 0 without triangles."""
+    return ShapeMesh(*mesh).volume if len(mesh[1]) else 0.0
+
+
+def _merged(rig: Rig, parts: Array) -> tuple[Integers, int]:
+    """`owners` and `leader` of the division.
+
+    parts  (n,) each joint's part of the volume
     """
     owners, parts = np.arange(len(parts)), parts.copy()
     for joint in range(len(owners) - 1, 0, -1):
-        if parts[joint] < LEAST:
+        if parts[joint] < MIN_VOLUME:
             parent = int(rig.parents[joint])
             owners[owners == joint] = parent
             parts[parent] += parts[joint]
     top = leader = 0
-    while parts[top] < TRUNK:
+    while parts[top] < MIN_ROOT_VOLUME:
         below = np.flatnonzero(_parents(rig, owners) == top)
         if not len(below):
             break
@@ -110,12 +220,13 @@ def _merged(rig: Rig, parts: Array) -> tuple[Integers, int]:
 def _pieces(
     rig: Rig, owners: Integers, surface: Surface, *, domed: bool = True
 ) -> tuple[list[Mesh], list[Mesh]]:
-    """The closed part of each joint, without triangles where it has none; and those with domes,
-    where they are asked for."""
-    share = surface.weights @ _beyond(rig.parents) - HALF
+    """The closed part of each joint, empty for a joint without one; and, if `domed`, those parts
+    with domes."""
+    beyond = _beyond(rig.parents)
+    share = surface.weights @ beyond - BEYOND_WEIGHT
     below = [np.flatnonzero(_parents(rig, owners) == joint) for joint in range(len(owners))]
-    share[:, owners != np.arange(len(owners))] = -HALF
-    of_vertex = _last(share, rig.parents)[surface.faces]
+    share[:, owners != np.arange(len(owners))] = -BEYOND_WEIGHT
+    of_vertex = _last(share)[surface.faces]
     pure = (of_vertex == of_vertex[:, :1]).all(axis=1)
     corners = [surface.vertices[surface.faces[pure]].reshape(-1, 3)]
     joints = [of_vertex[pure, 0]]
@@ -131,9 +242,8 @@ def _pieces(
     points, faces = every[first], welded.reshape(-1, 3)
     sound = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     faces, of_face = faces[sound], of_face[sound]
-    beyond = _beyond(rig.parents) > 0.0
     rims = {
-        joint: loops_of(rims_of(faces[beyond[of_face, joint]]))
+        joint: loops_of(rims_of(faces[beyond[of_face, joint] > 0.0]))
         for joint in np.unique(of_face).tolist()
         if rig.parents[joint] >= 0
     }
@@ -152,7 +262,7 @@ def _pieces(
 
 
 def _beyond(parents: Integers) -> Array:
-    """(n, n) 1 where a joint, the row, is another one, the column, or anywhere below it."""
+    """(n, n) 1 where the joint of the row is that of the column or below it."""
     found = np.eye(len(parents))
     for joint, parent in enumerate(parents):
         if parent >= 0:
@@ -161,21 +271,19 @@ def _beyond(parents: Integers) -> Array:
 
 
 def _parents(rig: Rig, owners: Integers) -> Integers:
-    """(n,) joint that moves above each joint that moves; -1 for the others, and at the top."""
+    """(n,) the moving joint above each moving joint; -1 for other joints, and at the top."""
     moves = owners == np.arange(len(owners))
     return np.where(moves & (rig.parents >= 0), owners[rig.parents], -1)
 
 
-def _last(share: Array, parents: Integers) -> Integers:
-    """(k,) the joint farthest from the root whose share (k, n) is above 0."""
-    found = np.zeros(len(share), np.int64)
-    for joint in range(len(parents)):
-        found[share[:, joint] > 0.0] = joint
-    return found
+def _last(share: Array) -> Integers:
+    """(k,) the last joint with a share (k, n) above 0, the root without any."""
+    return np.asarray((share > 0.0).cumsum(axis=1).argmax(axis=1))
 
 
 def _cut(triangle: Array, heights: list[Array]) -> Array:
-    """(k, 3) the polygon of a triangle where linear functions, (3,) at its corners, are above 0."""
+    """(k, 3) the polygon of a triangle in which all linear functions, (3,) at its corners, are
+    positive."""
     share = np.eye(3)
     for height in heights:
         share = _clipped(share, share @ height)
@@ -183,7 +291,7 @@ def _cut(triangle: Array, heights: list[Array]) -> Array:
 
 
 def _clipped(polygon: Array, height: Array) -> Array:
-    """The part of a convex polygon (k, m) where a linear function, (k,) there, is above 0.
+    """The part of a convex polygon (k, m) in which a linear function, (k,) there, is positive.
 
     source  Sutherland and Hodgman 1974, Reentrant polygon clipping, for one plane
     """
@@ -199,7 +307,7 @@ def _clipped(polygon: Array, height: Array) -> Array:
 
 
 def _joined(parts: list[Mesh]) -> Mesh:
-    """Triangles of several meshes as one mesh without those that lie back to back."""
+    """Triangles of several meshes as one mesh, without pairs that lie back to back."""
     corners = np.concatenate([points[faces].reshape(-1, 3) for points, faces in parts])
     points, number = np.unique(corners, axis=0, return_inverse=True)
     faces = number.reshape(-1, 3)

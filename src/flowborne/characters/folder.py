@@ -12,10 +12,16 @@ import tomli_w
 
 from flowborne.characters.division import Division, divided
 from flowborne.characters.limits import check_work
-from flowborne.characters.model import model_files
-from flowborne.characters.pose import as_cycle, clip_of, posed
-from flowborne.characters.rig import Action, Array, Rig, Surface, printable
-from flowborne.characters.size import scaled, size_notes
+from flowborne.characters.model import as_cycle, clip_of, model_files, posed
+from flowborne.characters.rig import (
+    Action,
+    Array,
+    Rig,
+    Surface,
+    printable,
+    scaled,
+    size_notes,
+)
 from flowborne.characters.source import clip_number, read_source
 from flowborne.errors import SceneError
 from flowborne.motion.bvh import write_clip
@@ -25,14 +31,14 @@ from flowborne.scenes.load import load_scene
 from flowborne.scenes.warn_speed import steps_for_bodies
 from flowborne.solids.skins import skinned
 
-ROOM = 0.35
-"""Water on every side of all that the clip reaches, in sizes of the character."""
+MARGIN = 0.35
+"""Water on every side of the region that the clip reaches, in sizes of the character."""
 
 DENSITIES = (1e-3, 1e6)
 """kg/m^3"""
 
-LONGEST_STEM = 150
-"""Bytes of the name that all files of a character begin with."""
+MAX_STEM_BYTES = 150
+"""Of the name with which all files of a character begin."""
 
 CELLS = 64
 """Cells along the longest side of the domain."""
@@ -40,10 +46,10 @@ CELLS = 64
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import has made.
+    """The result of an import.
 
     scene  file of the scene
-    notes  what became of joints, surface and clip, a sentence each
+    notes  sentences about joints, surface and clip
     """
 
     scene: Path
@@ -60,20 +66,20 @@ def import_character(
     scale: float = 1.0,
     fill: bool = False,
 ) -> Imported:
-    """Make a scene of a rigged character, in a folder of its own.
+    """Make a scene of a rigged character in a new folder.
 
-    The character floats in a room of water, and its joints follow the clip; the folder's scene is
-    there to be edited.
+    The character floats in a room of water, and its joints follow the clip. The scene is meant to
+    be edited.
 
     file        .glb, .gltf or USD with a skeleton and a surface bound to it
-    out         folder, which is made when it is missing
+    out         folder, created if missing
     clip        name of the clip; the only one by default
-    animations  file that has the clip, on joints of the same names; `file` by default
+    animations  file of the clip, with joints of the same names; `file` by default
     density     kg/m^3
-    scale       by which the character is made larger, 0.01 where its file is in centimetres
-    fill        whether holes of any size are closed, and not only small ones
-    raises      SceneError when a file cannot be used, a library is missing, or the scene is there
-                already; OSError when the folder cannot be written
+    scale       of the character's size, 0.01 for a file in centimetres
+    fill        whether to close holes of any size, and not only small ones
+    raises      SceneError when a file cannot be used, a library is missing, or the scene exists;
+                OSError when the folder cannot be written
     """
     if not DENSITIES[0] <= density <= DENSITIES[1]:
         raise SceneError(
@@ -126,15 +132,15 @@ def import_character(
     try:
         steps = _steps(scene)
     except SceneError:
-        scene.unlink()  # what cannot be run is no obstacle to the next import
+        scene.unlink()  # a scene that cannot run must not block the next import
         raise
     scene.write_bytes(_scene(name, called, motion, loop, reach, steps).encode())
     left_out = printable(", ".join(source.left_out))
     notes = (
-        *_told(rig, division, density),
+        *_body_notes(rig, division, density),
         *([f"left out, for no joint carries them by weights: {left_out}"] if left_out else []),
         *sizes,
-        _told_clip(motion, moving.clips[number], strays),
+        _clip_note(motion, moving.clips[number], strays),
     )
     return Imported(scene, notes)
 
@@ -142,7 +148,7 @@ def import_character(
 def _plain(stem: str) -> str:
     """A name for files and models."""
     plain = "".join(c if c.isalnum() or c in "-_" else "-" for c in stem) or "character"
-    return plain.encode()[:LONGEST_STEM].decode(errors="ignore")
+    return plain.encode()[:MAX_STEM_BYTES].decode(errors="ignore")
 
 
 def _bvh(clip: Clip) -> bytes:
@@ -157,13 +163,13 @@ def _reach(rig: Rig, surface: Surface, pose: Action) -> tuple[Array, Array]:
     shift = pose.position - np.einsum("fnij,nj->fni", turn, rig.position)
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     for turned, shifted in zip(turn, shift, strict=True):
-        places = skinned(surface.vertices, surface.weights, turned, shifted)
-        low, high = np.minimum(low, places.min(axis=0)), np.maximum(high, places.max(axis=0))
+        points = skinned(surface.vertices, surface.weights, turned, shifted)
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     return low, high
 
 
 def _steps(scene: Path) -> int:
-    """Steps a frame in which the fastest body of a scene crosses a cell at most."""
+    """Steps a frame such that the fastest body of a scene crosses at most one cell in a step."""
     loaded = load_scene(scene)
     return steps_for_bodies(loaded, build(loaded).world.setup)
 
@@ -171,9 +177,9 @@ def _steps(scene: Path) -> int:
 def _scene(
     name: str, called: str, clip: Clip, loop: bool, reach: tuple[Array, Array], steps: int = 1
 ) -> str:
-    """The scene file, with remarks for whoever edits it."""
+    """The scene file, with comments for the user."""
     low, high = reach
-    room = ROOM * float((high - low).max())
+    room = MARGIN * float((high - low).max())
     root, last = clip.names[0], clip.names[-1]
     return f"""description = {_quoted(called)}
 dimensions = 3
@@ -223,7 +229,7 @@ exports = ["{name}.glb"]
 
 
 def _quoted(text: str) -> str:
-    """A text as TOML has it."""
+    """A text as a TOML string."""
     return tomli_w.dumps({"text": text}).partition("= ")[2].strip()
 
 
@@ -235,7 +241,7 @@ def _corner(point: Array) -> list[float]:
     return [float(f"{x:.4g}") for x in point]
 
 
-def _told(rig: Rig, division: Division, density: float) -> Sequence[str]:
+def _body_notes(rig: Rig, division: Division, density: float) -> Sequence[str]:
     """Joints, bodies and mass in sentences."""
     rigid = [name for n, name in enumerate(rig.names) if division.owners[n] != n]
     lines = [
@@ -250,7 +256,7 @@ def _told(rig: Rig, division: Division, density: float) -> Sequence[str]:
     return lines
 
 
-def _told_clip(clip: Clip, name: str, strays: float) -> str:
+def _clip_note(clip: Clip, name: str, strays: float) -> str:
     return (
         f"clip '{name}': {clip.frames} frames in {clip.duration:.4g} s; its joints are at most "
         f"{strays:.2g} m from where the file has them"

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from flowborne.characters.gltf_accessors import Accessors
-from flowborne.characters.gltf_colours import Colours
+from flowborne.characters.gltf_buffers import Accessors, Colours
 from flowborne.characters.gltf_document import Node, Primitive, Skin, read_document
 from flowborne.characters.gltf_gate import WIDTH, check_document, joint_sets
 from flowborne.characters.limits import check_size
@@ -29,12 +28,12 @@ from flowborne.characters.rig import (
     one_tree,
     own_names,
     placed,
-    told_apart,
+    unique_names,
 )
 from flowborne.errors import SceneError
 
 PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
-"""Extensions that hide the numbers."""
+"""Extensions that compress the arrays."""
 
 Curve = tuple[Array, Array, str]
 """Times (k,) s, values (k or 3 k, m) and the kind of interpolation."""
@@ -66,20 +65,21 @@ class GltfSource:
         self._joints = [n for n in self._order if n in skinned or not skinned]
         if not self._joints:
             raise SceneError(f"{path.name} has no joints. Export the armature with it.")
+        self._number = {node: joint for joint, node in enumerate(self._joints)}
 
     @property
     def clips(self) -> tuple[str, ...]:
         """Names of the animations, each once."""
         found = self._gltf.animations
-        return told_apart([clip.name or f"animation_{n}" for n, clip in enumerate(found)])
+        return unique_names([clip.name or f"animation_{n}" for n, clip in enumerate(found)])
 
     @cached_property
-    @np.errstate(all="ignore")  # what overflows is found in the end
+    @np.errstate(all="ignore")  # `placed` checks the result
     def rig(self) -> Rig:
-        """The joints where their skin is bound to them; every node of a file without a skin."""
+        """The joints in the pose of their skin's binding; all nodes of a file without a skin."""
         check_size(len(self._joints), 0, self._name)
         names = own_names([self._gltf.nodes[node].name for node in self._joints])
-        number = {node: joint for joint, node in enumerate(self._joints)}
+        number = self._number
         parents = []
         for node in self._joints:
             above = self._parents[node]
@@ -98,7 +98,6 @@ class GltfSource:
     def surface(self) -> Surface | None:
         """All skinned meshes as one; None when there is none."""
         found = []
-        number = {node: joint for joint, node in enumerate(self._joints)}
         carried = [n for n in self._gltf.nodes if n.mesh is not None and n.skin is not None]
         check_size(len(self._joints), sum(self._points(node) for node in carried), self._name)
         for node in carried:
@@ -106,7 +105,7 @@ class GltfSource:
             assert node.skin is not None
             skin = self._gltf.skins[node.skin]
             inner = self._into_world(skin)
-            own = np.array([number[joint] for joint in skin.joints])
+            own = np.array([self._number[joint] for joint in skin.joints])
             for part in self._gltf.meshes[node.mesh].primitives:
                 points = self._arrays.read(part.attributes["POSITION"]).astype(float)
                 corners = np.arange(len(points))
@@ -138,7 +137,7 @@ class GltfSource:
     def action(self, clip: int) -> Action:
         """The `clip`-th animation, sampled at its own rate.
 
-        raises  SceneError when it moves nothing
+        raises  SceneError when it moves no joint
         """
         animation = self._gltf.animations[clip]
         curves: dict[tuple[int, str], Curve] = {}
@@ -164,7 +163,7 @@ class GltfSource:
 
     @cached_property
     def _rest(self) -> Array:
-        """(nodes, 4, 4) every node's frame to the world's as the file has it without a clip."""
+        """(nodes, 4, 4) every node's frame to the world's without a clip."""
         return self._worlds(np.zeros(1), {})[0]
 
     def _parents_first(self) -> list[int]:
@@ -191,18 +190,18 @@ class GltfSource:
         return world
 
     def _into_world(self, skin: Skin) -> Array:
-        """(4, 4) from the axes of a skin's meshes to the world's: by its first joint, at rest."""
+        """(4, 4) the frame of a skin's meshes to the world's, by its first joint at rest."""
         first = min(range(len(skin.joints)), key=lambda n: self._order.index(skin.joints[n]))
         return np.asarray(self._rest[skin.joints[first]] @ self._inverse_binds(skin)[first])
 
     def _inverse_binds(self, skin: Skin) -> Array:
-        """(joints, 4, 4) world of a skin's meshes to each joint's frame."""
+        """(joints, 4, 4) the frame of a skin's meshes to each joint's."""
         assert skin.inverse_bind_matrices is not None
         columns = self._arrays.read(skin.inverse_bind_matrices)[: len(skin.joints)].astype(float)
         return columns.reshape(-1, 4, 4).swapaxes(1, 2)
 
     def _weights(self, part: Primitive, joints: Integers, count: int) -> Array:
-        """(count, n) shares of all joints, which need not sum to one in the file."""
+        """(count, n) weights of all joints, normalized: in the file they need not sum to one."""
         shares = np.zeros((count, len(self._joints)))
         for number, weight in joint_sets(part):
             own = joints[self._arrays.read(part.attributes[number]).astype(np.int64)]
@@ -234,7 +233,7 @@ def _local(node: Node, number: int, times: Array, curves: dict[tuple[int, str], 
 
 
 def _sampled(keys: Array, values: Array, kind: str, times: Array, *, turns: bool) -> Array:
-    """(frames, m) values of a curve at some times; `turns` where they are quaternions."""
+    """(frames, m) values of a curve at some times; `turns` says that they are quaternions."""
     times = np.clip(times, keys[0], keys[-1])
     before = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, max(len(keys) - 2, 0))
     if kind == "CUBICSPLINE":

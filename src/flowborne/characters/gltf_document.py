@@ -1,4 +1,4 @@
-"""A glTF file as plain tables, each value of its type: what is there, and not yet whether it fits.
+"""A glTF file as typed tables, not yet checked for consistency.
 
 source  Khronos glTF 2.0 specification, sections 3.4, 3.6 and 4.4 (GLB), and appendix C
 """
@@ -15,11 +15,9 @@ from urllib.parse import unquote, unquote_to_bytes, urlsplit
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, model_validator
 from pydantic.alias_generators import to_camel
 
+from flowborne.characters.limits import MAX_FILE_BYTES
 from flowborne.errors import SceneError
 from flowborne.files.given import check_file
-
-LARGEST_FILE = 1 << 30
-"""Bytes of a file, and of all its buffers together."""
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
@@ -32,7 +30,7 @@ Sixteen = Annotated[list[Number], Field(min_length=16, max_length=16)]
 
 
 class _Table(BaseModel):
-    """Keys that nothing here reads are left out; null is as if a key were not there."""
+    """Unknown keys are ignored; null counts as a missing key."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, alias_generator=to_camel)
 
@@ -157,7 +155,7 @@ class Animation(_Table):
 
 
 class Document(_Table):
-    """What of a glTF document a character is made of."""
+    """The parts of a glTF document that a character needs."""
 
     extensions_required: list[str] = []
     buffers: list[Buffer] = []
@@ -200,19 +198,19 @@ def read_document(path: Path) -> tuple[Document, list[memoryview]]:
 
 
 def _bounded(path: Path, shown: str) -> bytes:
-    """The bytes of a file; raises SceneError when there are too many, or none can be read."""
+    """The bytes of a file; raises SceneError when there are too many, or it cannot be read."""
     try:
         check_file(path, None)
         with open(path, "rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+            data = file.read(MAX_FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         said = getattr(error, "strerror", None) or str(error)
         raise SceneError(
             f"{shown} cannot be read ({said}). Put it there, or export the character as one .glb."
         ) from None
-    if len(data) > LARGEST_FILE:
+    if len(data) > MAX_FILE_BYTES:
         raise SceneError(
-            f"{shown} has more than {LARGEST_FILE / 2**30:g} GB, which is the most. Export fewer "
+            f"{shown} has more than {MAX_FILE_BYTES / 2**30:g} GB, which is the most. Export fewer "
             "meshes and clips."
         )
     return data
@@ -238,10 +236,10 @@ def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
 
 def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memoryview]:
     asked = sum(buffer.byte_length for buffer in document.buffers)
-    if asked > LARGEST_FILE:
+    if asked > MAX_FILE_BYTES:
         raise SceneError(
-            f"{path.name}: its buffers ask for {asked / 2**30:.3g} GB, and {LARGEST_FILE / 2**30:g}"
-            " GB is the most. Export fewer meshes and clips."
+            f"{path.name}: its buffers ask for {asked / 2**30:.3g} GB, and "
+            f"{MAX_FILE_BYTES / 2**30:g} GB is the most. Export fewer meshes and clips."
         )
     found = []
     for number, buffer in enumerate(document.buffers):
@@ -262,7 +260,7 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
 
 
 def _from_uri(path: Path, uri: str, where: str) -> bytes:
-    """What a uri holds, or the file in the folder of `path` that it names."""
+    """The content of a data uri, or of the file in the folder of `path` that a uri names."""
     if uri[:5].lower() == "data:":
         try:
             return embedded(uri)
@@ -275,7 +273,7 @@ def _from_uri(path: Path, uri: str, where: str) -> bytes:
 
 
 def embedded(uri: str) -> bytes:
-    """What a data uri holds, of any type, as base64 or percent-encoded.
+    """The content of a data uri of any type, base64 or percent-encoded.
 
     source  RFC 2397; base64 may have line breaks and lack its padding
     raises  ValueError
@@ -291,7 +289,7 @@ def embedded(uri: str) -> bytes:
 
 
 def inside(uri: str, folder: Path, where: str) -> Path:
-    """The path of a file in `folder`, relative to it, that a percent-encoded reference names.
+    """The path, relative to `folder`, that a percent-encoded reference names.
 
     raises  SceneError when it leaves the folder: by a scheme, a host, an absolute path, a part '..'
             or a symbolic link

@@ -1,4 +1,4 @@
-"""What a glTF document has to be before a character is made of it: checked whole, then read.
+"""Checks of a whole glTF document, before any of it is read.
 
 source  Khronos glTF 2.0 specification, sections 3.5 (nodes), 3.7 (meshes, skins) and 3.11
         (animations)
@@ -11,16 +11,16 @@ from math import hypot
 
 import numpy as np
 
-from flowborne.characters.gltf_accessors import Accessors, within, wrong
+from flowborne.characters.gltf_buffers import Accessors, within, wrong
 from flowborne.characters.gltf_document import Document, Primitive, Sampler, Skin
 from flowborne.errors import SceneError
 
-MOST_NODES = 10_000
+MAX_NODES = 10_000
 
 TRIANGLES = 4
 FLOATS, INDICES, JOINTS = (5126,), (5121, 5123, 5125), (5121, 5123)
 PARTS = (5120, 5121, 5122, 5123, 5126)
-"""Types of components: floats, whole numbers, and those that may also stand for parts of one."""
+"""Types of components: floats, integers, and floats or normalized integers."""
 
 WIDTH = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 """Path of a channel -> type of its values."""
@@ -53,8 +53,8 @@ def check_document(name: str, document: Document, arrays: Accessors) -> None:
             _check_part(primitive, joints, arrays, own, node.name)
     for number, animation in enumerate(document.animations):
         where = f"{name}, animations[{number}]"
-        for place, channel in enumerate(animation.channels):
-            own = f"{where}.channels[{place}]"
+        for k, channel in enumerate(animation.channels):
+            own = f"{where}.channels[{k}]"
             within(channel.sampler, animation.samplers, f"{own}.sampler", "samplers in this clip")
             if channel.target.node is None or channel.target.path not in WIDTH:
                 continue
@@ -67,9 +67,9 @@ def check_document(name: str, document: Document, arrays: Accessors) -> None:
 def check_tree(name: str, document: Document) -> None:
     """Raise SceneError unless every node has at most one parent and none is its own ancestor."""
     nodes = document.nodes
-    if len(nodes) > MOST_NODES:
+    if len(nodes) > MAX_NODES:
         raise SceneError(
-            f"{name} has {len(nodes)} nodes, and {MOST_NODES} are the most. Export the character "
+            f"{name} has {len(nodes)} nodes, and {MAX_NODES} are the most. Export the character "
             "alone."
         )
     parents = [-1] * len(nodes)
@@ -163,7 +163,7 @@ def _check_part(part: Primitive, joints: int, arrays: Accessors, where: str, nod
 
 
 def joint_sets(part: Primitive) -> Iterator[tuple[str, str]]:
-    """Attributes of joints and weights, four a vertex each."""
+    """Names of the attributes of joints and weights, four of each for a vertex."""
     number = 0
     while f"JOINTS_{number}" in part.attributes:
         yield f"JOINTS_{number}", f"WEIGHTS_{number}"

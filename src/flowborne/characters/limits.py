@@ -1,4 +1,4 @@
-"""What a character may ask for: sizes with which an import ends, checked before the work."""
+"""Limits of a character, checked before the work of an import."""
 
 from __future__ import annotations
 
@@ -9,39 +9,42 @@ from flowborne.errors import SceneError
 
 Array = NDArray[np.float64]
 
-MOST_JOINTS = 500
+MAX_FILE_BYTES = 1 << 30
+"""Of a file, and of all its buffers together."""
+
+MAX_JOINTS = 500
 """Each is a body in the one above it."""
 
-MOST_VERTICES = 500_000
+MAX_VERTICES = 500_000
 
-MOST_WEIGHTS = 50_000_000
+MAX_WEIGHTS = 50_000_000
 """Vertices times joints."""
 
-MOST_POSES = 3_000_000
+MAX_POSES = 3_000_000
 """Frames times nodes."""
 
-MOST_SKINNED = 5e10
+MAX_SKINNING = 5e10
 """Frames times vertices times joints, some minutes of skinning."""
 
-FARTHEST = 1e6
-"""m from the origin."""
+MAX_COORDINATE = 1e6
+"""m"""
 
-SMALLEST = 1e-6
+MIN_SIZE = 1e-6
 """m along the longest side of a surface."""
 
-FRAME_TIMES = (1e-5, 1e4)
+KEY_INTERVALS = (1e-5, 1e4)
 """s between keys."""
 
-LONGEST_NAME = 100
-"""Letters of a joint's name."""
+MAX_NAME_LENGTH = 100
+"""Characters of a joint's name."""
 
 
 def check_size(joints: int, vertices: int, where: str) -> None:
-    """Raise SceneError where there are more joints, vertices or weights than can be worked on."""
+    """Raise SceneError where there are more joints, vertices or weights than an import can take."""
     for count, most, what in (
-        (joints, MOST_JOINTS, "joints"),
-        (vertices, MOST_VERTICES, "vertices"),
-        (joints * vertices, MOST_WEIGHTS, "weights (vertices times joints)"),
+        (joints, MAX_JOINTS, "joints"),
+        (vertices, MAX_VERTICES, "vertices"),
+        (joints * vertices, MAX_WEIGHTS, "weights (vertices times joints)"),
     ):
         if count > most:
             raise SceneError(
@@ -51,30 +54,30 @@ def check_size(joints: int, vertices: int, where: str) -> None:
 
 
 def check_surface(vertices: Array, where: str) -> None:
-    """Raise SceneError unless a surface (k, 3), m, has a size and is near."""
-    check_places(vertices, where)
+    """Raise SceneError unless a surface (k, 3), m, has a size and is near the origin."""
+    check_points(vertices, where)
     size = float(np.ptp(vertices, axis=0).max())
-    if size < SMALLEST:
+    if size < MIN_SIZE:
         raise SceneError(
-            f"{where}: the surface is {size:.3g} m long, and {SMALLEST:g} m is the least. Scale it "
+            f"{where}: the surface is {size:.3g} m long, and {MIN_SIZE:g} m is the least. Scale it "
             "before exporting."
         )
 
 
-def check_places(places: Array, where: str) -> None:
-    """Raise SceneError unless places (..., 3), m, are finite and not too far away."""
+def check_points(points: Array, where: str) -> None:
+    """Raise SceneError unless points (..., 3), m, are finite and near the origin."""
     with np.errstate(all="ignore"):
-        largest = float(np.abs(places).max(initial=0.0))
-    if not largest <= FARTHEST:
+        largest = float(np.abs(points).max(initial=0.0))
+    if not largest <= MAX_COORDINATE:
         raise SceneError(
-            f"{where}: a point has a coordinate of {largest:.3g} m, and {FARTHEST:g} m is the "
-            "most. Look for stray points, or scale the character before exporting."
+            f"{where}: a point has a coordinate of {largest:.3g} m, and {MAX_COORDINATE:g} m is "
+            "the most. Look for stray points, or scale the character before exporting."
         )
 
 
 def check_poses(matrices: Array, where: str) -> None:
-    """Raise SceneError unless frames (..., 4, 4) are finite and not too far away."""
-    check_places(matrices[..., :3, 3], where)
+    """Raise SceneError unless frames (..., 4, 4) are finite and near the origin."""
+    check_points(matrices[..., :3, 3], where)
     with np.errstate(all="ignore"):
         largest = float(np.abs(matrices[..., :3, :3]).max(initial=0.0))
     if not largest < 1e12:
@@ -85,26 +88,26 @@ def check_poses(matrices: Array, where: str) -> None:
 
 def check_work(frames: int, joints: int, vertices: int, where: str) -> None:
     """Raise SceneError where skinning a surface in every frame takes hours."""
-    if (work := float(frames) * joints * vertices) > MOST_SKINNED:
+    if (work := float(frames) * joints * vertices) > MAX_SKINNING:
         raise SceneError(
             f"{where}: {frames:,} frames of {vertices:,} vertices on {joints} joints ask for "
-            f"{work:.2g} sums, and {MOST_SKINNED:g} are the most. Export a coarser mesh or a "
+            f"{work:.2g} sums, and {MAX_SKINNING:g} are the most. Export a coarser mesh or a "
             "shorter clip."
         )
 
 
 def check_frames(frames: float, step: float, nodes: int, where: str) -> None:
-    """Raise SceneError where a clip has too many frames, for as many nodes, or too close ones.
+    """Raise SceneError where a clip has too many frames for its nodes, or too close ones.
 
     step  s between keys
     """
-    if not FRAME_TIMES[0] <= step <= FRAME_TIMES[1]:
+    if not KEY_INTERVALS[0] <= step <= KEY_INTERVALS[1]:
         raise SceneError(
-            f"{where} has a key every {step:.3g} s, and {FRAME_TIMES[0]:g} to {FRAME_TIMES[1]:g} s "
-            "can be. Sample it anew before exporting."
+            f"{where} has a key every {step:.3g} s, and {KEY_INTERVALS[0]:g} to "
+            f"{KEY_INTERVALS[1]:g} s can be. Sample it anew before exporting."
         )
-    if frames * nodes > MOST_POSES:
+    if frames * nodes > MAX_POSES:
         raise SceneError(
-            f"{where} asks for {frames:,.0f} frames of {nodes} nodes, and {MOST_POSES:,} poses "
+            f"{where} asks for {frames:,.0f} frames of {nodes} nodes, and {MAX_POSES:,} poses "
             "are the most. Export a shorter clip, or one with fewer keys."
         )

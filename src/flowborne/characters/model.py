@@ -1,21 +1,30 @@
-"""The bodies of a character as MJCF, with its surface as skins for viewers and exporters."""
+"""The bodies of a character as MJCF, and their motion in a clip.
+
+The surface is a skin for viewers and exporters."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from flowborne.characters.colours import few_colours
 from flowborne.characters.division import Division
-from flowborne.characters.rig import Array, Rig, Surface
+from flowborne.characters.rig import Action, Array, Integers, Rig, Surface
+from flowborne.motion.clip import Clip
+from flowborne.motion.clip_loop import CLOSED
+from flowborne.quaternions import angle, inverse, product
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.geoms import DISPLACED
 
-INFLUENCES = 8
-"""Joints that carry a vertex of the skin at most: as many as exporters write."""
+MAX_INFLUENCES = 8
+"""Joints that carry a vertex of the skin; exporters write as many."""
+
+MAX_COLOURS = 8
+"""Colours of a surface; each is a skin."""
 
 Element = ElementTree.Element
 
@@ -23,10 +32,10 @@ Element = ElementTree.Element
 def model_files(
     name: str, rig: Rig, division: Division, surface: Surface, density: float
 ) -> dict[str, bytes]:
-    """A model whose bodies have the rig's names and frames: file -> content.
+    """A model with a body for each joint of the rig, with its name and frame: file -> content.
 
-    Every joint of the rig is a body, in whose frame it rests. Those that move have a ball joint of
-    the same name, the topmost a free joint; the others are rigid with the body above them.
+    Bodies of moving joints have a ball joint of the same name, the topmost a free joint; the others
+    are rigid with the body above them.
 
     density  kg/m^3 of all pieces
     """
@@ -68,8 +77,8 @@ def model_files(
 
 
 def mass_of(mesh: Mesh, density: float) -> Any:
-    """Mass, centre and inertia of a closed surface, as trimesh has them."""
-    import trimesh  # a tenth of a second that only characters need
+    """Mass, centre and inertia of a closed surface, by trimesh."""
+    import trimesh  # takes a tenth of a second
 
     vertices, faces = mesh
     return trimesh.triangles.mass_properties(vertices[faces], density=density)
@@ -86,7 +95,7 @@ def _inertial(mass: Any) -> Element:
 
 
 def _place(rig: Rig, joint: int) -> dict[str, str]:
-    """Where a joint is in the frame of the one above it."""
+    """Position and rotation of a joint in the frame of the one above it, as attributes."""
     position, rotation, parent = rig.position[joint], rig.rotation[joint], int(rig.parents[joint])
     if parent >= 0:
         above = rig.rotation[parent].T
@@ -96,7 +105,7 @@ def _place(rig: Rig, joint: int) -> dict[str, str]:
 
 
 def _skins(name: str, rig: Rig, surface: Surface) -> Element:
-    """The whole surface, carried by the bodies: a skin for each of its colours."""
+    """The whole surface on the bodies: a skin for each of its colours."""
     root = ElementTree.Element("mujoco")
     deformable = ElementTree.SubElement(root, "deformable")
     colours, which = few_colours(surface.colours)
@@ -110,13 +119,13 @@ def _skins(name: str, rig: Rig, surface: Surface) -> Element:
             face=" ".join(map(str, faces.ravel().tolist())),
             rgba=f"{_numbers(colour)} 1",
         )
-        _carry(skin, rig, surface.weights[used])
+        _add_bones(skin, rig, surface.weights[used])
     return root
 
 
-def _carry(skin: Element, rig: Rig, weights: Array) -> None:
-    """Bones of a skin, which carry its vertices with shares `weights` (k, n)."""
-    least = np.sort(weights, axis=1)[:, -INFLUENCES:].min(axis=1)
+def _add_bones(skin: Element, rig: Rig, weights: Array) -> None:
+    """Add the bones to a skin whose vertices have the weights (k, n)."""
+    least = np.sort(weights, axis=1)[:, -MAX_INFLUENCES:].min(axis=1)
     carried = (weights >= least[:, None]) & (weights > 0.0)
     turns = Rotation.from_matrix(rig.rotation).as_quat(scalar_first=True)
     for joint in np.flatnonzero(carried.any(axis=0)):
@@ -130,6 +139,20 @@ def _carry(skin: Element, rig: Rig, weights: Array) -> None:
             vertid=" ".join(map(str, vertices.tolist())),
             vertweight=_numbers(weights[vertices, joint]),
         )
+
+
+def few_colours(colours: Array) -> tuple[Array, Integers]:
+    """At most MAX_COLOURS colours (n, 3), and the number (m,) of the one for each of (m, 3)."""
+    bytes_of = np.rint(255.0 * np.clip(np.nan_to_num(colours), 0.0, 1.0)).astype(np.uint8)
+    found, which = np.unique(bytes_of, axis=0, return_inverse=True)
+    if len(found) > MAX_COLOURS:
+        reduced = Image.fromarray(bytes_of[None]).quantize(
+            MAX_COLOURS, Image.Quantize.MEDIANCUT, MAX_COLOURS
+        )
+        palette = np.array(reduced.getpalette(), np.uint8).reshape(-1, 3)
+        used, which = np.unique(np.asarray(reduced)[0], return_inverse=True)
+        found = palette[used]
+    return found / 255.0, which.reshape(-1).astype(np.int64)
 
 
 def _obj(mesh: Mesh) -> bytes:
@@ -146,3 +169,90 @@ def _numbers(values: Array) -> str:
 def _text(root: Element) -> bytes:
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="utf-8") + b"\n"
+
+
+def posed(rig: Rig, source: Rig, action: Action) -> Action:
+    """A rig in the frames of a clip of any file, matched by the names of the joints.
+
+    Joints get the rotations of the clip; joints without any keep their angles. Displacements in the
+    parents' frames are scaled by the ratio of the bones' lengths.
+
+    source  the skeleton of the clip's file
+    """
+    number = [source.names.index(name) if name in source.names else -1 for name in rig.names]
+    own = rig.offsets(rig.position, rig.rotation)
+    other = source.offsets(source.position, source.rotation)
+    moved = source.offsets(action.position, action.rotation) - other
+    moved *= _scale(own, other, number)
+    position = np.empty((len(action.position), len(rig.names), 3))
+    rotation = np.empty((*position.shape, 3))
+    for joint, (parent, k) in enumerate(zip(rig.parents, number, strict=True)):
+        offset = own[joint] + (moved[:, k] if k >= 0 else np.zeros((len(position), 3)))
+        position[:, joint], still = offset, rig.rotation[joint]
+        if parent >= 0:
+            above = rotation[:, parent]
+            position[:, joint] = position[:, parent] + np.einsum("fij,fj->fi", above, offset)
+            still = above @ rig.rotation[parent].T @ still
+        rotation[:, joint] = still if k < 0 else action.rotation[:, k]
+    return Action(action.frame_time, position, rotation)
+
+
+def clip_of(rig: Rig, division: Division, pose: Action) -> tuple[Clip, float]:
+    """The motion of a character's bodies.
+
+    returns  a clip of the moving joints, and their largest distance from the file's positions, m:
+             bodies are rigid, and the bones of a file may stretch
+    """
+    joints = list(division.bodies)
+    leaders = [division.leader, *joints[1:]]
+    turn = pose.rotation[:, leaders] @ np.swapaxes(rig.rotation[leaders], 1, 2)
+    world = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    world = world.reshape(*turn.shape[:2], 4)
+    above = [division.owners[rig.parents[joint]] if n else -1 for n, joint in enumerate(joints)]
+    parents = np.array([joints.index(joint) if joint >= 0 else -1 for joint in above])
+    local = world.copy()
+    local[:, 1:] = product(inverse(world[:, parents[1:]]), world[:, 1:])
+    rest = rig.position[joints]
+    handle = rig.position[0] - rig.position[division.leader]
+    clip = Clip(
+        names=tuple(rig.names[joint] for joint in joints),
+        parents=parents,
+        offsets=rest - np.where(parents[:, None] < 0, rest, rest[parents]),
+        ends={},
+        frame_time=pose.frame_time,
+        rotations=local,
+        translation=pose.position[:, division.leader] + turn[:, 0] @ handle,
+    )
+    away = np.linalg.norm(clip.places()[0][:, 1:] - pose.position[:, joints[1:]], axis=2)
+    return clip, float(away.max(initial=0.0))
+
+
+def as_cycle(clip: Clip) -> Clip | None:
+    """A clip that ends exactly as it begins; None if it is no cycle.
+
+    A clip whose last pose is within a frame's motion of the first gets its first pose again at the
+    end; a travelling root continues for that frame.
+    """
+    steps = angle(product(inverse(clip.rotations[:-1]), clip.rotations[1:])).max()
+    apart = angle(product(inverse(clip.rotations[0]), clip.rotations[-1])).max()
+    if clip.frames < 3 or apart > steps:
+        return None
+    if apart < CLOSED:
+        return clip
+    place, step = clip.translation, clip.translation[-1] - clip.translation[-2]
+    gap = np.linalg.norm(place[0] - place[-1])
+    travels = gap > np.linalg.norm(np.diff(place, axis=0), axis=1).max()
+    last = place[-1] + step if travels else place[0]
+    return replace(
+        clip,
+        rotations=np.concatenate([clip.rotations, clip.rotations[:1]]),
+        translation=np.concatenate([place, [[last[0], last[1], place[0, 2]]]]),
+    )
+
+
+def _scale(own: Array, other: Array, number: list[int]) -> float:
+    """Length of the bones over that of another file's, summed over the common ones."""
+    shared = [joint for joint, k in enumerate(number) if joint > 0 and k > 0]
+    lengths = np.linalg.norm(own[shared], axis=1).sum()
+    others = np.linalg.norm(other[[number[joint] for joint in shared]], axis=1).sum()
+    return float(lengths / others) if others > 0.0 else 1.0

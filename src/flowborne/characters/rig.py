@@ -1,22 +1,37 @@
-"""A skeleton at rest, the surface that it carries, and how a clip moves it; metres, z up."""
+"""A skeleton at rest, its surface and its clips, read from a file; metres, z up."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.characters.limits import LONGEST_NAME, check_frames, check_poses, check_surface
+from flowborne.characters.limits import (
+    MAX_NAME_LENGTH,
+    check_frames,
+    check_points,
+    check_poses,
+    check_surface,
+)
+from flowborne.errors import SceneError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""From axes with y up to the world's: the way back of what exporters do."""
+"""From axes with y up to the world's, the inverse of the rotation by exporters."""
+
+PLAIN = 0.5
+"""Red, green and blue of a surface whose file gives it no colour."""
+
+ANIMAL_LENGTHS = (2e-3, 35.0)
+"""Longest side of animals in m, from a fruit fly to a whale. Files have numbers without a unit or
+with a wrong one: centimetres taken as metres make a fox 156 m long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +50,8 @@ class Rig:
     rotation: Array
 
     def offsets(self, position: Array, rotation: Array) -> Array:
-        """(..., n, 3) m, places (..., n, 3) in the frames (..., n, 3, 3) of the parents, the root's
-        in the world's."""
+        """(..., n, 3) m, positions (..., n, 3) in the parents' frames (..., n, 3, 3); the root's
+        position is in the world's frame."""
         found = position.copy()
         for joint, parent in enumerate(self.parents):
             if parent >= 0:
@@ -78,7 +93,7 @@ class Action:
 
 
 def joined(parts: Sequence[Surface], where: str) -> Surface | None:
-    """Several surfaces as one; None for no parts. Raises SceneError as `check_surface`."""
+    """Several surfaces as one, None without parts. Raises SceneError like `check_surface`."""
     if not parts:
         return None
     counts = [len(part.vertices) for part in parts]
@@ -93,18 +108,62 @@ def joined(parts: Sequence[Surface], where: str) -> Surface | None:
     )
 
 
-def own_names(names: list[str]) -> tuple[str, ...]:
-    """Names of joints, each once, also where a file has none or one twice; in one short line.
+def scaled(rig: Rig, surface: Surface, scale: float, name: str) -> tuple[Rig, Surface]:
+    """A character scaled about the origin.
 
-    Braces are BVH's own, and the name of the world is MuJoCo's.
+    name    of its file, for messages
+    raises  SceneError when the scale is not positive, or gives lengths beyond the limits
     """
-    plain = [re.sub(r"[{}]", "_", printable(name))[:LONGEST_NAME].strip() for name in names]
+    if not (scale > 0.0 and math.isfinite(scale)):
+        raise SceneError(f"scale is {scale:g}. Give a number above 0.")
+    if scale == 1.0:
+        return rig, surface
+    where = f"{name} scaled by {scale:g}"
+    larger = replace(surface, vertices=scale * surface.vertices)
+    check_surface(larger.vertices, where)
+    check_points(scale * rig.position, where)
+    return replace(rig, position=scale * rig.position), larger
+
+
+def size_notes(vertices: Array, mass: float, scale: float, name: str) -> Iterator[str]:
+    """A sentence about a surface (k, 3), m, that is far longer than animals.
+
+    mass    kg
+    scale   already applied to the surface
+    name    of its file, for messages
+    raises  SceneError when it is far smaller than animals: MuJoCo refuses the inertia of its parts
+    """
+    length = float(np.ptp(vertices, axis=0).max())
+    more = 10.0 ** round(-math.log10(length))
+    resized = (
+        f"with --scale {more * scale:g} it is {more * length:.3g} m long and "
+        f"{more**3 * mass:.3g} kg"
+    )
+    said = f"{length:.3g} m long and {mass:.3g} kg"
+    if length < ANIMAL_LENGTHS[0]:
+        raise SceneError(
+            f"{name} is {said}, smaller than a fly, and its parts too small to compute. Import it "
+            f"in its own unit: {resized}."
+        )
+    if length > ANIMAL_LENGTHS[1]:
+        yield (
+            f"it is {said}, longer than a whale: is its file in another unit than metres? Imported "
+            f"into another folder {resized}"
+        )
+
+
+def own_names(names: list[str]) -> tuple[str, ...]:
+    """Unique short names of joints, also where a file has no name or a name twice.
+
+    BVH reserves braces, and MuJoCo the name "world".
+    """
+    plain = [re.sub(r"[{}]", "_", printable(name))[:MAX_NAME_LENGTH].strip() for name in names]
     given = [name or f"joint_{number}" for number, name in enumerate(plain)]
-    return told_apart(["world", *given])[1:]
+    return unique_names(["world", *given])[1:]
 
 
-def told_apart(names: Sequence[str]) -> tuple[str, ...]:
-    """Names each once: the second of a kind ends in _2."""
+def unique_names(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, each once: repeated names get an ending, _2 first."""
     found: dict[str, None] = {}
     for base in names:
         again = (f"{base}_{n}" for n in count(2))
@@ -113,7 +172,7 @@ def told_apart(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def printable(text: str) -> str:
-    """A text with '_' in place of each letter that has no width or breaks a line."""
+    """A text with '_' in place of each character that has no width or breaks a line."""
     return "".join(letter if letter.isprintable() else "_" for letter in text)
 
 
@@ -131,9 +190,9 @@ def rotations_in(matrices: Array) -> Array:
 
 
 def placed(matrices: Array, where: str) -> tuple[Array, Array]:
-    """(..., 3) m and (..., 3, 3), places and rotations of frames (..., 4, 4).
+    """(..., 3) m and (..., 3, 3), positions and rotations of frames (..., 4, 4).
 
-    where   the file and what of it they are
+    where   the file and the part of it, for messages
     raises  SceneError when they are not finite, or too far away
     """
     check_poses(matrices, where)
@@ -141,13 +200,13 @@ def placed(matrices: Array, where: str) -> tuple[Array, Array]:
 
 
 def frame_times(keys: Array, densest: Array, nodes: int, where: str) -> Array:
-    """(frames,) s evenly from the first key to the last.
+    """(frames,) s, evenly spaced from the first key to the last.
 
     keys     s of all curves of a clip
-    densest  s of the curve that has most: its usual step is the frames'
-    nodes    number of things that are posed in every frame
+    densest  s of the curve with most keys; its median step is that of the frames
+    nodes    number of nodes with a pose in every frame
     where    the file and its clip
-    raises   SceneError when these are more frames, or closer ones, than a run can have
+    raises   SceneError when there are more frames, or closer ones, than a run can have
     """
     first, last = float(keys.min()), float(keys.max())
     step = float(np.median(np.diff(densest))) if len(densest) > 1 else 0.0

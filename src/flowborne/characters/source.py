@@ -1,4 +1,4 @@
-"""A character's file, read by its ending."""
+"""The reader of a character's file, by its ending."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ BLENDER = (
     "use_empty=True); bpy.ops.import_scene.fbx(filepath='{name}'); "
     "bpy.ops.export_scene.gltf(filepath='{stem}.glb')\""
 )
-"""What makes an .fbx file a .glb file."""
+"""Command that converts an .fbx file to a .glb file."""
 
 
 class Source(Protocol):
-    """What a reader gives.
+    """The content of a file.
 
     clips     names of the clips
     rig       the skeleton
-    surface   None when nothing is bound to it
-    left_out  names of meshes that no joint carries
+    surface   None when no mesh is bound to the skeleton
+    left_out  names of meshes that are not bound to it
     """
 
     @property
@@ -74,10 +74,10 @@ def read_source(path: Path) -> Source:
 
 
 def clip_number(source: Source, clip: str | None, name: str) -> int:
-    """Number of the clip with a name, or of the only one.
+    """Number of the clip with a name, or of the only clip.
 
     name    of the file, for messages
-    raises  SceneError when there is none, no such one, or several to choose from
+    raises  SceneError when there is no clip, or none of that name, or several without a name given
     """
     if not source.clips:
         raise SceneError(

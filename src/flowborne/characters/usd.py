@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade, UsdSkel
 
-from flowborne.characters.colours import PLAIN
 from flowborne.characters.limits import check_size
 from flowborne.characters.rig import (
+    PLAIN,
     Z_UP,
     Action,
     Array,
@@ -26,7 +26,7 @@ from flowborne.characters.rig import (
     one_tree,
     own_names,
     placed,
-    told_apart,
+    unique_names,
 )
 from flowborne.characters.usd_gate import (
     check_faces,
@@ -50,7 +50,7 @@ class UsdSource:
     """
 
     def __init__(self, path: Path, *, probed: bool = False) -> None:
-        """probed  whether this process may end by what is damaged in a binary file"""
+        """probed  whether to open binary files without a trial in another process"""
         self._name = path.name
         with reading_usd(path.name):
             self._open(path, probed)
@@ -84,11 +84,11 @@ class UsdSource:
     @property
     def clips(self) -> tuple[str, ...]:
         """Names of the SkelAnimations, each once."""
-        return told_apart([animation.GetPrim().GetName() for animation in self._animations])
+        return unique_names([animation.GetPrim().GetName() for animation in self._animations])
 
     @cached_property
     def rig(self) -> Rig:
-        """The joints where their skin is bound to them."""
+        """The joints in the pose of their skin's binding."""
         with reading_usd(self._name):
             return self._rig()
 
@@ -116,7 +116,7 @@ class UsdSource:
     def action(self, clip: int) -> Action:
         """The `clip`-th animation, sampled at its own rate.
 
-        raises  SceneError when it moves nothing
+        raises  SceneError when it moves no joint
         """
         with reading_usd(self._name):
             return self._action(clip)
@@ -193,7 +193,7 @@ class UsdSource:
         return np.asarray(self._turned @ matrix)
 
     def _weights(self, target: UsdSkel.SkinningQuery, count: int) -> Array:
-        """(count, n) shares of the skeleton's joints, which need not sum to one in the file."""
+        """(count, n) weights of the joints, normalized: in the file they need not sum to one."""
         where = f"{self._name}, {target.GetPrim().GetPath()}"
         width = target.GetNumInfluencesPerComponent()
         found_for = target.ComputeVaryingJointInfluences(count) or ((), ())
@@ -216,13 +216,13 @@ class UsdSource:
 
 
 def _matrices(transforms: Any) -> Array:
-    """(n, 4, 4) USD's transforms, which multiply rows, as ones that multiply columns."""
+    """(n, 4, 4) transposes of USD's transforms, which multiply rows."""
     return np.array([np.array(transform) for transform in transforms]).swapaxes(1, 2)
 
 
 def _colour(mesh: UsdGeom.Mesh) -> Array:
-    """(3,) sRGB colour of a mesh: the plain one of the material that is bound to it, or else the
-    mean of its displayColor."""
+    """(3,) sRGB colour of a mesh: the plain colour of its material, or else the mean of its
+    displayColor."""
     material, _ = UsdShade.MaterialBindingAPI(mesh.GetPrim()).ComputeBoundMaterial()
     shader = material.ComputeSurfaceSource()[0] if material else None
     plain = shader.GetInput("diffuseColor") if shader else None

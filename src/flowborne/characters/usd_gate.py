@@ -1,4 +1,7 @@
-"""What a USD file has to be before a character is made of it.
+"""Checks of a USD file, before a character is made of it.
+
+A damaged binary file can end the process that reads it, and no check in that process helps. It is
+read by another process first.
 
 source  OpenUSD: UsdGeomMesh, UsdSkelBindingAPI; SdfLayer.GetCompositionAssetDependencies
 """
@@ -6,6 +9,8 @@ source  OpenUSD: UsdGeomMesh, UsdSkelBindingAPI; SdfLayer.GetCompositionAssetDep
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
@@ -14,21 +19,22 @@ from typing import Any
 import numpy as np
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
-from flowborne.characters.gltf_document import LARGEST_FILE
-from flowborne.characters.limits import MOST_POSES
+from flowborne.characters.limits import MAX_FILE_BYTES, MAX_POSES
 from flowborne.characters.rig import Array, Integers
-from flowborne.characters.usd_probe import probe
 from flowborne.errors import SceneError
 
-MOST_LAYERS = 1000
-MOST_PRIMS = 100_000
+MAX_LAYERS = 1000
+MAX_PRIMS = 100_000
+
+PROBE_SECONDS = 300.0
+"""s that the other process may take."""
 
 
 def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
-    """The stage of a file, when it and all that it is composed of are in the file's folder.
+    """The stage of a file that is composed of files in its own folder only.
 
-    probed  whether binary files may be opened as they are; else they are probed first
-    raises  SceneError when it cannot be read, is too large, or reads elsewhere
+    probed  whether to open binary files at once; else another process reads them first
+    raises  SceneError when it cannot be read, is too large, or names a file elsewhere
     """
     folder, pending, known = path.parent.resolve(), [str(path)], {str(path)}
     while pending:
@@ -49,31 +55,55 @@ def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
             if below not in known:
                 known.add(below)
                 pending.append(below)
-        if len(known) > MOST_LAYERS:
+        if len(known) > MAX_LAYERS:
             raise SceneError(
-                f"{path.name} is made of more than {MOST_LAYERS} files, which is the most. Flatten "
+                f"{path.name} is made of more than {MAX_LAYERS} files, which is the most. Flatten "
                 "it into one (usdcat --flatten)."
             )
     stage = Usd.Stage.Open(str(path))
     everything = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
     for number, _ in enumerate(Usd.PrimRange.Stage(stage, everything)):
-        if number >= MOST_PRIMS:
+        if number >= MAX_PRIMS:
             raise SceneError(
-                f"{path.name} has more than {MOST_PRIMS:,} prims, which is the most. Export the "
+                f"{path.name} has more than {MAX_PRIMS:,} prims, which is the most. Export the "
                 "character alone."
             )
     return stage
 
 
+def probe(path: Path) -> None:
+    """Raise SceneError unless another process can read a file."""
+    command = [sys.executable, "-P", "-m", "flowborne.characters.usd_process", str(path)]
+    nowhere = subprocess.DEVNULL
+    try:
+        done = subprocess.run(
+            command,
+            stdin=nowhere,
+            stdout=nowhere,
+            stderr=nowhere,
+            timeout=PROBE_SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise SceneError(
+            f"{path.name} cannot be read as USD within {PROBE_SECONDS:g} s. Export a smaller "
+            "character."
+        ) from None
+    if done.returncode:
+        raise SceneError(
+            f"{path.name} cannot be read as USD: it ends the program that reads it. Export it anew."
+        )
+
+
 @contextmanager
 def reading_usd(name: str) -> Iterator[None]:
-    """Context for calls of usd-core, which prints to the terminal's errors whatever it finds odd.
+    """Context for calls of usd-core that drops its warnings on the terminal.
 
-    raises  SceneError where it raises an error of its own
+    raises  SceneError in place of usd-core's exceptions
     """
     with (
         open(os.devnull, "w", encoding="utf-8") as nowhere,
-        redirect_stderr(nowhere),  # what it prints through Python
+        redirect_stderr(nowhere),  # its output through Python
         np.errstate(all="ignore"),
     ):
         kept = os.dup(2)
@@ -111,7 +141,7 @@ def points_of(mesh: UsdGeom.Mesh, where: str) -> Array:
 
 
 def check_faces(counts: Integers, corners: Integers, points: int, where: str) -> None:
-    """Raise SceneError unless the faces of a mesh, by their sizes and corners, fit its points."""
+    """Raise SceneError unless the sizes and corners of a mesh's faces fit its points."""
     if not len(counts) or counts.min() < 3:
         raise _wrong(f"{where}.faceVertexCounts: a face needs 3 corners or more")
     if counts.sum() != len(corners):
@@ -127,7 +157,7 @@ def check_faces(counts: Integers, corners: Integers, points: int, where: str) ->
 
 
 def check_influences(indices: Integers, weights: Array, size: int, joints: int, where: str) -> None:
-    """Raise SceneError unless `size` weights carry a mesh on a skeleton of so many joints."""
+    """Raise SceneError unless there are `size` influences of a mesh by existing joints."""
     if len(indices) != size or len(weights) != size:
         raise _wrong(
             f"{where} has {len(indices)} jointIndices and {len(weights)} jointWeights, not {size}"
@@ -142,16 +172,16 @@ def check_influences(indices: Integers, weights: Array, size: int, joints: int, 
 
 
 def check_samples(samples: int, joints: int, where: str) -> None:
-    """Raise SceneError where a clip has more samples of so many joints than can be read."""
-    if samples * joints > MOST_POSES:
+    """Raise SceneError where a clip has too many samples for its joints."""
+    if samples * joints > MAX_POSES:
         raise SceneError(
-            f"{where} asks for {samples:,} samples of {joints} joints, and {MOST_POSES:,} poses "
+            f"{where} asks for {samples:,} samples of {joints} joints, and {MAX_POSES:,} poses "
             "are the most. Export a shorter clip."
         )
 
 
 def _is_text(name: str) -> bool:
-    """Whether a layer is a text file, which is parsed and not mapped into the memory."""
+    """Whether a layer is a text file, which usd-core parses instead of mapping it into memory."""
     file = Path(name)
     if not file.is_file():  # it is within a package
         return False
@@ -160,11 +190,11 @@ def _is_text(name: str) -> bool:
 
 
 def _layer(name: str, where: str) -> Sdf.Layer:
-    """The layer of a file, or of one within a package."""
+    """The layer of a file, or of a file within a package."""
     file = Path(Ar.SplitPackageRelativePathOuter(name)[0])
-    if (size := file.stat().st_size) > LARGEST_FILE:
+    if (size := file.stat().st_size) > MAX_FILE_BYTES:
         raise SceneError(
-            f"{where} has {size / 2**30:.3g} GB, and {LARGEST_FILE / 2**30:g} GB is the most. "
+            f"{where} has {size / 2**30:.3g} GB, and {MAX_FILE_BYTES / 2**30:g} GB is the most. "
             "Export fewer meshes and clips."
         )
     layer = Sdf.Layer.FindOrOpen(name)
@@ -174,7 +204,7 @@ def _layer(name: str, where: str) -> Sdf.Layer:
 
 
 def _named_files(layer: Sdf.Layer) -> list[str]:
-    """Other files that a layer is composed of, clips of values included."""
+    """Other files of which a layer is composed, value clips included."""
     named = {str(name) for name in layer.GetCompositionAssetDependencies()}
 
     def add(value: Any) -> None:

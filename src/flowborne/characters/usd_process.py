@@ -1,4 +1,4 @@
-"""The process that reads a binary USD file first, and may end by it."""
+"""The process that reads a binary USD file first, which may end it."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from pathlib import Path
 from flowborne.characters.usd import UsdSource
 from flowborne.errors import SceneError
 
-LARGEST_MEMORY = 8 << 30
-"""Bytes of addresses that reading may take, where the system can be asked for that."""
+MAX_MEMORY = 8 << 30
+"""Bytes of addresses that reading may take; Windows has no such limit."""
 
 
 def main(path: Path) -> None:
-    """Read all that an import reads. What is wrong with it is said by the process that asks."""
+    """Read all that an import reads. The calling process reports errors."""
     if sys.platform != "win32":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (LARGEST_MEMORY, LARGEST_MEMORY))
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with suppress(SceneError):
         source = UsdSource(path, probed=True)

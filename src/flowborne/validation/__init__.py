@@ -5,25 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 
-from flowborne.validation.case import Case, GridSeries, Result, Tier
+from flowborne.validation.case import Case, Result, Tier
+from flowborne.validation.findings import GridSeries
 
 __all__ = ["Case", "GridSeries", "Result", "Tier", "case", "case_ids"]
 
 MODULES = {
     "F1": "fluid_cases",
     "F2": "cavity",
-    "F3": "taylor_green",
+    "F3": "fluid_cases",
     "F4": "scalar_cases",
     "F5": "hydrostatics",
     "F6": "fluid_cases",
     "F7": "fluid_cases",
-    "B1": "fixed_bodies",
-    "B2": "fixed_bodies",
-    "B3": "channel_pulse",
-    "B4": "open_cylinder",
-    "B5": "fixed_bodies",
-    "B6": "open_cylinder",
-    "B7": "fixed_sphere",
+    "B1": "channel_cylinder",
+    "B2": "channel_cylinder",
+    "B3": "channel_cylinder",
+    "B4": "open_water",
+    "B5": "open_water",
+    "B6": "open_water",
+    "B7": "open_water",
     "I1": "added_mass",
     "I2": "added_mass",
     "I4": "inviscid",
@@ -31,19 +32,19 @@ MODULES = {
     "I7": "inviscid",
     "I8": "inviscid",
     "I9": "inviscid",
-    "V1": "settling_cylinder",
+    "V1": "settling",
     "V2": "settling",
     "V3": "oscillating_cylinder",
-    "V5": "induced_vibration",
+    "V5": "oscillating_cylinder",
     "V8": "viscous",
-    "V9": "open_cylinder",
+    "V9": "open_water",
     "D1": "flesh",
     "D2": "flag_in_channel",
     "D3": "flag_in_channel",
     "D4": "flesh",
     "D5": "flesh",
-    "A1": "articulated",
-    "A2": "articulated",
+    "A1": "pendulums",
+    "A2": "pendulums",
     "A3": "articulated",
     "A4": "articulated",
     "K1": "controller",
@@ -55,14 +56,14 @@ MODULES = {
     "K7": "gradients",
     "K8": "human",
     "K9": "human",
-    "K10": "human_wind",
-    "K11": "swimmer",
-    "S1": "anguilliform",
+    "K10": "human",
+    "K11": "creatures",
+    "S1": "swimmers",
     "S3": "flapping_ellipse",
     "S5": "swimmers",
     "R1": "rexeel",
 }
-"""Case -> module that holds it, in the order of the list; a module is imported when it is run."""
+"""Case -> its module, in the order of the list; a module is imported when its case is run."""
 
 
 def case_ids() -> Sequence[str]:

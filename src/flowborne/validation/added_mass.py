@@ -1,6 +1,6 @@
-"""Bodies let go in ideal fluid: I1 in an unbounded one, I2 in closed containers.
+"""Bodies released in ideal fluid: I1 unbounded, I2 in closed containers.
 
-One step from rest is enough, because the first acceleration is what the cases are about.
+One step from rest is enough: the cases are about the first acceleration.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from flowborne import Grid
 from flowborne.motions import JointCommand
-from flowborne.validation.case import Case, Finding, GridSeries, at_most, near
-from flowborne.validation.reference import reference, table
+from flowborne.validation.case import Case, reference, table
+from flowborne.validation.findings import Finding, GridSeries, at_most, near
 from flowborne.validation.worlds import Vector, mjcf
 from flowborne.worlds import advance, make_world
 
 DT = 1e-3
-"""s, the one step; nothing depends on it."""
+"""s, the only step; no figure depends on it."""
 
 LIGHT = 0.01
 """Density of most bodies here over the fluid's."""
@@ -80,12 +80,25 @@ def turned(grid: Grid, geom: str) -> float:
     return -float(advance(world, DT, command=command).pressure_wrench[1, 5])
 
 
-def series_of(label: str, grids: Grids, values: Sequence[float], exact: float) -> GridSeries:
-    """The values and their relative errors."""
-    return GridSeries(label, grids, values, [abs(v / exact - 1.0) for v in values])
+def pushed(grid: Grid, geom: str, direction: Vector) -> float:
+    """Added mass over the fluid's density, from the pressure as a drive starts the body."""
+    axis = " ".join(str(x) for x in direction)
+    body = f'<body name="body"><joint name="slide" type="slide" axis="{axis}"/>{geom}</body>'
+    world = make_world(mjcf(body), grid, solid_density=1.0, tolerance=1e-11)
+    command = JointCommand.none(1)
+    command.set(np.array([0]), 0.0, DT)
+    force = advance(world, DT, command=command).pressure_wrench[1, :3]
+    return -float(force @ np.array(direction))
+
+
+def judged(title: str, label: str, grids: Grids, values: Sequence[float], exact: float) -> Finding:
+    """A finding within 1 % of its reference on the finest grid."""
+    series = GridSeries.toward(label, grids, values, exact, relative=True)
+    return near(title, series, exact, relative=0.01)
 
 
 ACROSS = "cells across D"
+LONGWISE = "cells along the long axis"
 
 
 def squares(quick: bool) -> list[Finding]:
@@ -97,9 +110,8 @@ def squares(quick: bool) -> list[Finding]:
             continue
         width = 1.0 / round(1.0 / ratio)
         values = [coefficient(box(round(n / width)), round_body(width)) for n in grids]
-        said = f"Ca of a cylinder in a square, D/L = {ratio:g}"
-        series = series_of(ACROSS, grids, values, exact)
-        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+        title = f"Ca of a cylinder in a square, D/L = {ratio:g}"
+        findings.append(judged(title, ACROSS, grids, values, exact))
     return findings
 
 
@@ -117,9 +129,8 @@ def oblongs(quick: bool) -> list[Finding]:
                 coefficient(box(round(n / width), long=2), round_body(width), direction)
                 for n in grids
             ]
-            series = series_of(ACROSS, grids, values, exact)
             title = f"Ca of a cylinder {said} a 1 x 2 box, D/L = {width:g}"
-            findings.append(near(title, values[-1], exact, relative=0.01, series=series))
+            findings.append(judged(title, ACROSS, grids, values, exact))
     return findings
 
 
@@ -139,12 +150,10 @@ def ellipse_in_box(quick: bool) -> list[Finding]:
         ("Ca across", across, [coefficient(g, geom, UP) for g in spaces]),
         ("I_a over the unbounded one", turning, [turned(g, geom) / unbounded for g in spaces]),
     )
-    findings = []
-    for said, exact, values in rows:
-        series = series_of("cells along the long axis", grids, values, exact)
-        title = f"ellipse in a box, {said}"
-        findings.append(near(title, values[-1], exact, relative=0.01, series=series))
-    return findings
+    return [
+        judged(f"ellipse in a box, {said}", LONGWISE, grids, values, exact)
+        for said, exact, values in rows
+    ]
 
 
 def cubes(quick: bool) -> list[Finding]:
@@ -156,9 +165,8 @@ def cubes(quick: bool) -> list[Finding]:
             continue
         width = 1.0 / round(1.0 / ratio)
         values = [coefficient(box(round(n / width), solid=True), round_body(width)) for n in grids]
-        series = series_of(ACROSS, grids, values, exact)
-        said = f"Ca of a sphere in a cube, D/L = {ratio:g}"
-        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+        title = f"Ca of a sphere in a cube, D/L = {ratio:g}"
+        findings.append(judged(title, ACROSS, grids, values, exact))
     return findings
 
 
@@ -184,15 +192,15 @@ def ball_of_boxes(radius: float) -> str:
     half = 0.08 * radius
     geoms = []
     for normal in normals:
-        place = " ".join(str(x) for x in (inner + half) * normal)
+        centre = " ".join(str(x) for x in (inner + half) * normal)
         along = " ".join(str(x) for x in normal)
         size = f"{0.15 * radius} {0.15 * radius} {half}"
-        geoms.append(f'<geom type="box" size="{size}" pos="{place}" zaxis="{along}"/>')
+        geoms.append(f'<geom type="box" size="{size}" pos="{centre}" zaxis="{along}"/>')
     return "".join(geoms)
 
 
 def shells(quick: bool) -> list[Finding]:
-    """Cylinder and sphere in the middle of a shell that stands still."""
+    """Cylinder and sphere in the middle of a fixed shell."""
     findings = []
     outer = 0.4
     for ratio in (2.0,) if quick else (2.0, 3.0, 4.0):
@@ -201,9 +209,8 @@ def shells(quick: bool) -> list[Finding]:
         exact = (ratio**2 + 1.0) / (ratio**2 - 1.0)
         walls = ring_of_boxes(outer)
         values = [coefficient(box(round(n / width)), round_body(width), walls=walls) for n in grids]
-        said = f"Ca of a cylinder in a concentric shell, b/a = {ratio:g}"
-        series = series_of(ACROSS, grids, values, exact)
-        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+        title = f"Ca of a cylinder in a concentric shell, b/a = {ratio:g}"
+        findings.append(judged(title, ACROSS, grids, values, exact))
     if not quick:
         grids = (8, 16, 32)
         exact = (2.0**3 + 2.0) / (2.0 * (2.0**3 - 1.0))
@@ -212,9 +219,8 @@ def shells(quick: bool) -> list[Finding]:
             coefficient(box(round(n / outer), solid=True), round_body(outer), walls=walls)
             for n in grids
         ]
-        series = series_of(ACROSS, grids, values, exact)
-        said = "Ca of a sphere in a concentric shell, b/a = 2"
-        findings.append(near(said, values[-1], exact, relative=0.01, series=series))
+        title = "Ca of a sphere in a concentric shell, b/a = 2"
+        findings.append(judged(title, ACROSS, grids, values, exact))
     return findings
 
 
@@ -224,8 +230,8 @@ def containers(quick: bool) -> list[Finding]:
 
 
 FLAT_IMAGES = 3.438 / (2.0 * np.pi)
-"""Flow that the images of a dipole in a square of 1 m make at its place, per area of the dipole:
-I2's fit Ca + 1 = 2/(1 - 3.438 (D/2L)^2), of which it is the general form."""
+"""Velocity of the images of a dipole in a square of 1 m at the dipole, per area of the dipole: the
+general form of I2's fit Ca + 1 = 2/(1 - 3.438 (D/2L)^2)."""
 
 SOLID_IMAGES = 4.84372 / (2.0 * np.pi)
 """The same for a cube of 1 m, per volume: I2's q = 4.84372 (D/2L)^3."""
@@ -234,7 +240,7 @@ SOLID_IMAGES = 4.84372 / (2.0 * np.pi)
 def unbounded(added: float, displaced: float, solid: bool = False) -> float:
     """Added mass over the fluid's density without the box of 1 m, from that in its middle.
 
-    The body's dipole S is its displaced volume and its added one together; in the box it is
+    The body's dipole S is the sum of displaced and added volume; in the box it is
     S / (1 - images S).
     """
     dipole = added + displaced
@@ -249,7 +255,7 @@ def free_rise(measured: float, ratio: float, displaced: float, solid: bool) -> f
 
 
 def density_ratios(quick: bool) -> list[Finding]:
-    """The list's tables of accelerations, downward positive, and their limits."""
+    """Accelerations of the list's tables, downward positive, and their limits."""
     findings = []
     for name, solid, limit in (("cylinder", False, -1.0), ("sphere", True, -2.0)):
         if quick and solid:
@@ -270,31 +276,22 @@ def density_ratios(quick: bool) -> list[Finding]:
 
 
 def ellipses(quick: bool) -> list[Finding]:
-    """How an ellipse rises along both axes, and its added moment of inertia."""
+    """Rise of an ellipse along both axes, and its added moment of inertia."""
     grids = (16, 32) if quick else (32, 64, 128)
-    area = np.pi * LONG * SHORT
+    geom, area = ellipse(LONG, SHORT), np.pi * LONG * SHORT
+    spaces = [box(round(n / (2.0 * LONG))) for n in grids]
     rows = reference("I1", "rise a/g for rho_s/rho_f=0.01")
     findings = []
     for said, direction in (("a=2b along long axis", SIDEWAYS), ("across", UP)):
         exact = rows[f"ellipse {said}"]
-        values = []
-        for n in grids:
-            space = box(round(n / (2.0 * LONG)))
-            values.append(
-                free_rise(rise(space, ellipse(LONG, SHORT), LIGHT, direction), LIGHT, area, False)
-            )
-        series = series_of("cells along the long axis", grids, values, exact)
+        boxed = [rise(space, geom, LIGHT, direction) for space in spaces]
+        values = [free_rise(found, LIGHT, area, False) for found in boxed]
         title = f"rise over g of an ellipse {said}"
-        findings.append(near(title, values[-1], exact, relative=0.01, series=series))
+        findings.append(judged(title, LONGWISE, grids, values, exact))
     inertia = turning(LONG, SHORT)
-    values = [
-        free_turning(turned(box(round(n / (2.0 * LONG))), ellipse(LONG, SHORT)), LONG, SHORT)
-        / inertia
-        for n in grids
-    ]
-    series = series_of("cells along the long axis", grids, values, 1.0)
+    values = [free_turning(turned(space, geom), LONG, SHORT) / inertia for space in spaces]
     title = "I_a of an ellipse over rho pi/8 (a^2-b^2)^2"
-    return [*findings, near(title, values[-1], 1.0, relative=0.01, series=series)]
+    return [*findings, judged(title, LONGWISE, grids, values, 1.0)]
 
 
 def turning(a: float, b: float) -> float:
@@ -306,7 +303,7 @@ def free_turning(boxed: float, a: float, b: float) -> float:
     """Added moment of inertia without the box of 1 m, from that in its middle.
 
     The images of the body's quadrupole, (a^2 - b^2)(a + b)^2/16, add its square times a number
-    that I2's ellipse tells.
+    that follows from I2's ellipse.
     """
 
     def square(a: float, b: float) -> float:
@@ -330,9 +327,8 @@ def spheroid(quick: bool) -> list[Finding]:
     for n in grids:
         boxed = coefficient(box(round(n / length), solid=True), geom)
         values.append(unbounded(boxed * volume, volume, solid=True) / volume)
-    series = series_of("cells along the axis", grids, values, exact)
-    said = "Ca of a prolate spheroid 2:1 along its axis"
-    return [near(said, values[-1], exact, relative=0.01, series=series)]
+    title = "Ca of a prolate spheroid 2:1 along its axis"
+    return [judged(title, "cells along the axis", grids, values, exact)]
 
 
 THIN = 1e-4
@@ -340,7 +336,7 @@ THIN = 1e-4
 
 
 def plates(quick: bool) -> list[Finding]:
-    """A plate across, along and turning; the fluid sees it 1.4 cells thick, so the order is 1."""
+    """A plate across, along and turning; in the fluid it is 1.4 cells thick, so the order is 1."""
     half = 0.2
     grids = (16, 32, 64) if quick else (64, 128, 256, 512, 1024)
     geom = f'<geom type="box" size="{half} {THIN} 1"/>'
@@ -352,16 +348,12 @@ def plates(quick: bool) -> list[Finding]:
         along.append(unbounded(pushed(space, geom, SIDEWAYS), displaced) / circle)
         rounds.append(free_turning(turned(space, geom), half, 0.0) / turning(half, 0.0))
     label = "cells across the plate"
-    lengthwise = GridSeries(label, grids, along, [abs(v) for v in along])
-    findings = [
-        near(said, values[-1], 1.0, relative=0.01, series=series_of(label, grids, values, 1.0))
-        for said, values in (
-            ("m_a of a plate across over rho pi a^2", across),
-            ("I_a of a plate over rho pi a^4/8", rounds),
-        )
+    lengthwise = GridSeries.toward(label, grids, along, 0.0)
+    return [
+        judged("m_a of a plate across over rho pi a^2", label, grids, across, 1.0),
+        judged("I_a of a plate over rho pi a^4/8", label, grids, rounds, 1.0),
+        at_most("m_a of a plate along over rho pi a^2", lengthwise, 0.01),
     ]
-    title = "m_a of a plate along over rho pi a^2"
-    return [*findings, at_most(title, along[-1], 0.01, series=lengthwise)]
 
 
 def quarter(cells: int) -> Grid:
@@ -371,8 +363,8 @@ def quarter(cells: int) -> Grid:
 
 
 def without_thickness(grids: Grids, values: Sequence[float]) -> float:
-    """Limit of values on three grids as the thickness that the fluid sees, which is in proportion
-    to e = 1/cells, falls to zero.
+    """Limit of values on three grids for no thickness in the fluid, which is proportional to
+    e = 1/cells.
 
     The flow round a thin rim of any shape adds terms in e ln e and e.
     """
@@ -381,9 +373,11 @@ def without_thickness(grids: Grids, values: Sequence[float]) -> float:
 
 
 def disc(quick: bool) -> list[Finding]:
-    """A disc broadside; the fluid sees it 1.75 cells thick, and a disc as thick as that has the
-    added mass that the series shows. The list's disc has no thickness: the limit is shown besides
-    the finest grid, which is what counts."""
+    """A disc broadside, and its limit for no thickness, as in the list.
+
+    In the fluid it is 1.75 cells thick, and a disc of this thickness has the added mass of the
+    series.
+    """
     half = 0.2
     grids = (16, 32, 64) if quick else (32, 64, 128)
     geom = f'<geom type="cylinder" size="{half} {THIN}" zaxis="0 1 0"/>'
@@ -392,29 +386,22 @@ def disc(quick: bool) -> list[Finding]:
     for n in grids:
         added = 4.0 * pushed(quarter(round(n / (2.0 * half))), geom, UP)
         values.append(unbounded(added, displaced, solid=True) / exact)
-    series = series_of("cells across the disc", grids, values, 1.0)
     title = "m_a of a disc broadside over 8/3 rho a^3"
-    found = without_thickness(grids, values)
-    return [
-        near(title, values[-1], 1.0, relative=0.01, series=series),
-        near(f"{title}, continued to no thickness", found, 1.0, relative=0.01, falling=series),
-    ]
+    thick = judged(title, "cells across the disc", grids, values, 1.0)
+    limit = near(
+        f"{title}, continued to no thickness",
+        without_thickness(grids, values),
+        1.0,
+        relative=0.01,
+        falling=True,
+        series=thick.series,
+    )
+    return [thick, limit]
 
 
 def unbounded_bodies(quick: bool) -> list[Finding]:
-    """I1: what is left without the container's part."""
+    """I1: bodies corrected for their container."""
     return density_ratios(quick) + ellipses(quick) + spheroid(quick) + plates(quick) + disc(quick)
-
-
-def pushed(grid: Grid, geom: str, direction: Vector) -> float:
-    """Added mass over the fluid's density, from the pressure while a drive starts the body."""
-    axis = " ".join(str(x) for x in direction)
-    body = f'<body name="body"><joint name="slide" type="slide" axis="{axis}"/>{geom}</body>'
-    world = make_world(mjcf(body), grid, solid_density=1.0, tolerance=1e-11)
-    command = JointCommand.none(1)
-    command.set(np.array([0]), 0.0, DT)
-    force = advance(world, DT, command=command).pressure_wrench[1, :3]
-    return -float(force @ np.array(direction))
 
 
 CASES = (Case("I1", unbounded_bodies, coarse=True), Case("I2", containers))

@@ -1,227 +1,90 @@
-"""What a validation case is, and what it finds."""
+"""The cases of the reference list, their references, and the results of their runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
 from traceback import extract_tb
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from flowborne import Array
-from flowborne.validation.reference import entry
-
-Value = float | str
-Verdict = Literal["pass", "coarse", "fail", "unconfirmed"]
-"""`coarse` is a figure outside its tolerance on a grid too coarse for it: no failure, as its case
-is judged on its finest grids. A figure inside its tolerance passes on any grid."""
+from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, Value, Verdict
 
 THE_RUN = "the run"
-"""What a case that broke down is judged by; its figures were not measured."""
+"""Quantity of a case whose run broke down, without figures."""
 
 
 class Tier(StrEnum):
-    """How long a validation takes on two cores; each tier takes in those before it."""
+    """How long a validation takes on two cores; each tier includes those before it."""
 
     MINUTE = "minute"
     HALF_HOUR = "half-hour"
     ALL = "all"
 
     def within(self, wanted: Tier) -> bool:
-        """Whether what belongs to this tier is run when `wanted` is asked for."""
+        """Whether a run of the tier `wanted` includes this tier."""
         tiers = tuple(Tier)
         return tiers.index(self) <= tiers.index(wanted)
 
 
 @dataclass(frozen=True)
-class GridSeries:
-    """A figure and its error from grid to grid.
+class Entry:
+    """A case of the list.
 
-    label   what the resolution counts, such as "cells across D"
-    cells   resolutions, from coarse to fine
-    values  the figure on each
-    errors  its error on each, not negative
+    quantities  name -> value in the list: a number, a formula in words, or a table
+    memory      names of quantities that were quoted from memory and not checked at their source
     """
 
-    label: str
-    cells: Sequence[float]
-    values: Sequence[float]
-    errors: Sequence[float]
-
-    @property
-    def order(self) -> float:
-        """Slope of log error over log spacing, fitted to all grids; NaN where there is none."""
-        if len(self.cells) < 2 or not min(self.errors) > 0.0:
-            return float("nan")
-        return float(-np.polyfit(np.log(self.cells), np.log(self.errors), 1)[0])
-
-    @property
-    def finest(self) -> str:
-        """The last of the grids, such as "10 cells across D"."""
-        return f"{self.cells[-1]:g} {self.label}"
-
-    @property
-    def falls(self) -> bool:
-        """Whether the error falls from each grid to the next."""
-        return bool(np.all(np.diff(self.errors) < 0.0))
-
-    def lines(self) -> list[str]:
-        """The series for people."""
-        rows = [
-            f"{cells:>6g} {self.label}: {value:.6g}, error {error:.3g}"
-            for cells, value, error in zip(self.cells, self.values, self.errors, strict=True)
-        ]
-        if len(self.cells) > 1:
-            rows.append(f"observed order {self.order:.2f}")
-        return rows
-
-    def as_dict(self) -> dict[str, Any]:
-        """The same for programs; an order that does not exist is None."""
-        order = self.order
-        return {
-            "label": self.label,
-            "cells": [float(c) for c in self.cells],
-            "values": [float(v) for v in self.values],
-            "errors": [float(e) for e in self.errors],
-            "order": order if np.isfinite(order) else None,
-        }
+    id: str
+    name: str
+    source: str
+    provenance: str
+    quantities: dict[str, Any]
+    memory: Sequence[str] = ()
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Points (x, y) of a plot; published ones stand beside those that were measured."""
-
-    label: str
-    x: Sequence[float] | Array
-    y: Sequence[float] | Array
-    published: bool = False
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, to the five digits that a plot can show."""
-        return {
-            "label": self.label,
-            "x": [float(f"{value:.5g}") for value in self.x],
-            "y": [float(f"{value:.5g}") for value in self.y],
-            "published": self.published,
-        }
+@cache
+def _entries() -> dict[str, Entry]:
+    text = files("flowborne.validation").joinpath("references.json").read_text(encoding="utf-8")
+    return {case["id"]: Entry(**case) for case in json.loads(text)["cases"]}
 
 
-@dataclass(frozen=True)
-class Plot:
-    """Curves over the same axes; x and y name them with their units."""
-
-    x: str
-    y: str
-    curves: Sequence[Curve]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {"x": self.x, "y": self.y, "curves": [curve.as_dict() for curve in self.curves]}
+def entry(case: str) -> Entry:
+    """The entry of a case. Raises KeyError for an unknown id."""
+    return _entries()[case]
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One quantity of a case, measured and judged.
-
-    tolerance  how far from the reference still counts, in words or as a number
-    lines      more for people
-    plot       the curve that the quantity was read from, beside the published one
-    confirmed  False where the list has the reference from memory: the finding does not count
-    """
-
-    quantity: str
-    value: Value
-    reference: Value
-    tolerance: Value
-    passed: bool
-    series: GridSeries | None = None
-    lines: tuple[str, ...] = ()
-    plot: Plot | None = None
-    confirmed: bool = True
-
-    def verdict(self, coarse: bool = False) -> Verdict:
-        """How the finding is judged; `coarse` says that the run has grids too coarse for its case.
-
-        Only a figure that was followed over grids can be coarse; all others hold on any grid.
-        """
-        if not self.confirmed:
-            return "unconfirmed"
-        if self.passed:
-            return "pass"
-        return "coarse" if coarse and self.series is not None else "fail"
+def reference(case: str, quantity: str) -> Any:
+    """A quantity's value in the list. Raises KeyError when there is none."""
+    return entry(case).quantities[quantity]
 
 
-def near(
-    quantity: str,
-    value: float,
-    reference: float,
-    *,
-    relative: float | None = None,
-    absolute: float | None = None,
-    falling: GridSeries | None = None,
-    series: GridSeries | None = None,
-    lines: Iterable[str] = (),
-) -> Finding:
-    """A finding that passes within a relative or an absolute tolerance of its reference.
-
-    falling  a grid series whose error has to fall from grid to grid besides
-    series   a grid series that is shown and no more
-    """
-    bound = relative * abs(reference) if relative is not None else absolute
-    assert bound is not None
-    passed = abs(value - reference) <= bound
-    said = f"{100.0 * relative:g} %" if relative is not None else f"{bound:g}"
-    if falling is not None:
-        passed = passed and falling.falls
-        said += ", falling from grid to grid"
-    shown = falling or series
-    return Finding(quantity, float(value), reference, said, bool(passed), shown, tuple(lines))
+def table(case: str, quantity: str) -> dict[float, Any]:
+    """A table of the list whose keys are numbers."""
+    return {float(key): value for key, value in reference(case, quantity).items()}
 
 
-def at_most(
-    quantity: str,
-    value: float,
-    bound: float,
-    *,
-    series: GridSeries | None = None,
-    lines: Iterable[str] = (),
-) -> Finding:
-    """A finding whose reference is 0 and whose size has to stay within `bound`."""
-    return Finding(
-        quantity, float(value), 0.0, f"{bound:g}", bool(abs(value) <= bound), series, tuple(lines)
-    )
-
-
-def order_of(
-    quantity: str,
-    series: GridSeries,
-    *,
-    least: float | None = None,
-    expected: float | None = None,
-    within: float = 0.2,
-) -> Finding:
-    """A finding about an order of convergence: at least `least`, or `expected` with a margin."""
-    order = series.order
-    if least is not None:
-        return Finding(quantity, order, 2.0, f">= {least:g}", bool(order >= least), series)
-    assert expected is not None
-    passed = bool(abs(order - expected) <= within and series.falls)
-    return Finding(quantity, order, expected, f"{within:g}", passed, series)
+def confirmed(case: str, quantity: str) -> bool:
+    """Whether a quantity's value was checked at its source, or derived."""
+    return quantity not in entry(case).memory
 
 
 @dataclass(frozen=True)
 class Result:
-    """A finding with the case that it belongs to.
+    """A finding of a case.
 
     id        of the case in the reference list
-    tier      that the run belongs to
-    quantity  which of its quantities
-    seconds   that the whole case took
-    finest    whether the run is the longest of its case, which has its finest grids
+    tier      of the run
+    quantity  of the case
+    seconds   of the whole run
+    finest    whether the run is the longest of its case, with its finest grids
     """
 
     id: str
@@ -240,7 +103,7 @@ class Result:
 
     @property
     def grid(self) -> str | None:
-        """The grid on which the figure was measured; None if it was not followed over grids."""
+        """The grid on which the figure was measured; None without a grid series."""
         return None if self.series is None else self.series.finest
 
     def as_dict(self) -> dict[str, Any]:
@@ -285,11 +148,11 @@ class Case:
     """A case of the reference list.
 
     id       in the list
-    measure  runs the case and gives its findings; True asks for coarser grids and shorter runs
-    quick    smallest tier that has the shorter run
-    full     smallest tier that has the whole one
+    measure  runs the case and returns its findings; True for coarser grids and shorter runs
+    quick    smallest tier with the shorter run
+    full     smallest tier with the whole run
     coarse   whether the shorter run's grids are too coarse for the tolerances of the source
-    alone    whether it measures seconds, so that no other case may run beside it
+    alone    whether it measures seconds, so that no other case may run at the same time
     """
 
     id: str
@@ -308,7 +171,7 @@ class Case:
         return entry(self.id).source
 
     def tier_in(self, wanted: Tier) -> Tier | None:
-        """The largest of the case's tiers that is run in `wanted`; None where it has none there."""
+        """The largest of the case's tiers within `wanted`; None if there is none."""
         has = (self.full, self.quick)
         return next((tier for tier in has if tier.within(wanted)), None)
 
@@ -317,8 +180,8 @@ class Case:
         started = perf_counter()
         try:
             findings = self.measure(quick)
-        except Exception as error:  # whatever it is, the other cases go on
-            return [self.broken(quick, _said(error), perf_counter() - started)]
+        except Exception as error:  # the other cases continue
+            return [self.broken(quick, _cause(error), perf_counter() - started)]
         seconds = perf_counter() - started
         return [self._result(finding, quick, seconds) for finding in findings]
 
@@ -348,8 +211,8 @@ class Case:
         )
 
 
-def _said(error: Exception) -> str:
-    """What broke a run: of a flow that blew up its message, of all else kind and place, too."""
+def _cause(error: Exception) -> str:
+    """The message of an error; kind and line, too, unless a flow blew up."""
     if isinstance(error, ArithmeticError):
         return str(error)
     last = extract_tb(error.__traceback__)[-1]

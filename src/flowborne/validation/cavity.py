@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline
 
 from flowborne import Array, Grid, World
 from flowborne.boundaries import Boundaries, BoundaryNoSlip
-from flowborne.validation.case import Case, Curve, Finding, GridSeries, Plot, at_most, near
-from flowborne.validation.reference import reference
+from flowborne.validation.case import Case, reference
+from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near
 from flowborne.worlds import advance, make_world, start_from
 
 REYNOLDS = {True: (100,), False: (100, 400, 1000)}
@@ -22,13 +22,13 @@ STEADY = {True: 1e-4, False: 1e-6}
 """max|du/dt| at which the flow is steady, m/s^2, by quick."""
 
 LONGEST = 400.0
-"""s that a flow is given to become steady."""
+"""s within which a flow has to become steady."""
 
 CFL = 1.0
 """Cells that the lid crosses in a step."""
 
 MISPRINT = (400, 0.9063)
-"""Reynolds number and x of a value in the printed table that is not the flow's."""
+"""Reynolds number and x of a wrong value in the printed table."""
 
 
 def cavity(cells: int, reynolds: int) -> World:
@@ -43,7 +43,7 @@ def cavity(cells: int, reynolds: int) -> World:
 
 
 def settle(world: World, rate: float) -> float:
-    """March until max|du/dt| is below `rate`; gives the time that it took, s.
+    """Time in s at which max|du/dt| falls below `rate`.
 
     Raises ArithmeticError when the flow does not become steady.
     """
@@ -62,10 +62,10 @@ def profiles(world: World) -> tuple[CubicSpline, CubicSpline]:
     """u over y on the line x = 0.5, and v over x on the line y = 0.5, walls included."""
     fluid, state = world.flow()
     n = fluid.grid.shape[0]
-    places = np.concatenate([[0.0], fluid.grid.cell_coordinates()[0], [1.0]])
+    line = np.concatenate([[0.0], fluid.grid.cell_coordinates()[0], [1.0]])
     u = np.concatenate([[0.0], state.velocity[0][n // 2, :, 0], [1.0]])
     v = np.concatenate([[0.0], state.velocity[1][:, n // 2, 0], [0.0]])
-    return CubicSpline(places, u), CubicSpline(places, v)
+    return CubicSpline(line, u), CubicSpline(line, v)
 
 
 def deviations(world: World, reynolds: int) -> tuple[float, float]:
@@ -80,10 +80,10 @@ def deviations(world: World, reynolds: int) -> tuple[float, float]:
 
 
 def plots(world: World, reynolds: int) -> tuple[Plot, Plot]:
-    """Both profiles beside the table."""
-    places = np.linspace(0.0, 1.0, 101)
+    """Both profiles, with the table."""
+    line = np.linspace(0.0, 1.0, 101)
     across, along = reference("F2", "u(x=0.5,y) table"), reference("F2", "v(x,y=0.5) table")
-    u, v = (Curve("flowborne", places, profile(places)) for profile in profiles(world))
+    u, v = (Curve("flowborne", line, profile(line)) for profile in profiles(world))
     tables = (
         Curve("Ghia et al.", across["y"], across[str(reynolds)], True),
         Curve("Ghia et al.", along["x"], along[str(reynolds)], True),
@@ -102,25 +102,25 @@ def stream_function(world: World) -> Array:
 
 
 def primary_vortex(world: World) -> tuple[float, float, float]:
-    """x, y (m) and psi (m^2/s) at the least psi: vertex of a parabola along each axis."""
+    """x, y (m) and psi (m^2/s) at the minimum of psi: vertex of a parabola along each axis."""
     fluid, _ = world.flow()
     psi = stream_function(world)
     i, j = np.unravel_index(int(np.argmin(psi)), psi.shape)
-    place, least = [], float(psi[i, j])
+    centre, least = [], float(psi[i, j])
     for at, line in ((i, psi[:, j]), (j, psi[i, :])):
         before, here, after = line[at - 1 : at + 2]
         shift = 0.5 * (before - after) / (before - 2.0 * here + after)
-        place.append(fluid.grid.spacing * (at + shift))
+        centre.append(fluid.grid.spacing * (at + shift))
         least -= 0.25 * (before - after) * shift
-    return float(place[0]), float(place[1]), least
+    return float(centre[0]), float(centre[1]), least
 
 
 def lid_driven(quick: bool) -> list[Finding]:
-    """F2: velocity profiles, and place and strength of the primary vortex.
+    """F2: velocity profiles, and position and strength of the primary vortex.
 
-    The tables are themselves good to some thousandths, so that the deviation from them levels off.
+    The tables are accurate to some thousandths, so that the deviation from them levels off.
     """
-    grids = GRIDS[quick]
+    grids, label = GRIDS[quick], "cells a side"
     findings = []
     for reynolds in REYNOLDS[quick]:
         rows, lines = [], []
@@ -135,27 +135,18 @@ def lid_driven(quick: bool) -> list[Finding]:
             coarser = world
         u, v, x, y, psi = zip(*rows, strict=True)
         vortex = reference("F2", "primary vortex (x,y,psi)")[str(reynolds)]
-        findings += [
-            replace(
-                at_most(
-                    f"max|{name} - table|, Re {reynolds}", w[-1], 0.01, series=series(grids, w, 0)
-                ),
-                plot=plot,
-            )
-            for name, w, plot in zip("uv", (u, v), plots(world, reynolds), strict=True)
-        ]
+        for name, values, plot in zip("uv", (u, v), plots(world, reynolds), strict=True):
+            series = GridSeries.toward(label, grids, values, 0.0)
+            finding = at_most(f"max|{name} - table|, Re {reynolds}", series, 0.01)
+            findings.append(replace(finding, plot=plot))
         for name, values, exact in (("x", x, vortex[0]), ("y", y, vortex[1])):
-            said = f"{name} of the vortex, Re {reynolds}"
-            shown = series(grids, values, exact)
-            findings.append(near(said, values[-1], exact, absolute=0.008, series=shown))
-        said, shown = f"psi of the vortex, Re {reynolds}", series(grids, psi, vortex[2])
-        findings.append(near(said, psi[-1], vortex[2], relative=0.01, series=shown, lines=lines))
+            series = GridSeries.toward(label, grids, values, exact)
+            title = f"{name} of the vortex, Re {reynolds}"
+            findings.append(near(title, series, exact, absolute=0.008))
+        series = GridSeries.toward(label, grids, psi, vortex[2])
+        title = f"psi of the vortex, Re {reynolds}"
+        findings.append(near(title, series, vortex[2], relative=0.01, lines=lines))
     return findings
-
-
-def series(grids: tuple[int, ...], values: tuple[float, ...], exact: float) -> GridSeries:
-    """Values from grid to grid with their errors."""
-    return GridSeries("cells a side", grids, values, [abs(value - exact) for value in values])
 
 
 CASES = (Case("F2", lid_driven),)

@@ -1,4 +1,4 @@
-"""A hinged block that answers simple winds: K1 to K4."""
+"""A controlled hinged block in simple winds: K1 to K4."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from flowborne.bodies import kinematics
 from flowborne.executors import Serial
 from flowborne.gradients import GradientCentral
 from flowborne.objectives import Objective, ObjectiveEffort, ObjectiveSum, ObjectiveWindDrag
-from flowborne.validation.case import Case, Finding, at_most, near
+from flowborne.validation.case import Case
+from flowborne.validation.findings import Finding, at_most, near
 from flowborne.validation.worlds import Vector, mjcf
 from flowborne.winds import Wind, WindFaces, WindForce
 from flowborne.worlds import make_world
@@ -23,7 +24,7 @@ G = 9.81
 FRAME = 1.0 / 24.0
 LENGTH, WIDTH, DENSITY = 1.0, 0.3, 100.0
 WEIGHT = DENSITY * LENGTH * WIDTH * G
-"""Of the block, N per m."""
+"""Weight of the block, N per m."""
 
 PROBE = 1.0
 """Displacement of the central difference, degrees."""
@@ -52,7 +53,7 @@ def controller_of(
 ) -> Controller:
     """Controller of the hinge.
 
-    weight  -1 maximises
+    weight  1 minimises, -1 maximises
     pace    degrees in a frame that the strength allows
     """
     return Controller(
@@ -81,7 +82,7 @@ def settled(world: World, controller: Controller, frames: int) -> float:
 
 
 def landscape(world: World, controller: Controller, angles: Array) -> Array:
-    """Objective in poses at `angles` (degrees), as the controller's trials see it."""
+    """Objective at `angles` (degrees) in the controller's trials."""
     here = float(np.degrees(world.solid.q[0]))
     return controller.trials(world, step).values(np.radians(angles - here)[:, None])
 
@@ -115,7 +116,7 @@ def uniform_wind(quick: bool) -> list[Finding]:
 
 
 def faces_wind(quick: bool) -> list[Finding]:
-    """K2: least effort under gravity and eq. (2), which counts windward and leeward faces."""
+    """K2: least effort under gravity and the wind of eq. (2), with windward and leeward faces."""
     pace = 0.1
     effort = controller_of(ObjectiveEffort(HINGE), 1.0, pace, "present")
     findings = []
@@ -143,7 +144,7 @@ SPEED, AIR = 5.0, 1.2
 
 
 def wind_towards(degrees: float) -> tuple[Vector, WindFaces]:
-    """Direction of a wind that blows at an angle from +x, and the wind."""
+    """Direction of a wind at an angle from +x, and the wind."""
     turn = float(np.radians(degrees))
     along = (float(np.cos(turn)), float(np.sin(turn)), 0.0)
     return along, WindFaces((SPEED * along[0], SPEED * along[1], 0.0), AIR, ("block",))
@@ -157,10 +158,10 @@ def drag_law(incidence: Array) -> Array:
 
 
 def drag_at_rest(quick: bool) -> list[Finding]:
-    """K3: most and least drag with the relative velocity taken out, for winds from all round.
+    """K3: most and least drag without the relative velocity, for winds from several sides.
 
-    The least drag is at tan phi = w/L, where d/dphi (L sin^3 + w cos^3) = 0: a thick block shows
-    its corner to the wind.
+    The least drag is at tan phi = w/L, where d/dphi (L sin^3 + w cos^3) = 0: a corner of a thick
+    block points into the wind.
     """
     pace = 0.5
     scale = 2.0 * AIR * SPEED**2 * LENGTH
@@ -189,10 +190,10 @@ def drag_at_rest(quick: bool) -> list[Finding]:
 
 
 def drag_of_slender_blocks(quick: bool) -> list[Finding]:
-    """K3 for blocks of several shapes, with all that the scene of least drag sets.
+    """K3 for blocks of several shapes, with the settings of the scene of least drag.
 
-    The least drag is at a kink, beside which the drag rises by more on one side than on the other:
-    a probe that stays as wide as it is would balance them away from it.
+    The least drag is at a kink with different slopes on its sides: a probe of constant width would
+    find a minimum away from it.
     """
     model = resources.files("flowborne.scenes.library").joinpath("block.xml").read_text()
     findings = []
@@ -222,7 +223,7 @@ def at_hinge(simulation: Simulation) -> float:
 
 
 def drag_in_motion(quick: bool) -> list[Finding]:
-    """K4: with velocities kept the block sweeps against or with the wind at its strength."""
+    """K4: with velocities kept the block turns against or with the wind at its strength."""
     pace = 20.0 * FRAME
     along, wind = wind_towards(0.0)
     drag = ObjectiveWindDrag(np.array([1]), along)

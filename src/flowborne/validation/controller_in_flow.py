@@ -1,4 +1,4 @@
-"""The block in a stream, and how fast controllers arrive: K5 and K6."""
+"""The controlled block in a stream (K5), and frames until controllers arrive (K6)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 
 from flowborne import Array, BlowUpError, Simulation, load_scene
 from flowborne.motions import JointCommand
-from flowborne.validation.case import Case, Finding, GridSeries, Tier, near
-from flowborne.validation.reference import reference
+from flowborne.validation.case import Case, Tier, reference
+from flowborne.validation.findings import Finding, GridSeries, near
 from flowborne.worlds import advance
 
 FRAMES_PER_SECOND = 24.0
@@ -23,15 +23,15 @@ STREAM_PRESSURE = 0.5 * 1000.0
 
 
 @dataclass(frozen=True)
-class Course:
-    """How the block's angle went.
+class AngleHistory:
+    """The angle of the block over the frames.
 
     angles    (frames + 1,) degrees
     step      degrees in a frame that the strength allows
     final     mean of the last tenth, at least ten frames, degrees
     reached   the first frame in which the angle is within a step of the final one
     frames    the first after which the angle stays within a step of the final one; the number of
-              frames when it never does
+              frames without such a frame
     chatter   largest departure from the final angle in those last frames, in steps
     """
 
@@ -54,13 +54,13 @@ def course(
     strength: float = STRENGTH,
     resolution: int | None = None,
     rule: str | None = None,
-) -> Course:
+) -> AngleHistory:
     """Run a built-in block scene with one worker.
 
-    frames      how many; as many as the scene asks for when None
+    frames      number of frames; that of the scene when None
     strength    degrees/s
-    resolution  of the domain, in place of the scene's
-    rule        of the controller, in place of the scene's
+    resolution  of the domain; that of the scene when None
+    rule        of the controller; that of the scene when None
     raises      ArithmeticError when the run blows up
     """
     settings = {"control.0.strength": str(strength)}
@@ -79,8 +79,8 @@ def course(
     return judged(np.degrees(angles), strength / FRAMES_PER_SECOND)
 
 
-def judged(angles: Array, step: float) -> Course:
-    """Final angle and convergence, as the summary of a run has them."""
+def judged(angles: Array, step: float) -> AngleHistory:
+    """Final angle and convergence, as in the summary of a run."""
     run = angles[1:]
     last = min(len(run), max(10, round(0.1 * len(run))))
     final = float(run[-last:].mean())
@@ -89,13 +89,13 @@ def judged(angles: Array, step: float) -> Course:
     frames = int(outside[-1]) + 2 if outside.size else 1
     reached = int(np.argmax(away <= step * (1.0 + 1e-9))) + 1
     chatter = float(away[-last:].max()) / step
-    return Course(angles, step, final, reached, min(frames, len(run)), chatter)
+    return AngleHistory(angles, step, final, reached, min(frames, len(run)), chatter)
 
 
 def held_drag(degrees: float, resolution: int, seconds: float) -> float:
     """Mean pressure drag of the block held at an angle, N, over the last half of `seconds`.
 
-    A step takes the stream of 1 m/s a quarter of a cell.
+    In a step the stream of 1 m/s moves by a quarter of a cell.
     """
     settings = {"domain.resolution": str(resolution), "initial.positions.hinge": str(degrees)}
     world = Simulation(load_scene("ns-block-drag-max", settings)).world
@@ -113,7 +113,7 @@ def from_wind(angle: float) -> float:
 
 
 def block_in_stream(quick: bool) -> list[Finding]:
-    """K5: where most and least drag lead, and the drag of held blocks on a grid of 5 degrees."""
+    """K5: final angles by most and least drag, and the drag of held blocks every 5 degrees."""
     grids = (48,) if quick else (64, 128)
     findings: list[Finding] = []
     goals = {"ns-block-drag-max": 90.0, "ns-block-drag-min": 0.0}
@@ -121,10 +121,10 @@ def block_in_stream(quick: bool) -> list[Finding]:
     for scene, goal in goals.items():
         runs = [course(scene, resolution=n) for n in grids]
         values = [from_wind(run.final) for run in runs]
-        series = GridSeries("cells a side", grids, values, [abs(v - goal) for v in values])
+        series = GridSeries.toward("cells a side", grids, values, goal)
         finals[scene] = runs[-1].final
-        said = f"{scene}: final angle to the stream, degrees"
-        findings.append(near(said, values[-1], goal, absolute=15.0, series=series))
+        title = f"{scene}: final angle to the stream, degrees"
+        findings.append(near(title, series, goal, absolute=15.0))
     angles = np.arange(-90.0, 91.0, 15.0 if quick else 5.0)
     resolution, seconds = (32, 3.0) if quick else (64, 6.0)
     drags = np.array([held_drag(a, resolution, seconds) for a in angles])
@@ -152,15 +152,15 @@ SCENES = {
     "simple min drag": "block-drag-min",
     "simple min effort": "block-effort-wind",
 }
-"""Rows of Fig. 2 and our scene of each."""
+"""Rows of Fig. 2 and their scenes."""
 
 PROBE = 5.0
 """Displacement of the scenes' central differences, degrees."""
 
 
 def balanced_corner() -> float:
-    """Angle at which the drag of the block (K3's law, w/L = 0.2) is the same a probe to either
-    side, degrees: the least drag as central differences see it, 0.9 degrees from where it is."""
+    """Angle in degrees at which central differences find the least drag of the block: the drag by
+    K3's law, w/L = 0.2, is the same a probe to either side. It is 0.9 degrees from the minimum."""
 
     def drag(degrees: float) -> float:
         phi = np.radians(degrees + 90.0)
@@ -178,8 +178,7 @@ OPTIMA = {
 
 
 def frames_and_strength(quick: bool) -> list[Finding]:
-    """K6: the law of the frames in simple winds, of the fixed step and of the scenes' own rule, and
-    the frames of Fig. 2."""
+    """K6: frames in simple winds by the rule `fixed` and by the scenes', and those of Fig. 2."""
     findings = []
     strengths = (20.0, 40.0) if quick else (5.0, 10.0, 20.0, 40.0)
     for scene, optimum in OPTIMA.items():
@@ -225,12 +224,12 @@ def frames_and_strength(quick: bool) -> list[Finding]:
 
 
 def frames_enough(away: float, strength: float) -> int:
-    """To go so many degrees at so many a second, and to settle."""
+    """Frames to turn by some degrees at a strength in degrees/s, and to settle."""
     return round(1.2 * away * FRAMES_PER_SECOND / strength) + 30
 
 
 def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Finding]:
-    """How a scene's own rule goes to its optimum (degrees): as fast, and to the optimum itself."""
+    """Frames and accuracy with which a scene's own rule arrives at its optimum (degrees)."""
     late, off, chatter = 0.0, 0.0, 0.0
     for strength in strengths:
         away = abs(float(np.degrees(Simulation(scene).world.solid.q[0])) - best)

@@ -1,33 +1,49 @@
-"""The paper's Figs. 2, 7, 9 b, 10 and 11 with our numbers: tables, a picture and plots."""
+"""The paper's Figs. 2, 7, 9 b, 10 and 11 by flowborne: tables, a picture and plots."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from flowborne import Simulation, load_scene
-from flowborne.bench.frames import frame_times
+from flowborne import Array, Simulation, SolidModel, load_scene, run
+from flowborne.bench.timing import frame_times
+from flowborne.bodies import SIDES, kinematics
 from flowborne.exporters import write_atomically
 from flowborne.machine import cores
 from flowborne.pictures import ChainCost, plot_chain_cost, plot_courses, plot_forces
-from flowborne.validation.blocked_arms import COLUMNS, blocked_rows, draw_frame
+from flowborne.validation.case import reference
 from flowborne.validation.controller_in_flow import SCENES, course
-from flowborne.validation.flyer import flights
-from flowborne.validation.reference import reference
-from flowborne.validation.swimmer import swims
+from flowborne.validation.creatures import flights, swims
 
 PAPER_SERIAL = {1: 14.0, 2: 29.0, 3: 43.0, 4: 58.0}
 PAPER_PARALLEL = (14.0, 15.0)
 """s per frame in Fig. 10 on the authors' machines; parallel: least and most."""
 
 CHAIN_FRAMES = 20
-"""Frames of each chain whose median time is taken, after the first."""
+"""Timed frames of each chain, after the first; their median is taken."""
+
+ARMS_SCENE = "human-gravity-arms"
+ARM = ("upper_arm", "forearm", "hand")
+SETTLED = 0.25
+"""Part of the frames of Fig. 9 b that is left out at the start."""
+
+ARMS_COLUMNS = (
+    "walk",
+    "left arm ahead mm",
+    "right arm ahead mm",
+    "torso ahead mm",
+    "torso to the left mm",
+    "twist to the left degrees",
+    "frames with contact",
+)
 
 
 def figure_names() -> tuple[str, ...]:
@@ -38,11 +54,11 @@ def figure_names() -> tuple[str, ...]:
 def make_figures(
     out: Path, names: Sequence[str] | None = None, console: Console | None = None
 ) -> None:
-    """Run the scenes of the paper's figures and write what they gave; print the tables.
+    """Run the scenes of the paper's figures, print their tables and write files.
 
-    out      folder; made when it is not there. A figure writes figure-<name>.csv, and most a .png
-    names    which; all when None
-    console  where the tables are printed
+    out      folder, created if missing. A figure writes figure-<name>.csv, and most a .png
+    names    of the figures; all when None
+    console  for the tables
     raises   ArithmeticError or BlowUpError when a run blows up, OSError when a file cannot be
              written, ValueError when this machine cannot draw in three dimensions
     """
@@ -80,7 +96,7 @@ def convergence_figure(out: Path, console: Console) -> None:
 
 
 def swimmer_figure(out: Path, console: Console) -> None:
-    """Fig. 7: way up, tilt and work of the swimmer, with its jet alone, and with neither."""
+    """Fig. 7: rise, tilt and work of the swimmer, with its jet alone, and with neither."""
     found = swims(quick=False)
     columns = ("run", "rises m", "largest tilt degrees", "work of the drives kJ")
     rows = [
@@ -99,9 +115,9 @@ def swimmer_figure(out: Path, console: Console) -> None:
 
 
 def arms_figure(out: Path, console: Console) -> None:
-    """Fig. 9 b: the leg blocks the arm, which stays ahead, and the torso answers."""
+    """Fig. 9 b: the leg blocks the arm, which stays ahead, and the torso balances it."""
     rows, frame = blocked_rows()
-    finish("Fig. 9 b: arms in the way", COLUMNS, rows, out / "figure-9b.csv", console)
+    finish("Fig. 9 b: arms in the way", ARMS_COLUMNS, rows, out / "figure-9b.csv", console)
     draw_frame(frame, out / "figure-9b.png")
 
 
@@ -149,6 +165,95 @@ def flyer_figure(out: Path, console: Console) -> None:
     plot_forces("upward force of the air (N)", curves, out / "figure-11.png")
 
 
+@dataclass(frozen=True)
+class Walk:
+    """Positions of arms and torso in a walk whose thighs are in the way of the hands.
+
+    ahead    (frames, 2) m, centre of mass of the left and of the right arm ahead of its shoulder
+    torso    (frames, 2) m, centre of mass of the bodies above the back's joint without the arms,
+             ahead and to the left of the joint
+    twist    (frames,) degrees of the thorax about the vertical, to the left
+    touched  (frames,) whether an arm touched the body
+    """
+
+    ahead: Array
+    torso: Array
+    twist: Array
+    touched: Array
+
+    def means(self) -> list[float]:
+        """Means over all but the first frames: arms and torso, mm; twist, degrees; part touched."""
+        late = slice(round(SETTLED * len(self.twist)), None)
+        lengths = 1e3 * np.concatenate([self.ahead[late], self.torso[late]], axis=1).mean(axis=0)
+        return [*lengths.tolist(), float(self.twist[late].mean()), float(self.touched.mean())]
+
+
+def blocked_rows(frames: int | None = None) -> tuple[list[Sequence[object]], int]:
+    """Rows of `ARMS_COLUMNS` with and without collisions, and the frame with the largest difference
+    between the arms.
+
+    frames  number of frames; that of the scene when None
+    """
+    walks = {"arms collide": walk(True, frames), "arms pass through": walk(False, frames)}
+    rows: list[Sequence[object]] = []
+    for name, found in walks.items():
+        *numbers, part = found.means()
+        rows.append((name, *(f"{number:.1f}" for number in numbers), f"{100.0 * part:.0f} %"))
+    blocked = walks["arms collide"]
+    apart = np.abs(blocked.ahead[:, 0] - blocked.ahead[:, 1])
+    late = round(SETTLED * len(apart))
+    return rows, int(apart[late:].argmax()) + late + 1
+
+
+def walk(collisions: bool, frames: int | None = None) -> Walk:
+    """Run the scene with or without collisions of the arms."""
+    rows: list[tuple[Array, Array, float, bool]] = []
+    with Simulation(load_scene(ARMS_SCENE), workers=1) as simulation:
+        model = simulation.world.setup.solid
+        if not collisions:
+            model.mj.geom_contype[:] = 0
+        for _ in range(simulation.frames if frames is None else frames):
+            report = simulation.advance_frame()
+            touched = any(step.contacts > 0 for step in report.steps)
+            rows.append((*posture(model, simulation.world.solid.q), touched))
+    ahead, torso, twist, touches = zip(*rows, strict=True)
+    return Walk(np.array(ahead), np.array(torso), np.array(twist), np.array(touches, float))
+
+
+def posture(model: SolidModel, q: Array) -> tuple[Array, Array, float]:
+    """(2,) arms ahead, (2,) torso ahead and to the left, m, and twist in degrees of a pose."""
+    pose = kinematics(model, q)
+
+    def centre(bodies: Sequence[int]) -> Array:
+        mass = model.body_mass[bodies]
+        return np.asarray(mass @ pose.mass_centre[bodies] / mass.sum())
+
+    arms = {side: [model.body(f"{side}_{part}") for part in ARM] for side in SIDES}
+    ahead = [centre(bodies)[0] - pose.body_position[bodies[0], 0] for bodies in arms.values()]
+    above = np.flatnonzero(model.moves[:, model.dofs_of("lower_back")[0]])
+    rest = np.setdiff1d(above, [body for bodies in arms.values() for body in bodies])
+    torso = centre(rest.tolist()) - pose.body_position[model.body("lower_back")]
+    turn = pose.body_rotation[model.body("thorax")]
+    return np.array(ahead), torso[:2], float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
+
+
+def draw_frame(frame: int, path: Path) -> None:
+    """Picture of the scene after `frame` frames.
+
+    raises  ValueError when this machine cannot draw in three dimensions
+    """
+    import imageio.v3 as imageio
+
+    from flowborne.pictures import Picture, Run
+
+    with TemporaryDirectory() as folder:
+        run(load_scene(ARMS_SCENE), Path(folder) / "run", frames=frame, film=False)
+        picture = Picture(Run.read(Path(folder) / "run"), scale=1.5)
+        pixels = picture.draw(frame)[:, :, :3].copy()
+        picture.close()
+    write_atomically(path, lambda file: imageio.imwrite(file, pixels, extension=".png"))
+
+
 def frame_seconds(joints: int, workers: int, frames: int = CHAIN_FRAMES) -> float:
     """Median time of a frame of ns-chain-`joints`, s; several workers are processes."""
     executor = "serial" if workers == 1 else "processes"
@@ -182,4 +287,4 @@ FIGURES: dict[str, Callable[[Path, Console], None]] = {
     "10": chain_figure,
     "11": flyer_figure,
 }
-"""Name of a figure -> what makes it."""
+"""Name of a figure -> function that makes it."""

@@ -10,13 +10,13 @@ import numpy as np
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, StepReport, World
 from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
 from flowborne.flesh import FleshMesh, FleshTable
-from flowborne.validation.case import Case, Finding, GridSeries, Tier, near
-from flowborne.validation.fixed_bodies import Parabola, begin
+from flowborne.validation.case import Case, Tier, reference
+from flowborne.validation.channel_cylinder import Parabola
+from flowborne.validation.findings import Finding, GridSeries, near
 from flowborne.validation.flesh import round_root
 from flowborne.validation.flesh_bars import flat_mesh, grown_from, tissue_table
-from flowborne.validation.reference import reference
-from flowborne.validation.shedding import Shedding, amplitude, crest
-from flowborne.validation.worlds import NOWHERE, mjcf
+from flowborne.validation.shedding import Oscillation, amplitude, crest
+from flowborne.validation.worlds import NOWHERE, begin, mjcf
 from flowborne.worlds import advance
 
 LENGTH, HEIGHT = 2.5, 0.41
@@ -27,13 +27,13 @@ PLATE = '<geom type="box" pos="0.4 0.2 0" size="0.2 0.01 0.5"/>'
 """The cylinder, and the rigid flag of D2 from the cylinder's middle to its end A."""
 
 END, SIZE = (0.6, 0.2), (0.35, 0.02)
-"""A, the middle of the flag's end, and how long (from the cylinder on) and thick it is, m."""
+"""A, the middle of the flag's end, and length from the cylinder on and thickness, m."""
 
 DENSITY, VISCOSITY = 1000.0, 1.0
 """Of the fluid, kg/m^3 and Pa s."""
 
 CELLS = (35, 2)
-"""Cells of flesh along and across the flag: D1 is 0.5 % off with them."""
+"""Cells of flesh along and across the flag; with them D1 is 0.5 % off."""
 
 CFL = 1.0
 """Cells that the fastest inflow crosses in a step."""
@@ -42,14 +42,14 @@ GRIDS = {True: (44,), False: (44, 85, 126)}
 FLUTTERING = (44, 85)
 """Cells across the channel, by quick; and for FSI2 and FSI3.
 
-With 44 and any 41 more both sides of the flag at rest run 0.39 and 0.54 of a cell above planes of
-the grid. Where they cross such planes the lift jumps, as the corner cells of the flag's end change:
-with CFD1's flow by 0.48 N/m on 41 cells and by 0.28 N/m on 82. Half-way between it is right. FSI1's
-flag rises by 0.2 cells on 85, and what its lift is above the published one comes from there.
+With 44 cells and steps of 41 the sides of the flag at rest lie 0.39 and 0.54 of a cell above planes
+of the grid. If they cross such planes the lift jumps, as the corner cells of the flag's end change:
+with CFD1's flow by 0.48 N/m on 41 cells and by 0.28 N/m on 82. Half-way between it is correct.
+FSI1's flag rises by 0.2 cells on 85, which makes its lift too large.
 """
 
 BEHIND = 0.1
-"""Cells between A and the plane of the grid before it. The jump grows with them, and just on the
+"""Cells between A and the plane of the grid before it. The jump grows with this distance; on the
 plane the flag's end is not closed."""
 
 
@@ -58,7 +58,7 @@ class Flow:
     """A row of the benchmark.
 
     mean     velocity of the inflow over its height, m/s
-    longest  s until it is at rest, or repeats itself, on the first grid
+    longest  s until it is steady or periodic on the first grid
     tissue   of the flag; None for a rigid one
     """
 
@@ -78,8 +78,8 @@ class Flow:
 
 
 SETTLING = 0.1
-"""Damping time of the flesh of FSI1, s. It does not enter where the flag is at rest, and without
-any its swing is still a fifth of the sinking after 4 s."""
+"""Damping time of the flesh of FSI1, s. It has no effect at rest; without it the swing after 4 s is
+still a fifth of the deflection."""
 
 
 def flag_tissue(shear: float, density: float, damping: float = 0.0) -> FleshTable:
@@ -88,7 +88,7 @@ def flag_tissue(shear: float, density: float, damping: float = 0.0) -> FleshTabl
 
 
 def flag_of(tissue: FleshTable) -> SolidModel:
-    """The flag behind the cylinder; a row of its cells lies in the cylinder, which holds it."""
+    """The flag behind the cylinder, held by a row of its cells in the cylinder."""
     along, across = CELLS
     inside = SIZE[0] / along
     points, elements = flat_mesh((along + 1, across), (SIZE[0] + inside, SIZE[1]))
@@ -97,8 +97,8 @@ def flag_of(tissue: FleshTable) -> SolidModel:
     points[:, 0] += round_root(points[:, 1]) * np.minimum(1.0, 1.0 - points[:, 0] / SIZE[0])
     points[:, :2] += np.array(END) - (SIZE[0], 0.0)
     mesh = FleshMesh(points, elements, tuple("clamp" if h else "" for h in held))
-    beside = CYLINDER.replace("/>", ' contype="0" conaffinity="0"/>')
-    return grown_from(mesh, tissue, beside, NOWHERE)
+    cylinder = CYLINDER.replace("/>", ' contype="0" conaffinity="0"/>')
+    return grown_from(mesh, tissue, cylinder, NOWHERE)
 
 
 CFD = (Flow("CFD1", 0.2, 8.0), Flow("CFD2", 1.0, 5.0), Flow("CFD3", 2.0, 6.0))
@@ -110,7 +110,7 @@ FSI = (
 
 
 def channel(cells: int, flow: Flow) -> World:
-    """The channel at rest, `cells` across it; the cylinder is the world's, body 0."""
+    """The channel at rest, `cells` across it; the cylinder belongs to the world, body 0."""
     h = HEIGHT / cells
     ahead = (BEHIND - END[0] / h) % 1.0
     wall = BoundaryNoSlip()
@@ -139,7 +139,7 @@ def force(report: StepReport) -> Array:
 
 
 def moved(world: World) -> Array:
-    """(2,) how far A has moved, m; none of a rigid flag."""
+    """(2,) displacement of A, m; zero for a rigid flag."""
     flesh = world.setup.solid.flesh
     if flesh is None:
         return np.zeros(2)
@@ -156,7 +156,7 @@ def start(world: World, flow: Flow, coarser: World | None) -> None:
 
 
 def march(world: World, flow: Flow, seconds: float) -> Array:
-    """(steps, 4) drag, lift and place of A, step by step."""
+    """(steps, 4) drag, lift and displacement of A, step by step."""
     dt = time_step(world, flow)
     rows = []
     for _ in range(round(seconds / dt)):
@@ -166,14 +166,14 @@ def march(world: World, flow: Flow, seconds: float) -> Array:
 
 
 SHORTER = 0.5
-"""Part of a flow's longest time that it is given on finer grids, and when quick."""
+"""Part of a flow's longest time on finer grids, and when quick."""
 
 LAST = 0.1
-"""Part of that time whose mean is taken, and whose changes are told."""
+"""Last part of that time, for the means and the remaining changes."""
 
 
 def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[str]]:
-    """(grids, 4) drag, lift and place of A of a flow that comes to rest, and how steady it is."""
+    """(grids, 4) drag, lift and displacement of A in a steady flow, and their changes as text."""
     found, lines, coarser = [], [], None
     for n in grids:
         world = channel(n, flow)
@@ -189,10 +189,7 @@ def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[s
     return np.array(found), lines
 
 
-def series_of(grids: Sequence[int], values: Array, exact: float) -> GridSeries:
-    """Values from grid to grid with their errors."""
-    errors = [abs(v - exact) for v in values]
-    return GridSeries("cells across the channel", grids, list(values), errors)
+LABEL = "cells across the channel"
 
 
 def judged(
@@ -203,11 +200,10 @@ def judged(
     relative: float,
     lines: Sequence[str] = (),
 ) -> Finding:
-    """A figure within a part of the published one."""
+    """A figure within a relative tolerance of the published one."""
     exact = reference(flow.case, flow.name)[quantity]
-    series = series_of(grids, values, exact)
-    label = f"{flow.name}, {quantity}"
-    return near(label, values[-1], exact, relative=relative, series=series, lines=lines)
+    series = GridSeries.toward(LABEL, grids, values, exact)
+    return near(f"{flow.name}, {quantity}", series, exact, relative=relative, lines=lines)
 
 
 def between(
@@ -216,23 +212,23 @@ def between(
     """A figure within the range of published ones."""
     exact, low, high = reference(flow.case, flow.name)[quantity]
     value = float(values[-1])
-    series = series_of(grids, values, exact)
+    series = GridSeries.toward(LABEL, grids, values, exact)
     said, within = f"{low:g} to {high:g}", bool(low <= value <= high)
     return Finding(f"{flow.name}, {quantity}", value, exact, said, within, series, tuple(lines))
 
 
 PERIODS = 4
-"""Periods that are looked at, the last of a run."""
+"""Evaluated periods at the end of a run."""
 
 
 @dataclass(frozen=True)
 class Flutter:
-    """Figures of a motion that repeats itself, or has come to rest.
+    """Figures of a periodic motion, or of one that has come to rest.
 
-    means, amplitudes  (4,) middle and half of what lies between the extremes of drag (N/m), lift
-                       (N/m) and the two coordinates of A (m), over whole periods
+    means, amplitudes  (4,) mean and half the difference of the extremes of drag (N/m), lift (N/m)
+                       and the two coordinates of A (m), over whole periods
     frequency          Hz, of a rigid flag's lift, or of A across the channel; 0 at rest
-    line               how far it is from repeating itself
+    line               its deviation from a periodic motion
     """
 
     means: Array
@@ -242,13 +238,13 @@ class Flutter:
 
 
 def flutter(rows: Array, dt: float) -> Flutter:
-    """Figures of the last PERIODS periods of drag, lift and place of A (steps, 4).
+    """Figures of the last PERIODS periods of drag, lift and displacement of A (steps, 4).
 
-    Where there are not so many, of the LAST part of the rows.
+    With fewer periods, of the LAST part of the rows.
     """
-    drag, lift, _, up = rows.T
+    _, lift, _, up = rows.T
     clock = up if up.any() else lift
-    seen = Shedding(dt, drag, clock, np.zeros(0))
+    seen = Oscillation(dt, clock)
     if seen.rises().size <= PERIODS:
         last = rows[-round(LAST * len(rows)) :]
         middle, swing = 0.5 * (last.max(axis=0) + last.min(axis=0)), 0.5 * np.ptp(last, axis=0)
@@ -279,7 +275,7 @@ def periodic(flow: Flow, grids: Sequence[int]) -> list[Flutter]:
 
 
 def rigid_flag(quick: bool) -> list[Finding]:
-    """D2: drag and lift of the rigid flag; CFD3's, which sheds vortices, not when quick."""
+    """D2: drag and lift of the rigid flag, unless quick also with the vortices of CFD3."""
     grids, findings = GRIDS[quick], []
     for flow in CFD[:2]:
         values, lines = steady(flow, grids, quick)
@@ -290,11 +286,12 @@ def rigid_flag(quick: bool) -> list[Finding]:
     seen = periodic(CFD[2], grids)
     lines = [s.line for s in seen]
     for axis, name in enumerate(("drag", "lift")):
-        means, swings = (np.array([v[axis] for v in values]) for values in _columns(seen))
+        means = np.array([s.means[axis] for s in seen])
+        swings = np.array([s.amplitudes[axis] for s in seen])
         findings.append(judged(CFD[2], f"{name} mean", grids, means, 0.02, lines))
         findings.append(judged(CFD[2], f"{name} amplitude", grids, swings, 0.05))
-    paces = np.array([s.frequency for s in seen])
-    return [*findings, judged(CFD[2], "frequency", grids, paces, 0.01)]
+    frequencies = np.array([s.frequency for s in seen])
+    return [*findings, judged(CFD[2], "frequency", grids, frequencies, 0.01)]
 
 
 def flag_of_flesh(quick: bool) -> list[Finding]:
@@ -306,7 +303,8 @@ def flag_of_flesh(quick: bool) -> list[Finding]:
     grids = FLUTTERING
     for flow in () if quick else FSI[1:]:
         seen = periodic(flow, grids)
-        means, swings = (np.array(values) for values in _columns(seen))
+        means = np.array([s.means for s in seen])
+        swings = np.array([s.amplitudes for s in seen])
         lines = [s.line for s in seen]
         for axis, name in enumerate(("drag", "lift", "ux", "uy")):
             exact = reference("D3", flow.name)[f"{name} mean"]
@@ -314,13 +312,9 @@ def flag_of_flesh(quick: bool) -> list[Finding]:
             shown = [f"mean {found} from grid to grid, published {exact:g}"]
             said = f"{name} amplitude"
             findings.append(judged(flow, said, grids, swings[:, axis], 0.05, shown + lines))
-        paces = np.array([s.frequency for s in seen])
-        findings.append(judged(flow, "frequency", grids, paces, 0.03))
+        frequencies = np.array([s.frequency for s in seen])
+        findings.append(judged(flow, "frequency", grids, frequencies, 0.03))
     return findings
-
-
-def _columns(seen: Sequence[Flutter]) -> tuple[list[Array], list[Array]]:
-    return [s.means for s in seen], [s.amplitudes for s in seen]
 
 
 CASES = (

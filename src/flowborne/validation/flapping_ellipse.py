@@ -1,24 +1,22 @@
-"""An ellipse that hovers by flapping to and fro: S3."""
+"""An ellipse that hovers by flapping: S3."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
 from flowborne import Array, Grid, World
 from flowborne.motions import TrajectorySinusoid
-from flowborne.validation.case import Case, Curve, Finding, GridSeries, Plot, Tier
-from flowborne.validation.reference import reference
+from flowborne.validation.case import Case, Tier, reference
+from flowborne.validation.findings import Curve, Finding, GridSeries, Plot
 from flowborne.validation.worlds import mjcf, whole_steps
 from flowborne.worlds import advance, make_world
 
 SWAY, PERIOD, PITCH = 2.8, 4.0, 0.25 * np.pi
-"""m that the centre of the ellipse of 1 m goes from end to end, s, and rad that it pitches from
-upright to each side."""
+"""m from end to end of the motion of the centre, for an ellipse of 1 m; s; rad by which it pitches
+from upright to each side."""
 
 THICKNESS = 0.1
-"""Of the ellipse over its chord."""
+"""Thickness over chord."""
 
 FASTEST = np.pi * SWAY / PERIOD
 """m/s, of the centre."""
@@ -32,20 +30,20 @@ SIDE = {True: 10, False: 30}
 """Chords across the closed box, by quick."""
 
 STROKES = {True: 1.0, False: 4.0}
-"""Periods that are followed from rest, by quick."""
+"""Simulated periods from rest, by quick."""
 
 CFL = 1.0
 """Cells that the centre crosses in a step at most; the tips are up to 1.4 times as fast."""
 
 TURNING = 0.012
-"""Of T: published drag so near to a turn of the stroke, where it jumps from one sign to the other,
-is left out."""
+"""Part of T around each reversal of the stroke in which the published drag is left out: it changes
+its sign there."""
 
 LIFT, DRAG, MEASURED = "CL(t/T) Eldredge", "CD(t/T) Eldredge", "CL experiment Wang"
 
 
 def hover(cells: int, side: int) -> World:
-    """The ellipse upright at one end of its way, in still fluid."""
+    """The ellipse upright at one end of its stroke, in still fluid."""
     body = (
         '<body name="wing"><joint name="x" type="slide" axis="1 0 0"/>'
         '<joint name="pitch" axis="0 0 1"/>'
@@ -67,8 +65,8 @@ def hover(cells: int, side: int) -> World:
 
 
 def largest_quasi_steady() -> tuple[float, float]:
-    """The largest lift and drag in a stroke by 1.2 sin 2a and 1.4 - cos 2a times rho u^2 c / 2, by
-    which the published coefficients are made dimensionless, N/m."""
+    """Scales of the published coefficients: the largest lift and drag in a stroke by 1.2 sin 2a and
+    1.4 - cos 2a times rho u^2 c / 2, N/m."""
     angle = np.linspace(0.0, 2.0 * np.pi, 10_001)
     pressure = 0.5 * (FASTEST * np.sin(angle)) ** 2
     pitch = 0.5 * np.pi + PITCH * np.sin(angle)
@@ -79,7 +77,7 @@ def largest_quasi_steady() -> tuple[float, float]:
 
 def flap(cells: int, side: int, strokes: float) -> Array:
     """(n, 3) t/T in the middle of every step, and lift and drag over the largest quasi-steady ones;
-    drag is positive against the way that the wing goes."""
+    drag is positive against the motion of the wing."""
     world = hover(cells, side)
     count, dt = whole_steps(strokes * PERIOD, CFL / cells / FASTEST)
     lift, drag = largest_quasi_steady()
@@ -101,10 +99,10 @@ def apart(times: Array, values: Array, published: Array) -> float:
 
 
 def hovering(quick: bool) -> list[Finding]:
-    """S3: lift and drag from rest, beside another solver's and beside the experiment.
+    """S3: lift and drag from rest, against another solver and the experiment.
 
-    The list has no tolerance: the measured lift is itself away from that solver's, and so far may
-    ours be; the drag, of which nothing was measured, may be as far.
+    The list has no tolerance. The distance of the measured lift from that solver's is the tolerance
+    of ours, and of the drag, which was not measured.
     """
     grids = GRIDS[quick]
     runs = [flap(n, SIDE[quick], STROKES[quick]) for n in grids]
@@ -117,7 +115,7 @@ def hovering(quick: bool) -> list[Finding]:
     findings = []
     for name, column, published in (("lift", 1, lift), ("drag", 2, drag)):
         away = [apart(run[:, 0], run[:, column], published) for run in runs]
-        series = GridSeries("cells across the chord", grids, away, away)
+        series = GridSeries.toward("cells across the chord", grids, away, 0.0)
         run = runs[-1][:: max(1, len(runs[-1]) // 500)]
         curves = [
             Curve("Eldredge", published[:, 0], published[:, 1], True),
@@ -126,15 +124,13 @@ def hovering(quick: bool) -> list[Finding]:
         if name == "lift":
             curves.append(Curve("measured by Wang", measured[:, 0], measured[:, 1], True))
         findings.append(
-            replace(
-                Finding(
-                    f"{name}, mean distance from Eldredge's",
-                    away[-1],
-                    bound,
-                    "at most the experiment's in lift",
-                    away[-1] <= bound,
-                    series,
-                ),
+            Finding(
+                f"{name}, mean distance from Eldredge's",
+                away[-1],
+                bound,
+                "at most the experiment's in lift",
+                away[-1] <= bound,
+                series,
                 plot=Plot("t/T", f"{name} over the largest quasi-steady one", curves),
             )
         )

@@ -9,13 +9,14 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from flowborne import SolidState
+from flowborne import Array, SolidState
 from flowborne.bodies import assemble_flesh, prescribe_flesh, static_forces, symmetric_factor
 from flowborne.flesh import FleshTable
-from flowborne.validation.case import Case, Finding, GridSeries, at_most, near, order_of
-from flowborne.validation.flesh_bars import Array, Bar, Vector, bar_of, equilibrium, tissue_table
+from flowborne.validation.case import Case, reference, table
+from flowborne.validation.findings import Finding, GridSeries, at_most, near, order_of
+from flowborne.validation.flesh_bars import Bar, bar_of, equilibrium, tissue_table
 from flowborne.validation.pendulums import passages
-from flowborne.validation.reference import reference, table
+from flowborne.validation.worlds import Vector
 
 Cells = tuple[int, ...]
 ALONG = "cells along the bar"
@@ -33,7 +34,7 @@ def flag_tissue(young: float) -> FleshTable:
 
 
 def round_root(y: Array) -> Array:
-    """Where the bar meets the cylinder of radius 0.05 m, from where its axis does, m."""
+    """Start of the bar on the cylinder of radius 0.05 m at heights y, from that of its axis, m."""
     return np.asarray(np.sqrt(0.05**2 - y**2) - 0.05)
 
 
@@ -67,10 +68,8 @@ def flags(quick: bool) -> list[Finding]:
 def _of_end(said: str, name: str, found: Array, grids: Sequence[Cells]) -> list[Finding]:
     findings = []
     for axis, (quantity, exact) in enumerate(reference("D1", f"{name} A [1e-3]").items()):
-        values = found[:, axis]
-        series = _series([g[0] for g in grids], values, exact)
-        label = f"{said}, {quantity} in mm"
-        findings.append(near(label, values[-1], exact, relative=0.02, series=series))
+        series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, axis], exact)
+        findings.append(near(f"{said}, {quantity} in mm", series, exact, relative=0.02))
     return findings
 
 
@@ -85,7 +84,7 @@ def beam(cells: Cells, stiffness: float, weight: float) -> Bar:
 
 
 def elastica(quick: bool) -> list[Finding]:
-    """D4: end of a slender beam of EI = 1 and L = 1 under a load at its tip, or all along."""
+    """D4: end of a slender beam of EI = 1 and L = 1 under a load at its tip, or a uniform load."""
     grids: tuple[Cells, ...] = ((10, 1), (20, 1)) if quick else ((10, 1), (20, 1), (40, 1))
     loads = {
         "tip load alpha": table("D4", "tip load: [w/L,u/L,tip deg]"),
@@ -97,15 +96,14 @@ def elastica(quick: bool) -> list[Finding]:
         found = np.array([_bent(grid, said.startswith("tip"), chosen) for grid in grids])
         for i, load in enumerate(chosen):
             for j, quantity in enumerate(("w/L", "u/L", "angle of the tip in degrees")):
-                values, value = found[:, i, j], exact[load][j]
-                series = _series([g[0] for g in grids], values, value)
-                label = f"{said} = {load:g}, {quantity}"
-                findings.append(near(label, values[-1], value, relative=0.01, series=series))
+                value, title = exact[load][j], f"{said} = {load:g}, {quantity}"
+                series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, i, j], value)
+                findings.append(near(title, series, value, relative=0.01))
     return findings
 
 
 def _bent(cells: Cells, at_tip: bool, loads: Sequence[float]) -> Array:
-    """(loads, 3) sinking and drawing back of the end, m, and its angle, degrees."""
+    """(loads, 3) downward and backward displacement of the end, m, and its angle, degrees."""
     found, q = [], None
     for load in loads:
         bar = beam(cells, 1.0, 0.0 if at_tip else load)
@@ -117,7 +115,7 @@ def _bent(cells: Cells, at_tip: bool, loads: Sequence[float]) -> Array:
 
 
 AMPLITUDE = 1e-3
-"""Of the vibration in time of D5, m."""
+"""Of D5's vibration in time, m."""
 
 
 def modes(bar: Bar, count: int) -> tuple[Array, Array]:
@@ -134,16 +132,16 @@ def modes(bar: Bar, count: int) -> tuple[Array, Array]:
 
 
 def swing(bar: Bar, q: Array, dt: float, steps: int) -> Array:
-    """(steps + 1,) height of the end above rest, m, after the bar is let go at q (nq,)."""
-    model, nothing = bar.model, np.zeros(bar.model.nv)
-    ahead = assemble_flesh(model, SolidState(q, nothing), nothing, dt)
-    first = prescribe_flesh(ahead, bar.fixed, nothing).velocity
-    state = SolidState(q.copy(), 0.5 * first)  # velocities belong to the middle of the coming step
+    """(steps + 1,) height of the end above rest, m, after the bar is released at q (nq,)."""
+    model, zero = bar.model, np.zeros(bar.model.nv)
+    ahead = assemble_flesh(model, SolidState(q, zero), zero, dt)
+    first = prescribe_flesh(ahead, bar.fixed, zero).velocity
+    state = SolidState(q.copy(), 0.5 * first)  # the velocity in the middle of the next step
     heights = [bar.end(q)[1]]
     for _ in range(steps):
         q = model.integrate(state.q, state.v, dt)
-        system = assemble_flesh(model, SolidState(q, state.v), nothing, dt)
-        state = SolidState(q, prescribe_flesh(system, bar.fixed, nothing).velocity)
+        system = assemble_flesh(model, SolidState(q, state.v), zero, dt)
+        state = SolidState(q, prescribe_flesh(system, bar.fixed, zero).velocity)
         heights.append(bar.end(q)[1])
     return np.array(heights)
 
@@ -155,15 +153,14 @@ def vibration(quick: bool) -> list[Finding]:
     grids: tuple[Cells, ...] = ((5, 1), (10, 1), (20, 1)) if quick else ((10, 1), (20, 1), (40, 1))
     found = np.array([modes(beam(grid, 1.0, 0.0), 3)[0] for grid in grids])
     for mode in range(3):
-        series = _series([g[0] for g in grids], found[:, mode], exact[mode])
-        label = f"f{mode + 1} of a beam, Hz"
-        findings.append(near(label, found[-1, mode], exact[mode], relative=0.02, series=series))
+        series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, mode], exact[mode])
+        findings.append(near(f"f{mode + 1} of a beam, Hz", series, exact[mode], relative=0.02))
     findings += in_time((20, 40) if quick else (25, 50, 100), 3 if quick else 10)
     return findings + flag_in_time(quick)
 
 
 def in_time(steps: Sequence[int], periods: int) -> list[Finding]:
-    """Frequency and amplitude of a beam let go in its first mode, `steps` in a period."""
+    """Frequency and amplitude of a beam released in its first mode, `steps` in a period."""
     bar = beam((10, 1), 1.0, 0.0)
     (f1,), shape = modes(bar, 1)
     rest = bar.model.mj.qpos0
@@ -175,8 +172,8 @@ def in_time(steps: Sequence[int], periods: int) -> list[Finding]:
         heights = swing(bar, q, dt, int((periods + 0.5) * n))
         times = passages(heights, dt)
         runs.append(float(1.0 / (2.0 * np.diff(times).mean())))
-        lost.append(_lost(heights, n))
-    series = _series(steps, runs, f1, label="steps in a period")
+        lost.append(1.0 - float(np.abs(heights[-n:]).max() / np.abs(heights[0])))
+    series = GridSeries.toward("steps in a period", steps, runs, f1)
     return [
         order_of("order in time of f1", series, expected=2.0),
         near("f1 in time over that of the mode", runs[-1] / f1, 1.0, relative=0.02),
@@ -184,15 +181,10 @@ def in_time(steps: Sequence[int], periods: int) -> list[Finding]:
     ]
 
 
-def _lost(heights: Array, n: int) -> float:
-    """Share of the amplitude lost from the start to the last whole period of n steps."""
-    return 1.0 - float(np.abs(heights[-n:]).max() / np.abs(heights[0]))
-
-
 def flag_in_time(quick: bool) -> list[Finding]:
-    """CSM3: the bar of CSM1 let go at rest, by its small vibrations and by its large ones.
+    """CSM3: the bar of CSM1 released at rest, by its small vibrations and by its large ones.
 
-    Nothing damps it. At 50 steps a second its fast modes grow in the large swings and take over
+    It is not damped. At 50 steps a second its fast modes grow in the large swings and dominate
     after some seconds; at 100 they do not in 10 s.
     """
     known = reference("D5", "CSM3 cross-check, Hz")
@@ -200,25 +192,18 @@ def flag_in_time(quick: bool) -> list[Finding]:
     grids = FLAG_CELLS[:2] if quick else FLAG_CELLS[:3]
     bars = [bar_of(g, FLAG, flag_tissue(1.4e6), FLAG_DOWN, round_root) for g in grids]
     values = [float(modes(bar, 1)[0][0]) for bar in bars]
-    series = _series([g[0] for g in grids], values, small)
-    findings = [near("f1 of CSM3's bar, Hz", values[-1], small, relative=0.02, series=series)]
+    series = GridSeries.toward(ALONG, [g[0] for g in grids], values, small)
+    findings = [near("f1 of CSM3's bar, Hz", series, small, relative=0.02)]
     steps, seconds = ((50, 100), 3.0) if quick else ((100, 200), 10.0)
     runs = []
     for n in steps:
         heights = swing(bars[1], bars[1].model.rest().q, 1.0 / n, int(seconds * n))
         times = passages(heights - heights.mean(), 1.0 / n)
         runs.append(float(1.0 / (2.0 * np.diff(times).mean())))
-    series = _series(steps, runs, large, label="steps a second")
-    label = "CSM3 at large amplitude, Hz"
+    series = GridSeries.toward("steps a second", steps, runs, large)
     lines = [f"the end swings between {1e3 * heights.min():.1f} and {1e3 * heights.max():.1f} mm"]
-    finding = near(label, runs[-1], large, relative=0.02, series=series, lines=lines)
-    return [*findings, finding]
-
-
-def _series(
-    cells: Sequence[float], values: Sequence[float] | Array, exact: float, label: str = ALONG
-) -> GridSeries:
-    return GridSeries(label, cells, list(values), [abs(v - exact) for v in values])
+    title = "CSM3 at large amplitude, Hz"
+    return [*findings, near(title, series, large, relative=0.02, lines=lines)]
 
 
 CASES = (Case("D1", flags), Case("D4", elastica), Case("D5", vibration))

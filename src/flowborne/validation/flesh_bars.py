@@ -1,4 +1,4 @@
-"""Bars of flesh for the cases, grown from a model and a table, and where they come to rest."""
+"""Bars of flesh for the cases, made from a model and a table, and their equilibrium."""
 
 from __future__ import annotations
 
@@ -12,26 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, dia_array
 
-from flowborne import SolidModel
+from flowborne import Array, SolidModel
 from flowborne.bodies import Flesh, static_forces, symmetric_factor
 from flowborne.flesh import FleshMesh, FleshTable, grow, mesh_bytes
+from flowborne.validation.worlds import Vector
 
-Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
 Root = Callable[[Array], Array]
 
 SETTLED = 1e-7
-"""A bar is at rest when a turn of Newton's method moves nothing by more than this of its length."""
+"""Largest displacement in an iteration of Newton's method for a bar at rest, over its length."""
 
-TURNS = 400
+MAX_ITERATIONS = 400
 
 SPLIT = np.array(
     [[0, 1, 3, 7], [0, 5, 1, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 6, 4, 7]]
 )
 """Six right-handed tetrahedra of a cell whose corner b is at (b & 1, b >> 1 & 1, b >> 2)."""
 
-CLAMP = '<mujoco><worldbody>{beside}<body name="clamp"/></worldbody></mujoco>'
-"""A body that does not move, to hold a bar."""
+CLAMP = '<mujoco><worldbody>{others}<body name="clamp"/></worldbody></mujoco>'
+"""A fixed body that holds a bar."""
 
 
 def bar_mesh(
@@ -73,12 +72,12 @@ def flat_mesh(cells: tuple[int, int], size: tuple[float, float]) -> tuple[Array,
 
 @dataclass(frozen=True)
 class Bar:
-    """A clamped bar of flesh along x that bends in the plane z = 0 alone.
+    """A clamped bar of flesh along x that bends in the plane z = 0 only.
 
     model  of the bar
     flesh  of the model
-    fixed  (nv,) dofs along z, which do not move
-    share  (n,) of an even load on the end face that each vertex bears; they add up to 1
+    fixed  (nv,) whether a dof is along z and does not move
+    share  (n,) share of each vertex in a uniform load on the end face; the sum is 1
     """
 
     model: SolidModel
@@ -87,13 +86,13 @@ class Bar:
     share: Array
 
     def end(self, q: Array) -> Array:
-        """(3,) how far the middle of the end face has moved at positions q (nq,), m."""
+        """(3,) displacement of the middle of the end face at positions q (nq,), m."""
         rest = self.flesh.rest
         middle = self._face() & (np.abs(rest[:, 1]) < 1e-9 * np.ptp(rest[:, 0]))
         return np.asarray((self.flesh.vertices(q) - rest)[middle].mean(axis=0))
 
     def turned(self, q: Array) -> float:
-        """Angle that the end face has turned by, rad."""
+        """Rotation of the end face, rad."""
         face = np.flatnonzero(self._face())
         height, now = self.flesh.rest[face, 1], self.flesh.vertices(q)[face]
         top, bottom = (np.isclose(height, edge) for edge in (height.max(), height.min()))
@@ -122,11 +121,11 @@ def bar_of(
     gravity: Vector,
     root: Root = straight,
 ) -> Bar:
-    """A bar that is held where it starts.
+    """A bar that is held at its root.
 
-    cells   of its length and thickness, in a slab; and of its depth, each as deep as it is long
+    cells   along length and thickness in a slab; and along the depth, with cells as deep as long
     tissue  table of its material
-    root    x at which the bar starts, at heights y (n,)
+    root    x of the root at heights y (n,)
     """
     if len(cells) == 2:
         points, elements = flat_mesh((cells[0], cells[1]), size)
@@ -143,13 +142,13 @@ def bar_of(
     return Bar(model, flesh, fixed, _end_share(flesh))
 
 
-def grown_from(mesh: FleshMesh, tissue: FleshTable, beside: str, gravity: Vector) -> SolidModel:
-    """A model with the flesh that a table grows from a mesh that "clamp" holds.
+def grown_from(mesh: FleshMesh, tissue: FleshTable, others: str, gravity: Vector) -> SolidModel:
+    """A model with the flesh of a table and a mesh that "clamp" holds.
 
-    beside  MJCF of the world body's other elements
+    others  MJCF of other elements of the world body
     """
     slab = mesh.elements.shape[1] == 3
-    spec = mujoco.MjSpec.from_string(CLAMP.format(beside=beside))
+    spec = mujoco.MjSpec.from_string(CLAMP.format(others=others))
     with TemporaryDirectory() as folder:
         (Path(folder) / "bar.npz").write_bytes(mesh_bytes(mesh, ""))
         grown = grow(spec, (tissue,), Path(folder))
@@ -157,7 +156,7 @@ def grown_from(mesh: FleshMesh, tissue: FleshTable, beside: str, gravity: Vector
 
 
 def tissue_table(young: float, poisson: float, density: float, damping: float = 0.0) -> FleshTable:
-    """Table of a St. Venant-Kirchhoff material, undamped unless said otherwise."""
+    """Table of a St. Venant-Kirchhoff material, undamped by default."""
     return FleshTable(
         name="bar",
         bones=("clamp",),
@@ -171,10 +170,10 @@ def tissue_table(young: float, poisson: float, density: float, damping: float = 
 
 
 def equilibrium(bar: Bar, applied: Array, start: Array | None = None) -> Array:
-    """(nq,) positions at which the bar is at rest under generalised forces (nv,) and its weight.
+    """(nq,) positions of the bar at rest under generalised forces (nv,) and its weight.
 
     Newton's method, damped where a step would raise the energy. It converges linearly, as the
-    stiffness is not the derivative of compressed elements' forces.
+    stiffness is not the derivative of the forces of compressed elements.
 
     start   (nq,) positions to start from; at rest when None
     raises  ArithmeticError when it does not settle
@@ -183,7 +182,7 @@ def equilibrium(bar: Bar, applied: Array, start: Array | None = None) -> Array:
     room = SETTLED * float(np.ptp(bar.flesh.rest[:, 0]))
     q, damping = np.array(model.mj.qpos0 if start is None else start), 0.0
     K, force = static_forces(model, q, applied)
-    for _ in range(TURNS):
+    for _ in range(MAX_ITERATIONS):
         within = csc_array(K[free][:, free])
         scale = dia_array((within.diagonal(), 0), shape=within.shape)
         move = np.zeros(model.nv)
@@ -198,7 +197,9 @@ def equilibrium(bar: Bar, applied: Array, start: Array | None = None) -> Array:
         if small and damping == 0.0:
             return q
         damping = 0.25 * damping if damping > 1e-7 else 0.0
-    raise ArithmeticError(f"the bar does not come to rest in {TURNS} turns of Newton's method")
+    raise ArithmeticError(
+        f"the bar does not come to rest in {MAX_ITERATIONS} iterations of Newton's method"
+    )
 
 
 def _end_share(flesh: Flesh) -> Array:

@@ -1,4 +1,4 @@
-"""Finite differences of the objective, and what they cost: K7."""
+"""Finite differences of the objective, and their cost: K7."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from flowborne.executors import Serial
 from flowborne.gradients import GradientCentral, GradientOneSided
 from flowborne.machine import cores, kernel_threads
 from flowborne.objectives import ObjectiveCallable, ObjectiveSum, ObjectiveWindDrag
-from flowborne.validation.case import Case, Finding, GridSeries, Tier, at_most, near, order_of
+from flowborne.validation.case import Case, Tier
 from flowborne.validation.controller import AIR, HINGE, LENGTH, SPEED, WIDTH, block
+from flowborne.validation.findings import Finding, GridSeries, at_most, near, order_of
 from flowborne.validation.worlds import Vector, mjcf
 from flowborne.winds import WindFaces, WindForce
 from flowborne.worlds import make_world
@@ -23,7 +24,7 @@ from flowborne.worlds import make_world
 FRAME = 1.0 / 24.0
 
 LEANING = 35.0
-"""degrees of the block where the gradient is taken; its incidence is 90 more."""
+"""Angle of the block at which the gradient is measured, degrees; its incidence is 90 more."""
 
 
 def drag_slope(degrees: float) -> float:
@@ -65,8 +66,8 @@ def difference_error(quick: bool) -> list[Finding]:
         ("one-sided", GradientOneSided, 1.0),
     ):
         found = slopes(kind, sizes, LEANING)
-        errors = [abs(f / exact - 1.0) for f in found]
-        series = GridSeries("h^-1 in 1/degree", [1.0 / s for s in sizes], found, errors)
+        inverse = [1.0 / size for size in sizes]
+        series = GridSeries.toward("h^-1 in 1/degree", inverse, found, exact, relative=True)
         findings.append(order_of(f"order of {said} differences", series, expected=order))
     scale = 2.0 * AIR * SPEED**2 * LENGTH
     level = slopes(GradientCentral, [5.0], 0.0)[0] / scale
@@ -80,7 +81,7 @@ def difference_error(quick: bool) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Angle:
-    """Objective that tells a joint's position, as the trial leaves it."""
+    """Objective whose value is a joint's position at the end of the trial."""
 
     dof: int
 
@@ -110,7 +111,7 @@ def pushed_arm(force: Vector) -> World:
 
 
 def exact_position(quick: bool) -> list[Finding]:
-    """Displacement of the trials over the one asked for, and where a frame's drive ends."""
+    """Displacement of the trials less the requested one, and joints less targets after a frame."""
     rng = np.random.default_rng(3)
     wrong, off = 0.0, 0.0
     for _ in range(2 if quick else 10):
@@ -150,7 +151,7 @@ def decision_seconds(
 ) -> list[float]:
     """Median time of a decision of each chain over the first `count` frames by `clock`, s.
 
-    The chains take turns, so that what else the machine does meets all of them.
+    The chains take turns, so that other load of the machine affects all of them alike.
     """
     spent: list[list[float]] = [[] for _ in CHAINS]
     settings = {"domain.resolution": str(resolution)}
@@ -173,7 +174,7 @@ def decision_seconds(
 def chain_cost(quick: bool) -> list[Finding]:
     """Time of a decision against the number of joints.
 
-    The serial time is the processor's, so that it does not depend on what else the machine does.
+    The serial time is CPU time, so that it does not depend on other load of the machine.
     """
     count, resolution = (3, 48) if quick else (15, 128)
     serial = decision_seconds(count, resolution, 1, process_time)

@@ -6,7 +6,8 @@ import numpy as np
 
 from flowborne import Array, Grid, World
 from flowborne.operators import cut_by_bodies
-from flowborne.validation.case import Case, Finding, at_most
+from flowborne.validation.case import Case
+from flowborne.validation.findings import Finding, at_most
 from flowborne.validation.worlds import Vector, mjcf
 from flowborne.worlds import advance, make_world
 
@@ -21,7 +22,7 @@ DT = 1e-3
 """s"""
 
 SOLVE = 1e-13
-"""Relative residual of the pressure solve, below what is asked of the velocity."""
+"""Relative residual of the pressure solve, below the tolerance of the velocity."""
 
 SLAB = Grid.slab(48, 48, 1.0 / 48.0, (-0.5, -0.5))
 BOX = Grid((20, 20, 20), 1.0 / 20.0, (-0.5, -0.5, -0.5))
@@ -31,11 +32,11 @@ SHAPES = (
     ("brick", (0.251, -0.23, -0.02), '<geom type="box" size="0.131 0.083 0.11" euler="0 0 0.4"/>'),
     ("egg", (0.24, 0.29, 0.01), '<geom type="ellipsoid" size="0.151 0.092 0.11" euler="0 0 1.1"/>'),
 )
-"""Name, place and geometry of bodies; the grids cut them all."""
+"""Name, position and geometry of bodies; the grids cut them all."""
 
 HOLLOW = "".join(
-    f'<geom type="box" size="{size}" pos="{place}"/>'
-    for size, place in (
+    f'<geom type="box" size="{size}" pos="{centre}"/>'
+    for size, centre in (
         ("0.161 0.041 0.161", "0 0.12 0"),
         ("0.161 0.041 0.161", "0 -0.12 0"),
         ("0.041 0.161 0.161", "0.12 0 0"),
@@ -47,8 +48,8 @@ HOLLOW = "".join(
 """A box around a closed pore."""
 
 FRAME = "".join(
-    f'<geom type="box" size="{size}" pos="{place}"/>'
-    for size, place in (
+    f'<geom type="box" size="{size}" pos="{centre}"/>'
+    for size, centre in (
         ("0.161 0.041 1", "0 0.12 0"),
         ("0.161 0.041 1", "0 -0.12 0"),
         ("0.041 0.161 1", "0.12 0 0"),
@@ -58,15 +59,15 @@ FRAME = "".join(
 """The same in a slab."""
 
 
-def placed(name: str, place: Vector, rest: str, grid: Grid, turned: str = "") -> str:
+def placed(name: str, centre: Vector, content: str, grid: Grid, turned: str = "") -> str:
     """MJCF of a body; in a slab at z = 0."""
-    z = 0.0 if grid.is_slab else place[2]
-    return f'<body name="{name}" pos="{place[0]} {place[1]} {z}" {turned}>{rest}</body>'
+    z = 0.0 if grid.is_slab else centre[2]
+    return f'<body name="{name}" pos="{centre[0]} {centre[1]} {z}" {turned}>{content}</body>'
 
 
 def fixed_bodies(grid: Grid) -> str:
     """MJCF of bodies without joints, one of them hollow."""
-    bodies = [placed(name, place, geom, grid) for name, place, geom in SHAPES]
+    bodies = [placed(name, centre, geom, grid) for name, centre, geom in SHAPES]
     pore = FRAME if grid.is_slab else HOLLOW
     hollow = placed("hollow", (-0.243, 0.228, 0.01), pore, grid, 'euler="0 0 0.3"')
     return mjcf(*bodies, hollow)
@@ -74,15 +75,15 @@ def fixed_bodies(grid: Grid) -> str:
 
 def free_bodies(grid: Grid) -> str:
     """MJCF of bodies that float."""
-    return mjcf(*(placed(name, place, "<freejoint/>" + geom, grid) for name, place, geom in SHAPES))
+    bodies = [placed(name, centre, "<freejoint/>" + geom, grid) for name, centre, geom in SHAPES]
+    return mjcf(*bodies)
 
 
 def displaced(world: World) -> tuple[Array, Array]:
-    """Discrete volume of each body that a pressure gradient along each axis sees, and where it
-    acts.
+    """Discrete volume of each body for a pressure gradient along each axis, and its centroid.
 
-    A gradient along an axis pushes on the closed parts of the faces across it; each stands for a
-    volume of closed area times h.
+    A gradient along an axis acts on the closed parts of the faces across it, each of which
+    represents a volume of closed area times h.
 
     returns  (nbody, 3) m^3; (nbody, 3, 3) centroid of that volume for each axis, m
     """
@@ -92,17 +93,17 @@ def displaced(world: World) -> tuple[Array, Array]:
     volume, moment = np.zeros((count, 3)), np.zeros((count, 3, 3))
     for axis in grid.axes:
         across = cut.axis == axis
-        places = grid.face_coordinates(axis)
+        centres = grid.face_coordinates(axis)
         index = np.unravel_index(cut.face[across], grid.face_shape(axis))
         part = grid.cell_volume * cut.closed[across]
         np.add.at(volume[:, axis], cut.body[across], part)
         for d in grid.axes:
-            np.add.at(moment[:, axis, d], cut.body[across], part * places[d][index[d]])
+            np.add.at(moment[:, axis, d], cut.body[across], part * centres[d][index[d]])
     return volume, moment / np.where(volume > 0.0, volume, 1.0)[:, :, None]
 
 
 def still_around_fixed(grid: Grid, gravity: Vector, steps: int) -> tuple[float, float, float]:
-    """Fluid that carries its own weight, at rest around fixed bodies.
+    """Fluid at rest under its own weight around fixed bodies.
 
     returns  max|u| / (g dt); largest error of a body's force over that force; largest torque
              about its displaced centroid over force times the cube root of its volume
@@ -155,9 +156,9 @@ def fastest(world: World) -> float:
 def hydrostatic_balance(quick: bool) -> list[Finding]:
     """F5: fluid at rest under its own weight around fixed bodies, and around neutral free ones.
 
-    The engine leaves the hydrostatic pressure out and gives bodies Archimedes' force in closed
-    form. So that the pressure of the cut cells is tested, gravity acts around the fixed bodies as
-    a force on the fluid; the free bodies have the engine's own gravity.
+    The solver omits the hydrostatic pressure and applies Archimedes' force to bodies in closed
+    form. To test the pressure of the cut cells, gravity is a force on the fluid around the fixed
+    bodies; the free bodies have the solver's own gravity.
     """
     findings = []
     for name, grid, gravity, steps in (

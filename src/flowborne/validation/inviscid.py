@@ -1,4 +1,4 @@
-"""Bodies and an ideal fluid that answer each other: I4, I6, I7, I8, I9."""
+"""Bodies coupled to an ideal fluid: I4, I6, I7, I8, I9."""
 
 from __future__ import annotations
 
@@ -9,11 +9,18 @@ import numpy as np
 
 from flowborne import Array, Grid
 from flowborne.boundaries import Boundaries, BoundaryOpen
-from flowborne.validation.case import Case, Finding, GridSeries, Tier, at_most, near
-from flowborne.validation.fluid_cases import Uniform, all_inflow
+from flowborne.validation.case import Case, Tier, reference, table
+from flowborne.validation.findings import Finding, GridSeries, at_most, near
 from flowborne.validation.pendulums import passages
-from flowborne.validation.reference import reference, table
-from flowborne.validation.worlds import PERIODIC, RING, Vector, mjcf, start_at_once
+from flowborne.validation.worlds import (
+    PERIODIC,
+    RING,
+    Uniform,
+    Vector,
+    all_inflow,
+    mjcf,
+    start_at_once,
+)
 from flowborne.winds import WindForce
 from flowborne.worlds import advance, kinetic_energy, make_world, set_velocity, start
 
@@ -31,7 +38,7 @@ SOLID_BODIES = (
     ((0.4, -0.4, -0.3), '<geom type="ellipsoid" size=".3 .2 .25" euler=".3 .5 .7"/>'),
     ((-0.4, 0.45, 0.4), '<geom type="cylinder" size=".2 .25" euler=".3 .5 .7"/>'),
 )
-"""Place and shape of the free bodies of I4, in boxes of 2 m about the origin."""
+"""Position and shape of the free bodies of I4, in boxes of 2 m about the origin."""
 
 
 def neutral(
@@ -41,10 +48,10 @@ def neutral(
     steps: int,
     stream: Vector | None = None,
 ) -> tuple[float, float]:
-    """Largest displacement (m, and of quaternions' entries) and change of velocity (m/s, rad/s) of
-    bodies as heavy as the fluid, under gravity.
+    """Largest displacement (m, quaternions) and change of velocity (m/s, rad/s) of bodies with the
+    fluid's density, under gravity.
 
-    stream  that carries fluid and bodies through a periodic box; None: at rest in a closed one
+    stream  of fluid and bodies through a periodic box; None for a closed box at rest
     """
     elements = (
         f'<body pos="{at[0]} {at[1]} {at[2]}"><freejoint/>{geom}</body>' for at, geom in bodies
@@ -63,14 +70,13 @@ def neutral(
         state.v.reshape(-1, 6)[:, :3] = stream
     first = state.v.copy()
     advance(world, dt, steps)
-    places = start.reshape(-1, 7)
-    places[:, :3] += steps * dt * first.reshape(-1, 6)[:, :3]
+    start.reshape(-1, 7)[:, :3] += steps * dt * first.reshape(-1, 6)[:, :3]
     moved = world.solid.q - start
     return float(np.abs(moved).max()), float(np.abs(world.solid.v - first).max())
 
 
 def neutrally_buoyant(quick: bool) -> list[Finding]:
-    """I4: bodies of many shapes stay where they are, or go with the stream."""
+    """I4: bodies of many shapes stay at rest, or move with the stream."""
     steps = 100 if quick else 1000
     flat = Grid.slab(32, 32, 2.0 / 32, (-1.0, -1.0))
     solid = Grid((16, 16, 16), 2.0 / 16, (-1.0, -1.0, -1.0))
@@ -104,9 +110,9 @@ class PotentialFlow:
     def __call__(
         self, x: Array, y: Array, z: Array, time: float = 0.0
     ) -> tuple[Array, Array, Array]:
-        place = x + 1j * y + 0.0 * z
+        point = x + 1j * y + 0.0 * z
         focus, radius = np.sqrt(LONG**2 - SHORT**2), 0.5 * (LONG + SHORT)
-        circle = 0.5 * (place + np.sqrt(place - focus) * np.sqrt(place + focus))
+        circle = 0.5 * (point + np.sqrt(point - focus) * np.sqrt(point + focus))
         onward, back = np.exp(-1j * self.incidence), np.exp(1j * self.incidence)
         velocity = onward - back * (radius / circle) ** 2
         velocity /= 1.0 - (0.5 * focus / circle) ** 2
@@ -141,13 +147,12 @@ def munk_moment(quick: bool) -> list[Finding]:
         exact = float(np.sin(2.0 * np.radians(degrees)))
         runs = [held_ellipse(n, np.radians(degrees)) for n in grids]
         moments, forces = [run[0] for run in runs], [run[1] for run in runs]
-        errors = [abs(m / exact - 1.0) for m in moments]
-        series = GridSeries(label, grids, moments, errors)
-        said = f"M over rho U^2 pi (a^2-b^2)/2 at {degrees:g} degrees"
-        findings.append(near(said, moments[-1], exact, relative=0.01, falling=series))
-        series = GridSeries(label, grids, forces, forces)
-        said = f"force over rho U^2 2a at {degrees:g} degrees"
-        findings.append(at_most(said, forces[-1], 0.02, series=series))
+        series = GridSeries.toward(label, grids, moments, exact, relative=True)
+        title = f"M over rho U^2 pi (a^2-b^2)/2 at {degrees:g} degrees"
+        findings.append(near(title, series, exact, relative=0.01, falling=True))
+        series = GridSeries.toward(label, grids, forces, 0.0)
+        title = f"force over rho U^2 2a at {degrees:g} degrees"
+        findings.append(at_most(title, series, 0.02))
     return findings
 
 
@@ -160,7 +165,7 @@ class PendulumBox:
     """The closed square in which I7's bob swings.
 
     side   m
-    above  m that the pivot is over the square's middle
+    above  height of the pivot over the square's middle, m
     grids  cells across it for the wider swings
     """
 
@@ -175,13 +180,13 @@ class PendulumBox:
 
 
 WIDEST = 150.0
-"""Degrees from which the bob is let go at most."""
+"""Largest angle of release of the bob, degrees."""
 
 NARROW = PendulumBox(2.0, ROD, (64, 128, 256, 384))
 """The bob rests in the middle."""
 
 WIDE = PendulumBox(4.0, 0.0, (128, 256, 512))
-"""For swings of more than 90 degrees, on which the bob would leave the other."""
+"""For swings of more than 90 degrees, which would leave the other box."""
 
 
 def small_period(ratio: float, added: float) -> float:
@@ -191,11 +196,11 @@ def small_period(ratio: float, added: float) -> float:
 
 
 def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: float) -> float:
-    """Period in s of the bob, let go at an angle from where it rests.
+    """Period in s of the bob, released at an angle from its rest position.
 
     cells   across the box
     ratio   density over the fluid's: the rod stands on its pivot below 1, and hangs above
-    period  expected, s; a hundredth of it is the step, less when the bob is fast
+    period  expected, s; the step is a hundredth of it, and shorter for a fast bob
     """
     grid = Grid.slab(cells, cells, box.side / cells, (-0.5 * box.side, -0.5 * box.side))
     up = 1.0 if ratio > 1.0 else -1.0
@@ -223,10 +228,9 @@ def pendulum(quick: bool) -> list[Finding]:
     for ratio in (2.0, 0.5) if quick else (2.0, 0.5, 0.01):
         exact = small_period(ratio, NARROW.added)
         found = [swing(NARROW, n, ratio, 5.0, exact) for n in grids]
-        errors = [abs(f / exact - 1.0) for f in found]
-        series = GridSeries("cells a side", grids, found, errors)
-        said = f"period at rho_s/rho_f = {ratio:g} let go at 5 degrees, s"
-        findings.append(near(said, found[-1], exact, relative=0.02, series=series))
+        series = GridSeries.toward("cells a side", grids, found, exact, relative=True)
+        title = f"period at rho_s/rho_f = {ratio:g} let go at 5 degrees, s"
+        findings.append(near(title, series, exact, relative=0.02))
     if quick:
         return findings
     for degrees, factor in table("I7", "amplitude factor").items():
@@ -235,10 +239,9 @@ def pendulum(quick: bool) -> list[Finding]:
         box = NARROW if degrees <= 90.0 else WIDE
         exact = small_period(2.0, box.added)
         values = [swing(box, n, 2.0, degrees, factor * exact) / exact for n in box.grids]
-        errors = [abs(v - factor) for v in values]
-        series = GridSeries("cells a side", box.grids, values, errors)
-        said = f"T/T0 at rho_s/rho_f = 2 let go at {degrees:g} degrees"
-        findings.append(near(said, values[-1], factor, relative=0.02, series=series))
+        series = GridSeries.toward("cells a side", box.grids, values, factor)
+        title = f"T/T0 at rho_s/rho_f = 2 let go at {degrees:g} degrees"
+        findings.append(near(title, series, factor, relative=0.02))
     return findings
 
 
@@ -286,8 +289,7 @@ def piston(quick: bool) -> list[Finding]:
                     wrong = max(wrong, abs(slug(n, 0.5, mass, sides, count, False) - 1.0))
                 wrong = max(wrong, abs(slug(8, 0.5, mass, sides, min(count, 10), True) - 1.0))
         between = [slug(n, 0.53, 1.0, sides, 1, False) for n in grids]
-        errors = [abs(b - 1.0) for b in between]
-        series = GridSeries("cells across", grids, between, errors)
+        series = GridSeries.toward("cells across", grids, between, 1.0)
         lines = [
             "a plug 0.53 m long, no whole number of cells, displaces whole faces:",
             *series.lines(),
@@ -298,10 +300,10 @@ def piston(quick: bool) -> list[Finding]:
 
 
 TURNING = (0.5, 0.35)
-"""Semi-axes of I9's ellipse, which is as heavy as the fluid, m."""
+"""Semi-axes of I9's ellipse, which has the fluid's density, m."""
 
 SPIN, DRIFT = 1.0, (0.1, 0.06)
-"""rad/s and m/s that it is set going with, before the fluid takes its share."""
+"""rad/s and m/s of the ellipse before the start, which gives part of its momentum to the fluid."""
 
 
 def turning(cells: int) -> Array:

@@ -1,40 +1,55 @@
-"""A cylinder that swings to and fro in still fluid: V3."""
+"""A cylinder that oscillates: driven in still fluid in V3, on a spring across a stream in V5."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flowborne import Array, Grid, World
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.motions import TrajectorySinusoid
-from flowborne.validation.case import Case, Curve, Finding, Plot, Tier, at_most, near
-from flowborne.validation.fixed_sphere import series_of
-from flowborne.validation.reference import confirmed, reference
+from flowborne.validation.case import Case, Tier, confirmed, reference
+from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near
+from flowborne.validation.shedding import CFL, STREAM, UNBOUNDED, Kicked, Oscillation, amplitude
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import advance, make_world, set_velocity
 
 PERIOD, KC, REYNOLDS = 5.0, 5.0, 100.0
-"""s, and Keulegan and Carpenter's number Umax T / D; D = 1 m, Umax = 1 m/s."""
+"""V3: s; Keulegan and Carpenter's number Umax T / D and Reynolds number; D = 1 m, Umax = 1 m/s."""
 
 SIDE = 20
-"""Diameters across the closed box."""
+"""Diameters across V3's closed box."""
 
 GRIDS = {True: (6, 8), False: (8, 16, 32)}
-"""Cells across D, by quick."""
+"""Cells across D of V3, by quick."""
 
 CYCLES = {True: 3, False: 7}
-"""Of which the last is looked at, by quick."""
+"""Of V3, by quick; the last one is evaluated."""
 
-CFL = 0.5
-"""Cells that the cylinder crosses in a step at most."""
+SWING_CFL = 0.5
+"""Cells that V3's cylinder crosses in a step at most."""
 
 CURVE = "C_D(t/T)=F/(0.5 rho Umax^2 D) digitised"
 
+SPRING_REYNOLDS, MASS = 150.0, 2.0
+"""V5: Re, and the cylinder's mass over rho D^2; D = 1 m, U = 1 m/s."""
+
+CELLS = {True: 4, False: 16}
+"""Across D of V5, by quick."""
+
+SPEEDS = {True: (3.0, 5.0, 8.0), False: (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)}
+"""U / (f_n D) of V5, by quick; f_n is the frequency on the spring in vacuum."""
+
+LOCKED, UNLOCKED = 5.0, 3.0
+"""Two of these: with the vortices in step with the spring, and out of step."""
+
+DURATION, PERIODS = 120.0, 5
+"""Times D/U of V5, and evaluated periods at their end."""
+
 
 def tank(cells: int) -> World:
-    """The cylinder in the middle of its swing, on its way to -x."""
+    """V3's cylinder in the middle of its swing, moving towards -x."""
     body = (
         '<body name="cylinder"><joint name="swing" type="slide" axis="1 0 0"/>'
         '<geom type="cylinder" size="0.5 1"/></body>'
@@ -50,9 +65,9 @@ def tank(cells: int) -> World:
 
 
 def last_cycle(cells: int, cycles: int) -> tuple[Array, Array]:
-    """(n,) t/T in the middle of the steps of the last cycle, and in-line force coefficients."""
+    """(n,) t/T in the middle of each step of the last cycle, and in-line force coefficients."""
     world = tank(cells)
-    count = int(np.ceil(PERIOD * cells / CFL))
+    count = int(np.ceil(PERIOD * cells / SWING_CFL))
     dt = PERIOD / count
     advance(world, dt, (cycles - 1) * count)
     forces = []
@@ -86,31 +101,103 @@ def swinging(quick: bool) -> list[Finding]:
     drags, inertias = zip(*(morison(*run) for run in runs), strict=True)
     curves = (Curve("Duetsch et al.", phase, published, True), Curve("flowborne", *runs[-1]))
     plot = Plot("t/T", "in-line force coefficient", curves)
-    peak = near(
-        "largest coefficient",
-        peaks[-1],
-        largest,
-        relative=0.03,
-        series=series_of(grids, peaks, largest),
-    )
-    course = at_most(
-        "farthest from the measured curve", away[-1], 0.15, series=series_of(grids, away, 0.0)
-    )
+    label = "cells across D"
+    peak = GridSeries.toward(label, grids, peaks, largest)
+    course = GridSeries.toward(label, grids, away, 0.0)
     known = dict(part.split("=") for part in reference("V3", "Morison fit").split(", "))
     sure = confirmed("V3", "Morison fit")
-    fit = [
-        replace(morison_finding(name, grids, values, float(known[name])), confirmed=sure)
-        for name, values in (("C_d", drags), ("C_i", inertias))
+    findings = [
+        near("largest coefficient", peak, largest, relative=0.03),
+        replace(at_most("farthest from the measured curve", course, 0.15), plot=plot),
     ]
-    return [peak, replace(course, plot=plot), *fit]
+    for name, values in (("C_d", drags), ("C_i", inertias)):
+        exact = float(known[name])
+        series = GridSeries.toward(label, grids, values, exact)
+        fitted = near(f"Morison's {name}", series, exact, relative=0.03)
+        findings.append(replace(fitted, confirmed=sure))
+    return findings
 
 
-def morison_finding(
-    name: str, grids: Sequence[int], values: Sequence[float], exact: float
-) -> Finding:
-    """One of Morison's coefficients from grid to grid."""
-    series = series_of(grids, values, exact)
-    return near(f"Morison's {name}", values[-1], exact, relative=0.03, series=series)
+def sprung(cells: int, speed: float) -> World:
+    """V5's cylinder, which moves only across the stream, on its spring without damping."""
+    stiffness = MASS * (2.0 * np.pi / speed) ** 2
+    body = (
+        f'<body name="cylinder"><joint name="y" type="slide" axis="0 1 0" stiffness="{stiffness}"/>'
+        '<geom type="cylinder" size="0.5 1"/></body>'
+    )
+    return make_world(
+        mjcf(body),
+        Grid.slab(40 * cells, 40 * cells, 1.0 / cells, (-15.0, -20.0)),
+        solid_density=MASS / (0.25 * np.pi),
+        viscosity=1.0 / SPRING_REYNOLDS,
+        boundaries=Boundaries(BoundaryInflow(STREAM), BoundaryOpen()),
+        tolerance=1e-7,
+    )
 
 
-CASES = (Case("V3", swinging, Tier.HALF_HOUR, coarse=True),)
+@dataclass(frozen=True)
+class Vibration:
+    """The cylinder's motion in the last periods: A/D, and its frequency over that of its spring."""
+
+    amplitude: float
+    frequency: float
+
+
+def vibration(cells: int, speed: float) -> Vibration:
+    """The cylinder's motion, from a stream with a gust across its wake."""
+    world = sprung(cells, speed)
+    set_velocity(world, Kicked(STREAM, UNBOUNDED, 0.0, 0.0))
+    dt = CFL / cells
+    path = []
+    for _ in range(round(DURATION / dt)):
+        advance(world, dt)
+        path.append(float(world.solid.q[0]))
+    late = np.array(path[len(path) // 2 :])
+    steps, period = Oscillation(dt, late).last(PERIODS)
+    return Vibration(amplitude(late[steps]), speed / period)
+
+
+def vibrating(quick: bool) -> list[Finding]:
+    """V5: amplitude and frequency in step with the spring, and the amplitude out of step."""
+    found = {speed: vibration(CELLS[quick], speed) for speed in SPEEDS[quick]}
+    lines = tuple(
+        f"U/(f_n D) = {speed:g}: A/D {seen.amplitude:.3f}, f/f_n {seen.frequency:.3f}"
+        for speed, seen in found.items()
+    )
+    best, worst = found[LOCKED], found[UNLOCKED]
+    drop = best.amplitude / worst.amplitude
+    peak, lock = confirmed("V5", "(a) peak A/D"), confirmed("V5", "lock-in")
+    at = f"at U/(f_n D) = {LOCKED:g}"
+    return [
+        Finding(
+            f"A/D {at}",
+            best.amplitude,
+            0.55,
+            "[0.5, 0.6] with a margin of 0.05",
+            0.45 <= best.amplitude <= 0.65,
+            lines=lines,
+            confirmed=peak,
+        ),
+        Finding(
+            f"f/f_n {at}",
+            best.frequency,
+            1.0,
+            "10 %",
+            abs(best.frequency - 1.0) <= 0.1,
+            confirmed=lock,
+        ),
+        Finding(
+            f"A/D {at} over that at {UNLOCKED:g}",
+            drop,
+            5.0,
+            "more than 5",
+            drop > 5.0,
+            confirmed=lock,
+        ),
+    ]
+
+
+CASES = (
+    Case("V3", swinging, Tier.HALF_HOUR, coarse=True),
+    Case("V5", vibrating, Tier.HALF_HOUR),
+)

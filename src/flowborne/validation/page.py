@@ -12,8 +12,8 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from flowborne.exporters import write_atomically
-from flowborne.validation.case import Curve, Plot
-from flowborne.validation.reference import entry
+from flowborne.validation.case import entry
+from flowborne.validation.findings import Curve, Plot
 from flowborne.validation.report import (
     Case,
     Data,
@@ -36,22 +36,22 @@ DRAG = (
     ("V9", "Cd, held", 185.0),
     ("B6", "Cd mean", 200.0),
 )
-"""Case, figure and Reynolds number of a cylinder's drag in open water."""
+"""Cases of a cylinder in open water, their drag and Reynolds number."""
 
 NO_PLOT = "A plot is missing here: Matplotlib is not installed. pip install 'flowborne[film]'"
-"""What stands in the page where a plot cannot be drawn."""
+"""Text in place of a plot that cannot be drawn."""
 
 PUBLISHED = {"ls": "", "marker": "o", "mfc": "none"}
-"""How published points look."""
+"""Style of published points."""
 
 COLOURS, LOOKS = 10, ("o-", "s--", "^:")
-"""Colours of matplotlib's cycle, and how lines look in each turn of it."""
+"""Colours of matplotlib's cycle, and styles of lines in the first, second and third cycle."""
 
 WIDTH, HEIGHT, LINE = 4.4, 2.7, 0.17
 """Inches: width of a plot, its height without the legend, and the height of a legend's line."""
 
 FEW = 20
-"""Points below which each of a line's is marked."""
+"""Number of points below which a line has markers."""
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 62rem; color: #222;
@@ -79,8 +79,7 @@ def write_page(folder: Path) -> None:
 
 
 def page_of(data: Data) -> str:
-    """The page: how many pass, the drag over the Reynolds number, then every case with its table
-    and its plots."""
+    """The page: number of passes, drag over the Reynolds number, cases with tables and plots."""
     counts = verdicts(data)
     drag = drag_over_reynolds(data)
     body = [
@@ -105,8 +104,7 @@ def page_of(data: Data) -> str:
 
 
 def drag_over_reynolds(data: Data) -> dict[str, Any]:
-    """Plot of a cylinder's drag in open water, from all cases that measured it; empty if that is
-    fewer than two."""
+    """Plot of a cylinder's drag in open water, from all cases with it; empty for fewer than two."""
     found = [
         (reynolds, finding)
         for name, quantity, reynolds in DRAG
@@ -118,10 +116,10 @@ def drag_over_reynolds(data: Data) -> dict[str, Any]:
         return {}
     curves = [Curve("flowborne", [re for re, _ in found], [f["value"] for _, f in found])]
     for label, sure in (("published", True), ("published, unconfirmed", False)):
-        beside = [(re, f) for re, f in found if (f["verdict"] != "unconfirmed") is sure]
-        places, values = [re for re, _ in beside], [f["reference"] for _, f in beside]
-        if beside:
-            curves.append(Curve(label, places, values, True))
+        known = [(re, f) for re, f in found if (f["verdict"] != "unconfirmed") is sure]
+        if known:
+            x, y = [re for re, _ in known], [f["reference"] for _, f in known]
+            curves.append(Curve(label, x, y, True))
     return Plot("Reynolds number", "drag coefficient of a cylinder", curves).as_dict()
 
 
@@ -151,7 +149,7 @@ def _case(name: str, tier: str, tiers: dict[str, Case]) -> list[str]:
 
 
 def plots_of(findings: Iterable[dict[str, Any]]) -> list[tuple[str, Callable[[], str]]]:
-    """Titles of the plots of a case, and what draws each as SVG."""
+    """Titles of the plots of a case, and functions that draw them as SVG."""
     found: list[tuple[str, Callable[[], str]]] = [
         (f["quantity"], partial(curves_of, f["plot"], f["quantity"]))
         for f in findings
@@ -166,10 +164,9 @@ def plots_of(findings: Iterable[dict[str, Any]]) -> list[tuple[str, Callable[[],
 
 
 def svg(draw: Callable[[Axes], None], title: str) -> str:
-    """What is drawn on axes, with the legend below them, as SVG; equal data give equal text.
+    """A drawing on axes, with the legend below them, as SVG; equal data give equal text.
 
-    It is as wide as a telephone shows it without shrinking the letters much. Where Matplotlib is
-    not installed, it is a sentence that says so.
+    Its width fits the screen of a telephone. Without Matplotlib it is the sentence NO_PLOT.
     """
     if find_spec("matplotlib") is None:
         return f"<p class=source>{NO_PLOT}</p>"
@@ -212,7 +209,7 @@ def errors_of(drawn: Sequence[tuple[str, dict[str, Any]]]) -> str:
 
 
 def curves_of(plot: dict[str, Any], title: str = "") -> str:
-    """A plot as SVG: what is published as circles, what was measured as lines."""
+    """A plot as SVG: published points as circles, measured ones as lines."""
 
     def draw(axes: Axes) -> None:
         for curve in plot["curves"]:

@@ -1,8 +1,7 @@
-"""The report: every case with its figures beside the references, as data.
+"""The report: every case with its figures and references, as data.
 
-A report is a folder with report.json and index.html, its page. Cases are put into it one by one, so
-that it grows over several runs; a case that is run again takes the place of what it said before, in
-its tier.
+A report is a folder with report.json and index.html, its page. Cases are added one by one, in one
+or several runs; a case that is run again replaces its older results in the same tier.
 """
 
 from __future__ import annotations
@@ -20,30 +19,31 @@ import flowborne
 from flowborne import __version__
 from flowborne.exporters import write_atomically
 from flowborne.validation import case as case_of
-from flowborne.validation.case import THE_RUN, Result, Tier, Verdict
+from flowborne.validation.case import THE_RUN, Result, Tier
+from flowborne.validation.findings import Verdict
 
 DATA = "report.json"
 TIERS = tuple(reversed(Tier))
-"""Tiers of a case, the one that counts first."""
+"""Tiers of a case, in the order in which they count."""
 
 Case = dict[str, Any]
-"""One case in one tier: seconds, date, version, code, cores, and findings as `Result.as_dict` has
-them, without what all of them share."""
+"""One case in one tier: seconds, date, version, code, cores, and findings as in `Result.as_dict`,
+without the values in SHARED."""
 Data = dict[str, dict[str, Case]]
 """id -> tier -> case, in the order of the reference list."""
 
 SHARED = ("id", "tier", "title", "seconds", "grid", "finest")
-"""Of a result, what its case says once, or its series."""
+"""Values of a result that its case has once, or its series."""
 
 VERDICTS: tuple[Verdict, ...] = ("fail", "coarse", "pass", "unconfirmed")
-"""From the worst on."""
+"""From the worst to the best; unconfirmed figures do not count."""
 
 
 def read_report(folder: Path) -> Data:
-    """What a report holds; nothing when there is none yet.
+    """The cases of a report; none when there is no report yet.
 
-    A case that is filed under "quick" or "full", as before there were tiers, is in the tier that it
-    has for that run today.
+    Old reports have "quick" and "full" instead of tiers: such a case is in the present tier of that
+    run.
 
     raises  ValueError when the file is no report
     """
@@ -67,7 +67,7 @@ def _tier(name: str, filed: str) -> str:
 
 
 def add_to_report(folder: Path, results: Sequence[Result], order: Iterable[str]) -> None:
-    """Put the results of one case into the report in `folder`, which is made when it is missing.
+    """Add the results of one case to the report in `folder`, which is created if missing.
 
     order   ids in the order of the reference list
     raises  ValueError when the folder holds another report.json; OSError when it cannot be written
@@ -93,8 +93,10 @@ def add_to_report(folder: Path, results: Sequence[Result], order: Iterable[str])
 
 @cache
 def code() -> str:
-    """Digest of every file of the package: the solver, the cases' recipes, the references, the
-    scenes. Two runs that have the same were made by the same flowborne."""
+    """Digest of every file of the package: solver, cases, references, scenes.
+
+    Two runs with the same digest were made by the same code.
+    """
     root = Path(flowborne.__file__).parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):
@@ -105,10 +107,9 @@ def code() -> str:
 
 
 def already_there(folder: Path, tiers: Mapping[str, Tier]) -> dict[str, list[Result]]:
-    """The results that need not be made again: those of the same code in the same tier. A run that
-    broke down has measured nothing and is not among them.
+    """Results of the report by the same code in the same tier, without runs that broke down.
 
-    tiers   id -> tier that is wanted of the case
+    tiers   id -> tier of the case
     raises  ValueError when the folder holds another report.json
     """
     data = read_report(folder)
@@ -130,7 +131,7 @@ def _result(name: str, tier: Tier, seconds: float, row: dict[str, Any]) -> Resul
 
 
 def tier_of(case: dict[str, Case]) -> str:
-    """The tier of a case that counts: the largest in which it was run."""
+    """The tier that counts of a case: the largest in which it was run."""
     return next(tier.value for tier in TIERS if tier.value in case)
 
 
@@ -140,21 +141,21 @@ def is_finest(name: str, tier: str) -> bool:
 
 
 def grid_of(finding: dict[str, Any]) -> str:
-    """The grid on which a figure was measured, such as "10 cells across D"; empty for a figure that
-    was not followed over grids."""
+    """The grid on which a figure was measured, such as "10 cells across D"; empty without a grid
+    series."""
     series = finding.get("series")
     return "" if series is None else f"{series['cells'][-1]:g} {series['label']}"
 
 
 def verdict_of(case: dict[str, Case]) -> Verdict:
-    """Of a case, the worst of its figures in the tier that counts: of the run on its finest grids,
-    if the report has that."""
+    """The worst verdict of a case in the tier that counts: of the run on its finest grids, if the
+    report has that."""
     found = {finding["verdict"] for finding in case[tier_of(case)]["findings"]}
     return next(verdict for verdict in VERDICTS if verdict in found)
 
 
 def failures(data: Data) -> list[tuple[str, str, dict[str, Any]]]:
-    """(id, tier, finding) of all that fails, each case in the tier that counts."""
+    """(id, tier, finding) of all figures that fail, each case in the tier that counts."""
     return [
         (name, tier_of(case), finding)
         for name, case in data.items()
@@ -164,7 +165,7 @@ def failures(data: Data) -> list[tuple[str, str, dict[str, Any]]]:
 
 
 def verdicts(data: Data) -> dict[str, int]:
-    """How many figures have each verdict, each case in the tier that counts."""
+    """Number of figures with each verdict, each case in the tier that counts."""
     counts: dict[str, int] = dict.fromkeys(VERDICTS, 0)
     for case in data.values():
         for finding in case[tier_of(case)]["findings"]:

@@ -1,51 +1,163 @@
-"""R1: a real swimming robot, and those of the scenes `eel` and `eel-room`, from the same start by
-the same gait: as a slab in flat flow, and as tall as it is in a tank four times as deep.
+"""R1: the real swimming robot RExEel, and the robots of the scenes `eel` and `eel-room`.
 
-The robot's thickness is not published: the scene's links are 1.6 cm thick. Nor is where it began in
-its tank: all start in the middle, and at 40 degrees the head's front ends beyond the upper wall,
-measured and computed. There the tank is a quarter longer, so that no wall is in its way.
+All have the same start and gait. `eel` is a slab in two-dimensional flow; `eel-room` has the
+robot's height, in a tank four times as deep.
 
-What limits the heading is that ours comes late, in the slab as in the room, on all grids: by 25 to
-30 ms at 20 degrees and by 60 to 75 ms at 40, which is nearly all of its error beyond the scatter.
-17 ms of that are the published comparison's, which takes the last sample for the last but one; by
-the robot's logs the motors lead the gait by 5 to 11 ms. Where the rest comes from is not known:
-half and one and a half times the thickness, a tenth of the viscosity and a third of the step change
-it by 10 ms at most, on 122 cells.
+The robot's thickness is not published: the scene's links are 1.6 cm thick. Its start in the tank is
+not published either: all start in the middle, and at 40 degrees the head's front ends beyond the
+upper wall, measured and computed. There the tank is a quarter longer, so that no wall is in the
+way.
+
+The heading's error is mostly a delay, in the slab and in the room, on all grids: 25 to 30 ms at 20
+degrees and 60 to 75 ms at 40, nearly all of the error beyond the scatter. 17 ms of it come from the
+published comparison, which takes the last sample for the last but one; by the robot's logs the
+motors lead the gait by 5 to 11 ms. The cause of the rest is not known: half and one and a half
+times the thickness, a tenth of the viscosity and a third of the step change it by 10 ms at most, on
+122 cells.
+
+Lengths are cm and angles degrees, as published. A link's direction points to the tail.
 """
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 from time import perf_counter
 from types import MappingProxyType
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from flowborne import Array, BlowUpError, Simulation, load_scene
 from flowborne.bodies import kinematics
-from flowborne.validation.case import Case, Finding, GridSeries
-from flowborne.validation.eel_runs import (
-    HEADING,
-    QUANTITIES,
-    TIMES,
-    SwimPath,
-    lag,
-    measured,
-    rmse,
-    scatter,
+from flowborne.validation.case import Case, reference
+from flowborne.validation.findings import Finding, GridSeries
+
+LINK_LENGTH = np.array([12.0, 9.8, 9.8, 9.8, 9.8, 9.8])
+"""cm of each link, head first."""
+
+MASS = np.array([192.0, 140.0, 140.0, 140.0, 140.0, 140.0])
+"""g."""
+
+TIMES = np.arange(241) / 60.0
+"""s at which trajectories are compared."""
+
+QUANTITIES = (
+    "centre of mass x cm",
+    "centre of mass y cm",
+    "head x cm",
+    "head y cm",
+    "heading degrees",
 )
-from flowborne.validation.reference import reference
+HEADING = 4
+"""Compared quantities, and the number of the heading."""
 
 GRIDS = {True: (122,), False: (122, 183, 244)}
 ROOM_GRIDS = (61, 92, 122)
-"""Cells across the tank, by quick; and of the one in three dimensions, which is not quick."""
+"""Cells across the tank, by quick; and across the tank of `eel-room`, unless quick."""
 
 AMPLITUDES = {True: (20,), False: (20, 40)}
 """Degrees of the gait, by quick."""
 
-LENGTH = {20: 1.0, 40: 1.25}
-"""Of the tank along the way, over that of the scene, by amplitude."""
+TANK_LENGTH = {20: 1.0, 40: 1.25}
+"""Length of the tank over that of the scene, by amplitude."""
+
+
+@dataclass(frozen=True)
+class SwimPath:
+    """The robot's path at TIMES.
+
+    mass_centre  (241, 2) cm
+    head         (241, 3) middle of the head link in cm, and its angle in degrees
+    """
+
+    mass_centre: Array
+    head: Array
+
+    def changes(self) -> Array:
+        """(241, 5) QUANTITIES less their values at the start."""
+        values = np.hstack([self.mass_centre, self.head])
+        return np.asarray(values - values[0])
+
+
+def table(name: str) -> dict[str, Array]:
+    """Columns of a table of measurements in the folder rexeel."""
+    packed = files("flowborne.validation").joinpath("rexeel", f"{name}.csv.gz").read_bytes()
+    header, *rows = gzip.decompress(packed).decode().split()
+    columns = np.array([row.split(",") for row in rows], dtype=np.float64).T
+    return dict(zip(header.split(","), columns, strict=True))
+
+
+def resampled(values: Array, last: float) -> Array:
+    """Samples (n, k) at TIMES, by natural cubic splines with straight ends beyond the last.
+
+    As in the published comparison, samples are taken as evenly spaced over 0 to `last` s.
+    """
+    spline = CubicSpline(np.linspace(0.0, last, len(values)), values, bc_type="natural")
+    within = np.minimum(TIMES, last)
+    return np.asarray(spline(within) + (TIMES - within)[:, None] * spline(within, 1))
+
+
+def motor_angles(amplitude: int, last: int = -2) -> Array:
+    """(241, 5) measured degrees of the joints at TIMES; `last` as in `measured`."""
+    log = table(f"motor_angles_{amplitude}deg")
+    angles = np.stack([log[f"actual_{n}"] for n in range(1, 6)], axis=1)
+    return resampled(angles, log["time_s"][last])
+
+
+def mass_centre(head: Array, joints: Array) -> Array:
+    """(n, 2) cm, of a robot with a head (n, 3) in cm and degrees, and joints (n, 5) in degrees.
+
+    The hinges lie at the links' ends, and the mass of each link in its middle.
+    """
+    turned = np.hstack([np.zeros((len(head), 1)), np.cumsum(joints, axis=1)])
+    angle = np.radians(head[:, 2:] + turned)
+    link = LINK_LENGTH[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    ends = np.cumsum(link, axis=1)
+    middles = head[:, None, :2] + ends - 0.5 * link - 0.5 * link[:, :1]
+    return np.asarray(np.average(middles, axis=1, weights=MASS))
+
+
+def measured(amplitude: int, last: int = -2) -> list[SwimPath]:
+    """All runs at an amplitude of the gait in degrees, 20 or 40.
+
+    last  number of the sample that gives the time of the last one: the last but one as published,
+          -1 by the logs' times, which are later by 17 ms in the mean
+    """
+    log, joints = table(f"hardware_{amplitude}deg"), motor_angles(amplitude, last)
+    runs = []
+    for run in np.unique(log["run"]):
+        mine = log["run"] == run
+        sampled = np.stack([log["x_cm"], log["y_cm"], -log["yaw_deg"]], axis=1)[mine]
+        head = resampled(sampled, log["time_s"][mine][last])
+        runs.append(SwimPath(mass_centre(head, joints), head))
+    return runs
+
+
+def rmse(changes: Array, runs: list[SwimPath]) -> Array:
+    """(5,) root mean square error of changes (241, 5) over all times of all runs."""
+    off = np.stack([changes - run.changes() for run in runs])
+    return np.asarray(np.sqrt(np.mean(off**2, axis=(0, 1))))
+
+
+def scatter(runs: list[SwimPath]) -> Array:
+    """(5,) rmse of the mean of all runs, the least of any trajectory."""
+    return rmse(np.mean([run.changes() for run in runs], axis=0), runs)
+
+
+def lag(changes: Array, runs: list[SwimPath]) -> tuple[float, float]:
+    """Delay of a trajectory's heading in s, to 5 ms, and its rmse without the delay."""
+    heading = CubicSpline(TIMES, changes[:, HEADING])
+    lags = 0.005 * np.arange(25)
+    errors = []
+    for late in lags:
+        earlier = changes.copy()
+        earlier[:, HEADING] = heading(np.minimum(TIMES + late, TIMES[-1])) - heading(late)
+        errors.append(float(rmse(earlier, runs)[HEADING]))
+    best = int(np.argmin(errors))
+    return float(lags[best]), errors[best]
 
 
 @dataclass(frozen=True)
@@ -53,7 +165,7 @@ class Swim:
     """A run of the scene.
 
     path     at TIMES
-    seconds  of wall clock that it took
+    seconds  of wall clock
     """
 
     path: SwimPath
@@ -66,34 +178,34 @@ def swim(
     settings: Mapping[str, str] = MappingProxyType({}),
     scene: str = "eel",
 ) -> Swim:
-    """Let the robot of a scene swim.
+    """Run the robot of a scene.
 
     cells     across the tank
     settings  in place of the scene's own
     raises    ArithmeticError when the run blows up
     """
-    told = load_scene(scene).domain
-    assert told is not None
-    upper = (told.upper[0], told.upper[1] * LENGTH[amplitude], *told.upper[2:])
+    domain = load_scene(scene).domain
+    assert domain is not None
+    upper = (domain.upper[0], domain.upper[1] * TANK_LENGTH[amplitude], *domain.upper[2:])
     own = {
         "constants.amplitude": f"{amplitude}",
         "domain.upper": f"[{', '.join(f'{c:g}' for c in upper)}]",
-        "domain.resolution": f"{round(cells * LENGTH[amplitude])}",
+        "domain.resolution": f"{round(cells * TANK_LENGTH[amplitude])}",
     }
     started = perf_counter()
     with Simulation(load_scene(scene, {**own, **settings})) as simulation:
-        rows = [place(simulation)]
+        rows = [quantities(simulation)]
         try:
             for _ in TIMES[1:]:
                 simulation.advance_frame()
-                rows.append(place(simulation))
+                rows.append(quantities(simulation))
         except BlowUpError as error:
             raise ArithmeticError(f"{scene} on {cells} cells: {error}") from error
-    places = np.array(rows)
-    return Swim(SwimPath(places[:, :2], places[:, 2:]), perf_counter() - started)
+    found = np.array(rows)
+    return Swim(SwimPath(found[:, :2], found[:, 2:]), perf_counter() - started)
 
 
-def place(simulation: Simulation) -> Array:
+def quantities(simulation: Simulation) -> Array:
     """(5,) QUANTITIES now."""
     model, q = simulation.world.setup.solid, simulation.world.solid.q
     pose, mass = kinematics(model, q), model.body_mass
@@ -103,7 +215,7 @@ def place(simulation: Simulation) -> Array:
 
 
 def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list[Finding]:
-    """Errors of the robot on some grids, the last one judged, beside those of other simulators."""
+    """Errors of the robot on some grids, of which the last is judged, and of other simulators."""
     runs = measured(amplitude)
     swims = [swim(amplitude, count, scene=scene) for count in cells]
     errors = np.array([rmse(one.path.changes(), runs) for one in swims])
@@ -121,7 +233,7 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
             for count, one in zip(cells, swims, strict=True)
         ]
         if n == HEADING:
-            lines += lateness(swims[-1].path.changes(), amplitude, runs)
+            lines += delay_lines(swims[-1].path.changes(), amplitude, runs)
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
         findings.append(
             Finding(
@@ -137,8 +249,8 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
     return findings
 
 
-def lateness(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[str]:
-    """What of a heading's error is lateness, in words."""
+def delay_lines(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[str]:
+    """The delay in a heading's error, in words."""
     late, left = lag(changes, runs)
     own = float(rmse(changes, measured(amplitude, last=-1))[HEADING])
     return [
@@ -148,7 +260,7 @@ def lateness(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[str]:
 
 
 def robot(quick: bool) -> list[Finding]:
-    """R1: none of the errors above those of the robot's own simulator, Aquarium."""
+    """R1: errors at most those of the robot's own simulator, Aquarium."""
     cases = [(amplitude, GRIDS[quick], "eel") for amplitude in AMPLITUDES[quick]]
     if not quick:
         cases += [(amplitude, ROOM_GRIDS, "eel-room") for amplitude in AMPLITUDES[quick]]

@@ -1,24 +1,32 @@
-"""Running the cases of a tier, side by side and not twice."""
+"""Runs of the cases of a tier in parallel processes, without those that the report has."""
 
 from __future__ import annotations
 
+import multiprocessing
+import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO, TypeVar
 
-from flowborne.machine import cores, kernel_threads
+from threadpoolctl import threadpool_limits
+
+from flowborne.machine import GRACE, cores, end_with_parent, kernel_threads
 from flowborne.validation import case, case_ids
 from flowborne.validation.case import Result, Tier
 from flowborne.validation.page import write_page
 from flowborne.validation.report import add_to_report, already_there
-from flowborne.validation.side_by_side import side_by_side
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
 class Job:
-    """A run of a case, and the threads that its kernels may use."""
+    """A run of a case, and the number of threads of its kernels."""
 
     id: str
     tier: Tier
@@ -26,7 +34,7 @@ class Job:
 
     @property
     def quick(self) -> bool:
-        """Whether it is the shorter one of the case's runs."""
+        """Whether it is the shorter of the case's runs."""
         return self.tier is not case(self.id).full
 
 
@@ -37,39 +45,39 @@ def run_cases(
     report: Path | None = None,
     stream: TextIO | None = None,
 ) -> list[Result]:
-    """Run cases on all of the machine's cores, each in a process with its share of them.
+    """Run cases on all cores of the machine, each in a process with its share of them.
 
-    What is in the report already is not run again: `already_there` says what counts as the same.
-    Interrupted, this leaves every finished case in the report.
+    A case that the report has already is not run again, see `already_there`. After an interruption
+    every finished case is in the report.
 
-    ids        which; every one that the tier has when None
-    on_result  called with every result as its case ends, those already in the report first
-    report     folder of the report that each case is put into as it ends
-    stream     where it is said how far the run is; stderr when None
+    ids        of the cases; all of the tier when None
+    on_result  called with every result as its case ends, and first with those in the report
+    report     folder of the report, to which each case is added as it ends
+    stream     for messages about the progress; stderr when None
     returns    all results, in the order of the list
-    raises     ValueError for a case that the tier has not, or when the folder holds something else;
-               OSError when it cannot be written
+    raises     ValueError for a case that is not in the tier, or when the folder has another
+               report.json; OSError when it cannot be written
     """
     names = [name for name in case_ids() if ids is None or name in ids]
     tiers = {n: has for n in names if (has := case(n).tier_in(tier)) is not None}
     if ids is not None and len(tiers) < len(names):
         raise ValueError(_not_in(next(name for name in names if name not in tiers), tier))
     found = {} if report is None else already_there(report, tiers)
-    news = News(len(tiers), len(found), sys.stderr if stream is None else stream)
+    progress = Progress(len(tiers), len(found), sys.stderr if stream is None else stream)
     show = on_result or (lambda result: None)
     for results in found.values():
         for result in results:
             show(result)
     try:
         for batch in batches([(n, tiers[n]) for n in tiers if n not in found]):
-            for job, answer in side_by_side(measure, batch, cores(), news.begun):
+            for job, answer in side_by_side(measure, batch, cores(), progress.begun):
                 results = answer or [case(job.id).broken(job.quick, "its process was killed")]
                 found[job.id] = results
                 if report is not None:
                     add_to_report(report, results, case_ids())
                 for result in results:
                     show(result)
-                news.ended(job, results[0].seconds)
+                progress.ended(job, results[0].seconds)
     finally:
         if report is not None and found:
             write_page(report)
@@ -77,8 +85,8 @@ def run_cases(
 
 
 def batches(runs: Sequence[tuple[str, Tier]]) -> list[list[Job]]:
-    """The jobs that may run beside each other, the longest tiers first; then, each by itself and on
-    all cores, those that measure seconds."""
+    """Jobs that may run in parallel, the longest tiers first; then, each alone on all cores, the
+    jobs that measure seconds."""
     together = [run for run in runs if not case(run[0]).alone]
     share = max(1, cores() // max(1, len(together)))
     found = [
@@ -89,16 +97,16 @@ def batches(runs: Sequence[tuple[str, Tier]]) -> list[list[Job]]:
 
 
 def measure(job: Job) -> list[Result]:
-    """Run a job, in a worker's process."""
+    """Run a job, in a worker process."""
     with kernel_threads(job.threads):
         return case(job.id).run(job.quick)
 
 
-class News:
-    """Says how many cases there are, and then, as each ends, how far the run is.
+class Progress:
+    """Prints the number of cases, and the progress as each ends.
 
-    total  cases
-    known  those of them that are in the report already
+    total  number of cases
+    known  number of those in the report already
     """
 
     def __init__(self, total: int, known: int, stream: TextIO) -> None:
@@ -123,3 +131,98 @@ def _not_in(name: str, tier: Tier) -> str:
     found = case(name)
     has = " and ".join(dict.fromkeys([found.quick.value, found.full.value]))
     return f"case {name} is not in the tier {tier.value}: it has {has}; name one by --tier"
+
+
+class DiedError(Exception):
+    """The process died during its task, killed or out of memory."""
+
+
+class Worker:
+    """A process that runs one task after the other, and ends with its parent."""
+
+    def __init__(self) -> None:
+        spawned = multiprocessing.get_context("spawn")
+        self.pipe, theirs = spawned.Pipe()
+        self._process = spawned.Process(target=serve, args=(theirs,))
+        self._process.start()
+        theirs.close()
+
+    def begin(self, function: Callable[[Any], Any], task: object) -> None:
+        """Start a task; `pipe` can be read when it has ended."""
+        try:
+            self.pipe.send((function, task))
+        except BrokenPipeError:
+            return  # it has died; `answer` raises the error
+
+    def answer(self) -> Any:
+        """Result of the task. Raises its exception, or DiedError when the process died."""
+        try:
+            answer, error = self.pipe.recv()
+        except (EOFError, ConnectionResetError):
+            raise DiedError from None
+        if error is not None:
+            raise error
+        return answer
+
+    def end(self) -> None:
+        """End the process and its task."""
+        self._process.terminate()
+        self._process.join(GRACE)
+        self._process.kill()
+        self._process.join()
+        self.pipe.close()
+
+
+def serve(pipe: Connection) -> None:
+    """Run tasks in a worker, with BLAS on one thread; the parent handles Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    end_with_parent()
+    threadpool_limits(limits=1, user_api="blas")
+    while True:
+        try:
+            function, task = pipe.recv()
+        except EOFError:
+            return
+        try:
+            pipe.send((function(task), None))
+        except Exception as error:
+            pipe.send((None, error))
+
+
+def side_by_side(
+    function: Callable[[Task], Answer],
+    tasks: Sequence[Task],
+    workers: int,
+    on_begin: Callable[[Task], None],
+) -> Iterator[tuple[Task, Answer | None]]:
+    """Run all tasks, started in their order, some at once; yields each as it ends.
+
+    function  of a module that a new process can import; its exceptions are raised here
+    on_begin  called with every task as it begins
+    yields    (task, its answer); None where the process died, killed or out of memory
+    """
+    waiting = deque(tasks)
+    free = [Worker() for _ in range(min(workers, len(tasks)))]
+    busy: dict[Any, tuple[Worker, Task]] = {}
+    try:
+        while waiting or busy:
+            while waiting and free:
+                worker, task = free.pop(), waiting.popleft()
+                worker.begin(function, task)
+                busy[worker.pipe] = worker, task
+                on_begin(task)
+            for pipe in wait(list(busy)):
+                worker, task = busy[pipe]
+                answer: Answer | None = None
+                try:
+                    answer = worker.answer()
+                    free.append(worker)
+                except DiedError:
+                    worker.end()
+                    free.append(Worker())
+                del busy[pipe]
+                yield task, answer
+    finally:
+        for worker in (*free, *(worker for worker, _ in busy.values())):
+            worker.end()

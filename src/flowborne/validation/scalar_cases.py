@@ -1,4 +1,4 @@
-"""Scalars carried by a given velocity: F4."""
+"""Scalars advected by a given velocity: F4."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from flowborne.operators import (
     nothing_brought,
     pad_cells,
 )
-from flowborne.validation.case import Case, Finding, GridSeries, order_of
+from flowborne.validation.case import Case
+from flowborne.validation.findings import Finding, GridSeries, order_of
 from flowborne.validation.worlds import whole_steps
 
 Shape = Callable[[Array, Array], Array]
@@ -29,7 +30,7 @@ Shape = Callable[[Array, Array], Array]
 WALLS, OPEN = Boundaries(), Boundaries(*(BoundaryOpen(),) * 4)
 
 BOUNDS = 0.0, 1.0
-"""Least and largest value of all shapes; that of no cell is quite as large as the blobs'."""
+"""Least and largest value of all shapes; the cells' values of a blob are a little below 1."""
 
 TURN_GRIDS = {True: (32, 64, 128), False: (64, 128, 256, 512)}
 SMEARED_GRIDS = {True: (64, 128, 256), False: (64, 128, 256, 512)}
@@ -43,7 +44,7 @@ SWIRL_PERIOD = {True: 2.0, False: 8.0}
 
 SHORT_PERIOD = 2.0
 """s, of the swirl with the semi-Lagrangian scheme: in 8 s it would smear LeVeque's thread away on
-every grid that can be run, and an order does not show."""
+every affordable grid, without an observable order."""
 
 
 class Flow(Protocol):
@@ -76,7 +77,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class Swirl:
-    """LeVeque's vortex in the unit box, which turns back half-way through `period` s."""
+    """LeVeque's vortex in the unit box, which reverses after half of `period` s."""
 
     period: float
 
@@ -110,8 +111,8 @@ def slotted_disc(x: Array, y: Array) -> Array:
 
 
 def advecting_velocity_of(flow: Flow, grid: Grid, time: float, dt: float) -> Faces:
-    """Padded Faces, cells per step: the velocity with which a particle on each face crosses the
-    step that begins at `time`, which is what the engine makes of velocity and acceleration."""
+    """Padded Faces, cells per step: the mean velocity, in the step from `time` on, of a particle at
+    each face, as the solver estimates it from velocity and acceleration."""
     h, (x0, y0, _) = grid.spacing, grid.origin
     wide = Grid.slab(grid.shape[0] + 2, grid.shape[1] + 2, h, (x0 - h, y0 - h))
     faces = wide.zeros_faces()
@@ -132,10 +133,10 @@ def flux_of(flow: Flow, grid: Grid, time: float) -> Faces:
 def carried_back(
     flow: Flow, shape: Shape, period: float, grid: Grid, courant: float, flux_form: bool
 ) -> tuple[Array, Array]:
-    """The scalar before and after a period, after which it is exactly where it was.
+    """The scalar before and after a period; exactly it would be the same.
 
     courant    cells that the fastest particle of the box crosses in a step
-    flux_form  else semi-Lagrangian
+    flux_form  False for the semi-Lagrangian scheme
     """
     x, y, _ = np.meshgrid(*grid.cell_coordinates(), indexing="ij")
     before = shape(x, y)
@@ -167,7 +168,7 @@ def carry_once(values: Array, advecting_velocity: Faces, grid: Grid) -> Array:
 
 
 def lost(before: Array, after: Array) -> float:
-    """Sum of the absolute differences over the sum of what there was."""
+    """Sum of the absolute differences over the sum before."""
     return float(np.abs(after - before).sum() / before.sum())
 
 
@@ -185,18 +186,18 @@ def blob_in_turn(grids: Sequence[int], flux_form: bool) -> tuple[GridSeries, Gri
         errors.append(lost(before, after))
         peaks.append(float(after.max() / before.max()))
     return (
-        GridSeries("cells a side", grids, errors, errors),
-        GridSeries("cells a side", grids, peaks, [abs(1.0 - peak) for peak in peaks]),
+        GridSeries.toward("cells a side", grids, errors, 0.0),
+        GridSeries.toward("cells a side", grids, peaks, 1.0),
     )
 
 
 def blob_in_swirl(grids: Sequence[int], period: float, flux_form: bool) -> GridSeries:
-    """Error of the blob after the swirl has turned back."""
+    """Error of the blob after the swirl has reversed."""
     errors = [
         lost(*carried_back(Swirl(period), Blob(0.75, 0.2), period, unit_box(n), 4.0, flux_form))
         for n in grids
     ]
-    return GridSeries("cells a side", grids, errors, errors)
+    return GridSeries.toward("cells a side", grids, errors, 0.0)
 
 
 def disc_in_turn(grids: Sequence[int]) -> tuple[GridSeries, Array]:
@@ -206,7 +207,7 @@ def disc_in_turn(grids: Sequence[int]) -> tuple[GridSeries, Array]:
         grid = Grid.slab(n, n, 100.0 / n, (0.0, 0.0))
         before, after = carried_back(Turn(50.0, 628.0), slotted_disc, 628.0, grid, 2.0, True)
         errors.append(lost(before, after))
-    return GridSeries("cells a side", grids, errors, errors), after
+    return GridSeries.toward("cells a side", grids, errors, 0.0), after
 
 
 def scalars_carried(quick: bool) -> list[Finding]:

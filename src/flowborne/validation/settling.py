@@ -1,4 +1,7 @@
-"""A sphere that settles in a box of oil: V2, ten Cate's experiments."""
+"""Bodies that settle in closed boxes: V1, a cylinder, and V2, the sphere of ten Cate's experiments.
+
+V1 is in centimetres, grams and seconds, V2 in SI units.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,101 @@ import numpy as np
 
 from flowborne import Array, Grid, World
 from flowborne.boundaries import Boundaries, BoundaryClosed, BoundaryNoSlip
-from flowborne.validation.case import Case, Curve, Finding, GridSeries, Plot, at_most, near
-from flowborne.validation.reference import reference
+from flowborne.validation.case import Case, confirmed, reference
+from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near, within
 from flowborne.validation.worlds import mjcf, whole_steps
 from flowborne.winds import WindForce
 from flowborne.worlds import advance, make_world
 
+CFL = 1.0
+"""Cells that a body falls in a step at most. A step eight times shorter changes the largest
+velocity of V2's E1 by 0.3 %."""
+
+CYLINDER, CYLINDER_GRAVITY = 0.25, 980.0
+"""Diameter in cm and cm/s^2, of V1."""
+
+CYLINDER_GRIDS = {True: (4, 6), False: (8, 16, 32)}
+"""Cells across the cylinder, by quick; multiples of 2 fit the box."""
+
+
+@dataclass(frozen=True)
+class Fall:
+    """One of V1's two cases.
+
+    name       in the list
+    density    g/cm^3, of the cylinder; the fluid's is 1
+    viscosity  g/(cm s)
+    low, high  range of the published largest Reynolds numbers
+    duration   s, until the cylinder nears the bottom
+    """
+
+    name: str
+    density: float
+    viscosity: float
+    low: float
+    high: float
+    duration: float
+
+    @property
+    def reynolds(self) -> float:
+        """The largest Reynolds number in the list."""
+        return float(reference("V1", f"{self.name} max Re"))
+
+    @property
+    def unit(self) -> float:
+        """Re over the velocity in cm/s: rho_s d / mu."""
+        return self.density * CYLINDER / self.viscosity
+
+
+FALLS = (Fall("case 1", 1.25, 0.1, 17.2, 17.5, 0.6), Fall("case 2", 1.5, 0.01, 438.0, 503.0, 0.3))
+
+
+def box(fall: Fall, cells: int) -> World:
+    """The box of 2 by 6 cm, `cells` across the cylinder, which is free in the plane."""
+    h = CYLINDER / cells
+    wall = BoundaryNoSlip()
+    disc = (
+        '<body name="disc" pos="1 4 0"><joint name="x" type="slide" axis="1 0 0"/>'
+        '<joint name="y" type="slide" axis="0 1 0"/><joint name="turn" axis="0 0 1"/>'
+        f'<geom type="cylinder" size="{0.5 * CYLINDER} 1"/></body>'
+    )
+    return make_world(
+        mjcf(disc),
+        Grid.slab(8 * cells, 24 * cells, h, (0.0, 0.0)),
+        gravity=(0.0, -CYLINDER_GRAVITY, 0.0),
+        solid_density=fall.density,
+        viscosity=fall.viscosity,
+        boundaries=Boundaries(wall, wall, wall, wall),
+    )
+
+
+def fastest(fall: Fall, cells: int) -> tuple[float, Array]:
+    """Largest Reynolds number, and (n, 2) times in s and Reynolds numbers of all steps."""
+    world = box(fall, cells)
+    count, dt = whole_steps(fall.duration, CFL * CYLINDER / cells * fall.unit / fall.reynolds)
+    rows = []
+    for _ in range(count):
+        advance(world, dt)
+        rows.append((world.time, -fall.unit * float(world.solid.v[1])))
+    course = np.array(rows)
+    return float(course[:, 1].max()), course
+
+
+def settling_cylinder(quick: bool) -> list[Finding]:
+    """V1: the largest Reynolds number of the light and slow and of the heavy and fast cylinder."""
+    findings = []
+    for fall in FALLS:
+        values = [fastest(fall, n)[0] for n in CYLINDER_GRIDS[quick]]
+        exact = fall.reynolds
+        series = GridSeries.toward("cells across D", CYLINDER_GRIDS[quick], values, exact)
+        sure = confirmed("V1", f"{fall.name} max Re")
+        title = f"{fall.name}, largest Re"
+        findings.append(within(title, series, exact, (fall.low, fall.high), confirmed=sure))
+    return findings
+
+
 DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
-"""m and kg/m^3 of the sphere, m/s^2."""
+"""m and kg/m^3 of V2's sphere, m/s^2."""
 
 HALF, HEIGHT, START = 0.05, 0.16, 0.1275
 """m: half the box's width, its height, and the height from which the sphere's centre falls."""
@@ -23,17 +113,13 @@ HALF, HEIGHT, START = 0.05, 0.16, 0.1275
 GRIDS = {True: (3, 4), False: (4, 6, 8, 10)}
 """Cells in 10 mm, of which the box is a whole number; 1.5 times as many are across the sphere."""
 
-CFL = 1.0
-"""Cells that the sphere falls in a step at most. A step eight times shorter changes the largest
-velocity of E1 by 0.3 %."""
-
 FREE_FALL = 0.9
-"""Part of its way down after which the sphere feels the bottom."""
+"""Part of the way down before the bottom affects the sphere."""
 
 
 @dataclass(frozen=True)
 class Oil:
-    """One of the experiments.
+    """One of V2's experiments.
 
     density, viscosity  kg/m^3, Pa s
     """
@@ -99,7 +185,7 @@ def fall(oil: Oil, cells: int, until: float) -> tuple[Array, Array, Array]:
 
 def settling(quick: bool) -> list[Finding]:
     """V2: the largest velocity, and the whole curve from release to the bottom."""
-    findings = []
+    findings, label = [], "cells across the sphere"
     for oil in OILS:
         times, measured = oil.curve
         until = 0.4 * times[-1] if quick else times[-1]
@@ -107,13 +193,11 @@ def settling(quick: bool) -> list[Finding]:
         falls = [fall(oil, cells, until) for cells in GRIDS[quick]]
         peaks = [float(velocity.max()) for _, velocity, _ in falls]
         across = [100.0 * DIAMETER * cells for cells in GRIDS[quick]]
-        errors = [abs(peak / oil.peak - 1.0) for peak in peaks]
-        series = GridSeries("cells across the sphere", across, peaks, errors)
+        series = GridSeries.toward(label, across, peaks, oil.peak, relative=True)
         title = f"{oil.name}, largest velocity, m/s"
-        findings.append(near(title, peaks[-1], oil.peak, relative=0.03, falling=series))
+        findings.append(near(title, series, oil.peak, relative=0.03, falling=True))
         found = [apart(one, times, measured, oil.peak) for one in falls]
-        aways = [away for away, _ in found]
-        course = GridSeries("cells across the sphere", across, aways, aways)
+        course = GridSeries.toward(label, across, [away for away, _ in found], 0.0)
         title = f"{oil.name}, farthest from the measured curve over its largest velocity"
         moments, velocity, _ = falls[-1]
         thin = slice(None, None, max(1, len(moments) // 200))
@@ -122,7 +206,7 @@ def settling(quick: bool) -> list[Finding]:
             Curve("flowborne", moments[thin], velocity[thin]),
         )
         plot = Plot("t (s)", "downward velocity (m/s)", curves)
-        bounded = at_most(title, aways[-1], 0.05, series=course, lines=found[-1][1])
+        bounded = at_most(title, course, 0.05, lines=found[-1][1])
         findings.append(replace(bounded, plot=plot))
     return findings
 
@@ -130,8 +214,8 @@ def settling(quick: bool) -> list[Finding]:
 def apart(
     fallen: tuple[Array, Array, Array], times: Array, measured: Array, peak: float
 ) -> tuple[float, list[str]]:
-    """Largest distance from a measured curve over `peak`, and where it is, besides that of the time
-    before the sphere feels the bottom."""
+    """Largest distance from a measured curve over `peak`, and lines with its time, on the whole way
+    and on the part before the bottom affects the sphere."""
     moments, velocity, height = fallen
     away = np.abs(np.interp(times, moments, velocity) - measured) / peak
     bottom = START - FREE_FALL * (START - 0.5 * DIAMETER)
@@ -144,4 +228,7 @@ def apart(
     return float(away.max()), lines
 
 
-CASES = (Case("V2", settling, coarse=True),)
+CASES = (
+    Case("V1", settling_cylinder, coarse=True),
+    Case("V2", settling, coarse=True),
+)

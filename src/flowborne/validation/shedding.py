@@ -1,35 +1,98 @@
-"""Figures of a flow that sheds vortices: means, extremes and frequency over whole periods."""
+"""Bodies in a stream that shed vortices: coefficients and their figures over whole periods."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne import Array
+from flowborne import Array, StepReport, World
+from flowborne.validation.case import confirmed, reference
+from flowborne.validation.findings import Finding, GridSeries, Plot, within
+from flowborne.validation.worlds import Uniform, mjcf
+from flowborne.worlds import Field, advance
+
+BEFORE = {True: 20.0, False: 40.0}
+AFTER = 15.0
+"""Times D/U before a flow that sheds vortices is evaluated: on the first grid, by quick, where
+shedding has to begin, and on a grid that starts from the flow of a coarser one."""
+
+PERIODS = {True: 2, False: 4}
+"""Evaluated periods, by quick."""
+
+CFL = 1.0
+"""Cells that the oncoming flow crosses in a step."""
 
 
 @dataclass(frozen=True)
-class Shedding:
-    """Coefficients of a flow that sheds vortices, step by step over some periods.
+class Stream:
+    """A flow past a cylinder, with the scales of its coefficients.
 
-    dt                s
-    drag, lift, drop  (n,) coefficients, and pressure drop in Pa
+    diameter  m
+    speed     U of the coefficients, m/s
+    fastest   largest oncoming velocity, m/s
     """
 
+    diameter: float
+    speed: float
+    fastest: float
+
+    def coefficients(self, report: StepReport) -> tuple[float, float]:
+        """Drag and lift coefficient, 2 F / (rho U^2 D)."""
+        force = (report.pressure_wrench + report.viscous_wrench)[1]
+        drag, lift = 2.0 * force[:2] / (self.speed**2 * self.diameter)
+        return float(drag), float(lift)
+
+    @property
+    def time(self) -> float:
+        """D / U, s."""
+        return self.diameter / self.speed
+
+
+UNBOUNDED, STREAM = Stream(1.0, 1.0, 1.0), Uniform((1.0, 0.0, 0.0))
+"""1 m/s past a body of D = 1 m in open water, and the oncoming velocity."""
+
+
+@dataclass(frozen=True)
+class Kicked:
+    """A field with a gust across the wake of the cylinder at (x, y), so that shedding begins."""
+
+    field: Field
+    stream: Stream
+    x: float
+    y: float
+
+    def __call__(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        u, v, w = self.field(x, y, z)
+        size = self.stream.diameter
+        away = ((x - self.x) / size - 1.5) ** 2 + ((y - self.y) / size) ** 2
+        return u, v + 0.5 * self.stream.speed * np.exp(-away), w
+
+
+def cylinder(diameter: float, x: float, y: float) -> str:
+    """MJCF of a fixed cylinder, body 1."""
+    return mjcf(
+        f'<body name="cylinder" pos="{x} {y} 0">'
+        f'<geom type="cylinder" size="{0.5 * diameter} 1"/></body>'
+    )
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """A periodic signal (n,), such as the lift, in samples dt (s) apart."""
+
     dt: float
-    drag: Array
-    lift: Array
-    drop: Array
+    signal: Array
 
     def rises(self) -> Array:
-        """Times at which the lift rises through its mean, s."""
-        lift = self.lift - self.lift.mean()
-        at = np.flatnonzero((lift[:-1] <= 0.0) & (lift[1:] > 0.0))
-        return self.dt * (at + lift[at] / (lift[at] - lift[at + 1]))
+        """Times at which the signal rises through its mean, s."""
+        away = self.signal - self.signal.mean()
+        at = np.flatnonzero((away[:-1] <= 0.0) & (away[1:] > 0.0))
+        return self.dt * (at + away[at] / (away[at] - away[at + 1]))
 
     def last(self, periods: int) -> tuple[slice, float]:
-        """The steps of the last whole periods, and the length of one in s.
+        """The samples of the last whole periods, and the length of one in s.
 
         Raises ArithmeticError when there are not so many.
         """
@@ -37,21 +100,20 @@ class Shedding:
         if rises.size <= periods:
             raise ArithmeticError(f"the lift rises {rises.size} times, {periods + 1} are needed")
         start, stop = rises[-1 - periods], rises[-1]
-        steps = slice(round(start / self.dt), round(stop / self.dt))
-        return steps, float((stop - start) / periods)
+        samples = slice(round(start / self.dt), round(stop / self.dt))
+        return samples, float((stop - start) / periods)
 
     def unsteadiness(self, periods: int) -> str:
-        """How far the flow is from repeating itself, for people."""
-        steps, period = self.last(periods)
+        """Amplitudes of the lift in the first and the last of some periods, as text."""
+        samples, period = self.last(periods)
         count = round(period / self.dt)
-        one, other = (
-            amplitude(part) for part in (self.lift[steps][:count], self.lift[steps][-count:])
-        )
+        lift = self.signal[samples]
+        one, other = (amplitude(part) for part in (lift[:count], lift[-count:]))
         return f"lift's amplitude {one:.4f} in the first period, {other:.4f} in the last"
 
 
 def crest(values: Array) -> tuple[float, float]:
-    """Largest value and where it is, in steps: vertex of the parabola through three samples."""
+    """Largest value and its place in samples: vertex of the parabola through three samples."""
     at = int(np.argmax(values[1:-1])) + 1
     before, here, after = values[at - 1 : at + 2]
     bend = before - 2.0 * here + after
@@ -62,3 +124,55 @@ def crest(values: Array) -> tuple[float, float]:
 def amplitude(values: Array) -> float:
     """Half the distance between the largest and the smallest value."""
     return 0.5 * (crest(values)[0] + crest(-values)[0])
+
+
+def watch(
+    world: World,
+    stream: Stream,
+    before: float,
+    strouhal: float,
+    periods: int,
+    drop: Callable[[World], float] = lambda world: 0.0,
+) -> tuple[Oscillation, Array, Array]:
+    """March, and record every step.
+
+    before    times D/U until the flow is periodic
+    strouhal  rough value of the expected frequency
+    drop      a further figure of the flow
+    returns   lift coefficient; (n,) drag coefficient; (n,) the further figure
+    """
+    fluid, _ = world.flow()
+    dt = CFL * fluid.grid.spacing / stream.fastest
+    duration = (before + (periods + 1.5) / strouhal) * stream.time
+    rows = []
+    for _ in range(round(duration / dt)):
+        drag, lift = stream.coefficients(advance(world, dt))
+        rows.append((drag, lift, drop(world)))
+    drags, lifts, drops = np.array(rows).T
+    return Oscillation(dt, lifts), drags, drops
+
+
+def judged(
+    name: str,
+    quantity: str,
+    grids: Sequence[int],
+    values: Sequence[float],
+    interval: tuple[float, float],
+    *,
+    falling: bool = False,
+    lines: Sequence[str] = (),
+    plot: Plot | None = None,
+) -> Finding:
+    """A quantity of the case `name` on some grids, inside an interval of the list."""
+    exact = reference(name, quantity)
+    series = GridSeries.toward("cells across D", grids, values, exact)
+    return within(
+        quantity,
+        series,
+        exact,
+        interval,
+        falling=falling,
+        lines=lines,
+        plot=plot,
+        confirmed=confirmed(name, quantity),
+    )

@@ -1,12 +1,14 @@
-"""What the cases' worlds have in common."""
+"""Models, flows, sides and steps that several cases use."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from flowborne import StepReport, World
-from flowborne.boundaries import Boundaries, BoundaryPeriodic
-from flowborne.worlds import advance
+from flowborne import Array, StepReport, World
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryPeriodic, Profile
+from flowborne.worlds import Field, advance, set_velocity, start_from
 
 Vector = tuple[float, float, float]
 
@@ -25,9 +27,9 @@ def mjcf(*elements: str, options: str = "") -> str:
 
 
 def start_at_once(world: World, dt: float) -> StepReport:
-    """One step from a flow that does not yet know its bodies: the impulsive start.
+    """The first step from a flow that is not yet adapted to its bodies: the impulsive start.
 
-    The pressure of this step is an impulse, which says nothing about the next step: it is cleared.
+    The pressure of this step is an impulse and no estimate of the next one, so it is cleared.
     """
     report = advance(world, dt)
     _, state = world.flow()
@@ -36,7 +38,34 @@ def start_at_once(world: World, dt: float) -> StepReport:
     return report
 
 
+@dataclass(frozen=True)
+class Uniform:
+    """The same velocity everywhere, as a profile and as a field."""
+
+    velocity: Vector
+
+    def __call__(
+        self, x: Array, y: Array, z: Array, time: float = 0.0
+    ) -> tuple[Array, Array, Array]:
+        same = 0.0 * (x + y + z)
+        return same + self.velocity[0], same + self.velocity[1], same + self.velocity[2]
+
+
+def all_inflow(profile: Profile) -> Boundaries:
+    """The same profile on all four sides of a slab."""
+    side = BoundaryInflow(profile)
+    return Boundaries(side, side, side, side)
+
+
+def begin(world: World, coarser: World | None, field: Field) -> None:
+    """Start from the flow on a coarser grid, or without one from a field."""
+    if coarser is None:
+        set_velocity(world, field)
+    else:
+        start_from(coarser, world)
+
+
 def whole_steps(duration: float, longest: float) -> tuple[int, float]:
-    """Number and length of equal steps, none longer than `longest`, that make up a duration."""
+    """Number and length of equal steps, at most `longest` each, of a duration."""
     count = max(1, int(np.ceil(duration / longest - 1e-9)))
     return count, duration / count

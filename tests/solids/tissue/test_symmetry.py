@@ -24,7 +24,7 @@ from flowborne.solids.tissue.contour import contour
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import ASTRAY, FIDELITY, FleshMesh, skin_mesh
 from flowborne.solids.tissue.symmetry import Chamber, chamber_of, reflection
-from flowborne.validation.flyer import held
+from flowborne.validation.creatures import held
 
 Array = NDArray[np.float64]
 

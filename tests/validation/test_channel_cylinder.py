@@ -1,15 +1,21 @@
-"""B1 and B2: flow past a cylinder, on a coarse grid."""
+"""B1 and B2: flow past a cylinder, on a coarse grid; B3, its first instants."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
 
 from flowborne.validation import case
-from flowborne.validation.fixed_bodies import (
+from flowborne.validation.channel_cylinder import (
     CENTRE,
     DIAMETER,
+    DURATION,
+    HEIGHT,
     Parabola,
+    Pulse,
     channel,
     pressure_drop,
+    pulse,
     recirculation,
 )
 from flowborne.worlds import set_velocity, start_from
@@ -46,3 +52,20 @@ def test_refined_flow_is_the_coarse_one():
     assert np.abs(state.velocity[0] - exact).max() < 0.01 * 0.3
     assert not state.velocity[1].any()
     np.testing.assert_allclose(np.diff(state.pressure[:, 0, 0]), 0.5)
+
+
+def test_B3_the_inflow_swells_and_dies_away():
+    y = np.array([0.0, 0.5 * HEIGHT, HEIGHT])
+    for time, peak in ((0.0, 0.0), (0.5 * DURATION, 1.5), (DURATION, 0.0)):
+        u, v, _ = Pulse()(np.zeros(3), y, np.zeros(3), time)
+        np.testing.assert_allclose(u, [0.0, peak, 0.0], atol=1e-12)
+        assert not v.any()
+
+
+def test_B3_begins_as_an_ideal_fluid_that_is_set_going():
+    """The stream's own pressure gradient and the added mass: 2 rho pi D^2 / 4 dU/dt. The parabola
+    comes in and evens out downstream: U lies between its mean and its peak."""
+    _, drag, lift, _ = pulse(10, duration=0.1)[1]
+    force = 2.0 * 0.25 * np.pi * DIAMETER**2 * 1.5 * np.pi / DURATION
+    assert 2.0 / 3.0 < drag / (2.0 * force / DIAMETER) < 1.0
+    assert abs(lift) < 0.02 * drag

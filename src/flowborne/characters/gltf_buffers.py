@@ -1,17 +1,30 @@
-"""Numbers of a glTF file: every accessor is held against its view and buffer before it is read.
+"""Arrays and colours in the buffers of a glTF file.
 
-source  Khronos glTF 2.0 specification, sections 3.6.1 and 3.6.2 (buffers and accessors)
+Every accessor is checked against its view and buffer before it is read. A colour is the factor of a
+material times its texture, if that is in the file.
+
+source  Khronos glTF 2.0 specification, sections 3.6.1 and 3.6.2 (buffers and accessors), 3.8
+        (textures) and 3.9.2 (materials)
 """
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
-from flowborne.characters.gltf_document import Accessor, Document
-from flowborne.characters.rig import Array, Integers
+from flowborne.characters.gltf_document import (
+    Accessor,
+    Document,
+    Primitive,
+    TextureInfo,
+    embedded,
+)
+from flowborne.characters.rig import PLAIN, Array, Integers
+from flowborne.colours import to_linear, to_srgb
 from flowborne.errors import SceneError
 
 KINDS = {
@@ -24,8 +37,11 @@ KINDS = {
 }
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
-MOST_NUMBERS = 30_000_000
-"""Of an accessor, three to a point."""
+MAX_NUMBERS = 30_000_000
+"""Of an accessor, three for each point."""
+
+MAX_PIXELS = 1 << 26
+"""Of a texture."""
 
 
 class Accessors:
@@ -49,12 +65,11 @@ class Accessors:
         return len(self._document.accessors)
 
     def table(self, number: int) -> Accessor:
-        """What the document says of an accessor."""
+        """An accessor of the document."""
         return self._document.accessors[number]
 
     def read(self, number: int) -> NDArray[Any]:
-        """(count, width) the elements of an accessor, whole numbers that stand for parts of one as
-        floats."""
+        """(count, width) the elements of an accessor; normalized integers become floats."""
         accessor = self.table(number)
         kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
         if accessor.buffer_view is None:
@@ -74,7 +89,7 @@ class Accessors:
         return values
 
     def numbers(self, number: int, where: str) -> Array:
-        """(count, width) the same as floats; raises SceneError unless all of them are finite."""
+        """(count, width) the elements as floats; raises SceneError unless all are finite."""
         values = self.read(number).astype(float)
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
@@ -82,7 +97,7 @@ class Accessors:
         return values
 
     def indices(self, number: int, count: int, where: str, what: str) -> Integers:
-        """(count, width) the same as whole numbers, each of which has to be below `count`."""
+        """(count, width) the elements as integers; raises SceneError for one from `count` on."""
         values = self.read(number).astype(np.int64)
         if (largest := int(values.max())) >= count:
             raise wrong(f"{where} (accessors[{number}]) names number {largest} of {count} {what}")
@@ -90,9 +105,9 @@ class Accessors:
 
     def _check(self, accessor: Accessor, where: str) -> None:
         kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
-        if accessor.count * width > MOST_NUMBERS:
+        if accessor.count * width > MAX_NUMBERS:
             raise SceneError(
-                f"{where} asks for {accessor.count * width:,} numbers, and {MOST_NUMBERS:,} are "
+                f"{where} asks for {accessor.count * width:,} numbers, and {MAX_NUMBERS:,} are "
                 "the most. Export fewer points or keys."
             )
         if accessor.buffer_view is not None:
@@ -111,7 +126,7 @@ class Accessors:
                 raise wrong(f"{where} names element {largest} of {accessor.count}")
 
     def _rows(self, accessor: Accessor) -> NDArray[Any]:
-        """(count,) elements that the sparse part of an accessor replaces."""
+        """(count,) numbers of the elements that the sparse part of an accessor replaces."""
         assert accessor.sparse is not None
         own, count = accessor.sparse.indices, accessor.sparse.count
         kind = np.dtype(KINDS[own.component_type])
@@ -146,6 +161,81 @@ class Accessors:
             view.byte_offset + first,
             (step, kind.itemsize),
         )
+
+
+class Colours:
+    """The colours of a document's meshes."""
+
+    def __init__(
+        self, name: str, document: Document, arrays: Accessors, buffers: list[memoryview]
+    ) -> None:
+        self._name, self._document, self._arrays = name, document, arrays
+        self._buffers = buffers
+        self._images: dict[int, Image.Image | None] = {}
+
+    def of(self, part: Primitive, triangles: Integers, points: int) -> Array:
+        """(m, 3) sRGB values from 0 to 1 in the middle of triangles (m, 3) of `points` vertices.
+
+        raises  SceneError when the material has a number that is not in the file
+        """
+        if part.material is None:
+            return np.full((len(triangles), 3), PLAIN)
+        materials = self._document.materials
+        within(part.material, materials, f"{self._name}, a primitive's material", "materials")
+        base = materials[part.material].pbr_metallic_roughness
+        light = np.tile(base.base_color_factor[:3], (len(triangles), 1))
+        if base.base_color_texture is not None:
+            light *= self._texture(base.base_color_texture, part, triangles, points)
+        return to_srgb(light)
+
+    def _texture(
+        self, texture: TextureInfo, part: Primitive, triangles: Integers, points: int
+    ) -> Array:
+        """(m, 3) linear values; 1 where the texture is not in the file or cannot be read."""
+        textures = self._document.textures
+        within(texture.index, textures, f"{self._name}, a baseColorTexture", "textures")
+        source, layer = textures[texture.index].source, f"TEXCOORD_{texture.tex_coord}"
+        if source is None or layer not in part.attributes:
+            return np.ones((len(triangles), 3))
+        within(source, self._document.images, f"{self._name}, textures[{texture.index}]", "images")
+        where = f"{self._name}, {layer}"
+        within(part.attributes[layer], self._arrays, where, "accessors")
+        coordinates = self._arrays.numbers(part.attributes[layer], where)
+        if coordinates.shape != (points, 2):
+            raise wrong(f"{where} is not a pair of numbers for each of the {points} points")
+        if source not in self._images:
+            self._images[source] = self._image(source)
+        image = self._images[source]
+        if image is None:
+            return np.ones((len(triangles), 3))
+        return to_linear(texture_at(image, coordinates[triangles].mean(axis=1)))
+
+    def _image(self, number: int) -> Image.Image | None:
+        image = self._document.images[number]
+        try:
+            if image.buffer_view is not None:
+                view = self._document.buffer_views[image.buffer_view]
+                end = view.byte_offset + view.byte_length
+                content = bytes(self._buffers[view.buffer][view.byte_offset : end])
+            else:
+                content = embedded(image.uri or "")
+            found = Image.open(BytesIO(content))
+            return found.convert("RGB") if found.width * found.height <= MAX_PIXELS else None
+        except Exception:  # Pillow's readers raise exceptions of any kind
+            return None
+
+
+def texture_at(image: Image.Image, coordinates: Array) -> Array:
+    """(m, 3) sRGB values from 0 to 1 of the nearest pixels.
+
+    coordinates  (m, 2) of the texture: 0 left, 0 above; it repeats beyond 1
+    """
+    pixels = np.asarray(image.convert("RGB"))
+    height, width = pixels.shape[:2]
+    inside = np.nan_to_num(coordinates) % 1.0
+    columns = np.minimum((inside[:, 0] * width).astype(int), width - 1)
+    rows = np.minimum((inside[:, 1] * height).astype(int), height - 1)
+    return np.asarray(pixels[rows, columns] / 255.0)
 
 
 def within(number: int, things: Any, where: str, what: str) -> None:

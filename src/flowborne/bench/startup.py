@@ -1,4 +1,4 @@
-"""How long one waits for the first frame: of the very first run, and of later ones."""
+"""Seconds until the command gives its help, and until the first frame of a run."""
 
 from __future__ import annotations
 
@@ -9,26 +9,43 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from flowborne.bench.result import Result, timed, verdict
+from flowborne.bench.timing import Result, timed, verdict
 
-NAME = "first-run"
-SCENE = "ns-block-drag-max"
+HELP = 0.5
 COMPILING, COMPILED = 60.0, 5.0
-"""Seconds that the command may take with nothing compiled, and with everything compiled."""
+"""Most seconds of `--help`, and of a run of one frame with nothing and with everything compiled."""
 
 
-def measure() -> Iterator[Result]:
+def start() -> Iterator[Result]:
+    """Seconds from the command to its help."""
+    yield help_time()
+
+
+def first_run(scene: str = "ns-block-drag-max") -> Iterator[Result]:
     """Seconds of a run of one frame, with an empty cache of kernels and with a full one."""
     with TemporaryDirectory() as folder:
         for state, allowed in (("first run", COMPILING), ("later run", COMPILED)):
-            seconds = run_once(SCENE, Path(folder))
+            seconds = run_once(scene, Path(folder))
             yield Result(
-                NAME,
-                f"{SCENE}: seconds to the first frame, {state}",
+                "first-run",
+                f"{scene}: seconds to the first frame, {state}",
                 seconds,
                 f"below {allowed:g}",
                 verdict(seconds < allowed),
             )
+
+
+def help_time(repeats: int = 5) -> Result:
+    """Seconds that `flowborne --help` takes, the quickest time of a few."""
+    command = [sys.executable, "-m", "flowborne", "--help"]
+    _, seconds = timed(lambda: subprocess.run(command, check=True, capture_output=True), repeats)
+    return Result(
+        "start",
+        "flowborne --help: seconds from the command to its end",
+        seconds,
+        f"below {HELP:g}",
+        verdict(seconds < HELP),
+    )
 
 
 def run_once(scene: str, folder: Path) -> float:

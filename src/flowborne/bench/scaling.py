@@ -1,0 +1,105 @@
+"""How the time of a frame changes with workers, joints and threads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+
+import numpy as np
+
+from flowborne import Scene, Simulation, load_scene
+from flowborne.bench.timing import FRAMES, Result, frame_times, in_words, verdict
+from flowborne.machine import cores, kernel_threads
+
+EXECUTORS = ("threads", "processes")
+FASTER = 1.8
+"""Least speed-up by a second worker."""
+
+DEVIATION = 0.1
+"""Largest deviation of the time of a frame from a line in the joints, part of the line's value."""
+
+
+def workers() -> Iterator[Result]:
+    """Speed-up of the controller's trials by a second worker."""
+    yield compare_workers(load_scene("ns-chain-4"))
+
+
+def chain() -> Iterator[Result]:
+    """Cost of a further joint: chains of one to four joints, one worker."""
+    yield straightness([load_scene(f"ns-chain-{n}") for n in (1, 2, 3, 4)])
+
+
+def threads() -> Iterator[Result]:
+    """Bits and speed of a swimmer with a jet of dye on one thread and on all.
+
+    Each array of its 192,000 cells is LARGE (see `kernels.jit`), so that threads start.
+    """
+    yield compare_threads(load_scene("swimmer-jet-only", {"domain.resolution": "120"}))
+
+
+def compare_workers(scene: Scene, frames: int = FRAMES) -> Result:
+    """One worker's quickest frame over that of two, threads or processes, whichever is faster."""
+    with ExitStack() as stack:
+        simulations = [stack.enter_context(Simulation(scene, 1, "serial"))]
+        for executor in EXECUTORS:
+            simulations.append(stack.enter_context(Simulation(scene, 2, executor)))
+        alone, *together = frame_times(simulations, frames)
+    ratios = [float(alone.min() / times.min()) for times in together]
+    best = int(np.argmax(ratios))
+    return Result(
+        "workers",
+        f"{scene.name}: one worker's time over that of two {EXECUTORS[best]}",
+        ratios[best],
+        f"at least {FASTER:g}",
+        verdict(ratios[best] >= FASTER),
+        [
+            f"one           {in_words(alone)}",
+            *(
+                f"two {executor:<9} {in_words(times)}; {ratio:.2f} times faster"
+                for executor, times, ratio in zip(EXECUTORS, together, ratios, strict=True)
+            ),
+        ],
+    )
+
+
+def straightness(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
+    """Largest deviation of the quickest frames of scenes with 1, 2, ... joints from a line."""
+    from flowborne.pictures import straight_line
+
+    with ExitStack() as stack:
+        simulations = [stack.enter_context(Simulation(scene, 1, "serial")) for scene in scenes]
+        times = frame_times(simulations, frames)
+    joints = np.arange(1.0, len(scenes) + 1.0)
+    slope, start, deviation = straight_line(joints, times.min(axis=1))
+    return Result(
+        "chain",
+        "largest deviation of the serial time of a frame from a line in the joints, part of it",
+        deviation,
+        f"at most {DEVIATION:g}",
+        verdict(deviation <= DEVIATION),
+        [
+            *(f"{scene.name} {in_words(row)}" for scene, row in zip(scenes, times, strict=True)),
+            f"line {1e3 * start:.1f} ms + {1e3 * slope:.1f} ms a joint",
+        ],
+    )
+
+
+def compare_threads(scene: Scene, frames: int = 4) -> Result:
+    """Arrays of the state that differ after some frames on one thread and on all.
+
+    frames  kernels compare their serial and parallel versions in the first six calls, so that both
+            have run after four
+    """
+    states, lines = [], []
+    for count in (1, cores()):
+        with Simulation(scene, 1, "serial") as simulation, kernel_threads(count):
+            reports = [simulation.advance_frame() for _ in range(frames)]
+            states.append(simulation.world.arrays())
+        seconds = min(report.seconds["total"] for report in reports)
+        lines.append(f"{count} threads: {seconds:.3g} s for the quickest frame")
+    alone, shared = states
+    differing = [name for name in alone if not np.array_equal(alone[name], shared[name])]
+    title = f"{scene.name}: arrays whose bits depend on the number of threads"
+    if differing:
+        lines.append(f"other bits in {', '.join(differing)}")
+    return Result("threads", title, len(differing), "0", verdict(not differing), lines)

@@ -1,0 +1,223 @@
+"""Flow past a fixed cylinder in a channel: B1 steady, B2 with vortices, B3 a pulse of inflow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flowborne import Array, Grid, World
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen, Profile
+from flowborne.validation.case import Case, Tier, reference
+from flowborne.validation.findings import Curve, Finding, Plot
+from flowborne.validation.shedding import (
+    AFTER,
+    BEFORE,
+    CFL,
+    PERIODS,
+    Kicked,
+    Stream,
+    crest,
+    cylinder,
+    judged,
+    watch,
+)
+from flowborne.validation.worlds import begin
+from flowborne.worlds import advance, make_world
+
+DIAMETER, CENTRE = 0.1, 0.2
+"""m: of the cylinder, and both coordinates of its centre."""
+
+LENGTH, HEIGHT = 2.2, 0.41
+"""m, of the channel."""
+
+VISCOSITY = 1e-3
+"""Pa s; the fluid's density is 1 kg/m^3."""
+
+STEADY_GRIDS = {True: (10,), False: (20, 40, 80)}
+SHEDDING_GRIDS = {True: (10,), False: (10, 20, 40)}
+"""Cells across D of B1, and of B2 and B3, by quick; multiples of 10 fit the channel."""
+
+STEADY = {True: 1e-2, False: 2e-5}
+"""Change of a coefficient in a time D/U below which B1's flow is steady, by quick."""
+
+LONGEST = 40
+"""Longest time of B1 on one grid, times D/U."""
+
+CREEPING = Stream(DIAMETER, 0.2, 0.3)
+SHEDDING = Stream(DIAMETER, 1.0, 1.5)
+"""B1; B2 and B3."""
+
+DURATION = 8.0
+"""s of B3, half a period of the inflow."""
+
+DRAG_AT, LIFT_AT = 3.93625, 5.693125
+"""s at which B3's published drag and lift are largest."""
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """Inflow of the channel with the largest velocity `peak` (m/s), as a profile and as a field."""
+
+    peak: float
+
+    def __call__(
+        self, x: Array, y: Array, z: Array, time: float = 0.0
+    ) -> tuple[Array, Array, Array]:
+        none = 0.0 * (x + y + z)
+        return 4.0 * self.peak * y * (HEIGHT - y) / HEIGHT**2 + none, none, none
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """Inflow of the channel that starts and ends at rest, as a profile."""
+
+    def __call__(self, x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
+        return Parabola(SHEDDING.fastest * np.sin(np.pi * time / DURATION))(x, y, z)
+
+
+def channel(cells: int, inflow: Profile) -> World:
+    """The channel at rest with the cylinder in it, `cells` across its diameter."""
+    h = DIAMETER / cells
+    grid = Grid.slab(round(LENGTH / h), round(HEIGHT / h), h, (0.0, 0.0))
+    wall = BoundaryNoSlip()
+    return make_world(
+        cylinder(DIAMETER, CENTRE, CENTRE),
+        grid,
+        viscosity=VISCOSITY,
+        boundaries=Boundaries(BoundaryInflow(inflow), BoundaryOpen(), wall, wall),
+        tolerance=1e-7,
+    )
+
+
+def pressure_drop(world: World) -> float:
+    """p at the front of the cylinder less p at its back, Pa.
+
+    Extrapolated to them along the centre line, which runs between two rows of cells.
+    """
+    fluid, state = world.flow()
+    h = fluid.grid.spacing
+    j = round(CENTRE / h)
+    row = 0.5 * (state.pressure[:, j - 1, 0] + state.pressure[:, j, 0])
+    front = round((CENTRE - 0.5 * DIAMETER) / h)
+    back = round((CENTRE + 0.5 * DIAMETER) / h)
+    before = 1.5 * row[front - 1] - 0.5 * row[front - 2]
+    behind = 1.5 * row[back] - 0.5 * row[back + 1]
+    return float(before - behind)
+
+
+def recirculation(world: World) -> float:
+    """Length of the backflow behind the cylinder, m."""
+    fluid, state = world.flow()
+    h = fluid.grid.spacing
+    j = round(CENTRE / h)
+    row = 0.5 * (state.velocity[0][:, j - 1, 0] + state.velocity[0][:, j, 0])
+    start = round((CENTRE + 0.5 * DIAMETER) / h) + 1
+    i = start + int(np.argmax(row[start:] > 0.0))
+    return float(h * (i - row[i] / (row[i] - row[i - 1])) - CENTRE - 0.5 * DIAMETER)
+
+
+def steady_flow(world: World, change: float) -> tuple[float, float]:
+    """Drag and lift coefficient of B1, when they change by less than `change` in a time D/U."""
+    fluid, _ = world.flow()
+    dt = CFL * fluid.grid.spacing / CREEPING.fastest
+    old = np.full(2, np.inf)
+    for _ in range(LONGEST):
+        new = np.array(CREEPING.coefficients(advance(world, dt, round(CREEPING.time / dt))))
+        if np.abs(new - old).max() < change:
+            break
+        old = new
+    return float(new[0]), float(new[1])
+
+
+def steady_cylinder(quick: bool) -> list[Finding]:
+    """B1: from the undisturbed flow on the coarsest grid, from the coarser one's on the others."""
+    grids = STEADY_GRIDS[quick]
+    rows = []
+    coarser = None
+    for n in grids:
+        world = channel(n, Parabola(CREEPING.fastest))
+        begin(world, coarser, Parabola(CREEPING.fastest))
+        forces = steady_flow(world, STEADY[quick])
+        rows.append((*forces, pressure_drop(world), recirculation(world)))
+        coarser = world
+    drag, lift, drop, length = zip(*rows, strict=True)
+    return [
+        judged("B1", "cD", grids, drag, (5.57, 5.59), falling=True),
+        judged("B1", "cL", grids, lift, (0.0104, 0.0110), falling=True),
+        judged("B1", "dp", grids, drop, (0.1172, 0.1176)),
+        judged("B1", "La", grids, length, (0.0842, 0.0852)),
+    ]
+
+
+def shedding_in_channel(quick: bool) -> list[Finding]:
+    """B2: largest coefficients over some periods, frequency, and the pressure drop half a period
+    after the largest lift."""
+    grids, periods = SHEDDING_GRIDS[quick], PERIODS[quick]
+    rows, lines = [], []
+    coarser = None
+    for n in grids:
+        world = channel(n, Parabola(SHEDDING.fastest))
+        begin(world, coarser, Kicked(Parabola(SHEDDING.fastest), SHEDDING, CENTRE, CENTRE))
+        before = AFTER if coarser else BEFORE[quick]
+        seen, drags, drops = watch(world, SHEDDING, before, 0.3, periods, pressure_drop)
+        steps, period = seen.last(periods)
+        lifts, later = seen.signal[steps], drops[steps]
+        half = crest(lifts[: round(period / seen.dt)])[1] + 0.5 * period / seen.dt
+        fallen = float(np.interp(half, np.arange(later.size), later))
+        rows.append((crest(drags[steps])[0], crest(lifts)[0], SHEDDING.time / period, fallen))
+        lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
+        coarser = world
+    drag, lift, strouhal, drop = zip(*rows, strict=True)
+    return [
+        judged("B2", "cD max", grids, drag, (3.22, 3.24), falling=True, lines=lines),
+        judged("B2", "cL max", grids, lift, (0.99, 1.01), falling=True),
+        judged("B2", "St", grids, strouhal, (0.295, 0.305), falling=True),
+        judged("B2", "dp", grids, drop, (2.46, 2.50)),
+    ]
+
+
+def pulse(cells: int, duration: float = DURATION) -> Array:
+    """(n, 4) time in s, drag and lift coefficient, pressure drop in Pa, from a fluid at rest."""
+    world = channel(cells, Pulse())
+    fluid, _ = world.flow()
+    count = int(np.ceil(duration * SHEDDING.fastest / (CFL * fluid.grid.spacing)))
+    dt = duration / count
+    rows = []
+    for _ in range(count):
+        drag, lift = SHEDDING.coefficients(advance(world, dt))
+        rows.append((world.time, drag, lift, pressure_drop(world)))
+    return np.array(rows)
+
+
+def swelling_inflow(quick: bool) -> list[Finding]:
+    """B3: largest drag and lift in the pulse, and the pressure drop at its end."""
+    grids = SHEDDING_GRIDS[quick]
+    runs = [pulse(n) for n in grids]
+    drags, lifts = ([crest(run[:, column])[0] for run in runs] for column in (1, 2))
+    drops = [float(run[-1, 3]) for run in runs]
+    drag = course(runs[-1], 1, "drag coefficient", DRAG_AT, reference("B3", "cD max"))
+    lift = course(runs[-1], 2, "lift coefficient", LIFT_AT, reference("B3", "cL max"))
+    drop = course(runs[-1], 3, "pressure drop (Pa)", DURATION, reference("B3", "dp(t=8)"))
+    return [
+        judged("B3", "cD max", grids, drags, (2.93, 2.97), plot=drag),
+        judged("B3", "cL max", grids, lifts, (0.47, 0.49), plot=lift),
+        judged("B3", "dp(t=8)", grids, drops, (-0.115, -0.105), plot=drop),
+    ]
+
+
+def course(run: Array, column: int, name: str, time: float, published: float) -> Plot:
+    """Some hundred points of a column of a run over time, with the one published value."""
+    thinned = run[:: max(1, len(run) // 400)]
+    curves = (
+        Curve("published", (time,), (published,), True),
+        Curve("flowborne", thinned[:, 0], thinned[:, column]),
+    )
+    return Plot("t (s)", name, curves)
+
+
+CASES = (
+    Case("B1", steady_cylinder, coarse=True),
+    Case("B2", shedding_in_channel, Tier.HALF_HOUR, coarse=True),
+    Case("B3", swelling_inflow, Tier.HALF_HOUR, coarse=True),
+)

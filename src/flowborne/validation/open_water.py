@@ -1,0 +1,302 @@
+"""Flow past a fixed body in open water: a cylinder in B4, B5, B6 and V9, a sphere in B7.
+
+B4 and B7 are steady; in B5, B6 and V9 the cylinder sheds vortices. V9's is held; of the moved one
+the list names curves and has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flowborne import Grid, World
+from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.validation.case import Case, Tier, confirmed, reference, table
+from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, near, within
+from flowborne.validation.shedding import (
+    AFTER,
+    BEFORE,
+    CFL,
+    PERIODS,
+    STREAM,
+    UNBOUNDED,
+    Kicked,
+    amplitude,
+    cylinder,
+    judged,
+    watch,
+)
+from flowborne.validation.worlds import Vector, begin, mjcf, whole_steps
+from flowborne.worlds import advance, make_world, velocity_at
+
+STEADY_GRIDS = {True: (4, 8), False: (8, 16, 24, 32)}
+OPEN_GRIDS = {True: (4,), False: (8, 16, 24, 32)}
+GERRIS_GRIDS = (8, 16)
+SPHERE_GRIDS = {True: (4,), False: (6, 8, 12)}
+"""Cells across D, by quick: of B4; of B5, B6 and V9; of B6's frequencies over the Reynolds number;
+of B7."""
+
+FIRST, NEXT = {True: 30.0, False: 60.0}, 15.0
+SPHERE_FIRST, SPHERE_NEXT = {True: 6.0, False: 16.0}, 6.0
+"""Times D/U in which B4 and B7 become steady: on the first grid, by quick, from the undisturbed
+flow, and on the others from that of the coarser grid."""
+
+FURTHEST = 6.0
+"""Diameters behind the cylinder's centre within which the backflow ends."""
+
+UPSTREAM, DOWNSTREAM, ASIDE = 6, 16, 5
+"""Diameters from the sphere's centre to the sides of its box; the lateral ones slip."""
+
+BETWEEN: Vector = (0.0, np.sqrt(0.5), np.sqrt(0.5))
+"""Between y and z, away from the planes of symmetry."""
+
+LABEL = "cells across D"
+
+
+def open_water(cells: int, viscosity: float) -> World:
+    """The cylinder at the origin, and the stream that enters the domain.
+
+    The domain reaches 20 D upstream and 30 D downstream and to each side, which slips; half as
+    wide it would raise the drag at Re 100 by 0.8 %.
+    """
+    grid = Grid.slab(50 * cells, 60 * cells, 1.0 / cells, (-20.0, -30.0))
+    return make_world(
+        cylinder(1.0, 0.0, 0.0),
+        grid,
+        viscosity=viscosity,
+        boundaries=Boundaries(BoundaryInflow(STREAM), BoundaryOpen()),
+        tolerance=1e-7,
+    )
+
+
+def bubble(world: World) -> float:
+    """Length of the backflow behind the cylinder along its axis, in D; 0 where there is none."""
+    h = world.flow()[0].grid.spacing
+    x = np.arange(0.5 + h, FURTHEST, 0.05 * h)
+    u = velocity_at(world, x[:, None] * np.array(STREAM.velocity))[:, 0]
+    if u[0] > 0.0:
+        return 0.0
+    return float(x[int(np.argmax(u > 0.0))] - 0.5)
+
+
+def steady_cylinder(quick: bool) -> list[Finding]:
+    """B4: drag, length of the backflow and the angle at which the flow leaves the cylinder."""
+    grids = STEADY_GRIDS[quick]
+    rows, lines = [], []
+    coarser = None
+    for n in grids:
+        world = open_water(n, 1.0 / 40.0)
+        begin(world, coarser, STREAM)
+        dt = CFL / n
+        steps = round((NEXT if coarser else FIRST[quick]) / dt)
+        before, _ = UNBOUNDED.coefficients(advance(world, dt, steps - n))
+        drag, _ = UNBOUNDED.coefficients(advance(world, dt, n))
+        rows.append((drag, bubble(world), 180.0 - separation(world, (0.0, 1.0, 0.0))))
+        lines.append(f"{n:>6g} cells across D: Cd changes by {drag - before:.2g} in the last D/U")
+        coarser = world
+    drags, lengths, angles = zip(*rows, strict=True)
+    return [
+        judged("B4", "Cd", grids, drags, (1.48, 1.62), lines=lines),
+        judged("B4", "bubble length L/D", grids, lengths, (2.13, 2.35)),
+        judged("B4", "separation angle deg", grids, angles, (52.7, 54.2)),
+    ]
+
+
+def shed_in_the_open(
+    reynolds: float, strouhal: float, grids: Sequence[int], quick: bool
+) -> tuple[list[list[float]], list[str]]:
+    """Mean drag, amplitude of the lift and frequency from grid to grid, and lines for people.
+
+    strouhal  rough value of the expected frequency
+    """
+    periods = PERIODS[quick]
+    rows, lines = [], []
+    coarser = None
+    for n in grids:
+        world = open_water(n, 1.0 / reynolds)
+        begin(world, coarser, Kicked(STREAM, UNBOUNDED, 0.0, 0.0))
+        before = AFTER if coarser else 2.0 * BEFORE[quick]
+        seen, drags, _ = watch(world, UNBOUNDED, before, strouhal, periods)
+        steps, period = seen.last(periods)
+        mean = float(drags[steps].mean())
+        rows.append((mean, amplitude(seen.signal[steps]), UNBOUNDED.time / period))
+        lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
+        coarser = world
+    return [list(column) for column in zip(*rows, strict=True)], lines
+
+
+def shedding_at_100(quick: bool) -> list[Finding]:
+    """B5: mean drag, amplitude of the lift and frequency at Re 100."""
+    grids = OPEN_GRIDS[quick]
+    (drag, lift, strouhal), lines = shed_in_the_open(100.0, 0.165, grids, quick)
+    return [
+        judged("B5", "Cd mean", grids, drag, (1.31, 1.39), falling=True, lines=lines),
+        judged("B5", "Cl amplitude", grids, lift, (0.30, 0.345), falling=True),
+        judged("B5", "St", grids, strouhal, (0.160, 0.170), falling=True),
+    ]
+
+
+def shedding_at_200(quick: bool) -> list[Finding]:
+    """B6: mean drag, amplitude of the lift and frequency at Re 200, and unless quick the frequency
+    at Re 250 to 500."""
+    grids = OPEN_GRIDS[quick]
+    (drag, lift, strouhal), lines = shed_in_the_open(200.0, 0.197, grids, quick)
+    findings = [
+        judged("B6", "Cd mean", grids, drag, (1.17, 1.41), lines=lines),
+        judged("B6", "Cl amplitude", grids, lift, (0.50, 0.70)),
+        judged("B6", "St", grids, strouhal, (0.190, 0.203)),
+    ]
+    return findings if quick else findings + frequencies()
+
+
+def frequencies() -> list[Finding]:
+    """Frequency over the Reynolds number, against Gerris's."""
+    known = table("B6", "St(Re) Gerris 250..500")
+    found = {re: shed_in_the_open(re, st, GERRIS_GRIDS, False)[0][2] for re, st in known.items()}
+    curves = (
+        Curve("Gerris", list(known), list(known.values()), True),
+        Curve("flowborne", list(known), [values[-1] for values in found.values()]),
+    )
+    plot = Plot("Reynolds number", "Strouhal number", curves)
+    findings = []
+    for reynolds, exact in known.items():
+        series = GridSeries.toward(LABEL, GERRIS_GRIDS, found[reynolds], exact)
+        findings.append(near(f"St at Re {reynolds:g}", series, exact, relative=0.03))
+    return [replace(findings[0], plot=plot), *findings[1:]]
+
+
+def held_at_185(quick: bool) -> list[Finding]:
+    """V9: the figures of the cylinder while it is held."""
+    known = numbers_of(reference("V9", "fixed cylinder Re=185"))
+    grids = OPEN_GRIDS[quick]
+    (drag, lift, strouhal), lines = shed_in_the_open(185.0, 0.195, grids, quick)
+    measured = (drag, [value * np.sqrt(0.5) for value in lift], strouhal)
+    findings = []
+    for (name, exact), values in zip(known.items(), measured, strict=True):
+        series = GridSeries.toward(LABEL, grids, values, exact)
+        findings.append(near(f"{name}, held", series, exact, relative=0.05))
+    sure = confirmed("V9", "fixed cylinder Re=185")
+    findings[0] = replace(findings[0], lines=tuple(lines))
+    return [replace(finding, confirmed=sure) for finding in findings]
+
+
+def numbers_of(text: str) -> dict[str, float]:
+    """Names and numbers of "Cd 1.287, Cl_rms 0.443"."""
+    pairs: Sequence[Sequence[str]] = [part.split() for part in text.split(",")]
+    return {name: float(number) for name, number in pairs}
+
+
+def quarter(cells: int, reynolds: float) -> World:
+    """A quarter of the sphere's box, between two planes about which the flow is symmetric."""
+    counts = (UPSTREAM + DOWNSTREAM) * cells, ASIDE * cells, ASIDE * cells
+    grid = Grid(counts, 1.0 / cells, (-float(UPSTREAM), 0.0, 0.0))
+    sphere = '<body name="sphere"><geom type="sphere" size="0.5"/></body>'
+    return make_world(
+        mjcf(sphere),
+        grid,
+        viscosity=1.0 / reynolds,
+        boundaries=Boundaries(BoundaryInflow(STREAM), BoundaryOpen()),
+        tolerance=1e-7,
+    )
+
+
+def steady_drag(world: World, duration: float) -> tuple[float, float]:
+    """Drag coefficient of the sphere after some times D/U, and its change over the last one."""
+    fluid, _ = world.flow()
+    steps, dt = whole_steps(duration, CFL * fluid.grid.spacing)
+    tail = round(1.0 / dt)
+    before = sphere_drag(world, dt, steps - tail)
+    after = sphere_drag(world, dt, tail)
+    return after, abs(after - before)
+
+
+def sphere_drag(world: World, dt: float, steps: int) -> float:
+    """Cd = F / (rho U^2 / 2  pi D^2 / 4) after some steps; the quarter has a quarter of F."""
+    report = advance(world, dt, steps)
+    force = (report.pressure_wrench + report.viscous_wrench)[1, 0]
+    return float(4.0 * force * 8.0 / np.pi)
+
+
+def recirculation(world: World) -> float:
+    """Length of the backflow behind the sphere along its axis, m; 0 where there is none."""
+    fluid, state = world.flow()
+    u = state.velocity[0]
+    # the flow is even about the axis: a parabola through the rows at h/2 and 3h/2
+    row = (9.0 * u[:, 0, 0] - u[:, 1, 1]) / 8.0
+    x = fluid.grid.face_coordinates(0)[0]
+    start = int(np.searchsorted(x, 0.5 + fluid.grid.spacing))
+    if row[start] > 0.0:
+        return 0.0
+    i = start + int(np.argmax(row[start:] > 0.0))
+    return float(x[i] - fluid.grid.spacing * row[i] / (row[i] - row[i - 1]) - 0.5)
+
+
+def separation(world: World, aside: Vector) -> float:
+    """Angle from the front at which the flow along a body of D = 1 m reverses, degrees; 180 if it
+    does not.
+
+    Extrapolated to the body from one and two cells away.
+
+    aside  direction across the stream that spans the plane of the angle
+    """
+    h = world.flow()[0].grid.spacing
+    angles = np.radians(np.arange(95.0, 175.0, 0.25))
+    outward = np.outer(-np.cos(angles), STREAM.velocity) + np.outer(np.sin(angles), aside)
+    along = np.outer(np.sin(angles), STREAM.velocity) + np.outer(np.cos(angles), aside)
+    turns = []
+    for away in (h, 2.0 * h):
+        backward = (velocity_at(world, (0.5 + away) * outward) * along).sum(axis=1) < 0.0
+        if not backward.any():
+            return 180.0
+        turns.append(float(np.degrees(angles[int(np.argmax(backward))])))
+    return 2.0 * turns[0] - turns[1]
+
+
+def sphere(quick: bool) -> list[Finding]:
+    """B7: drag at Re 100 and 150, and the bubble behind the sphere at Re 100."""
+    grids = SPHERE_GRIDS[quick]
+    findings = []
+    for reynolds in (100, 150):
+        rows, lines = [], []
+        coarser = None
+        for n in grids:
+            world = quarter(n, reynolds)
+            begin(world, coarser, STREAM)
+            duration = SPHERE_NEXT if coarser else SPHERE_FIRST[quick]
+            coefficient, change = steady_drag(world, duration)
+            rows.append((coefficient, recirculation(world), separation(world, BETWEEN)))
+            lines.append(f"{n:>6g} cells across D: Cd changes by {change:.2g} in the last D/U")
+            coarser = world
+        drags, lengths, angles = zip(*rows, strict=True)
+        exact = float(reference("B7", f"Cd({reynolds})"))
+        series = GridSeries.toward(LABEL, grids, drags, exact)
+        title = f"Cd at Re {reynolds}"
+        findings.append(near(title, series, exact, relative=0.03, falling=True, lines=lines))
+        if reynolds == 100:
+            findings += sphere_bubble(grids, lengths, angles)
+    return findings
+
+
+def sphere_bubble(
+    grids: tuple[int, ...], lengths: tuple[float, ...], angles: tuple[float, ...]
+) -> list[Finding]:
+    """The findings about the bubble at Re 100."""
+    length = float(reference("B7", "L/D(100)"))
+    angle = float(reference("B7", "separation angle").removesuffix(" deg"))
+    long = GridSeries.toward(LABEL, grids, lengths, length)
+    turned = GridSeries.toward(LABEL, grids, angles, angle)
+    return [
+        within("L/D at Re 100", long, length, (0.85, 0.90)),
+        near("separation angle at Re 100", turned, angle, absolute=2.0),
+    ]
+
+
+CASES = (
+    Case("B4", steady_cylinder, Tier.HALF_HOUR, coarse=True),
+    Case("B5", shedding_at_100, Tier.HALF_HOUR, coarse=True),
+    Case("B6", shedding_at_200, Tier.HALF_HOUR, coarse=True),
+    Case("V9", held_at_185, Tier.HALF_HOUR, coarse=True),
+    Case("B7", sphere, full=Tier.HALF_HOUR, coarse=True),
+)
