@@ -45,7 +45,7 @@ class ExporterBvh:
 
 
 def _clip_of(creature: Creature) -> tuple[Clip, dict[str, Array]]:
-    """The motion of a skeleton, and joint -> (frames, 3) position in its parent, m, if it slides."""
+    """The motion of a skeleton, and sliding joint -> (frames, 3) m, position in its parent."""
     skeleton = creature.skeleton
     names = tuple("_".join(name.split()) for name in skeleton.names)  # a space ends a name
     rest, parents = skeleton.rest[0], skeleton.parents

@@ -31,7 +31,7 @@ def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:
 @provided(".csv")
 @dataclass(frozen=True)
 class ExporterCsv:
-    """A row per frame, with the columns of history.csv; names end in the unit, numbers are exact."""
+    """A row per frame, with the columns of history.csv; names end in units, numbers are exact."""
 
     def write(self, run: OpenRun, path: Path) -> None:
         columns = _columns(run)
