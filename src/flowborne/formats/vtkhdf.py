@@ -1,6 +1,6 @@
 """A run as one VTKHDF file for ParaView, by h5py.
 
-Lengths are in m, times in s. The file has blocks for fluid, bodies, forces and flesh, each only if the run has it:
+Lengths are in m, times in s. The blocks are, each only if the run has it:
 
     fluid   cells: velocity (m/s, mean of the faces), vorticity (1/s), pressure (Pa), open (open
             fraction of the cell), and the dyes by name
