@@ -19,14 +19,12 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from flowborne.view import style
-from flowborne.view.arrows import arrow, round_number
-from flowborne.view.forces import SHAFT, Forces
+from flowborne.view.glyphs import SHAFT, Forces, arrow, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
-from flowborne.view.map_slab import MapSlab
+from flowborne.view.maps import MapSlab, MapSpace
+from flowborne.view.plots import Strip, joint_curves, strip_curves
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.space.map_space import MapSpace
-from flowborne.view.strips import Strip, joint_curves, strip_curves
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Plots of numbers: the cost of chains (Fig. 10) and the course of a run."""
+"""Plots of numbers: curves below a picture, over time, and the cost of chains (Fig. 10)."""
 
 from __future__ import annotations
 
@@ -7,15 +7,168 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import StrMethodFormatter
 from numpy.typing import NDArray
 
 from flowborne.files.atomic import write_atomically
 from flowborne.view import style
-from flowborne.view.strips import legend, strip_style
+from flowborne.view.run import Run
 
 Array = NDArray[np.float64]
+
+MOST_CURVES = 6
+
+EFFORT = "measured_effort_"
+"""Beginning of the columns with the effort of named joints."""
+
+
+def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
+    """(title with unit, name -> values) of the joints worth a look.
+
+    The controlled joints, or all where none is controlled; hinges in degrees before slides in m,
+    which are shown where there is no hinge.
+    """
+    for kind, unit, title, factor in (
+        ("angle_", "_rad", "angle (°)", 180.0 / np.pi),
+        ("position_", "_m", "position (m)", 1.0),
+    ):
+        joints = {
+            column.removeprefix(kind).removesuffix(unit): factor * values
+            for column, values in run.history.items()
+            if column.startswith(kind)
+        }
+        chosen = {name: v for name, v in joints.items() if name in run.controlled} or joints
+        if chosen:
+            return title, dict(list(chosen.items())[:MOST_CURVES])
+    return "", {}
+
+
+def objective_curve(run: Run) -> Array | None:
+    """The objective of the last decision in every frame; None where there is none."""
+    values = run.history.get("objective")
+    return None if values is None or not np.isfinite(values).any() else values
+
+
+def _terms(run: Run) -> list[str]:
+    """Columns of the terms of the objective."""
+    return [column for column in run.history if column.startswith("measured_")]
+
+
+def effort_curves(run: Run) -> dict[str, Array]:
+    """Joint or joints -> effort after every frame, of objectives that name the joints.
+
+    None where such an effort is all of the objective.
+    """
+    if len(_terms(run)) < 2:
+        return {}
+    named = {
+        column.removeprefix(EFFORT).replace("_", " "): values
+        for column, values in run.history.items()
+        if column.startswith(EFFORT)
+    }
+    return dict(list(named.items())[:MOST_CURVES])
+
+
+def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
+    """(title, name -> values) of every strip of a run."""
+    strips: list[tuple[str, dict[str, Array]]] = []
+    objective = objective_curve(run)
+    if objective is not None:
+        terms = [column.removeprefix("measured_").replace("_", " ") for column in _terms(run)]
+        title = f"objective: {terms[0]}" if len(terms) == 1 else "objective"
+        strips.append((title, {"": objective}))
+    efforts = effort_curves(run)
+    if efforts:
+        strips.append(("effort (N m s)", efforts))
+    title, joints = joint_curves(run)
+    if joints:
+        strips.append((title, joints))
+    return strips
+
+
+class Strip:
+    """One strip of curves in `axes`: all of the run faintly, what is past brightly.
+
+    moving  artists to draw anew in every frame
+    """
+
+    def __init__(self, axes: Axes, title: str, times: Array, curves: dict[str, Array]) -> None:
+        self.axes = axes
+        self.times = times
+        self.curves = list(curves.values())
+        strip_style(axes)
+        axes.set_xlim(0.0, 1.01 * _span(np.append(times, 0.0))[1])
+        axes.set_ylim(*robust_limits(np.concatenate(self.curves)))
+        axes.set_title(title, loc="left", fontsize=8.5, color=style.MUTED, pad=4)
+        self._past, self._heads = [], []
+        for n, (name, values) in enumerate(curves.items()):
+            colour = style.CURVES[n % len(style.CURVES)]
+            axes.plot(times, values, color=colour, lw=1.1, alpha=0.3)
+            self._past += axes.plot([], [], color=colour, lw=1.9, animated=True, label=name)
+            self._heads += axes.plot([], [], "o", ms=4.5, mec="none", color=colour, animated=True)
+        if len(curves) > 1:
+            legend(axes, self._past)
+        self._cursor = axes.axvline(0.0, color=style.TEXT, lw=0.9, alpha=0.7, animated=True)
+        self.moving: list[Artist] = [self._cursor, *self._past, *self._heads]
+
+    def show(self, time: float, row: int | None) -> None:
+        """Move the cursor to `time`; `row` is the row of the history there, if there is one."""
+        self._cursor.set_xdata([time, time])
+        count = 0 if row is None else row + 1
+        for values, past, head in zip(self.curves, self._past, self._heads, strict=True):
+            past.set_data(self.times[:count], values[:count])
+            head.set_data(self.times[max(count - 1, 0) : count], values[max(count - 1, 0) : count])
+
+
+def strip_style(axes: Axes) -> None:
+    """Plain dark axes with a faint grid."""
+    axes.set_facecolor(style.WATER)
+    axes.grid(color=style.LINE, lw=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(colors=style.MUTED, labelsize=8, length=0, pad=5)
+    axes.locator_params(axis="y", nbins=4)
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:.5g}"))
+    for spine in axes.spines.values():
+        spine.set_color(style.LINE)
+        spine.set_linewidth(0.6)
+
+
+def legend(axes: Axes, handles: Sequence[Artist]) -> None:
+    """Names of curves in one row above the axes, at the right."""
+    axes.legend(
+        handles=handles,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.97),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=8,
+        labelcolor=style.MUTED,
+        handlelength=1.1,
+        columnspacing=1.2,
+        borderaxespad=0.0,
+    )
+
+
+def robust_limits(values: Array) -> tuple[float, float]:
+    """Limits that show `values` but for rare spikes; (-1, 1) where there is nothing to show."""
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        return -1.0, 1.0
+    low, high = np.percentile(finite, [5.0, 95.0])
+    inside = finite[(finite >= 2.0 * low - high) & (finite <= 2.0 * high - low)]
+    return _span(inside if inside.size else finite, margin=0.1)
+
+
+def _span(values: Array, margin: float = 0.0) -> tuple[float, float]:
+    """Smallest and largest of `values` with a margin, never the same."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    room = margin * (high - low)
+    if high - low <= 1e-9 * max(abs(low), abs(high), 1e-300):
+        room = max(0.05 * abs(high), 1e-6)
+    return low - room, high + room
 
 
 @dataclass(frozen=True)

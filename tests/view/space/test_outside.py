@@ -7,8 +7,7 @@ import pytest
 
 from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom
-from flowborne.view.space.outside import Outside
-from flowborne.view.space.shapes import mesh_of
+from flowborne.view.space.surfaces import Outside, mesh_of
 
 TURN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """The geometry's x is the world's y, its y z and its z x."""

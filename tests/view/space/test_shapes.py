@@ -7,7 +7,7 @@ import pytest
 
 from flowborne.shapes.kinds import shape_of
 from flowborne.view.run import Geom
-from flowborne.view.space.shapes import mesh_of
+from flowborne.view.space.surfaces import mesh_of
 
 A, B, C = 0.2, 0.5, 0.3
 TETRAHEDRON = (

@@ -1,27 +1,99 @@
-"""The map of a run in two dimensions: its fluid, its bodies and the forces on them from above."""
+"""The map of a picture, which shows the run itself: of a slab from above, or of space by VTK."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.path import Path
 from numpy.typing import NDArray
+from PIL import Image
 
 from flowborne.view import style
-from flowborne.view.arrows import arrow
-from flowborne.view.fields import field_of, over
-from flowborne.view.forces import SHAFT, Forces
-from flowborne.view.map_image import MapImage
-from flowborne.view.marks import crosses, goes_along
+from flowborne.view.fields import Scale, field_of, over
+from flowborne.view.framing import windows
+from flowborne.view.glyphs import SHAFT, Forces, arrow, crosses, goes_along
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.window import windows
+from flowborne.view.space.camera import camera_of
+from flowborne.view.space.opengl import off_screen
+from flowborne.view.space.seen import seen_of
+
+if TYPE_CHECKING:
+    from flowborne.view.space.stage import Stage
+
+
+class MapImage(Artist):
+    """An image, smoothly enlarged to fill its part of the map; drawn anew in every frame.
+
+    matplotlib's own images say the same at five times the cost.
+
+    image  (ny, nx, 3 or 4) colours, lowest row first
+    """
+
+    def __init__(self, axes: Axes, extent: tuple[float, float, float, float] | None = None) -> None:
+        """`extent`: (x0, x1, y0, y1) of the image on the axes; all of them when None."""
+        super().__init__()
+        self.image = np.zeros((1, 1, 3), np.uint8)
+        self._axes = axes
+        self._extent = extent
+        self.set_animated(True)
+        axes.add_artist(self)
+
+    @property
+    def pixels(self) -> tuple[int, int]:
+        """Width and height of the axes on the canvas."""
+        x0, y0, x1, y1 = self._edges()
+        return x1 - x0, y1 - y0
+
+    def draw(self, renderer: RendererBase) -> None:
+        seen = self._seen()
+        if seen is None:
+            return
+        (x0, y0, width, height), part = seen
+        small = Image.fromarray(np.ascontiguousarray(self.image[::-1]))
+        sized = small.resize((width, height), Image.Resampling.BICUBIC, box=part)
+        pixels = np.asarray(sized.convert("RGBA"))
+        if small.size != (width, height) and self.image.shape[-1] == 3:
+            # a cubic swings below its knots, which would show as black seams along dye
+            darkest = np.append(self.image.min(axis=(0, 1)), np.uint8(255))
+            pixels = np.maximum(pixels, darkest)
+        renderer.draw_image(renderer.new_gc(), x0, y0, pixels[::-1])
+
+    def _seen(
+        self,
+    ) -> tuple[tuple[int, int, int, int], tuple[float, float, float, float]] | None:
+        """Where on the canvas the image is seen (left, bottom, width, height), and what part of it
+        (left, upper, right, lower) in its own pixels; None when it is not on the map."""
+        left, bottom, right, top = self._edges()
+        rows, columns = self.image.shape[:2]
+        if self._extent is None:
+            return (left, bottom, right - left, top - bottom), (0.0, 0.0, columns, rows)
+        x0, x1, y0, y1 = self._extent
+        (low, high), (lower, upper) = self._axes.get_xlim(), self._axes.get_ylim()
+        across, along = (right - left) / (high - low), (top - bottom) / (upper - lower)
+        first = np.round([left + across * (x0 - low), bottom + along * (y0 - lower)]).astype(int)
+        last = np.round([left + across * (x1 - low), bottom + along * (y1 - lower)]).astype(int)
+        begin = np.maximum(first, [left, bottom])
+        end = np.minimum(last, [right, top])
+        if (end <= begin).any():
+            return None
+        share = np.array([columns, rows]) / (last - first)
+        (a, b), (c, d) = (begin - first) * share, (end - first) * share
+        size = end - begin
+        place = (int(begin[0]), int(begin[1]), int(size[0]), int(size[1]))
+        return place, (float(a), float(rows - d), float(c), float(rows - b))
+
+    def _edges(self) -> tuple[int, int, int, int]:
+        x0, y0, x1, y1 = (round(edge) for edge in self._axes.bbox.extents)
+        return x0, y0, x1, y1
+
 
 Array = NDArray[np.float64]
 
@@ -141,3 +213,48 @@ def wind_arrows(view: Array, corner: Array, wind: Array) -> list[Array]:
             middle = corner + pitch * (np.array([column + 0.5 * (row % 2), row]) + 0.5)
             arrows.append(arrow(middle - 0.5 * vector, vector, 0.035 * pitch))
     return arrows
+
+
+class MapSpace:
+    """Map of space, a `Map` of view.pictures.
+
+    camera  from which it is seen
+    """
+
+    def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
+        """`aspect`: height over width that the map must have, if any."""
+        self.run = run
+        self._shot = shot
+        self.camera = camera_of(run, shot, aspect)
+        self.width, self.aspect = self.camera.width, self.camera.aspect
+        self.forces = Forces(run, min(self.camera.width, self.camera.height))
+        self._seen = seen_of(run, shot)
+        self.legend: Sequence[tuple[str, str]] = () if self._seen is None else self._seen.legend
+        self.scale: Scale | None = None if self._seen is None else self._seen.scale
+        self._stage: Stage | None = None
+
+    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
+        """Set the stage; the artist of what is seen of it in `axes`, `pixels` wide at scale 1.
+
+        raises  ValueError when nothing can draw three dimensions here
+        """
+        self._image = MapImage(axes)
+        plotter = off_screen(*self._image.pixels)
+        # imports VTK, which is known to work from here on
+        from flowborne.view.space.stage import Stage
+
+        pixel = self.width / pixels
+        self._stage = Stage(
+            plotter, self.run, self.camera, self.forces, self._seen, pixel, self._shot
+        )
+        return [self._image]
+
+    def show(self, number: int, state: State) -> None:
+        """Make what is seen that of the `number`-th state."""
+        assert self._stage is not None
+        self._image.image = self._stage.image(number, state)
+
+    def close(self) -> None:
+        """Close VTK's window; nothing can be drawn after."""
+        if self._stage is not None:
+            self._stage.close()
