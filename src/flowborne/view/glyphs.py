@@ -11,14 +11,38 @@ Array = NDArray[np.float64]
 
 HEAD_LENGTH = 3.6
 HEAD_WIDTH = 3.0
-"""Of an arrow's head, in widths of its shaft."""
+"""Size of an arrow's head, in widths of its shaft."""
+
+LARGE_FORCE_LENGTH = 0.2
+"""Length of the arrow of a large force, in smaller sides of the view."""
+
+LARGE_FORCE_PERCENTILE = 90.0
+"""Percentile over the frames of the largest force that defines a large force."""
+
+MAX_FORCE_LENGTH = 1.6
+"""Maximum length of an arrow, in those of a large force: cuts the jolt of a sudden start."""
+
+SHAFT_WIDTH = 5.0
+"""Width of the shaft of a force's arrow, pixels."""
+
+MIN_FORCE_LENGTH = 3.0
+"""Length below which arrows are left out, pixels."""
+
+CROSS_SPACING = 0.22
+"""Maximum distance between crosses, in smaller sides of the view; a round number of metres."""
+
+CROSS_ARM = 0.06
+"""Half length of a cross, in distances between them."""
+
+MIN_CAMERA_PATH = 0.06
+"""Extent of the camera's path above which there are marks, in smaller sides of the view."""
 
 
 def arrow(tail: Array, vector: Array, width: float) -> Array:
     """(7, 2) corners of an arrow from `tail` (2,) along `vector` (2,) with a shaft `width` wide.
 
-    An arrow shorter than its head is that head, smaller. The tip is corner 3.
-    raises  ValueError when the vector has no length
+    The head of an arrow shorter than its head is scaled down. The tip is corner 3.
+    raises  ValueError if the vector is 0
     """
     length = float(np.hypot(*vector))
     if not length > 0.0:
@@ -36,46 +60,30 @@ def arrow(tail: Array, vector: Array, width: float) -> Array:
 
 
 def round_number(value: float) -> float:
-    """Largest of 1, 2 and 5 times a power of ten that is not above `value` > 0."""
+    """Largest of 1, 2 and 5 times a power of ten that is at most `value` > 0."""
     power = 10.0 ** np.floor(np.log10(value))
     step = max(n for n in (1.0, 2.0, 5.0) if n * power <= value * (1.0 + 1e-9))
     return float(step * power)
 
 
-LONGEST_FORCE = 0.2
-"""Length of the arrow of a large force, as a share of the smaller side of what is seen."""
-
-LARGE_FORCE = 90.0
-"""Percentile over the frames of the largest force that counts as a large one."""
-
-CUT_FORCE = 1.6
-"""Longest arrow in lengths of that of a large force: where the jolt of a sudden start ends."""
-
-SHAFT = 5.0
-"""Width of the shaft of a force's arrow, pixels."""
-
-SHORTEST = 3.0
-"""Arrows shorter than this many pixels are left out."""
-
-
 class Forces:
-    """The arrows of a run.
+    """The forces of fluid and winds on the bodies of a run, as arrows of one scale.
 
     reach  m, length of the arrow of a large force
-    large  N (N per unit depth in a slab), size of a large force of the film; 0 when there is none
+    large  N (N/m in a slab), size of a large force in the film; 0 if there is none
     unit   of `large`
     """
 
     def __init__(self, run: Run, side: float) -> None:
-        """`side` is the smaller side of what is seen, m."""
+        """`side`: smaller side of the view, m."""
         self._axes = 2 if run.slab else 3
-        self._bodies = _pushed(run)
-        self.reach = LONGEST_FORCE * side
+        self._bodies = _drawn_bodies(run)
+        self.reach = LARGE_FORCE_LENGTH * side
         self.large = self._large(run)
         self.unit = "N/m" if run.slab else "N"
 
     def arrows(self, state: State, pixel: float) -> list[tuple[int, Array, Array]]:
-        """(body, tail, vector) of the forces that are worth an arrow.
+        """(body, tail, vector) of the forces that are large enough for an arrow.
 
         Tails and vectors are (2,) in a slab and (3,) in space, m.
 
@@ -87,9 +95,9 @@ class Forces:
             vector = self.reach / self.large * force
             length = float(np.linalg.norm(vector))
             tail = state["fluid_centre"][body, : self._axes].astype(float)
-            if not SHORTEST * pixel <= length < np.inf or not np.isfinite(tail).all():
+            if not MIN_FORCE_LENGTH * pixel <= length < np.inf or not np.isfinite(tail).all():
                 continue
-            arrows.append((body, tail, min(1.0, CUT_FORCE * self.reach / length) * vector))
+            arrows.append((body, tail, min(1.0, MAX_FORCE_LENGTH * self.reach / length) * vector))
         return arrows
 
     def _large(self, run: Run) -> float:
@@ -98,54 +106,42 @@ class Forces:
         forces = run.every("fluid_force")[:, list(self._bodies), : self._axes]
         sizes = np.linalg.norm(forces, axis=-1).max(axis=1)
         finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-        return float(np.percentile(finite, LARGE_FORCE)) if finite.size else 0.0
+        return float(np.percentile(finite, LARGE_FORCE_PERCENTILE)) if finite.size else 0.0
 
 
-def _pushed(run: Run) -> tuple[int, ...]:
-    """Bodies whose forces are shown: those that are drawn, the world's only when it is alone."""
+def _drawn_bodies(run: Run) -> tuple[int, ...]:
+    """Bodies that are drawn; the world is among them only if it is the only one."""
     carrying = () if run.flesh is None else run.flesh.bodies
     drawn = sorted({*carrying, *(geom.body for geom in run.geoms)})
     return tuple(body for body in drawn if body > 0) or tuple(drawn)
 
 
-PITCH = 0.22
-"""Largest distance between crosses, in smaller sides of what is seen; it is a round number of
-metres."""
-
-ARM = 0.06
-"""Half length of a cross, in distances between them."""
-
-MOVED = 0.06
-"""Way of the camera from which on there are marks, in smaller sides of what is seen."""
-
-
 def goes_along(path: Array, side: float) -> bool:
-    """Whether a camera that looks at `path` (frames, n) m moves, and sees `side` m."""
-    return bool(np.ptp(path, axis=0).max() > MOVED * side)
+    """Whether a camera that looks at `path` (frames, n) m moves noticeably; it shows `side` m."""
+    return bool(np.ptp(path, axis=0).max() > MIN_CAMERA_PATH * side)
 
 
 def crosses(low: Array, high: Array, side: float) -> Array:
-    """(n, 2, 2) m, the strokes of upright crosses between two corners (2,) of a plane.
+    """(n, 2, 2) m, strokes of upright crosses between two corners (2,) of a plane.
 
-    side  m, smaller side of what is seen of it
+    side  m, smaller side of the view
     """
-    pitch = round_number(PITCH * side)
+    spacing = round_number(CROSS_SPACING * side)
     ticks = (
-        pitch * np.arange(np.ceil(a / pitch), np.floor(b / pitch) + 1.0)
+        spacing * np.arange(np.ceil(a / spacing), np.floor(b / spacing) + 1.0)
         for a, b in zip(low, high, strict=True)
     )
-    middles = np.stack([axis.ravel() for axis in np.meshgrid(*ticks)], axis=1)
-    arms = ARM * pitch * np.array([[[-1.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [0.0, 1.0]]])
-    return np.asarray((middles[:, None, None] + arms).reshape(-1, 2, 2))
+    centres = np.stack([axis.ravel() for axis in np.meshgrid(*ticks)], axis=1)
+    arms = CROSS_ARM * spacing * np.array([[[-1.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [0.0, 1.0]]])
+    return np.asarray((centres[:, None, None] + arms).reshape(-1, 2, 2))
 
 
 def motes(count: int, around: Array, reach: float) -> Array:
-    """(count, 3) m, points strewn through space, those that are within `reach` m of `around` (3,)
-    along each axis.
+    """(count, 3) m, random points within `reach` m of `around` (3,) along each axis.
 
-    They stand still: around another place nearby they are the same ones, but for those that are
-    new at one side and gone at the other.
+    They are fixed in the world: if `around` moves a little, only points that leave on one side are
+    replaced by points on the other side.
     """
-    strewn = 2.0 * reach * np.random.default_rng(1).random((count, 3))
-    away = strewn - around
-    return np.asarray(around + away - 2.0 * reach * np.round(away / (2.0 * reach)))
+    points = 2.0 * reach * np.random.default_rng(1).random((count, 3))
+    offset = points - around
+    return np.asarray(around + offset - 2.0 * reach * np.round(offset / (2.0 * reach)))

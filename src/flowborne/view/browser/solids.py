@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.view import style
 from flowborne.view.browser.meshes import Mesh, counter_clockwise, joined, nothing, prism, show_mesh
-from flowborne.view.glyphs import SHAFT, Forces, arrow
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, Skin, State
 from flowborne.view.space.arrows import arrow_mesh
@@ -121,7 +121,7 @@ class Pushes:
 
     def _mesh(self, state: State) -> Mesh:
         """All arrows of a state as one."""
-        width = SHAFT * self._pixel
+        width = SHAFT_WIDTH * self._pixel
         if self._outside is None:
             found = self.scale.arrows(state, self._pixel)
             flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
-from flowborne.view.glyphs import SHAFT, Forces, goes_along
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, goes_along
 from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows, WindArrows
@@ -101,7 +101,7 @@ class Stage:
         for facing, edge in self._edges:
             edge.visibility = bool((facing @ toward < 0.0).any())
         shown = pushes(self._forces, self._outside, state, self._pixel)
-        self._arrows.show(*shown, SHAFT * self._pixel)
+        self._arrows.show(*shown, SHAFT_WIDTH * self._pixel)
         self._look(number)
         return self._cut_out() if self._shot.transparent else self._render(self._shot.colour)
 
