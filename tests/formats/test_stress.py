@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from flowborne.formats.stress import cauchy_stress, deformation_gradients, von_mises
+from flowborne.formats.vtkhdf import cauchy_stress, deformation_gradients, von_mises
 from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import measures, with_middles
 

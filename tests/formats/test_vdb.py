@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import flowborne as fb
-from flowborne.formats.vdb_file import VdbGrid, vdb_bytes
+from flowborne.formats.vdb import VdbGrid, vdb_bytes
 from flowborne.runs.cell_fields import cell_velocity
 
 tinyvdb = pytest.importorskip("tinyvdb")

@@ -17,7 +17,7 @@ from flowborne.runs.run_folder import RunFolderError
 from flowborne.view import drawing
 from flowborne.view.drawing import drawn_frames
 from flowborne.view.film import make_preview, write_film, write_shot
-from flowborne.view.map_slab import MapSlab
+from flowborne.view.maps import MapSlab
 from flowborne.view.pictures import Picture
 from flowborne.view.plots import ChainCost, plot_chain_cost, straight_line
 from flowborne.view.run import Run

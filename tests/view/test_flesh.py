@@ -21,7 +21,7 @@ from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
 from flowborne.view import style
-from flowborne.view.map_slab import MapSlab
+from flowborne.view.maps import MapSlab
 from flowborne.view.outlines import skin_loops
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run

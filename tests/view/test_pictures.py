@@ -11,11 +11,18 @@ import numpy as np
 import pytest
 
 from flowborne.view import style
-from flowborne.view.fields import FieldDye, FieldVorticity, field_of, over
+from flowborne.view.fields import (
+    FieldDye,
+    FieldVorticity,
+    field_of,
+    full_strength,
+    over,
+    vorticity,
+    vorticity_limit,
+)
 from flowborne.view.layout import Box
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
-from flowborne.view.values import full_strength, turning, vorticity
 
 Write = Callable[..., Path]
 Pixels = np.ndarray
@@ -235,8 +242,8 @@ def test_strong_vorticity_keeps_the_colour_of_its_sense(write_run: Write) -> Non
 
 def test_a_scale_of_vorticity_does_not_depend_on_the_still_water_around() -> None:
     wake = np.array([5.0, -4.0, 3.0, -2.0, 1.0])
-    assert turning([wake, np.zeros(20)]) == turning([wake, np.zeros(20_000)]) == 4.0
-    assert turning([np.array([np.nan])]) == 1.0
+    assert vorticity_limit([wake, np.zeros(20)]) == vorticity_limit([wake, np.zeros(20_000)]) == 4.0
+    assert vorticity_limit([np.array([np.nan])]) == 1.0
 
 
 def test_faces_of_cut_cells_carry_no_vorticity(write_run: Write) -> None:

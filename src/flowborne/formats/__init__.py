@@ -1,5 +1,5 @@
-"""Exporters that flowborne brings, one module a format; libraries that one needs load with it.
+"""Built-in exporters, one module per format, which imports its library when it writes a file.
 
-They read run folders, and the model that the folder's scene describes, and never a live solver.
-A new one is a module here, and its ending in `flowborne.runs.exporters.FORMATS`.
+They read run folders and the model of the folder's scene, never a live solver. To add one, add a
+module here and its ending to `flowborne.runs.exporters.FORMATS`.
 """

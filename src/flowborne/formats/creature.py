@@ -1,6 +1,6 @@
-"""The bodies of a run as other programs want them: a skeleton, surfaces on its bones, and skin.
+"""The bodies of a run for other programs: a skeleton, surfaces on its bones, and skins.
 
-Lengths are in m, axes the world's, z up.
+Lengths are in m, in world axes with z up. The rest pose is the model's reference pose.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 WORLD = "world"
-"""Name of the bone that stays, where there is one."""
+"""Name of the bone of the world, if there is one."""
 
 SKIN_COLOUR = np.array([0.86, 0.60, 0.48, 1.0])
-"""Red, green, blue and opacity of flesh, for which models say none."""
+"""Red, green, blue and opacity of flesh, which has no colour in the model."""
 
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """A bone for each body that moves; its frame is the body's, placed at its joint.
+    """A bone for each moving body; its axes are the body's, its origin is at the joint.
 
     names     (n) of the bodies, parents before children
     parents   (n,) number of the parent, -1 for a root
     bodies    (n,) number of the body in the model
-    rest      (n, 3) m and (n, 3, 3), where the bones are in the model's own pose
+    rest      (n, 3) m and (n, 3, 3), position and rotation of the bones in the rest pose
     position  (frames, n, 3) m
-    rotation  (frames, n, 3, 3) bone's frame to the world's
+    rotation  (frames, n, 3, 3) from the axes of the bone to the world's
     """
 
     names: tuple[str, ...]
@@ -51,30 +51,29 @@ class Skeleton:
 
     def local(self) -> tuple[Array, Array]:
         """(frames, n, 3) m and (frames, n, 3, 3) of every bone in the frame of its parent."""
-        return in_parents(self.parents, self.position, self.rotation)
+        return _relative_to_parents(self.parents, self.position, self.rotation)
 
     def rest_local(self) -> tuple[Array, Array]:
-        """The same of the model's own pose."""
-        return in_parents(self.parents, *self.rest)
+        """The same in the rest pose, (n, 3) m and (n, 3, 3)."""
+        return _relative_to_parents(self.parents, *self.rest)
 
     @cached_property
     def carried(self) -> tuple[Array, Array]:
-        """(frames, n, 3, 3) R and (frames, n, 3) t of every bone's motion x -> R x + t from the
-        model's own pose."""
-        place, frame = self.rest
-        turn = np.einsum("fnij,nkj->fnik", self.rotation, frame)
-        return turn, self.position - np.einsum("fnij,nj->fni", turn, place)
+        """(frames, n, 3, 3) R and (frames, n, 3) t, m: motion x -> R x + t from the rest pose."""
+        position, rotation = self.rest
+        R = np.einsum("fnij,nkj->fnik", self.rotation, rotation)
+        return R, self.position - np.einsum("fnij,nj->fni", R, position)
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A geometry of a bone, in the model's own pose.
+    """A geometry of a bone in the rest pose.
 
     name      of the geometry
-    bone      number, -1 of what stays in the world
-    vertices  (k, 3) m, and faces (m, 3) of them, outward
+    bone      number, -1 if it is fixed to the world
+    vertices  (k, 3) m
+    faces     (m, 3) vertices of each triangle, outward
     rgba      (4,) colour
-    covered   whether flesh is all around it
     """
 
     name: str
@@ -82,18 +81,17 @@ class Surface:
     vertices: Array
     faces: Integers
     rgba: Array
-    covered: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The outside of one flesh.
+    """The surface of one flesh.
 
     name      of the flesh
-    chosen    (k,) numbers of its vertices in the `flesh_vertices` of a state
-    faces     (m, 3) of its own vertices, outward
-    rest      (k, 3) vertices in the model's own pose, m
-    weights   (k, n) share of each bone in carrying a vertex, together 1
+    chosen    (k,) its vertices in the `flesh_vertices` of a state
+    faces     (m, 3) vertices of each triangle, outward
+    rest      (k, 3) vertices in the rest pose, m
+    weights   (k, n) weight of each bone for each vertex; rows sum to 1
     """
 
     name: str
@@ -105,12 +103,12 @@ class Skin:
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """A surface that several bones carry: a <skin> of the model.
+    """A <skin> of the model: a surface bound to several bones.
 
     name      of the skin
-    vertices  (k, 3) m in the model's own pose
-    faces     (m, 3) of them, outward
-    weights   (k, n) share of each bone in carrying a vertex, together 1
+    vertices  (k, 3) m in the rest pose
+    faces     (m, 3) vertices of each triangle, outward
+    weights   (k, n) weight of each bone for each vertex; rows sum to 1
     rgba      (4,) colour
     """
 
@@ -122,75 +120,73 @@ class Bound:
 
 
 class Creature:
-    """What of a run is bodies: `skeleton`, `surfaces`, `bound` and `skins`.
+    """The bodies of a run: `skeleton`, `surfaces`, `bound` and `skins`.
 
-    raises  SceneError when the run has no bodies, or its model cannot be read
+    raises  SceneError if the run has no bodies, or its model cannot be read
     """
 
     def __init__(self, run: OpenRun) -> None:
         if not has_bodies(run):
             raise SceneError(f"{run.folder} has no bodies. Add [solids] or [human] to its scene.")
         self.run, self.model = run, load_model(read_scene(run.folder / "scene.toml"))
-        self._numbers = _bones(self.model)
+        self._bodies = _bones(self.model)
+        self._bone_of = {int(body): bone for bone, body in enumerate(self._bodies)}
+        self._rest = kinematics(self.model, self.model.rest().q)
 
     @cached_property
     def skeleton(self) -> Skeleton:
-        model, bodies = self.model, self._numbers
+        model, bodies, bone_of = self.model, self._bodies, self._bone_of
         pivot = np.array([_pivot(model, int(body)) for body in bodies])
-        number = {int(body): n for n, body in enumerate(bodies)}
-        parents = [number.get(int(model.mj.body_parentid[b]), -1) if b else -1 for b in bodies]
-        pose = kinematics(model, model.rest().q)
+        parents = [bone_of.get(int(model.mj.body_parentid[b]), -1) if b else -1 for b in bodies]
+        rest_rotation = self._rest.body_rotation[bodies]
+        rest_position = self._rest.body_position[bodies]
         rotation = self.run.every("body_rotation")[:, bodies]
         position = self.run.every("body_position")[:, bodies]
-        frame = pose.body_rotation[bodies]
         return Skeleton(
             tuple(model.body_names[body] if body else WORLD for body in bodies),
             np.array(parents, np.int64),
             bodies,
-            (pose.body_position[bodies] + np.einsum("nij,nj->ni", frame, pivot), frame),
+            (rest_position + np.einsum("nij,nj->ni", rest_rotation, pivot), rest_rotation),
             position + np.einsum("fnij,nj->fni", rotation, pivot),
             rotation,
         )
 
     @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
-        model = self.model
-        pose = kinematics(model, model.rest().q)
-        number = {int(body): n for n, body in enumerate(self._numbers)}
-        number.setdefault(0, -1)
+        """All geometries of the model."""
+        model, rest, bone_of = self.model, self._rest, {0: -1} | self._bone_of
         found = []
         for geom, shape in enumerate(model.geom_shape):
             vertices, faces = shape.triangles()
             found.append(
                 Surface(
                     model.geom_names[geom],
-                    number[int(model.geom_body[geom])],
-                    pose.geom_position[geom] + vertices @ pose.geom_rotation[geom].T,
+                    bone_of[int(model.geom_body[geom])],
+                    rest.geom_position[geom] + vertices @ rest.geom_rotation[geom].T,
                     np.asarray(faces, np.int64),
                     model.geom_rgba[geom],
-                    bool(model.geom_covered[geom]),
                 )
             )
         return tuple(found)
 
     @cached_property
     def bound(self) -> tuple[Bound, ...]:
-        """The model's skins, which follow the bodies and have no part in the flow."""
+        """The model's skins, which follow the bodies and do not affect the flow."""
         return tuple(
-            Bound(skin.name, skin.vertices, skin.faces, skin.weights[:, self._numbers], skin.rgba)
+            Bound(skin.name, skin.vertices, skin.faces, skin.weights[:, self._bodies], skin.rgba)
             for skin in skins_of(self.model.mj)
         )
 
     @cached_property
     def seen(self) -> tuple[Surface, ...]:
-        """The surfaces of bones that carry no skin of the model, which stands for theirs, and are
-        not rigid with one that does."""
-        clad = clad_bodies(self.model.mj)[self._numbers]
+        """The surfaces except those that a skin of the model replaces: surfaces of the bones that
+        carry it, and of bones rigidly connected to these."""
+        clad = clad_bodies(self.model.mj)[self._bodies]
         return tuple(s for s in self.surfaces if s.bone < 0 or not clad[s.bone])
 
     @cached_property
     def skins(self) -> tuple[Skin, ...]:
-        """Of every flesh that has an outside; empty without flesh."""
+        """One of every flesh that has a surface; empty without flesh."""
         flesh = self.model.flesh
         if flesh is None:
             return ()
@@ -205,29 +201,29 @@ class Creature:
                         np.searchsorted(kept, vertices),
                         np.searchsorted(vertices, triangles),
                         flesh.rest[vertices],
-                        flesh.carried[vertices][:, self._numbers],
+                        flesh.carried[vertices][:, self._bodies],
                     )
                 )
         return tuple(found)
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """(3,) lower and upper corner of all that moves or is carried, over the whole run, m."""
+        """(3,) lower and upper corner of all moving surfaces and flesh over the whole run, m."""
         points = [self.run.every("flesh_vertices").reshape(-1, 3)] if self.skins else []
-        turn, shift = self.skeleton.carried
+        R, t = self.skeleton.carried
         for surface in self.surfaces:
             if surface.bone < 0:
                 continue
             low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
             corners = np.where(np.indices((2, 2, 2)).reshape(3, -1).T, low, high)
-            moved = np.einsum("fij,kj->fki", turn[:, surface.bone], corners)
-            points.append((moved + shift[:, None, surface.bone]).reshape(-1, 3))
+            moved = np.einsum("fij,kj->fki", R[:, surface.bone], corners)
+            points.append((moved + t[:, None, surface.bone]).reshape(-1, 3))
         every = np.concatenate(points or [self.skeleton.position.reshape(-1, 3)])
         return every.min(axis=0), every.max(axis=0)
 
     @property
     def size(self) -> float:
-        """Largest extent of bodies and flesh in the model's own pose, m."""
+        """Largest extent of bodies and flesh in the rest pose, m."""
         points = [surface.vertices for surface in self.surfaces if surface.bone >= 0]
         points += [skin.rest for skin in self.skins]
         every = np.concatenate(points or [self.skeleton.rest[0]])
@@ -239,27 +235,29 @@ def has_bodies(run: OpenRun) -> bool:
     return not {"solids", "human"}.isdisjoint(run.scene)
 
 
-def in_parents(parents: Integers, position: Array, rotation: Array) -> tuple[Array, Array]:
-    """Places (..., n, 3) and rotations (..., n, 3, 3) in the frames of the parents; roots stay."""
-    place, turn = position.copy(), rotation.copy()
+def _relative_to_parents(
+    parents: Integers, position: Array, rotation: Array
+) -> tuple[Array, Array]:
+    """Positions (..., n, 3) and rotations (..., n, 3, 3) in the parents' frames; roots stay."""
+    local_position, local_rotation = position.copy(), rotation.copy()
     for bone, parent in enumerate(parents):
         if parent >= 0:
-            above = np.swapaxes(rotation[..., parent, :, :], -1, -2)
-            turn[..., bone, :, :] = above @ rotation[..., bone, :, :]
-            apart = position[..., bone, :] - position[..., parent, :]
-            place[..., bone, :] = (above @ apart[..., None])[..., 0]
-    return place, turn
+            to_parent = np.swapaxes(rotation[..., parent, :, :], -1, -2)
+            local_rotation[..., bone, :, :] = to_parent @ rotation[..., bone, :, :]
+            offset = position[..., bone, :] - position[..., parent, :]
+            local_position[..., bone, :] = (to_parent @ offset[..., None])[..., 0]
+    return local_position, local_rotation
 
 
 def _bones(model: SolidModel) -> Integers:
-    """Bodies that become bones; the world's where it holds several trees together, or flesh."""
+    """Bodies that become bones. The world is one if it joins several trees or carries flesh."""
     roots = int((model.mj.body_parentid[1 : model.nbody] == 0).sum())
-    held = model.flesh is not None and bool(model.flesh.carried[:, 0].any())
-    return np.arange(0 if roots != 1 or held else 1, model.nbody)
+    carries_flesh = model.flesh is not None and bool(model.flesh.carried[:, 0].any())
+    return np.arange(0 if roots != 1 or carries_flesh else 1, model.nbody)
 
 
 def _pivot(model: SolidModel, body: int) -> Array:
-    """(3,) the point in a body's frame about which its first joint that turns does so, m."""
+    """(3,) position of a body's first rotational joint in the body's frame, m; 0 without one."""
     mj = model.mj
     first = int(mj.body_jntadr[body])
     for joint in range(first, first + int(mj.body_jntnum[body])):

@@ -12,16 +12,16 @@ from flowborne.formats.morphs import morphed
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
 
-NEAR = 1e-6
-"""Distance from the run at which flesh has enough morph targets, in sizes of the creature."""
+TOLERANCE = 1e-6
+"""Error of flesh below which no morph target is added, in sizes of the creature."""
 
 
 @provided(".glb")
 @dataclass(frozen=True)
 class ExporterGlb:
-    """Skinned meshes on a skeleton that moves; flesh has morph targets for what skinning lacks.
+    """Skinned meshes on an animated skeleton; morph targets correct the skinning error of flesh.
 
-    targets  largest number of morph targets for a flesh
+    targets  maximum number of morph targets per flesh
     """
 
     targets: int = 64
@@ -35,16 +35,16 @@ class ExporterGlb:
         from flowborne.formats.glb_file import INFLUENCES, write_glb
 
         creature = Creature(run)
-        near = NEAR * creature.size
+        tolerance = TOLERANCE * creature.size
         skins = {
-            skin.name: morphed(creature, skin, INFLUENCES, self.targets, near)
+            skin.name: morphed(creature, skin, INFLUENCES, self.targets, tolerance)
             for skin in creature.skins
         }
         with replaced_whole(path) as new:
             write_glb(creature, skins, new)
-        told = (
+        notes = (
             f"flesh '{name}': {len(skin.targets)} morph targets, at most {skin.error:.2g} m from "
             f"the run; {skin.unmorphed:.2g} m by skinning alone"
             for name, skin in skins.items()
         )
-        return Written((path,), "; ".join(told))
+        return Written((path,), "; ".join(notes))

@@ -1,4 +1,4 @@
-"""The nodes of a glTF file: lengths in m, y up by a turn of the root node."""
+"""The nodes of a glTF file: lengths in m; the root node rotates z up to y up."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from flowborne.quaternions import continuous
 from flowborne.version import __version__
 
 Y_UP = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
-"""Quaternion (x, y, z, w) from z up to y up."""
+"""Rotation from z up to y up, as a quaternion (x, y, z, w)."""
 
 INFLUENCES = 4
-"""Bones that carry a vertex: as many as every reader of glTF takes."""
+"""Maximum number of bones per vertex, which every reader of glTF supports."""
 
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-"""Numbers in an element -> glTF's word."""
+"""Components of an element -> glTF's name of the type."""
 
 COMPONENTS = {"float32": gl.FLOAT, "uint32": gl.UNSIGNED_INT, "uint16": gl.UNSIGNED_SHORT}
 
@@ -43,7 +43,7 @@ def write_glb(creature: Creature, skins: Mapping[str, MorphedSkin], path: Path) 
 
 
 class _File:
-    """A glTF file as it grows: its JSON part, its binary part, and one animation."""
+    """A glTF file under construction: its JSON part, its binary part, and one animation."""
 
     def __init__(self, name: str, frames_per_second: float) -> None:
         about = {"scene": name, "frames_per_second": frames_per_second}
@@ -55,32 +55,32 @@ class _File:
         self._times, self._rate = -1, frames_per_second
 
     def add_skeleton(self, creature: Creature) -> int:
-        """Nodes of the bones with their motion, and the skin that all meshes share."""
+        """Add the bones with their motion, and the skin of all meshes; returns its number."""
         skeleton = creature.skeleton
         frames = np.array(creature.run.frames, np.float32)
         self._times = self._numbers(frames / np.float32(self._rate), bounds=True)
         first = len(self._gltf.nodes)
-        place, turn = skeleton.rest_local()
-        at_rest = Rotation.from_matrix(turn).as_quat()
+        rest_position, rest_rotation = skeleton.rest_local()
+        rest_quaternion = Rotation.from_matrix(rest_rotation).as_quat()
         for bone, name in enumerate(skeleton.names):
             self._gltf.nodes.append(
                 gl.Node(
                     name=name,
-                    translation=place[bone].tolist(),
-                    rotation=at_rest[bone].tolist(),
+                    translation=rest_position[bone].tolist(),
+                    rotation=rest_quaternion[bone].tolist(),
                     children=[],
                 )
             )
             parent = int(skeleton.parents[bone])
-            above = self._gltf.nodes[0 if parent < 0 else first + parent]
-            above.children.append(first + bone)
-        place, turn = skeleton.local()
-        quaternions = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_quat()
-        quaternions = continuous(quaternions.reshape(*turn.shape[:2], 4))
+            parent_node = self._gltf.nodes[0 if parent < 0 else first + parent]
+            parent_node.children.append(first + bone)
+        position, rotation = skeleton.local()
+        quaternions = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat()
+        quaternions = continuous(quaternions.reshape(*rotation.shape[:2], 4))
         for bone in range(len(skeleton.names)):
-            self._animate(first + bone, "translation", place[:, bone])
+            self._animate(first + bone, "translation", position[:, bone])
             self._animate(first + bone, "rotation", quaternions[:, bone])
-        inverse = np.zeros((len(skeleton.names), 4, 4))  # columns one after the other
+        inverse = np.zeros((len(skeleton.names), 4, 4))  # column-major
         position, rotation = skeleton.rest
         inverse[:, :3, :3] = rotation
         inverse[:, 3, :3] = -np.einsum("nji,nj->ni", rotation, position)
@@ -93,26 +93,24 @@ class _File:
         return len(self._gltf.skins) - 1
 
     def add_surface(self, surface: Surface, skinned: int) -> None:
-        """A geometry on its bone, or one that stays."""
+        """Add a geometry on its bone, or a fixed one."""
         attributes = gl.Attributes(POSITION=self._points(surface.vertices))
-        if surface.bone < 0:
-            self._mesh(surface.name, attributes, surface.faces, surface.rgba, None)
-            return
-        count = len(surface.vertices)
-        bones, shares = np.full((count, 1), surface.bone), np.ones((count, 1))
-        self._carry(attributes, bones, shares)
-        self._mesh(surface.name, attributes, surface.faces, surface.rgba, skinned)
+        if surface.bone >= 0:
+            count = len(surface.vertices)
+            self._bind(attributes, np.full((count, 1), surface.bone), np.ones((count, 1)))
+        skin = None if surface.bone < 0 else skinned
+        self._mesh(surface.name, attributes, surface.faces, surface.rgba, skin)
 
     def add_bound(self, bound: Bound, skinned: int) -> None:
-        """A surface on several bones."""
+        """Add a surface on several bones."""
         attributes = gl.Attributes(POSITION=self._points(bound.vertices))
-        self._carry(attributes, *strongest(bound, INFLUENCES))
+        self._bind(attributes, *strongest(bound, INFLUENCES))
         self._mesh(bound.name, attributes, bound.faces, bound.rgba, skinned)
 
     def add_flesh(self, skin: Skin, morphed: MorphedSkin) -> None:
-        """A flesh on its bones, with its morph targets and what is left of error."""
+        """Add a flesh on its bones, with its morph targets and the remaining error."""
         attributes = gl.Attributes(POSITION=self._points(skin.rest))
-        self._carry(attributes, morphed.bones, morphed.shares)
+        self._bind(attributes, morphed.bones, morphed.shares)
         node, mesh = self._mesh(skin.name, attributes, skin.faces, SKIN_COLOUR, 0)
         mesh.extras = {"error_m": morphed.error, "error_by_skinning_alone_m": morphed.unmorphed}
         if len(morphed.targets):
@@ -133,7 +131,7 @@ class _File:
     def _mesh(
         self, name: str, attributes: gl.Attributes, faces: Integers, rgba: Array, skin: int | None
     ) -> tuple[int, gl.Mesh]:
-        """A node with a mesh of triangles; number of the node, and the mesh."""
+        """Add a node with a mesh of triangles; returns its number and the mesh."""
         gltf = self._gltf
         colour = gl.PbrMetallicRoughness(
             baseColorFactor=[*to_linear(rgba[:3]).tolist(), float(rgba[3])],
@@ -152,15 +150,15 @@ class _File:
         gltf.meshes.append(mesh)
         gltf.nodes.append(gl.Node(name=name, mesh=len(gltf.meshes) - 1, skin=skin))
         node = len(gltf.nodes) - 1
-        # a skinned mesh takes no transform but its bones', so it stands beside the root
+        # skinned meshes ignore transforms of their parents, so they are not under the root
         if skin is None:
             gltf.nodes[0].children.append(node)
         else:
             gltf.scenes[0].nodes.append(node)
         return node, mesh
 
-    def _carry(self, attributes: gl.Attributes, bones: Integers, shares: Array) -> None:
-        """Bones (k, m <= 4) and shares (k, m) of the vertices."""
+    def _bind(self, attributes: gl.Attributes, bones: Integers, shares: Array) -> None:
+        """Bind the vertices to bones (k, m <= 4) with weights `shares` (k, m)."""
         joints, weights = np.zeros((len(bones), 4)), np.zeros((len(bones), 4))
         joints[:, : bones.shape[1]], weights[:, : bones.shape[1]] = bones, shares
         joints[weights == 0.0] = 0.0
@@ -168,26 +166,26 @@ class _File:
         attributes.WEIGHTS_0 = self._numbers(weights.astype(np.float32), target=gl.ARRAY_BUFFER)
 
     def _animate(self, node: int, path: str, values: Array) -> None:
-        """Values of a property of a node in every frame; rotations are (x, y, z, w)."""
-        made = gl.AnimationSampler(
+        """Animate a property of a node by its values in every frame; rotations are (x, y, z, w)."""
+        sampler = gl.AnimationSampler(
             input=self._times,
             output=self._numbers(values.astype(np.float32)),
             interpolation="LINEAR",
         )
-        self._animation.samplers.append(made)
+        self._animation.samplers.append(sampler)
         target = gl.AnimationChannelTarget(node=node, path=path)
         self._animation.channels.append(
             gl.AnimationChannel(sampler=len(self._animation.samplers) - 1, target=target)
         )
 
     def _points(self, points: Array) -> int:
-        """Accessor of places (k, 3) with their bounds."""
+        """Accessor of positions (k, 3) with their bounds."""
         return self._numbers(points.astype(np.float32), target=gl.ARRAY_BUFFER, bounds=True)
 
     def _numbers(
         self, values: NDArray[Any], *, target: int | None = None, bounds: bool = False
     ) -> int:
-        """Accessor of an array (k,) or (k, m), one element a row."""
+        """Accessor of an array (k,) or (k, m), one element per row."""
         rows = np.ascontiguousarray(values.reshape(len(values), -1))
         self._bytes += bytes(-len(self._bytes) % 4)
         view = gl.BufferView(

@@ -17,11 +17,11 @@ from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
 
 COUNTS = ("frame", "solver_iterations", "contacts", "flesh_inside_out")
-"""Columns of whole numbers."""
+"""Columns of integers."""
 
 
 def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:
-    """The history, counts as whole numbers."""
+    """The history, with counts as integers."""
     return {
         name: values.astype(np.int64) if name in COUNTS and np.isfinite(values).all() else values
         for name, values in run.history.items()
@@ -31,7 +31,7 @@ def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:
 @provided(".csv")
 @dataclass(frozen=True)
 class ExporterCsv:
-    """A row per frame under the names of history.csv, which end in their unit; numbers exact."""
+    """A row per frame, with the columns of history.csv; names end in units, numbers are exact."""
 
     def write(self, run: OpenRun, path: Path) -> None:
         columns = _columns(run)
@@ -47,27 +47,23 @@ class ExporterCsv:
 class ExporterParquet:
     """The same columns, each with its unit in the metadata of its field.
 
-    Metadata of the whole: scene, frames_per_second, and slab, 1 where forces, torques, impulses,
-    work and volumes are per metre of depth.
+    Metadata of the table: scene, frames_per_second, and slab, which is 1 if forces, torques,
+    impulses, work and volumes are per metre of depth.
     """
 
     def write(self, run: OpenRun, path: Path) -> None:
         arrow = optional("pyarrow", "pyarrow", "parquet", "'.parquet' files")
         parquet = optional("pyarrow.parquet", "pyarrow", "parquet", "'.parquet' files")
         columns = _columns(run)
-        whole = {
+        metadata = {
             "scene": run.name,
             "frames_per_second": repr(run.frames_per_second),
             "slab": str(int(run.is_slab)),
         }
-        schema = arrow.schema(
-            [
-                arrow.field(
-                    name, arrow.from_numpy_dtype(values.dtype), True, {"unit": unit_of(name)}
-                )
-                for name, values in columns.items()
-            ],
-            whole,
-        )
+        fields = [
+            arrow.field(name, arrow.from_numpy_dtype(values.dtype), True, {"unit": unit_of(name)})
+            for name, values in columns.items()
+        ]
+        schema = arrow.schema(fields, metadata)
         with replaced_whole(path) as new:
             parquet.write_table(arrow.table(columns, schema=schema), new)

@@ -20,7 +20,7 @@ from flowborne.runs.open_run import OpenRun
 class ExporterUsd:
     """Skeleton, surfaces, flesh, forces, paths, camera and dye; see `usd_stage`.
 
-    Dye lies beside: swim.usd refers to swim_dye/swim_0000.vdb and so on.
+    Dye is in separate files: swim.usd refers to swim_dye/swim_0000.vdb and so on.
     """
 
     def write(self, run: OpenRun, path: Path) -> Written:

@@ -1,14 +1,14 @@
-"""The stage of a run: frames are time codes, lengths metres, z is up.
+"""The USD stage of a run: time codes are frames, lengths are in m, z is up.
 
-/Run                    the model; its custom data name the scene
-  Creature              UsdSkel root: Skeleton, its Animation, and the bodies' geometries,
+/Run                    the model; its custom data contain the scene's name
+  Creature              UsdSkel root: Skeleton, its Animation, and the geometries of the bodies,
                         each bound to the bone of its body
-    Bound               flesh in the model's own pose, bound to bones by its weights, as a guide
-  Flesh                 the skin as the run has it, a time sample per frame
-  World                 geometries that stay
-  Forces                an arrow per body, for the force that fluid and winds exert on it
-  Paths                 where each bone has been
-  Camera                looks at all that moves
+    Bound               flesh in the rest pose, bound to bones by its weights, as a guide
+  Flesh                 the skin as recorded in the run, a time sample per frame
+  World                 fixed geometries
+  Forces                an arrow per body, for the force of fluid and winds on it
+  Paths                 trajectory of each bone
+  Camera                shows all moving bodies
 """
 
 from __future__ import annotations
@@ -34,31 +34,31 @@ Array = NDArray[np.float64]
 ROOT = Sdf.Path("/Run")
 
 INFLUENCES = 8
-"""Largest number of bones that a vertex of the guide of flesh is bound to."""
+"""Maximum number of bones per vertex of the guide of flesh."""
 
-LONGEST = 0.5
-"""Length of the greatest force's arrow, in sizes of the creature."""
+LARGEST_ARROW = 0.5
+"""Length of the arrow of the largest force, in sizes of the creature."""
 
-THIN = 0.005
+CURVE_WIDTH = 0.005
 """Width of a curve, in sizes of the creature."""
 
-ROUGH = 0.8
+ROUGHNESS = 0.8
 """Roughness of every surface, from 0 to 1."""
 
-LENS, FILM, ASPECT = 50.0, 36.0, 16.0 / 9.0
-"""Focal length and width of the picture, both in mm, and its width over its height."""
+FOCAL_LENGTH, FILM_WIDTH, ASPECT = 50.0, 36.0, 16.0 / 9.0
+"""Focal length and width of the film, both in mm, and its width over its height."""
 
 MM = 0.01
-"""What USD has lenses and films in where lengths are metres: tenths of the unit."""
+"""A millimetre in USD's unit of focal lengths and apertures, a tenth of the stage's unit (m)."""
 
-TOWARD = np.array([-0.45, 0.85, -0.3])
-"""Direction in which the camera looks in a room."""
+VIEW_DIRECTION = np.array([-0.45, 0.85, -0.3])
+"""Direction in which the camera looks in 3D."""
 
 
 def write_stage(creature: Creature, path: Path, volumes: Sequence[str]) -> None:
     """Write the run of a creature to `path`.
 
-    volumes  names of the files with the dyes of each state, from the stage's folder; empty without
+    volumes  paths of the files with the dyes of each state, relative to the stage; may be empty
     """
     run = creature.run
     stage = Usd.Stage.CreateNew(str(path))
@@ -83,11 +83,11 @@ def write_stage(creature: Creature, path: Path, volumes: Sequence[str]) -> None:
 
 
 def _creature(stage: Usd.Stage, creature: Creature) -> None:
-    """The skeleton with its motion, and all that is bound to it."""
+    """Write the skeleton with its motion, the meshes bound to it, and the fixed geometries."""
     skeleton, frames = creature.skeleton, creature.run.frames
-    above = ROOT.AppendChild("Creature")
-    root = UsdSkel.Root.Define(stage, above)
-    skel = UsdSkel.Skeleton.Define(stage, above.AppendChild("Skeleton"))
+    parent = ROOT.AppendChild("Creature")
+    root = UsdSkel.Root.Define(stage, parent)
+    skel = UsdSkel.Skeleton.Define(stage, parent.AppendChild("Skeleton"))
     joints = joint_paths(skeleton)
     skel.CreateJointsAttr(joints)
     skel.CreateJointNamesAttr(list(skeleton.names))
@@ -95,15 +95,14 @@ def _creature(stage: Usd.Stage, creature: Creature) -> None:
     skel.CreateRestTransformsAttr(_matrices(*skeleton.rest_local()))
     animation = UsdSkel.Animation.Define(stage, skel.GetPath().AppendChild("Animation"))
     animation.CreateJointsAttr(joints)
-    place, turn = skeleton.local()
-    quaternions = continuous(
-        Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_quat().reshape(*turn.shape[:2], 4)
-    )
+    position, rotation = skeleton.local()
+    quaternions = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat()
+    quaternions = continuous(quaternions.reshape(*rotation.shape[:2], 4))
     animation.CreateScalesAttr(Vt.Vec3hArray([Gf.Vec3h(1.0)] * len(joints)))
-    moved, turned = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()
-    for frame, translation, rotation in zip(frames, place, quaternions, strict=True):
-        moved.Set(_vectors(translation), frame)
-        turned.Set(Vt.QuatfArray.FromNumpy(rotation.astype(np.float32)), frame)
+    translations, rotations = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()
+    for frame, x, q in zip(frames, position, quaternions, strict=True):
+        translations.Set(_vectors(x), frame)
+        rotations.Set(Vt.QuatfArray.FromNumpy(q.astype(np.float32)), frame)
     binding = UsdSkel.BindingAPI.Apply(skel.GetPrim())
     binding.CreateAnimationSourceRel().AddTarget(animation.GetPath())
     UsdSkel.BindingAPI.Apply(root.GetPrim()).CreateSkeletonRel().AddTarget(skel.GetPath())
@@ -112,16 +111,16 @@ def _creature(stage: Usd.Stage, creature: Creature) -> None:
     names = Names()
     for surface in creature.seen:
         if surface.bone >= 0:
-            mesh = _surface(stage, above.AppendChild(names.of(surface.name)), surface)
+            mesh = _surface(stage, parent.AppendChild(names.of(surface.name)), surface)
             _bind(mesh, np.array([[surface.bone]]), np.ones((1, 1)), rigid=True)
     for bound in creature.bound:
-        path = above.AppendChild(names.of(bound.name))
+        path = parent.AppendChild(names.of(bound.name))
         mesh = _mesh(stage, path, bound.name, bound.faces, bound.rgba)
         _set_points(mesh, bound.vertices)
         _bind(mesh, *strongest(bound, INFLUENCES), rigid=False)
     for skin in creature.skins:
-        UsdGeom.Scope.Define(stage, above.AppendChild("Bound"))
-        path = above.AppendChild("Bound").AppendChild(names.of(skin.name))
+        UsdGeom.Scope.Define(stage, parent.AppendChild("Bound"))
+        path = parent.AppendChild("Bound").AppendChild(names.of(skin.name))
         mesh = _mesh(stage, path, skin.name, skin.faces, SKIN_COLOUR)
         mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
         _set_points(mesh, skin.rest)
@@ -133,29 +132,28 @@ def _creature(stage: Usd.Stage, creature: Creature) -> None:
 
 
 def _flesh(stage: Usd.Stage, creature: Creature) -> None:
-    """The skin of each flesh as the run has it."""
+    """Write the skin of each flesh as recorded in the run."""
     if not creature.skins:
         return
-    above, names = _scope(stage, "Flesh"), Names()
-    vertices = creature.run.arrays["flesh_vertices"]
+    scope, names = _scope(stage, "Flesh"), Names()
     meshes = [
-        _mesh(stage, above.AppendChild(names.of(skin.name)), skin.name, skin.faces, SKIN_COLOUR)
+        _mesh(stage, scope.AppendChild(names.of(skin.name)), skin.name, skin.faces, SKIN_COLOUR)
         for skin in creature.skins
     ]
     for number, frame in enumerate(creature.run.frames):
-        places = vertices[number]
+        vertices = creature.run.arrays["flesh_vertices"][number]
         for skin, mesh in zip(creature.skins, meshes, strict=True):
-            _set_points(mesh, places[skin.chosen], frame)
+            _set_points(mesh, vertices[skin.chosen], frame)
 
 
 def _forces(stage: Usd.Stage, creature: Creature) -> None:
-    """Arrows from the centroid of each body, all to one scale, and the forces in numbers."""
+    """Write arrows from the centroid of each body, all to one scale, and the forces in N."""
     run = creature.run
     force = run.every("fluid_force")[:, 1:]
-    greatest = float(np.linalg.norm(force, axis=2).max(initial=0.0))
-    if greatest == 0.0:
+    largest = float(np.linalg.norm(force, axis=2).max(initial=0.0))
+    if largest == 0.0:
         return
-    scale = LONGEST * creature.size / greatest
+    scale = LARGEST_ARROW * creature.size / largest
     start = run.every("fluid_centre")[:, 1:]
     ends = np.stack([start, start + scale * force], axis=2)
     curves = _curves(stage, ROOT.AppendChild("Forces"), creature, [2] * force.shape[1])
@@ -163,28 +161,28 @@ def _forces(stage: Usd.Stage, creature: Creature) -> None:
     vectors = UsdGeom.PrimvarsAPI(curves).CreatePrimvar(
         "force", Sdf.ValueTypeNames.Vector3fArray, UsdGeom.Tokens.uniform
     )
-    for frame, points, exerted in zip(run.frames, ends, force, strict=True):
+    for frame, points, forces in zip(run.frames, ends, force, strict=True):
         _set_points(curves, points.reshape(-1, 3), frame)
-        vectors.Set(_vectors(exerted), frame)
+        vectors.Set(_vectors(forces), frame)
 
 
 def _paths(stage: Usd.Stage, creature: Creature) -> None:
-    """A curve through the places of each bone in the whole run."""
-    places = np.swapaxes(creature.skeleton.position, 0, 1)
-    if places.shape[1] > 1:
-        counts = [places.shape[1]] * places.shape[0]
+    """Write the trajectory of each bone as a curve."""
+    positions = np.swapaxes(creature.skeleton.position, 0, 1)
+    if positions.shape[1] > 1:
+        counts = [positions.shape[1]] * positions.shape[0]
         curves = _curves(stage, ROOT.AppendChild("Paths"), creature, counts)
         curves.GetPrim().SetCustomData({"bones": list(creature.skeleton.names)})
-        _set_points(curves, places.reshape(-1, 3))
+        _set_points(curves, positions.reshape(-1, 3))
 
 
 def _dye(stage: Usd.Stage, run: OpenRun, volumes: Sequence[str]) -> None:
-    """A volume for each dye, whose field is in the file of the frame."""
+    """Write a volume for each dye, which refers to a file per frame."""
     if run.grid is None or not volumes:
         return
-    above, names = _scope(stage, "Dye"), Names()
+    scope, names = _scope(stage, "Dye"), Names()
     for dye in run.dyes:
-        volume = UsdVol.Volume.Define(stage, above.AppendChild(names.of(dye)))
+        volume = UsdVol.Volume.Define(stage, scope.AppendChild(names.of(dye)))
         volume.GetPrim().SetDisplayName(dye)
         volume.CreateExtentAttr(_vectors(np.array([run.grid.origin, run.grid.upper])))
         field = UsdVol.OpenVDBAsset.Define(stage, volume.GetPath().AppendChild("field"))
@@ -197,37 +195,37 @@ def _dye(stage: Usd.Stage, run: OpenRun, volumes: Sequence[str]) -> None:
 
 
 def _camera(stage: Usd.Stage, creature: Creature) -> None:
-    """From above on a slab, else from the side and a little above."""
+    """Write a camera above a slab, else at the side and a little above the bodies."""
     low, high = creature.bounds
     middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     camera = UsdGeom.Camera.Define(stage, ROOT.AppendChild("Camera"))
     height = 2.2 * radius
-    toward, up = TOWARD / np.linalg.norm(TOWARD), np.array([0.0, 0.0, 1.0])
-    distance = 1.1 * radius / np.sin(np.arctan(0.5 * FILM / ASPECT / LENS))
+    forward, up = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION), np.array([0.0, 0.0, 1.0])
+    distance = 1.1 * radius / np.sin(np.arctan(0.5 * FILM_WIDTH / ASPECT / FOCAL_LENGTH))
     if creature.run.is_slab:
-        toward, up = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
+        forward, up = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
         camera.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
         camera.CreateHorizontalApertureAttr(10.0 * ASPECT * height)
         camera.CreateVerticalApertureAttr(10.0 * height)
     else:
-        camera.CreateHorizontalApertureAttr(FILM * MM)
-        camera.CreateVerticalApertureAttr(FILM / ASPECT * MM)
-    camera.CreateFocalLengthAttr(LENS * MM)
+        camera.CreateHorizontalApertureAttr(FILM_WIDTH * MM)
+        camera.CreateVerticalApertureAttr(FILM_WIDTH / ASPECT * MM)
+    camera.CreateFocalLengthAttr(FOCAL_LENGTH * MM)
     camera.CreateClippingRangeAttr(Gf.Vec2f(0.01 * distance, 100.0 * distance))
-    right = np.cross(toward, up) / np.linalg.norm(np.cross(toward, up))
-    axes = np.stack([right, np.cross(right, toward), -toward], axis=1)
-    place = _matrices((middle - distance * toward)[None], axes[None])[0]
-    camera.MakeMatrixXform().Set(place)
+    right = np.cross(forward, up) / np.linalg.norm(np.cross(forward, up))
+    axes = np.stack([right, np.cross(right, forward), -forward], axis=1)
+    matrix = _matrices((middle - distance * forward)[None], axes[None])[0]
+    camera.MakeMatrixXform().Set(matrix)
 
 
 class Names:
-    """Names of siblings, valid in USD and each of them once."""
+    """Unique names of siblings, valid in USD."""
 
     def __init__(self) -> None:
         self._taken: set[str] = set()
 
     def of(self, name: str) -> str:
-        """The name, or one like it."""
+        """The name, or a valid and unused one like it."""
         valid = Tf.MakeValidIdentifier(name)
         number, found = 1, valid
         while found in self._taken:
@@ -237,7 +235,7 @@ class Names:
 
 
 def joint_paths(skeleton: Skeleton) -> list[str]:
-    """The bones as USD names joints: by the way from the root."""
+    """USD's names of the bones: their paths from the root."""
     names, paths = Names(), list[str]()
     for name, parent in zip(skeleton.names, skeleton.parents, strict=True):
         own = names.of(name)
@@ -260,7 +258,7 @@ def _surface(stage: Usd.Stage, path: Sdf.Path, surface: Surface) -> UsdGeom.Mesh
 def _mesh(
     stage: Usd.Stage, path: Sdf.Path, name: str, faces: NDArray[np.int64], rgba: Array
 ) -> UsdGeom.Mesh:
-    """A mesh of triangles that lacks its points."""
+    """A mesh of triangles without points yet."""
     mesh = UsdGeom.Mesh.Define(stage, path)
     mesh.GetPrim().SetDisplayName(name)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
@@ -273,7 +271,7 @@ def _mesh(
 
 
 def _material(stage: Usd.Stage, rgba: Array) -> UsdShade.Material:
-    """The plain surface of a colour, made when it is first asked for."""
+    """The material of a colour, created on first use."""
     red, green, blue = to_linear(rgba[:3]).tolist()
     name = "colour_" + "".join(f"{round(255.0 * float(part)):02x}" for part in rgba)
     path = _scope(stage, "Materials").AppendChild(name)
@@ -284,7 +282,7 @@ def _material(stage: Usd.Stage, rgba: Array) -> UsdShade.Material:
     shader.CreateIdAttr("UsdPreviewSurface")
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(red, green, blue))
     shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(float(rgba[3]))
-    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(ROUGH)
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(ROUGHNESS)
     surface = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
     material.CreateSurfaceOutput().ConnectToSource(surface)
     return material
@@ -293,17 +291,17 @@ def _material(stage: Usd.Stage, rgba: Array) -> UsdShade.Material:
 def _curves(
     stage: Usd.Stage, path: Sdf.Path, creature: Creature, counts: Iterable[int]
 ) -> UsdGeom.BasisCurves:
-    """Straight pieces, as many vertices a curve as `counts` says, that lack their points."""
+    """Polylines with `counts` vertices each, without points yet."""
     curves = UsdGeom.BasisCurves.Define(stage, path)
     curves.CreateTypeAttr(UsdGeom.Tokens.linear)
     curves.CreateCurveVertexCountsAttr(Vt.IntArray(list(counts)))
-    curves.CreateWidthsAttr([THIN * creature.size])
+    curves.CreateWidthsAttr([CURVE_WIDTH * creature.size])
     curves.SetWidthsInterpolation(UsdGeom.Tokens.constant)
     return curves
 
 
 def _set_points(prim: UsdGeom.PointBased, points: NDArray[Any], frame: int | None = None) -> None:
-    """Points and their extent, of a frame or for good."""
+    """Set points and their extent, of a frame or of all time."""
     time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
     prim.CreatePointsAttr().Set(_vectors(points), time)
     extent = UsdGeom.Boundable.ComputeExtentFromPlugins(prim, time)
@@ -311,7 +309,7 @@ def _set_points(prim: UsdGeom.PointBased, points: NDArray[Any], frame: int | Non
 
 
 def _bind(mesh: UsdGeom.Mesh, bones: NDArray[np.int64], weights: Array, *, rigid: bool) -> None:
-    """Bind a mesh in the model's own pose to bones (k, m) with weights (k, m)."""
+    """Bind a mesh in the rest pose to bones (k, m) with weights (k, m)."""
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
     count = bones.shape[1]
@@ -325,9 +323,9 @@ def _vectors(values: NDArray[Any]) -> Vt.Vec3fArray:
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values, np.float32))
 
 
-def _matrices(place: Array, turn: Array) -> Vt.Matrix4dArray:
-    """USD's transforms, which multiply rows, of places (n, 3) and rotations (n, 3, 3)."""
-    matrices = np.zeros((len(place), 4, 4))
-    matrices[:, :3, :3] = np.swapaxes(turn, 1, 2)
-    matrices[:, 3, :3], matrices[:, 3, 3] = place, 1.0
+def _matrices(position: Array, rotation: Array) -> Vt.Matrix4dArray:
+    """Transforms of positions (n, 3) and rotations (n, 3, 3); USD's multiply row vectors."""
+    matrices = np.zeros((len(position), 4, 4))
+    matrices[:, :3, :3] = np.swapaxes(rotation, 1, 2)
+    matrices[:, 3, :3], matrices[:, 3, 3] = position, 1.0
     return Vt.Matrix4dArray.FromNumpy(matrices)

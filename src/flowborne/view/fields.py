@@ -1,4 +1,4 @@
-"""What is seen of the fluid of a slab, as an image of its cells."""
+"""The fluid of a slab as an image of its cells, and the values behind it: filled and refined."""
 
 from __future__ import annotations
 
@@ -8,54 +8,58 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
+from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.values import (
-    filled,
-    full_strength,
-    in_fluid,
-    levels,
-    pressure,
-    refined,
-    robust,
-    speed,
-    turning,
-    vorticity,
-)
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 Scale = tuple[Array, float, float, str]
+"""Colours from lowest to highest (k, 3), lowest value, highest value, name."""
+Legend = Sequence[tuple[str, str]]
+"""(name, colour) of each thing shown in a colour of its own."""
 
 SAMPLES = 24
 """Frames from which the scale of a film is taken."""
 
-HIGHEST = 99.8
-"""Percentile of speed and pressure at which their colours end: they are high in small places."""
+MAX_PERCENTILE = 99.8
+"""Percentile of speed and pressure at which their colours end: peaks are small in area."""
+
+STRONG_DYE_PERCENTILE = 75.0
+"""Percentile of a dye's values above half the largest at which it has its full colour."""
+
+STRONGER_CIRCULATION = 0.4
+"""Fraction of the sum of |vorticity| that exceeds the scale of vorticity."""
+
+UNCUT = 0.999
+"""Open fraction above which a cell counts as not cut by a body."""
+
+REFINED_SIDE = 256
+"""Minimum number of points along the longer side of a refined field."""
+
+FILLED_LAYERS, FILLED_LAYERS_VORTICITY = 2, 4
+"""Layers of cells in a body that continue the fluid; vorticity is also missing in cut cells."""
 
 
 class Field(Protocol):
-    """What is shown of the fluid.
+    """What is shown of the fluid."""
 
-    legend  (name, colour) of each thing shown in a colour of its own
-    scale   (colours from lowest to highest (k, 3), lowest, highest, name), or None
-    """
-
-    legend: Sequence[tuple[str, str]]
+    legend: Legend
     scale: Scale | None
 
     def image(self, state: State) -> Pixels:
-        """(k ny, k nx, 4) colours and opacities of the cells, or of k by k parts of each, lowest
-        row first."""
+        """(k ny, k nx, 4) colours and opacities of the cells, or of k by k parts of each cell;
+        lowest row first."""
         ...
 
 
 def field_of(run: Run, shot: Shot) -> Field | None:
     """What `shot` shows of the fluid of `run`; None without fluid.
 
-    raises  ValueError when it shows dye and there is none
+    raises  ValueError if it shows dye and there is none
     """
     if run.grid is None:
         return None
@@ -69,17 +73,16 @@ def field_of(run: Run, shot: Shot) -> Field | None:
 
 
 def dyes_of(run: Run) -> list[str]:
-    """Arrays of a state that hold dye."""
+    """Names of the arrays of a state that hold dye."""
     return [name for name in run.state(0) if name.startswith("scalar_")]
 
 
 def dye_colours(
     run: Run, dyes: Sequence[str], samples: int
-) -> tuple[dict[str, tuple[float, str]], Sequence[tuple[str, str]]]:
-    """Of each array that holds dye the value at which it has its full colour, and that colour; and
-    the legend, (name, colour) of each.
+) -> tuple[dict[str, tuple[float, str]], Legend]:
+    """Array of dye -> (value at full colour, colour), and the legend.
 
-    samples  frames that are looked at
+    samples  number of frames from which the values are taken
     """
     sampled = run.sampled(samples)
     colours = [style.DYES[n % len(style.DYES)] for n in range(len(dyes))]
@@ -91,25 +94,25 @@ def dye_colours(
 class FieldStill:
     """Plain water."""
 
-    def __init__(self) -> None:
-        self.legend: Sequence[tuple[str, str]] = ()
-        self.scale: Scale | None = None
+    legend: Legend = ()
+    scale: Scale | None = None
 
     def image(self, state: State) -> Pixels:
         return np.zeros((1, 1, 4), np.uint8)
 
 
 class FieldDye:
-    """Carried dyes, each in a colour of its own, mixed where they meet."""
+    """Dyes, each in its own colour, mixed where they meet."""
+
+    scale: Scale | None = None
 
     def __init__(self, run: Run, dyes: Sequence[str]) -> None:
         self._dyes, self.legend = dye_colours(run, dyes, SAMPLES)
-        self.scale: Scale | None = None
 
     def image(self, state: State) -> Pixels:
-        known = in_fluid(state)[:, :, 0]
+        known = _in_fluid(state)[:, :, 0]
         strengths = [
-            np.clip(filled(state[dye][:, :, 0] / full, known).T, 0.0, 1.0)[..., None]
+            np.clip(_filled(state[dye][:, :, 0] / full, known).T, 0.0, 1.0)[..., None]
             for dye, (full, _) in self._dyes.items()
         ]
         weight: Array = np.zeros_like(strengths[0])
@@ -120,67 +123,39 @@ class FieldDye:
             weight += strength
             clear *= 1.0 - strength
         mixed = colour / np.maximum(weight, 1e-12)
-        return pixels(np.concatenate([mixed, 1.0 - clear], axis=-1))
+        return style.to_bytes(np.concatenate([mixed, 1.0 - clear], axis=-1))
 
 
 class FieldVorticity:
-    """Vorticity, warm where the fluid turns counter-clockwise, on one scale for all frames.
+    """Vorticity, warm if counter-clockwise, on one scale for all frames.
 
-    limit  1/s, where the colours are strongest
+    limit  1/s, at the strongest colours
     """
 
+    legend: Legend = ()
+
     def __init__(self, run: Run, background: str) -> None:
-        """`background`: what is seen where nothing turns, "#rrggbb"."""
+        """`background`: colour at zero vorticity, "#rrggbb"."""
         if run.grid is None:
             raise ValueError("a run without fluid has no vorticity")
         self.grid = run.grid
-        self.limit = turning([vorticity(state, run.grid) for state in run.sampled(SAMPLES)])
-        self.table = _fading(1023)
-        self.legend: Sequence[tuple[str, str]] = ()
-        self.scale: Scale | None = (
-            over(self.table, background) / 255.0,
-            -self.limit,
-            self.limit,
-            "vorticity (1/s)",
-        )
+        self.limit = vorticity_limit([vorticity(state, run.grid) for state in run.sampled(SAMPLES)])
+        self.table = style.vorticity_table(1023)
+        colours = over(self.table, background) / 255.0
+        self.scale: Scale | None = (colours, -self.limit, self.limit, "vorticity (1/s)")
 
     def image(self, state: State) -> Pixels:
-        share = refined(vorticity(state, self.grid).T / self.limit)
-        return self.table[levels(share, len(self.table))]
-
-
-class FieldNumber:
-    """Speed or pressure, on one scale for all frames.
-
-    limit  in the quantity's unit, where the colours end
-    """
-
-    def __init__(self, run: Run, shown: Shown) -> None:
-        self._shown, self.values = shown, shown.values
-        seen = [np.abs(shown.values(state))[in_fluid(state)] for state in run.sampled(SAMPLES)]
-        self.limit = robust(seen, HIGHEST)
-        self.table = shown.table(255)
-        low = -self.limit if shown.signed else 0.0
-        self.legend: Sequence[tuple[str, str]] = ()
-        self.scale: Scale | None = (self.table / 255.0, low, self.limit, shown.name)
-
-    def image(self, state: State) -> Pixels:
-        values = filled(self.values(state)[:, :, 0], in_fluid(state)[:, :, 0])
-        return opaque(self.colours(refined(values.T)))
-
-    def colours(self, values: Array) -> Pixels:
-        """(..., 3) colours of values in the quantity's unit."""
-        share = values / self.limit
-        return self.table[levels(share if self._shown.signed else 2.0 * share - 1.0, 255)]
+        share = _refined(vorticity(state, self.grid).T / self.limit)
+        return self.table[_table_rows(share, len(self.table))]
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A number of each cell that can be shown.
+    """A cell quantity that can be shown.
 
     name    with its unit, for the scale
     values  state -> (nx, ny, nz)
-    signed  whether it goes both ways about 0; else it is never less
+    signed  whether it has both signs; otherwise it is never negative
     table   count -> (count, 3) colours from lowest to highest
     """
 
@@ -190,56 +165,153 @@ class Shown:
     table: Callable[[int], Pixels]
 
 
-def opaque(colours: Pixels) -> Pixels:
-    """(..., 4) colours (..., 3) that hide what is behind."""
-    return np.concatenate([colours, np.full((*colours.shape[:-1], 1), 255, np.uint8)], axis=-1)
+class FieldNumber:
+    """Speed or pressure, on one scale for all frames.
+
+    limit  in the quantity's unit, at the end of the scale
+    """
+
+    legend: Legend = ()
+
+    def __init__(self, run: Run, shown: Shown) -> None:
+        self._shown, self.values = shown, shown.values
+        sampled = [np.abs(self.values(state))[_in_fluid(state)] for state in run.sampled(SAMPLES)]
+        sizes = _finite_sizes(sampled)
+        self.limit = max(float(np.percentile(sizes, MAX_PERCENTILE)), 1e-12) if sizes.size else 1.0
+        self.table = shown.table(255)
+        low = -self.limit if shown.signed else 0.0
+        self.scale: Scale | None = (self.table / 255.0, low, self.limit, shown.name)
+
+    def image(self, state: State) -> Pixels:
+        values = _filled(self.values(state)[:, :, 0], _in_fluid(state)[:, :, 0])
+        colours = self.colours(_refined(values.T))
+        opaque = np.full((*colours.shape[:-1], 1), 255, np.uint8)
+        return np.concatenate([colours, opaque], axis=-1)
+
+    def colours(self, values: Array) -> Pixels:
+        """(..., 3) colours of values in the quantity's unit."""
+        share = values / self.limit
+        return self.table[_table_rows(share if self._shown.signed else 2.0 * share - 1.0, 255)]
 
 
 def over(image: Pixels, background: str) -> Pixels:
-    """(..., 3) an image (..., 4) before a background, "#rrggbb"."""
+    """(..., 3) an image (..., 4) in front of a background, "#rrggbb"."""
     share = image[..., 3:] / 255.0
     return np.rint(image[..., :3] * share + 255.0 * style.rgb(background) * (1.0 - share)).astype(
         np.uint8
     )
 
 
-def _fading(count: int) -> Pixels:
-    """(count, 4) colours from strong clockwise through nothing to strong counter-clockwise."""
-    (right, left), clear = (_knots(style.SPIN_RIGHT), _knots(style.SPIN_LEFT)), np.zeros(1)
-    colours = np.stack([*right, right[-1], left[-1], *left[::-1]])
-    places = [-1.0, -0.55, -0.2, -1e-9, 1e-9, 0.2, 0.55, 1.0]
-    faint = np.concatenate([np.ones(3), clear, clear, np.ones(3)])
-    return pixels(_ramp(places, np.column_stack([colours, faint]), count))
+def vorticity(state: State, grid: Grid) -> Array:
+    """(nx, ny) vorticity about z at the cell centres, 1/s; bodies continue their neighbours.
+
+    The corners' values dv/dx - du/dy are averaged; the outermost corners copy their neighbours.
+    Corners of cells that a body cuts are left out: partly closed faces carry a flux, not a velocity
+    that can be differentiated.
+    """
+    u, v = state["velocity_x"][:, :, 0], state["velocity_y"][:, :, 0]
+    corners = (np.diff(v[:, 1:-1], axis=0) - np.diff(u[1:-1], axis=1)) / grid.spacing
+    uncut = state["open"][:, :, 0] > UNCUT
+    counted = np.isfinite(corners)
+    counted &= uncut[1:, 1:] & uncut[1:, :-1] & uncut[:-1, 1:] & uncut[:-1, :-1]
+    padded = np.pad(np.where(counted, corners, 0.0).astype(float), 1, mode="edge")
+    count = _corner_sum(np.pad(counted.astype(float), 1, mode="edge"))
+    mean = _corner_sum(padded) / np.maximum(count, 1.0)
+    return _filled(mean, count > 0.0, FILLED_LAYERS_VORTICITY)
 
 
-def _rising(count: int) -> Pixels:
-    """(count, 3) colours from rest to the highest speed."""
-    return pixels(_ramp(np.linspace(-1.0, 1.0, len(style.SPEED)), _knots(style.SPEED), count))
+def _speed(state: State) -> Array:
+    """(nx, ny, nz) magnitude of the velocity in the cells, m/s."""
+    faces = [state[name] for name in ("velocity_x", "velocity_y", "velocity_z") if name in state]
+    cells = [0.5 * (np.delete(v, 0, axis) + np.delete(v, -1, axis)) for axis, v in enumerate(faces)]
+    return np.asarray(np.sqrt(sum(v.astype(float) ** 2 for v in cells)))
 
 
-def _balanced(count: int) -> Pixels:
-    """(count, 3) colours from the lowest pressure to the highest."""
-    knots = _knots((*style.SUCTION, style.LEVEL, *style.PUSH[::-1]))
-    return pixels(_ramp(np.linspace(-1.0, 1.0, len(knots)), knots, count))
+def _pressure(state: State) -> Array:
+    """(nx, ny, nz) pressure in the cells relative to its mean in the fluid, Pa."""
+    values = state["pressure"].astype(float)
+    known = values[_in_fluid(state)]
+    return np.asarray(values - (known[np.isfinite(known)].mean() if known.size else 0.0))
 
 
-def _knots(colours: Sequence[str]) -> Array:
-    return np.stack([style.rgb(colour) for colour in colours])
+def _in_fluid(state: State) -> NDArray[np.bool_]:
+    """(nx, ny, nz) cells that are mostly open."""
+    return np.asarray(state["open"] > 0.5)
 
 
-def _ramp(places: Sequence[float] | Array, knots: Array, count: int) -> Array:
-    """(count, k) `knots` (n, k) at places from -1 to 1, joined by straight lines."""
-    share = np.linspace(-1.0, 1.0, count)
-    return np.stack([np.interp(share, places, knot) for knot in knots.T], axis=1)
+def _filled(
+    values: NDArray[np.floating], known: NDArray[np.bool_], layers: int = FILLED_LAYERS
+) -> Array:
+    """`values` (nx, ny) with unknown ones and NaNs replaced by the mean of their neighbours.
+
+    This fills `layers` of cells, so that interpolation has no jump at a body's edge; the rest is 0.
+    """
+    known = np.isfinite(values) & known
+    result = np.where(known, values, 0.0).astype(float)
+    for _ in range(layers):
+        total, count = _neighbour_sum(result), _neighbour_sum(known.astype(float))
+        reached = ~known & (count > 0.0)
+        result[reached] = total[reached] / count[reached]
+        known |= reached
+    return result
 
 
-def pixels(colours: NDArray[np.floating]) -> Pixels:
-    """Colours from 0 to 1 as bytes."""
-    return np.rint(255.0 * colours).astype(np.uint8)
+def _corner_sum(values: Array) -> Array:
+    """Sum over the four corners of each cell."""
+    return np.asarray(values[1:, 1:] + values[1:, :-1] + values[:-1, 1:] + values[:-1, :-1])
+
+
+def _neighbour_sum(values: Array) -> Array:
+    """Sum over the four neighbours of each cell."""
+    padded = np.pad(values, 1)
+    return np.asarray(padded[2:, 1:-1] + padded[:-2, 1:-1] + padded[1:-1, 2:] + padded[1:-1, :-2])
+
+
+def _refined(values: Array) -> Array:
+    """`values` (n, m) interpolated by cubics on a grid finer by an integer factor, so that edges of
+    colours follow the values and not the cells."""
+    factor = -(-REFINED_SIDE // max(values.shape))
+    if factor == 1:
+        return values
+    size = (factor * values.shape[1], factor * values.shape[0])
+    fine = Image.fromarray(values.astype(np.float32)).resize(size, Image.Resampling.BICUBIC)
+    return np.asarray(fine, float)
+
+
+def vorticity_limit(values: Sequence[Array]) -> float:
+    """Size of vorticity with the strongest colours, by STRONGER_CIRCULATION.
+
+    So a wake has the same colours in a large domain as in a small one.
+    """
+    sizes = np.sort(_finite_sizes(values))[::-1]
+    if not sizes.size:
+        return 1.0
+    total = np.cumsum(sizes)
+    return max(float(sizes[np.searchsorted(total, STRONGER_CIRCULATION * total[-1])]), 1e-12)
+
+
+def full_strength(frames: Sequence[NDArray[np.floating]]) -> float:
+    """Value at which a dye has its full colour: a percentile of its strong values, not the maximum,
+    which is an overshoot of the advection at an edge."""
+    values = np.concatenate([frame.ravel() for frame in frames])
+    values = values[np.isfinite(values)]
+    strong = values[values > 0.5 * values.max(initial=0.0)]
+    return max(float(np.percentile(strong, STRONG_DYE_PERCENTILE)), 1e-12) if strong.size else 1.0
+
+
+def _finite_sizes(values: Sequence[Array]) -> Array:
+    sizes = np.abs(np.concatenate([one.ravel() for one in values]))
+    return np.asarray(sizes[np.isfinite(sizes)])
+
+
+def _table_rows(share: Array, count: int) -> NDArray[np.intp]:
+    """Rows of a table of `count` colours for shares of the limit from -1 to 1."""
+    half = 0.5 * (count - 1)
+    return np.rint(half + half * np.clip(np.nan_to_num(share), -1.0, 1.0)).astype(np.intp)
 
 
 NUMBERS = {
-    "speed": Shown("speed (m/s)", speed, False, _rising),
-    "pressure": Shown("pressure about its mean (Pa)", pressure, True, _balanced),
+    "speed": Shown("speed (m/s)", _speed, False, style.speed_table),
+    "pressure": Shown("pressure about its mean (Pa)", _pressure, True, style.pressure_table),
 }
-"""Fields that are one number of each cell."""
+"""Fields that are one number per cell."""

@@ -1,4 +1,4 @@
-"""Where the parts of a picture stand, in pixels at scale 1."""
+"""The layout of a picture: boxes of its parts, in pixels at scale 1."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from matplotlib.figure import Figure
 MARGIN, HEADER, LEGEND, STRIP, STRIP_GAP, FOOTER = 28, 56, 46, 78, 30, 40
 """Margin at the sides, and heights of the parts."""
 
-NUMBERS = 44
-"""Room left of the strips for their numbers."""
+STRIP_NUMBERS = 44
+"""Width of the numbers to the left of the strips."""
 
-MAP_WIDTH, MAP_HEIGHT, LEAST_WIDTH = 904, 780, 640
-"""Largest sides of the map, and least width of the picture."""
+MAP_WIDTH, MAP_HEIGHT, MIN_WIDTH = 904, 780, 640
+"""Maximum width and height of the map, and minimum width of the picture."""
 
-WIDE, WIDE_WIDTH, BESIDE = 1.25, 1440, 0.62
-"""Width over height from which on strips stand beside the map; then the width of the picture, and
-the map's part of it."""
+WIDE, WIDE_WIDTH, WIDE_MAP = 1.25, 1440, 0.62
+"""Width over height above which strips are to the right of the map; then the width of the picture,
+and the map's share of it."""
 
-HIGHEST_STRIP = 260
-"""Height of a strip beside the map at most."""
+MAX_STRIP = 260
+"""Maximum height of a strip to the right of the map."""
 
-LEAST_MAP = 120
-"""Least height of a map above its strips."""
+MIN_MAP = 120
+"""Minimum height of a map above its strips."""
 
-DOTS = 100
-"""Pixels per inch, an inch being matplotlib's 72 points."""
+DPI = 100
+"""Pixels per inch (72 points of matplotlib)."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """Rectangle in pixels from the upper left corner of the picture."""
+    """Rectangle in pixels, from the upper left corner of the picture."""
 
     left: int
     top: int
@@ -42,9 +42,9 @@ class Box:
 
 @dataclass(frozen=True)
 class Layout:
-    """Size of the picture, even at its own scale, and its parts; those that are None are absent.
+    """Size of the picture, even at its own scale, and its parts; absent ones are None.
 
-    scale  pixels of the picture in one of the layout
+    scale  pixels of the picture per pixel of the layout
     """
 
     width: float
@@ -56,9 +56,9 @@ class Layout:
 
     @classmethod
     def of(cls, aspect: float, strips: int) -> Layout:
-        """Layout with a map that is `aspect` times as high as wide above so many strips."""
+        """Layout of a map of height over width `aspect` above a number of strips."""
         map_width, map_height = _map_sides(aspect)
-        width = _even(max(map_width + 2 * MARGIN, LEAST_WIDTH))
+        width = _even(max(map_width + 2 * MARGIN, MIN_WIDTH))
         inner = width - 2 * MARGIN
         below = HEADER + map_height
         boxes = _stacked(MARGIN, below + LEGEND + 20, inner, strips)
@@ -79,10 +79,10 @@ class Layout:
 
     @classmethod
     def sized(cls, size: tuple[int, int], strips: int, *, bare: bool) -> Layout:
-        """Layout of a picture of `size` pixels, strips beside the map where it is wide.
+        """Layout of a picture of `size` pixels; if it is wide, strips are to the right of the map.
 
         bare    the map alone
-        raises  ValueError when the size leaves the map no room
+        raises  ValueError if the size is too small for the map and its strips
         """
         if bare:
             return cls(*size, Box(0, 0, *size), None, ())
@@ -92,9 +92,9 @@ class Layout:
         height = size[1] / scale
         inner = width - 2 * MARGIN
         if wide:
-            map_width, map_height = round(BESIDE * inner), int(height) - HEADER - LEGEND
+            map_width, map_height = round(WIDE_MAP * inner), int(height) - HEADER - LEGEND
             left = MARGIN + map_width + 20
-            each = min((map_height - 20) // strips - STRIP_GAP, HIGHEST_STRIP)
+            each = min((map_height - 20) // strips - STRIP_GAP, MAX_STRIP)
             boxes = _stacked(left, HEADER + 20, width - MARGIN - left, strips, each)
             cramped = each < STRIP // 2
         else:
@@ -102,7 +102,7 @@ class Layout:
             map_width, map_height = inner, int(height) - HEADER - LEGEND - foot
             boxes = _stacked(MARGIN, HEADER + map_height + LEGEND + 20, inner, strips)
             cramped = False
-        if map_height < LEAST_MAP or cramped:
+        if map_height < MIN_MAP or cramped:
             raise ValueError(
                 f"a picture of {size[0]} by {size[1]} pixels has no room for its plots; make it "
                 "higher, or drop them with plots=false"
@@ -113,9 +113,9 @@ class Layout:
 
     def figure(self, scale: float) -> Figure:
         """Empty figure of this size times `scale`."""
-        dots = DOTS * scale * self.scale
+        dots = DPI * scale * self.scale
         width, height = (side * self.scale * scale for side in (self.width, self.height))
-        # a little more than the length, because a canvas cuts fractions of pixels off
+        # a little more than the length, because a canvas truncates fractions of pixels
         inches = ((round(width) + 0.01) / dots, (round(height) + 0.01) / dots)
         return Figure(figsize=inches, dpi=dots)
 
@@ -127,14 +127,8 @@ class Layout:
     def axes(self, figure: Figure, box: Box) -> Axes:
         """New axes at `box`."""
         bottom = self.height - box.top - box.height
-        return figure.add_axes(
-            (
-                box.left / self.width,
-                bottom / self.height,
-                box.width / self.width,
-                box.height / self.height,
-            )
-        )
+        left, width = box.left / self.width, box.width / self.width
+        return figure.add_axes((left, bottom / self.height, width, box.height / self.height))
 
 
 def _map_sides(aspect: float) -> tuple[int, int]:
@@ -143,9 +137,9 @@ def _map_sides(aspect: float) -> tuple[int, int]:
 
 
 def _stacked(left: int, top: int, width: int, strips: int, height: int = STRIP) -> tuple[Box, ...]:
-    """Strips one below the other, room for their numbers on their left."""
+    """A column of strips, with space for their numbers on the left."""
     return tuple(
-        Box(left + NUMBERS, top + n * (height + STRIP_GAP), width - NUMBERS, height)
+        Box(left + STRIP_NUMBERS, top + n * (height + STRIP_GAP), width - STRIP_NUMBERS, height)
         for n in range(strips)
     )
 

@@ -1,12 +1,9 @@
-"""The picture of one frame of a run: fluid, bodies, forces and the curves of the run below them.
+"""The picture of one frame of a run: fluid, bodies, forces, and curves below them.
 
-Whatever does not change from frame to frame is drawn once; a frame redraws only what moves.
+What does not change from frame to frame is drawn once; a frame redraws only the rest.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -19,70 +16,39 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from flowborne.view import style
-from flowborne.view.arrows import arrow, round_number
-from flowborne.view.forces import SHAFT, Forces
+from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
-from flowborne.view.map_slab import MapSlab
-from flowborne.view.run import Run, State
+from flowborne.view.maps import Map, MapSlab, MapSpace
+from flowborne.view.plots import Strip, joint_curves, strip_curves
+from flowborne.view.run import Run
 from flowborne.view.shot import Shot
-from flowborne.view.space.map_space import MapSpace
-from flowborne.view.strips import Strip, joint_curves, strip_curves
 
 Array = NDArray[np.float64]
 
 FIGURE_SPACE = "\u2007"
-"""As wide as a digit, so that words stand still while their numbers change."""
+"""As wide as a digit, so that text does not move when its numbers change."""
 
-LONGEST_BAR = 120.0
-"""Length of a scale bar at most, pixels."""
+MAX_BAR = 120.0
+"""Maximum length of a scale bar, pixels."""
 
 PLAIN_SIDE = 600.0
-"""Smaller side in pixels of a map from which on what is written on it grows with it."""
+"""Smaller side of a map above which the text on it grows with it, pixels."""
 
-NAMED = 3
-"""Joints whose positions are written beside the time."""
-
-
-class Map(Protocol):
-    """The part of a picture that shows the run itself.
-
-    width   m across the map, where the bodies are
-    aspect  its height over its width
-    forces  the scale of the arrows of forces
-    legend  (name, colour) of each thing of the fluid that is shown in a colour of its own
-    scale   (colours from lowest to highest (k, 3), lowest, highest, name), or None
-    """
-
-    width: float
-    aspect: float
-    forces: Forces
-    legend: Sequence[tuple[str, str]]
-    scale: tuple[Array, float, float, str] | None
-
-    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
-        """Draw what stands still in `axes`, `pixels` wide at scale 1; the artists of what moves."""
-        ...
-
-    def show(self, number: int, state: State) -> None:
-        """Make what moves that of the `number`-th state."""
-        ...
-
-    def close(self) -> None:
-        """Let go of what the map holds besides memory; it cannot be drawn after."""
-        ...
+NAMED_JOINTS = 3
+"""Maximum number of joint positions that are written next to the time."""
 
 
 class Picture:
     """Draws the frames of a run, all on the same scales. Close it after use.
 
-    Making one raises ValueError when the run has three dimensions and nothing can draw them here.
+    raises  ValueError if the run has three dimensions and this machine cannot draw them
 
     layout  sizes at scale 1; a picture is `scale` times as large
-    map     what the picture shows of the run itself
+    map     the part that shows the run itself
     """
 
     def __init__(self, run: Run, scale: float = 1.0, shot: Shot | None = None) -> None:
-        """`shot`: what is shown, that of the run's own scene when None."""
+        """`shot`: what is shown; None is the shot of the run's scene."""
         self.run = run
         self.shot = shot = run.shot if shot is None else shot
         curves = strip_curves(run) if shot.plots else []
@@ -138,50 +104,34 @@ class Picture:
         return np.asarray(self._canvas.buffer_rgba())
 
     def close(self) -> None:
-        """Let go of what the map holds."""
+        """Release the resources of the map."""
         self.map.close()
 
     def _draw_header(self) -> Text:
-        """Write the name of the run; what tells the time, to be drawn anew in every frame."""
+        """Write the name of the run; returns the text of the time, which changes in every frame."""
         figure, height = self._canvas.figure, self.layout.height
         left, right = MARGIN / self.layout.width, 1.0 - MARGIN / self.layout.width
         middle = 1.0 - 0.5 * self.layout.map.top / height
-        figure.text(
-            left,
-            middle,
-            self.run.name,
-            color=style.TEXT,
-            fontsize=15,
-            weight="bold",
-            va="center_baseline",
-        )
-        return figure.text(
-            right,
-            middle,
-            "",
-            color=style.TEXT,
-            fontsize=11,
-            ha="right",
-            va="center_baseline",
-            animated=True,
-        )
+        drawn = {"color": style.TEXT, "va": "center_baseline"}
+        figure.text(left, middle, self.run.name, fontsize=15, weight="bold", **drawn)
+        return figure.text(right, middle, "", fontsize=11, ha="right", animated=True, **drawn)
 
     def _draw_legend(self, axes: Axes, box: Box) -> None:
-        """Scales of length, force and colour in a row below the map."""
+        """Draw the scales of length, force and colour in a row below the map."""
         width, height = box.width, box.height
         axes.set(xlim=(0, width), ylim=(0, height))
         axes.axis("off")
-        middle, place = 0.5 * height, 0.0
+        middle, x = 0.5 * height, 0.0
         if self.shot.scale_bar:
-            length, pixels = self._bar(LONGEST_BAR)
+            length, pixels = self._bar(MAX_BAR)
             bar = _bar_outline(0.0, middle, pixels, 1.0)
             axes.add_patch(Polygon(bar, color=style.MUTED, lw=0))
-            place = _write(axes, pixels + 8, middle, f"{length:g} m")
+            x = _write(axes, pixels + 8, middle, f"{length:g} m")
         if self.map.forces.large > 0.0:
-            place = self._force_key(axes, place, middle)
+            x = self._force_key(axes, x, middle)
         for name, colour in self.map.legend:
-            axes.plot(place + 6, middle, "o", ms=8, color=colour)
-            place = _write(axes, place + 16, middle, name)
+            axes.plot(x + 6, middle, "o", ms=8, color=colour)
+            x = _write(axes, x + 16, middle, name)
         if self.map.scale is not None:
             colours, low, high, name = self.map.scale
             left, right, half = width - 260, width - 60, 5
@@ -201,51 +151,49 @@ class Picture:
         return length, length / self._metres
 
     def _bar_on_map(self, axes: Axes) -> list[Artist]:
-        """A bar of a round length in the lower left corner of a map that is all of the picture, in
-        `axes` over it."""
+        """Draw a scale bar in the lower left corner of a map that fills the picture, in `axes` over
+        it; returns its artists."""
         box = self.layout.map
         axes.set(xlim=(0, box.width), ylim=(0, box.height))
         axes.axis("off")
         size = max(1.0, min(box.width, box.height) / PLAIN_SIDE)
-        length, pixels = self._bar(min(LONGEST_BAR * size, 0.25 * box.width))
+        length, pixels = self._bar(min(MAX_BAR * size, 0.25 * box.width))
         edge = [withStroke(linewidth=2.4 * size, foreground=style.EDGE, alpha=0.6)]
         left = bottom = 22.0 * size
         bar = Polygon(
             _bar_outline(left, bottom, pixels, size), color=style.TEXT, lw=0, path_effects=edge
         )
-        artists: list[Artist] = [axes.add_patch(bar)]
-        artists.append(
-            axes.text(
-                left + pixels + 9.0 * size,
-                bottom,
-                f"{length:g} m",
-                color=style.TEXT,
-                fontsize=9.0 * size,
-                va="center_baseline",
-                path_effects=edge,
-            )
+        text = axes.text(
+            left + pixels + 9.0 * size,
+            bottom,
+            f"{length:g} m",
+            color=style.TEXT,
+            fontsize=9.0 * size,
+            va="center_baseline",
+            path_effects=edge,
         )
+        artists: list[Artist] = [axes.add_patch(bar), text]
         for artist in artists:
             artist.set_animated(True)
         return artists
 
-    def _force_key(self, axes: Axes, place: float, middle: float) -> float:
-        """Draw the arrow of a round force; the place behind it."""
+    def _force_key(self, axes: Axes, x: float, middle: float) -> float:
+        """Draw the arrow of a round force; returns x of the next item."""
         forces = self.map.forces
         force = round_number(forces.large)
         pixels = force / forces.large * forces.reach / self._metres
-        key = arrow(np.array([place, middle]), np.array([pixels, 0.0]), SHAFT)
+        key = arrow(np.array([x, middle]), np.array([pixels, 0.0]), SHAFT_WIDTH)
         axes.add_collection(
             PolyCollection([key], facecolors=style.FORCE, edgecolors=style.EDGE, linewidths=0.8)
         )
-        return _write(axes, place + pixels + 8, middle, f"{force:g} {forces.unit}")
+        return _write(axes, x + pixels + 8, middle, f"{force:g} {forces.unit}")
 
     def _words(self, time: float, row: int | None) -> str:
-        """The time and the positions of the first joints, each of steady width."""
+        """The time and the positions of the first joints, each of constant width."""
         words = []
         title, joints = joint_curves(self.run)
         unit, digits = ("°", 1) if "°" in title else (" m", 3)
-        for name, values in list(joints.items())[:NAMED] if row is not None else ():
+        for name, values in list(joints.items())[:NAMED_JOINTS] if row is not None else ():
             number = f"{values[row]:+{digits + 5}.{digits}f}".replace(" ", FIGURE_SPACE)
             words.append(f"{name} {number.replace('-', '−')}{unit}")
         return (4 * FIGURE_SPACE).join([*words, f"t = {time:.2f} s"])
@@ -266,7 +214,7 @@ def _signed(value: float) -> str:
 
 
 def _write(axes: Axes, x: float, y: float, words: str, align: str = "left") -> float:
-    """Write into a legend; the place behind the words, with a gap."""
+    """Write into a legend; returns x of the next item."""
     text = axes.text(x, y, words, color=style.MUTED, fontsize=8.5, ha=align, va="center_baseline")
     right = text.get_window_extent().x1
     return float(axes.transData.inverted().transform((right, 0.0))[0]) + 26.0

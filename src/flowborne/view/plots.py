@@ -1,30 +1,184 @@
-"""Plots of numbers: the cost of chains (Fig. 10) and the course of a run."""
+"""Plots of numbers: curves below a picture, over time, and the cost of chains (Fig. 10)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import StrMethodFormatter
 from numpy.typing import NDArray
 
 from flowborne.files.atomic import write_atomically
 from flowborne.view import style
-from flowborne.view.strips import legend, strip_style
+from flowborne.view.run import Run
 
 Array = NDArray[np.float64]
+
+MAX_CURVES = 6
+"""Maximum number of curves in a strip."""
+
+EFFORT = "measured_effort_"
+"""Prefix of the columns with the effort of named joints."""
+
+
+def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
+    """(title with unit, name -> values) of the controlled joints, or of all if none is controlled.
+
+    Angles of hinges in degrees; positions of slides in m only if there is no hinge.
+    """
+    for kind, unit, title, factor in (
+        ("angle_", "_rad", "angle (°)", 180.0 / np.pi),
+        ("position_", "_m", "position (m)", 1.0),
+    ):
+        joints = {
+            column.removeprefix(kind).removesuffix(unit): factor * values
+            for column, values in run.history.items()
+            if column.startswith(kind)
+        }
+        chosen = {name: v for name, v in joints.items() if name in run.controlled} or joints
+        if chosen:
+            return title, dict(list(chosen.items())[:MAX_CURVES])
+    return "", {}
+
+
+def objective_curve(run: Run) -> Array | None:
+    """The objective of the last decision in every frame; None without an objective."""
+    values = run.history.get("objective")
+    return None if values is None or not np.isfinite(values).any() else values
+
+
+def _terms(run: Run) -> list[str]:
+    """Columns of the objective's terms."""
+    return [column for column in run.history if column.startswith("measured_")]
+
+
+def effort_curves(run: Run) -> dict[str, Array]:
+    """Joint or joints -> effort after every frame, of objectives that name the joints.
+
+    Empty if such an effort is the whole objective.
+    """
+    if len(_terms(run)) < 2:
+        return {}
+    named = {
+        column.removeprefix(EFFORT).replace("_", " "): values
+        for column, values in run.history.items()
+        if column.startswith(EFFORT)
+    }
+    return dict(list(named.items())[:MAX_CURVES])
+
+
+def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
+    """(title, name -> values) of every strip of a run."""
+    strips: list[tuple[str, dict[str, Array]]] = []
+    objective = objective_curve(run)
+    if objective is not None:
+        terms = [column.removeprefix("measured_").replace("_", " ") for column in _terms(run)]
+        title = f"objective: {terms[0]}" if len(terms) == 1 else "objective"
+        strips.append((title, {"": objective}))
+    efforts = effort_curves(run)
+    if efforts:
+        strips.append(("effort (N m s)", efforts))
+    title, joints = joint_curves(run)
+    if joints:
+        strips.append((title, joints))
+    return strips
+
+
+class Strip:
+    """One strip of curves in `axes`: the whole run faint, the part up to the cursor bright.
+
+    moving  artists that change in every frame
+    """
+
+    def __init__(self, axes: Axes, title: str, times: Array, curves: dict[str, Array]) -> None:
+        self.axes = axes
+        self.times = times
+        self.curves = list(curves.values())
+        strip_style(axes)
+        axes.set_xlim(0.0, 1.01 * _span(np.append(times, 0.0))[1])
+        axes.set_ylim(*robust_limits(np.concatenate(self.curves)))
+        axes.set_title(title, loc="left", fontsize=8.5, color=style.MUTED, pad=4)
+        self._past, self._heads = [], []
+        for n, (name, values) in enumerate(curves.items()):
+            colour = style.CURVES[n % len(style.CURVES)]
+            axes.plot(times, values, color=colour, lw=1.1, alpha=0.3)
+            self._past += axes.plot([], [], color=colour, lw=1.9, animated=True, label=name)
+            self._heads += axes.plot([], [], "o", ms=4.5, mec="none", color=colour, animated=True)
+        if len(curves) > 1:
+            legend(axes, self._past)
+        self._cursor = axes.axvline(0.0, color=style.TEXT, lw=0.9, alpha=0.7, animated=True)
+        self.moving: list[Artist] = [self._cursor, *self._past, *self._heads]
+
+    def show(self, time: float, row: int | None) -> None:
+        """Move the cursor to `time`; `row` is the row of the history at that time, if any."""
+        self._cursor.set_xdata([time, time])
+        count = 0 if row is None else row + 1
+        for values, past, head in zip(self.curves, self._past, self._heads, strict=True):
+            past.set_data(self.times[:count], values[:count])
+            head.set_data(self.times[max(count - 1, 0) : count], values[max(count - 1, 0) : count])
+
+
+def strip_style(axes: Axes) -> None:
+    """Style axes as dark with a faint grid."""
+    axes.set_facecolor(style.WATER)
+    axes.grid(color=style.LINE, lw=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(colors=style.MUTED, labelsize=8, length=0, pad=5)
+    axes.locator_params(axis="y", nbins=4)
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:.5g}"))
+    for spine in axes.spines.values():
+        spine.set_color(style.LINE)
+        spine.set_linewidth(0.6)
+
+
+def legend(axes: Axes, handles: Sequence[Artist]) -> None:
+    """Write the names of curves in one row above the axes, at the right."""
+    axes.legend(
+        handles=handles,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.97),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=8,
+        labelcolor=style.MUTED,
+        handlelength=1.1,
+        columnspacing=1.2,
+        borderaxespad=0.0,
+    )
+
+
+def robust_limits(values: Array) -> tuple[float, float]:
+    """Limits that show `values` except rare spikes; (-1, 1) if there are no finite values."""
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        return -1.0, 1.0
+    low, high = np.percentile(finite, [5.0, 95.0])
+    inside = finite[(finite >= 2.0 * low - high) & (finite <= 2.0 * high - low)]
+    return _span(inside if inside.size else finite, margin=0.1)
+
+
+def _span(values: Array, margin: float = 0.0) -> tuple[float, float]:
+    """Smallest and largest of `values` with a margin, never equal."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    pad = margin * (high - low)
+    if high - low <= 1e-9 * max(abs(low), abs(high), 1e-300):
+        pad = max(0.05 * abs(high), 1e-6)
+    return low - pad, high + pad
 
 
 @dataclass(frozen=True)
 class ChainCost:
-    """What a frame of a chain costs.
+    """Time per frame of a chain.
 
-    joints    controlled
-    serial    s per frame, one trial after the other
-    parallel  s per frame, the trials side by side
+    joints    number of controlled joints
+    serial    s per frame, with trials in sequence
+    parallel  s per frame, with trials in parallel
     """
 
     joints: int
@@ -33,10 +187,9 @@ class ChainCost:
 
 
 def straight_line(x: Array, y: Array) -> tuple[float, float, float]:
-    """(slope, value at 0, largest deviation of y from the line as a share of the line's value).
+    """(slope, value at 0, largest relative deviation of y) of the line fitted by least squares.
 
-    The line is that of least squares.
-    raises  ValueError when fewer than two different x are given
+    raises  ValueError if there are fewer than two different x
     """
     if np.unique(x).size < 2:
         raise ValueError(f"a line needs two different x, and x is {np.asarray(x).tolist()}")
@@ -46,51 +199,37 @@ def straight_line(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 def plot_chain_cost(rows: Sequence[ChainCost], path: Path) -> None:
-    """Plot seconds per frame against the number of controlled joints, as Fig. 10 has it.
+    """Plot seconds per frame against the number of controlled joints, as in Fig. 10.
 
     rows    at least two lengths of chain
-    path    .png, .svg or .pdf; made anew
-    raises  ValueError when there are fewer than two lengths, or no such format
+    path    .png, .svg or .pdf; overwritten
+    raises  ValueError for fewer than two lengths, or another format
     """
     joints = np.array([row.joints for row in rows], float)
     serial = np.array([row.serial for row in rows])
-    slope, start, off = straight_line(joints, serial)
-    figure, axes = _figure(1, (6.4, 4.2))
+    slope, start, deviation = straight_line(joints, serial)
+    figure, (axes,) = _figure(1, (6.4, 4.2))
     ends = np.array([0.0, joints.max() + 0.5])
-    dashes, *_ = axes[0].plot(
+    dashes, *_ = axes.plot(
         ends,
         slope * ends + start,
         "--",
         color=style.CURVES[0],
         lw=1.2,
         alpha=0.75,
-        label=f"{1e3 * slope:.3g} ms a joint, within {100.0 * off:.2g} %",
+        label=f"{1e3 * slope:.3g} ms a joint, within {100.0 * deviation:.2g} %",
     )
-    handles = [dashes]
-    for n, (name, seconds) in enumerate(
-        (("serial", serial), ("parallel", np.array([row.parallel for row in rows])))
-    ):
-        handles += axes[0].plot(
-            joints,
-            seconds,
-            linestyle="-" if name == "parallel" else "none",
-            marker="o",
-            ms=7,
-            lw=1.4,
-            color=style.CURVES[n],
-            mec=style.EDGE,
-            label=name,
-        )
-    axes[0].set(xlim=ends, ylim=(0.0, None), xticks=joints)
-    axes[0].set_xlabel("controlled joints", fontsize=9, color=style.MUTED)
-    axes[0].set_title("seconds per frame", loc="left", fontsize=9, color=style.MUTED)
-    axes[0].legend(
-        handles=[*handles[1:], dashes],
-        loc="upper left",
-        frameon=False,
-        fontsize=9,
-        labelcolor=style.TEXT,
-    )
+    marks: dict[str, Any] = {"marker": "o", "ms": 7, "lw": 1.4, "mec": style.EDGE}
+    parallel = np.array([row.parallel for row in rows])
+    handles = [
+        *axes.plot(joints, serial, ls="none", color=style.CURVES[0], label="serial", **marks),
+        *axes.plot(joints, parallel, ls="-", color=style.CURVES[1], label="parallel", **marks),
+        dashes,
+    ]
+    axes.set(xlim=ends, ylim=(0.0, None), xticks=joints)
+    axes.set_xlabel("controlled joints", fontsize=9, color=style.MUTED)
+    axes.set_title("seconds per frame", loc="left", fontsize=9, color=style.MUTED)
+    axes.legend(handles=handles, loc="upper left", frameon=False, fontsize=9, labelcolor=style.TEXT)
     _save(figure, path)
 
 
@@ -98,7 +237,7 @@ def plot_forces(title: str, curves: dict[str, tuple[Array, Array]], path: Path) 
     """Plot forces over time.
 
     curves  name -> times (n,) s and forces (n,) N
-    path    .png, .svg or .pdf; made anew
+    path    .png, .svg or .pdf; overwritten
     """
     figure, (axes,) = _figure(1, (8.4, 3.6))
     handles = []
@@ -113,16 +252,16 @@ def plot_forces(title: str, curves: dict[str, tuple[Array, Array]], path: Path) 
 
 
 def plot_courses(strips: dict[str, dict[str, tuple[Array, Array]]], path: Path) -> None:
-    """Plot several quantities over time, one below the other.
+    """Plot several quantities over time, in a column of strips.
 
     strips  title -> name -> times (n,) s and values (n,); the same names in every strip
-    path    .png, .svg or .pdf; made anew
+    path    .png, .svg or .pdf; overwritten
     """
     figure, axes = _figure(len(strips), (7.2, 0.6 + 2.0 * len(strips)))
-    for place, (title, curves) in zip(axes, strips.items(), strict=True):
-        place.set_title(title, loc="left", fontsize=9, color=style.MUTED)
+    for strip, (title, curves) in zip(axes, strips.items(), strict=True):
+        strip.set_title(title, loc="left", fontsize=9, color=style.MUTED)
         lines = [
-            place.plot(times, values, lw=1.6, color=colour, label=name)[0]
+            strip.plot(times, values, lw=1.6, color=colour, label=name)[0]
             for (name, (times, values)), colour in zip(curves.items(), style.CURVES, strict=False)
         ]
     legend(axes[0], lines)
@@ -133,8 +272,8 @@ def plot_courses(strips: dict[str, dict[str, tuple[Array, Array]]], path: Path) 
 def _figure(rows: int, inches: tuple[float, float]) -> tuple[Figure, list[Axes]]:
     figure = Figure(figsize=inches, dpi=150, layout="constrained", facecolor=style.PAPER)
     axes = list(np.ravel(figure.subplots(rows, 1, sharex=True)))
-    for place in axes:
-        strip_style(place)
+    for strip in axes:
+        strip_style(strip)
     return figure, axes
 
 

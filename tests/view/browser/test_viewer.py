@@ -22,18 +22,16 @@ from flowborne.runs.cell_fields import cell_velocity
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.view import style
-from flowborne.view.browser.camera_keys import camera_text
-from flowborne.view.browser.curves import room_for
-from flowborne.view.browser.growing import GrowingRun
-from flowborne.view.browser.layer import velocity_arrows
+from flowborne.view.browser.fluid import velocity_arrows
 from flowborne.view.browser.page import CSS
+from flowborne.view.browser.panel import room_for
 from flowborne.view.browser.surroundings import surround
-from flowborne.view.browser.viewer import Viewer, open_viewer
-from flowborne.view.browser.viewpoint import FilmView, Viewpoint
+from flowborne.view.browser.viewer import GrowingRun, Viewer, open_viewer
+from flowborne.view.browser.viewpoint import FilmView, Viewpoint, camera_text
+from flowborne.view.framing import windows
 from flowborne.view.outlines import Outlines
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
-from flowborne.view.window import windows
 
 pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")
 

@@ -9,7 +9,7 @@ import pytest
 
 from flowborne.fluid.grid import Grid
 from flowborne.shapes.kinds import shape_of
-from flowborne.view.following import swept
+from flowborne.view.framing import swept
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
 from flowborne.view.space.camera import (

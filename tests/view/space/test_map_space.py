@@ -16,11 +16,11 @@ from flowborne.fluid.grid import Grid
 from flowborne.running import RunOutcome
 from flowborne.view import style
 from flowborne.view.film import make_preview
+from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
-from flowborne.view.space.ground import stands
-from flowborne.view.space.map_space import MapSpace
+from flowborne.view.space.surroundings import stands
 
 from .projecting import project
 

@@ -27,16 +27,14 @@ from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.view import style
+from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Flesh, Geom, Run
 from flowborne.view.space.camera import FILLED, camera_of
-from flowborne.view.space.ground import stands
 from flowborne.view.space.lighting import KEY
-from flowborne.view.space.map_space import MapSpace
 from flowborne.view.space.opengl import off_screen
-from flowborne.view.space.outside import Outside
-from flowborne.view.space.shapes import mesh_of
-from flowborne.view.space.skin import SkinSurface, creased, normals, way_out
+from flowborne.view.space.surfaces import Outside, SkinSurface, creased, mesh_of, normals, way_out
+from flowborne.view.space.surroundings import stands
 
 from .projecting import project
 

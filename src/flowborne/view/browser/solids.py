@@ -9,16 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.view import style
-from flowborne.view.arrows import arrow
-from flowborne.view.browser.nodes import show_mesh
-from flowborne.view.browser.prism import Mesh, counter_clockwise, joined, nothing, prism
-from flowborne.view.forces import SHAFT, Forces
+from flowborne.view.browser.meshes import Mesh, counter_clockwise, joined, nothing, prism, show_mesh
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, Skin, State
 from flowborne.view.space.arrows import arrow_mesh
-from flowborne.view.space.outside import Outside, pushes
-from flowborne.view.space.shapes import colour_of, mesh_of
-from flowborne.view.space.skin import creased
+from flowborne.view.space.surfaces import Outside, colour_of, creased, mesh_of, pushes
 
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
@@ -125,7 +121,7 @@ class Pushes:
 
     def _mesh(self, state: State) -> Mesh:
         """All arrows of a state as one."""
-        width = SHAFT * self._pixel
+        width = SHAFT_WIDTH * self._pixel
         if self._outside is None:
             found = self.scale.arrows(state, self._pixel)
             flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]

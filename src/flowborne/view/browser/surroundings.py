@@ -9,13 +9,12 @@ import numpy as np
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
-from flowborne.view.arrows import round_number
 from flowborne.view.browser.viewpoint import FilmView
-from flowborne.view.marks import crosses, goes_along, motes
+from flowborne.view.glyphs import crosses, goes_along, motes, round_number
 from flowborne.view.run import Run
 from flowborne.view.space.arrows import arrow_mesh
-from flowborne.view.space.ground import SQUARE, stands
 from flowborne.view.space.lighting import LIGHTS
+from flowborne.view.space.surroundings import SQUARE, stands
 
 if TYPE_CHECKING:
     from viser import SceneApi

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.view.following import followed, radius_of
+from flowborne.view.framing import followed, radius_of
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
 

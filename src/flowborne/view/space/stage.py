@@ -8,23 +8,16 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
-from flowborne.view.forces import SHAFT, Forces
-from flowborne.view.marks import goes_along
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, goes_along
 from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.space.arrows import Arrows
+from flowborne.view.space.arrows import Arrows, WindArrows
 from flowborne.view.space.camera import Camera
-from flowborne.view.space.ground import Ground, stands
+from flowborne.view.space.fluid import Slice, Smoke, Vortices
 from flowborne.view.space.lighting import KEY, LIGHTS
-from flowborne.view.space.motes import Motes
-from flowborne.view.space.outside import Outside, pushes
 from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
-from flowborne.view.space.shapes import LIT, colour_of, mesh_of
-from flowborne.view.space.skin import SkinSurface
-from flowborne.view.space.slices import Slice
-from flowborne.view.space.smoke import Smoke
-from flowborne.view.space.vortices import Vortices
-from flowborne.view.space.wind import WindArrows
+from flowborne.view.space.surfaces import LIT, Outside, SkinSurface, colour_of, mesh_of, pushes
+from flowborne.view.space.surroundings import Ground, Motes, stands
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -108,7 +101,7 @@ class Stage:
         for facing, edge in self._edges:
             edge.visibility = bool((facing @ toward < 0.0).any())
         shown = pushes(self._forces, self._outside, state, self._pixel)
-        self._arrows.show(*shown, SHAFT * self._pixel)
+        self._arrows.show(*shown, SHAFT_WIDTH * self._pixel)
         self._look(number)
         return self._cut_out() if self._shot.transparent else self._render(self._shot.colour)
 

@@ -1,13 +1,17 @@
-"""Flat shapes raised to prisms."""
+"""Meshes in the scene, and flat shapes raised to prisms."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
+
+if TYPE_CHECKING:
+    from viser import SceneApi
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -72,3 +76,15 @@ def _inside(points: Array, loops: Sequence[Integers]) -> Integers:
     cap.Update()
     faces = pv.wrap(cap.GetOutput()).regular_faces
     return np.asarray(faces, np.int64)
+
+
+def show_mesh(scene: SceneApi, name: str, mesh: Mesh, **drawn: Any) -> None:
+    """Show a mesh under a name, in place of what was there; nothing when it has no triangles.
+
+    drawn  how, as viser's add_mesh_simple has it
+    """
+    vertices, faces = mesh
+    if len(faces):
+        scene.add_mesh_simple(name, vertices.astype(np.float32), faces.astype(np.uint32), **drawn)
+    else:
+        scene.remove_by_name(name)

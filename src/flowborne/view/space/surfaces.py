@@ -1,6 +1,9 @@
-"""Skins, of flesh or of the model, as smooth surfaces that deform from frame to frame."""
+"""Surfaces of bodies and skins as meshes, and where a line leaves them."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -10,8 +13,40 @@ from scipy.sparse.csgraph import connected_components
 
 from flowborne.shapes.shape import unit
 from flowborne.view import style
-from flowborne.view.run import Skin, State
-from flowborne.view.space.shapes import LIT
+from flowborne.view.glyphs import Forces
+from flowborne.view.run import Geom, Skin, State
+
+SHARP = 35.0
+"""Angle between two faces from which on their edge is seen, degrees."""
+
+UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
+"""Colour of a geometry to which the model gives none."""
+
+LIT: dict[str, Any] = {
+    "ambient": 0.22,
+    "diffuse": 0.82,
+    "specular": 0.12,
+    "specular_power": 18.0,
+    "interpolation": "phong",
+}
+"""How bodies and flesh take the light."""
+
+
+def mesh_of(geom: Geom) -> pv.PolyData:
+    """Surface of a geometry in its own frame, m, with normals to shade it by."""
+    return pv.PolyData.from_regular_faces(*geom.shape.triangles()).compute_normals(
+        feature_angle=SHARP, split_vertices=True, consistent_normals=False
+    )
+
+
+def colour_of(geom: Geom, accented: frozenset[int]) -> tuple[NDArray[np.float64], float]:
+    """(3,) colour of a geometry, the model's own unless it stands fixed or is accented, and its
+    opacity, from 0 to 1."""
+    own = np.round(geom.rgba, 6)
+    plain = tuple(own) == UNCOLOURED or geom.body == 0 or geom.body in accented
+    colour = style.rgb(style.body_colour(geom.body, accented)) if plain else own[:3]
+    return colour, float(geom.rgba[3])
+
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -107,3 +142,63 @@ def way_out(place: Array, along: Array, corners: Array) -> float:
         return 0.0
     nearest = np.flatnonzero(met)[np.argmin(distance[met])]
     return float(distance[nearest]) if slope[nearest] > 0.0 else 0.0
+
+
+class Outside:
+    """The bodies as convex parts bounded by planes, and the skins around them.
+
+    meshes  of the geometries, in their own frames
+    """
+
+    def __init__(
+        self, geoms: Sequence[Geom], meshes: Sequence[pv.PolyData], skins: Sequence[Skin] = ()
+    ) -> None:
+        self._skins = skins
+        self._planes = [_planes(mesh) for mesh in meshes]
+        self._parts: dict[int, list[int]] = {}
+        for n, geom in enumerate(geoms):
+            self._parts.setdefault(geom.body, []).append(n)
+
+    def around(self, state: State) -> list[Array]:
+        """(m, 3, 3) m, the corners of each skin's triangles in a state."""
+        return [skin.vertices(state)[skin.triangles] for skin in self._skins]
+
+    def reach(
+        self, body: int, place: Array, vector: Array, state: State, around: Sequence[Array]
+    ) -> float:
+        """m along `vector` (3,) from `place` (3,) to the surface of a body or of the skin around
+        the place; 0 from outside both. `around` is that of the state."""
+        along = vector / np.linalg.norm(vector)
+        farthest = 0.0
+        for corners in around:
+            farthest = max(farthest, way_out(place, along, corners))
+        for part in self._parts.get(body, ()):
+            turn, centre = state["geom_rotation"][part], state["geom_position"][part]
+            normals, heights = self._planes[part]
+            room = heights - normals @ ((place - centre) @ turn)
+            slope = normals @ (along @ turn)
+            if (room > 0.0).all():
+                farthest = max(farthest, float((room[slope > 0.0] / slope[slope > 0.0]).min()))
+        return farthest
+
+
+def pushes(forces: Forces, outside: Outside, state: State, pixel: float) -> tuple[Array, Array]:
+    """Tails, on the bodies' surfaces, and vectors (n, 3) of the arrows of forces, m.
+
+    pixel  size of a pixel, m
+    """
+    arrows = forces.arrows(state, pixel)
+    around = outside.around(state) if arrows else []
+    tails = [
+        tail + outside.reach(body, tail, vector, state, around) * vector / np.linalg.norm(vector)
+        for body, tail, vector in arrows
+    ]
+    vectors = [vector for *_, vector in arrows]
+    return np.reshape(tails, (-1, 3)), np.reshape(vectors, (-1, 3))
+
+
+def _planes(mesh: pv.PolyData) -> tuple[Array, Array]:
+    """Outward normals (m, 3) of a mesh's faces, and their heights (m,) over the origin, m."""
+    normals = np.asarray(mesh.face_normals, float)
+    middles = np.asarray(mesh.cell_centers().points, float)
+    return normals, np.einsum("ij,ij->i", normals, middles)

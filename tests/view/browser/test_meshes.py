@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.view.browser.prism import counter_clockwise, joined, nothing, prism
+from flowborne.view.browser.meshes import counter_clockwise, joined, nothing, prism
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 

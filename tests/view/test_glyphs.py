@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.view.marks import crosses, goes_along, motes
+from flowborne.view.glyphs import crosses, goes_along, motes
 
 
 def test_marks_are_for_cameras_that_move() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from flowborne.runs.run_folder import RunFolder
-from flowborne.view.browser.origins import is_own, only_own_requests
+from flowborne.view.browser.page import is_own, only_own_requests
 from flowborne.view.browser.viewer import open_viewer
 
 pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")

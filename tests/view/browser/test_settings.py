@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.view.browser.timeline import Timeline
+from flowborne.view.browser.settings import Timeline
 
 TIMES = np.array([0.0, 0.1, 0.2, 0.5])
 

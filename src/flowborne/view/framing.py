@@ -1,0 +1,163 @@
+"""What a camera looks at: the path that it follows, and the window of a slab that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from flowborne.shapes.shape import DIRECTIONS
+from flowborne.view.fields import SAMPLES
+from flowborne.view.outlines import Outlines, flesh_loops
+from flowborne.view.run import Run
+from flowborne.view.shot import Shot
+
+Array = NDArray[np.float64]
+
+SMOOTHING = 0.4
+"""Standard deviation of the Gaussian that smooths the camera's path, s."""
+
+MAX_WHOLE_DOMAIN = 6.0
+"""Largest fluid domain that is shown whole, in sizes of the volume swept by the bodies."""
+
+ROOM = 3.0
+"""Height of the view of a larger domain or around a followed body, in sizes of the bodies."""
+
+ASPECT = 0.75
+"""Default height of a window over its width."""
+
+
+def followed(run: Run, shot: Shot) -> tuple[Array, Array]:
+    """(frames, 3) m, the target of the camera, and (frames, n, 3) m, what it shows, from there.
+
+    Fixed bodies count only if there are no moving bodies and no flesh.
+    raises  ValueError if the camera follows a body that does not exist
+    """
+    camera, body = shot.camera, shot.followed(run.bodies)
+    if body is not None:
+        own = [n for n, geom in enumerate(run.geoms) if geom.body == body]
+        points = _geom_points(run, own) if own else run.every("body_position")[:, [body]]
+    else:
+        moving = [n for n, geom in enumerate(run.geoms) if geom.body > 0]
+        points = swept(run, moving if moving or run.flesh else range(len(run.geoms)))
+    if camera.target is not None:
+        path = np.broadcast_to(np.array(camera.target, float), (len(run), 3))
+    elif camera.follow == "nothing":
+        known = points[np.isfinite(points).all(axis=-1)]
+        middle = 0.5 * (known.min(axis=0) + known.max(axis=0)) if len(known) else np.zeros(3)
+        path = np.broadcast_to(middle, (len(run), 3))
+    else:
+        path = _smoothed(points, SMOOTHING * run.frames_per_second)
+    return path, points - path[:, None]
+
+
+def radius_of(seen: Array) -> float:
+    """Radius of the sphere about the origin that contains all points `seen` (..., n), m."""
+    sizes = np.linalg.norm(seen, axis=-1)
+    return float(sizes[np.isfinite(sizes)].max(initial=0.0))
+
+
+def swept(run: Run, geoms: Sequence[int]) -> Array:
+    """(frames, n, 3) m, outermost points of geometries and of all flesh; the origin if none."""
+    points = [] if run.flesh is None else [_flesh_points(run)]
+    points += [_geom_points(run, geoms)] if geoms else []
+    return np.concatenate(points, axis=1) if points else np.zeros((len(run), 1, 3))
+
+
+def _geom_points(run: Run, geoms: Sequence[int]) -> Array:
+    """(frames, n, 3) m, outermost points of geometries."""
+    position, rotation = run.every("geom_position"), run.every("geom_rotation")
+    points = [
+        position[:, n, None] + run.geoms[n].shape.outermost() @ np.swapaxes(rotation[:, n], 1, 2)
+        for n in geoms
+    ]
+    return np.concatenate(points, axis=1)
+
+
+def _flesh_points(run: Run) -> Array:
+    """(frames, k, 3) m, vertices that are in any frame the farthest in one of 26 directions."""
+    vertices = run.every("flesh_vertices")
+    farthest = [np.argmax(frame @ DIRECTIONS.T, axis=0) for frame in vertices]
+    return vertices[:, np.unique(farthest)]
+
+
+def _smoothed(points: Array, deviation: float) -> Array:
+    """(frames, 3) smoothed path of the mean of points (frames, n, 3); `deviation` is in frames.
+
+    The path is extrapolated beyond its ends, so that a steady walk keeps its speed to the end.
+    Frames with non-finite numbers keep the last finite position.
+    """
+    middle = points.mean(axis=1)
+    good = np.flatnonzero(np.isfinite(middle).all(axis=1))
+    if good.size == 0:
+        return np.zeros_like(middle)
+    # the extended path has a period of 2 n frames, damped by exp(-5 deviation^2 / n^2)
+    deviation = min(deviation, 2.0 * good.size)
+    pad = int(4.0 * deviation) + 1
+    padded = np.pad(middle[good], ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
+    smooth = gaussian_filter1d(padded, deviation, axis=0)[pad:-pad]
+    last = np.searchsorted(good, np.arange(len(middle)), side="right") - 1
+    return np.asarray(smooth[np.maximum(last, 0)])
+
+
+def windows(run: Run, outlines: Outlines, shot: Shot, aspect: float | None) -> Array:
+    """(frames, 4) m, (x0, x1, y0, y1) that is shown in each frame; all of one size.
+
+    aspect  height over width that it must have, if any
+    raises  ValueError if the camera follows a body that does not exist, or turns
+    """
+    camera = shot.camera
+    if camera.orbit or camera.position is not None:
+        raise ValueError(
+            "a slab is seen from straight above; drop camera.orbit and camera.position, and give "
+            "camera.target and camera.distance"
+        )
+    path, seen = followed(run, shot)
+    radius = radius_of(seen[..., :2])
+    default = camera.target is None and camera.distance is None and camera.follow == "bodies"
+    if default and (run.grid is None or radius == 0.0 or _is_small(run, radius)):
+        low, high = _extent(run, outlines)
+        centre = np.broadcast_to(0.5 * (low + high), (len(run), 2))
+        half = _enlarged(0.5 * (high - low), aspect)
+    else:
+        centre = path[:, :2]
+        height = ROOM * radius
+        if camera.distance is not None:
+            height = camera.distance * np.tan(0.5 * np.radians(camera.lens))
+        half = height * np.array([1.0 / (aspect or ASPECT), 1.0])
+    return np.stack([centre - half, centre + half], axis=2).reshape(-1, 4)
+
+
+def _extent(run: Run, outlines: Outlines) -> tuple[Array, Array]:
+    """(2,) m, lower and upper corner of the fluid's domain, or of the swept area with a margin."""
+    if run.grid is not None:
+        return np.array(run.grid.origin[:2]), np.array(run.grid.upper[:2])
+    placed = [
+        outline
+        for state in run.sampled(SAMPLES)
+        for outline in [*outlines.placed(state), *flesh_loops(run, state)]
+    ]
+    points = np.concatenate(placed) if placed else np.zeros((1, 2))
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    half = half + 0.6 * max(half.max(), 1e-6)
+    half = np.maximum(half, 0.8 * half.max())
+    return middle - half, middle + half
+
+
+def _is_small(run: Run, radius: float) -> bool:
+    """Whether the fluid's domain is small enough to show it whole."""
+    assert run.grid is not None
+    size = np.array(run.grid.upper) - np.array(run.grid.origin)
+    return bool(size[:2].min() <= 2.0 * MAX_WHOLE_DOMAIN * radius)
+
+
+def _enlarged(half: Array, aspect: float | None) -> Array:
+    """Half sides (2,) that contain `half` and have an aspect, if one is given."""
+    if aspect is None:
+        return half
+    width = max(half[0], half[1] / aspect)
+    return np.array([width, aspect * width])

@@ -1,0 +1,215 @@
+"""The fluid in space: lit smoke of dye, surfaces of vortices, and a coloured slice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import zoom
+from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
+from vtkmodules.vtkRenderingCore import vtkVolume, vtkVolumeProperty
+from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
+
+from flowborne.fluid.grid import Grid
+from flowborne.view import style
+from flowborne.view.run import State
+from flowborne.view.space.lighting import scattered
+from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
+from flowborne.view.space.surfaces import LIT
+
+Array = NDArray[np.float64]
+Pixels = NDArray[np.uint8]
+
+THICK = 0.016
+"""Depth of full smoke that lets through a third of the light, in heights of the picture, or in
+sides of a smaller domain."""
+
+CELLS = 0.8
+"""The same in cells at least: what is thinner has steps in it."""
+
+FAINT, FULL = 0.06, 0.5
+"""Densities below which smoke is not seen, and from which on it is full."""
+
+FINE_VOXELS = 1_500_000
+"""Voxels up to which smoke is drawn on a grid twice as fine."""
+
+
+class Smoke:
+    """A cloud in a plotter."""
+
+    def __init__(self, plotter: pv.Plotter, grid: Grid, dye: SeenDye, height: float) -> None:
+        """`height`: m, of what is seen."""
+        self._grid, self._dye = grid, dye
+        self._depth = max(THICK * min(max(grid.shape), height / grid.spacing), CELLS)
+        self._mapper = vtkGPUVolumeRayCastMapper()
+        self._mapper.SetAutoAdjustSampleDistances(False)
+        self._mapper.SetUseJittering(True)
+        self._volume = vtkVolume()
+        self._volume.SetMapper(self._mapper)
+        self._volume.SetProperty(_property(self._depth * grid.spacing))
+        self._added = False
+        self._plotter = plotter
+
+    def show(self, state: State, toward: Array) -> None:
+        """Show the smoke of a state to a camera in the direction `toward` (3,)."""
+        colour, strength = self._dye.smoke(state)
+        share = np.clip((strength - FAINT) / (FULL - FAINT), 0.0, 1.0)
+        density = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
+        solid = (1.0 - state["open"]).astype(np.float32)
+        light = scattered(density / np.float32(self._depth), solid, toward)
+        filled = np.argwhere(density > 1.0 / 255.0)
+        self._volume.SetVisibility(len(filled) > 0)
+        if len(filled) == 0:
+            return
+        first = np.maximum(filled.min(axis=0) - 2, 0)
+        last = np.minimum(filled.max(axis=0) + 3, density.shape)
+        part = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
+        size = np.prod(last - first)
+        finer = 2 if 8 * size <= FINE_VOXELS else 1
+        lit = np.clip(colour[part] * light[part], 0.0, 1.0)
+        voxels = _voxels(lit, share[part], finer)
+        h = self._grid.spacing / finer
+        image = pv.ImageData(
+            dimensions=voxels.shape[:3],
+            spacing=(h, h, h),
+            origin=np.array(self._grid.origin) + first * self._grid.spacing + 0.5 * h,
+        )
+        image.point_data["voxels"] = voxels.transpose(2, 1, 0, 3).reshape(-1, 4)
+        self._mapper.SetInputData(image)
+        self._mapper.SetSampleDistance(h)
+        if not self._added:
+            self._plotter.add_actor(self._volume, reset_camera=False, render=False)
+            self._added = True
+
+
+def _voxels(colour: NDArray[np.float32], share: NDArray[np.float32], finer: int) -> Pixels:
+    """Colours (nx, ny, nz, 3) and shares of full density (nx, ny, nz) as bytes (..., 4).
+
+    The shares are drawn through by cubics before they are sharpened to densities, so that an edge
+    is as smooth as the smoke is, and not as its cells are.
+    """
+    if finer > 1:
+        how = {"grid_mode": True, "mode": "nearest"}
+        share = np.clip(zoom(share, finer, order=3, **how), 0.0, 1.0)
+        colour = zoom(colour, (finer, finer, finer, 1), order=1, **how)
+    density = share * share * (3.0 - 2.0 * share)
+    return np.rint(255.0 * np.concatenate([colour, density[..., None]], axis=-1)).astype(np.uint8)
+
+
+def _property(depth: float) -> vtkVolumeProperty:
+    """Voxels with a colour of their own, of which `depth` m at full density let through 1/e."""
+    wanted = vtkVolumeProperty()
+    wanted.IndependentComponentsOff()
+    wanted.ShadeOff()
+    wanted.SetInterpolationTypeToLinear()
+    opacity = vtkPiecewiseFunction()
+    opacity.AddPoint(0.0, 0.0)
+    opacity.AddPoint(255.0, 1.0 - np.exp(-1.0))
+    wanted.SetScalarOpacity(opacity)
+    wanted.SetScalarOpacityUnitDistance(depth)
+    return wanted
+
+
+FINE_POINTS = 4_000_000
+"""Points up to which surfaces are found on a grid twice as fine, between which Q is cubic."""
+
+
+class VortexSurfaces:
+    """The surfaces of a state as meshes.
+
+    fine  points up to which they are found on a grid twice as fine
+    """
+
+    def __init__(self, grid: Grid, seen: SeenVortices, fine: int = FINE_POINTS) -> None:
+        self._seen = seen
+        self._finer = 2 if 8 * np.prod(grid.shape) <= fine else 1
+        h = grid.spacing / self._finer
+        self._image = pv.ImageData(
+            dimensions=[self._finer * n for n in grid.shape],
+            spacing=(h, h, h),
+            origin=[x + 0.5 * h for x in grid.origin],
+        )
+
+    def of(self, state: State, toward: Array) -> pv.PolyData:
+        """Triangles; their vertices have "sense" from -1, clockwise to a camera in the direction
+        `toward` (3,), to 1."""
+        for name, values, order in (
+            ("q", self._seen.q(state), 3),
+            ("sense", self._seen.sense(state, toward), 1),
+        ):
+            fine = values.astype(np.float32)
+            if self._finer > 1:
+                fine = zoom(fine, self._finer, order=order, grid_mode=True, mode="nearest")
+            self._image.point_data[name] = fine.ravel(order="F")
+        return self._image.contour([self._seen.level], scalars="q")
+
+
+class Vortices:
+    """The surfaces in a plotter."""
+
+    def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenVortices) -> None:
+        self._surfaces = VortexSurfaces(grid, seen)
+        self._plotter = plotter
+        self._actor: pv.Actor | None = None
+
+    def show(self, state: State, toward: Array) -> None:
+        """Show the vortices of a state to a camera in the direction `toward` (3,)."""
+        surface = self._surfaces.of(state, toward)
+        if self._actor is not None:
+            self._plotter.remove_actor(self._actor, render=False)
+            self._actor = None
+        if surface.n_points == 0:
+            return
+        share = 0.5 + 0.5 * np.clip(surface.point_data["sense"], -1.0, 1.0)[:, None]
+        warm, cold = style.rgb(style.SPIN_LEFT[1]), style.rgb(style.SPIN_RIGHT[1])
+        surface.point_data["colour"] = np.rint(255.0 * (cold + share * (warm - cold))).astype(
+            np.uint8
+        )
+        self._actor = self._plotter.add_mesh(
+            surface,
+            scalars="colour",
+            rgb=True,
+            smooth_shading=True,
+            reset_camera=False,
+            render=False,
+            **{key: value for key, value in LIT.items() if key != "interpolation"},
+        )
+
+
+PIXELS = 1024
+"""Longer side of the plane's image."""
+
+
+class Slice:
+    """The plane in a plotter.
+
+    toward  (3,) direction of the camera at first, which says across which axis the slice is
+    """
+
+    def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenSlice, toward: Array) -> None:
+        self._grid, self._seen = grid, seen
+        self._axis = int(np.argmax(np.abs(toward[:2])))
+        first, second = (n for n in range(3) if n != self._axis)
+        low, high = np.array(grid.origin), np.array(grid.upper)
+        self._corners = np.tile(low, (4, 1))
+        self._corners[[1, 2], first] = high[first]
+        self._corners[[2, 3], second] = high[second]
+        self._quad = pv.PolyData(self._corners, faces=[4, 0, 1, 2, 3])
+        self._quad.active_texture_coordinates = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+        sides = np.array([grid.shape[first], grid.shape[second]])
+        width, height = np.ceil(PIXELS * sides / sides.max()).astype(int).tolist()
+        self._pixels = (width, height)
+        self._actor = plotter.add_mesh(
+            self._quad, lighting=False, texture=pv.Texture(np.zeros((2, 2, 3), np.uint8))
+        )
+
+    def show(self, state: State, focus: Array) -> None:
+        """Show the slice of a state through `focus` (3,) m."""
+        place = (focus[self._axis] - self._grid.origin[self._axis]) / self._grid.spacing
+        image = self._seen.image(state, self._axis, place)
+        small = Image.fromarray(np.ascontiguousarray(image.transpose(1, 0, 2)[::-1]))
+        large = np.asarray(small.resize(self._pixels, Image.Resampling.BICUBIC))
+        self._actor.texture = pv.Texture(large)
+        self._corners[:, self._axis] = focus[self._axis]
+        self._quad.points = self._corners.copy()
