@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.primitives import shape_of
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.own_shapes import Own, own_shape
 
