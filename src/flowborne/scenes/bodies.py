@@ -34,12 +34,12 @@ from flowborne.scenes.schema_solids import (
     SolidsTable,
 )
 from flowborne.solids import mjcf
+from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import element_name
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
-from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from flowborne.scenes.schema_flesh import FleshTable
-from flowborne.solids.quiet import compiled_quietly
+from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
 from flowborne.solids.tissue.mesh import (
     ASTRAY,

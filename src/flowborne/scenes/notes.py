@@ -14,8 +14,7 @@ from flowborne.scenes.not_taken import not_taken, switched_off
 from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_control import RuleFixed
-from flowborne.solids.joined import joined_pairs
-from flowborne.solids.mending import mended_meshes
+from flowborne.solids.mending import joined_pairs, mended_meshes
 from flowborne.solids.model import SolidModel
 
 

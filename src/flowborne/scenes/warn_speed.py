@@ -19,7 +19,7 @@ from flowborne.scenes.fields import MOST_STEPS
 from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_fluid import InflowSide
-from flowborne.solids.outline import Outline
+from flowborne.solids.surfaces import Outline
 
 Array = NDArray[np.float64]
 

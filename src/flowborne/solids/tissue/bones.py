@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from flowborne.phrases import suggestion
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh, Shape
+from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.geoms import (
     displacing_geoms,
     element_name,
     geom_shape,
     rest_poses,
 )
-from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.tissue.distance import signed_distance
 
 Array = NDArray[np.float64]
