@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
-from flowborne.solids.scratch import Scratch, scratch
+from flowborne.solids.momentum import Halfway, halfway
+from flowborne.solids.scratch import Scratch, scratch, twists_about_origin
 from flowborne.solids.state import SolidState
-from flowborne.solids.twists import twists_about_origin
 
 Array = NDArray[np.float64]
 Zones = NDArray[np.int64]

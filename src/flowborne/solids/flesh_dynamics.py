@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, dia_array
 
 from flowborne.solids.dynamics import AT_REST, SETTLED, Rows, Zones, centred, rows_of
-from flowborne.solids.halfway import Halfway, halfway
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import Halfway, halfway
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
 
