@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from flowborne.motion.human.body import human_mjcf
-from flowborne.motion.human.skeleton import SIDES
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flowborne.coupling.world import Setup
-from flowborne.motion.clip_scale import UPRIGHT, standing_axis
+from flowborne.motion.clip_reading import UPRIGHT, standing_axis
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.schema import Scene
 
