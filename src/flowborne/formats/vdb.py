@@ -12,9 +12,9 @@ from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically
 from flowborne.fluid.grid import Grid
 from flowborne.formats.vdb_file import VdbGrid, vdb_bytes
-from flowborne.runs.cell_fields import cell_velocity
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
+from flowborne.runs.states import cell_velocity
 
 
 @provided(".vdb")

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from flowborne.fluid.grid import Grid
 from flowborne.formats.creature import Creature, has_bodies
 from flowborne.formats.stress import cauchy_stress, deformation_gradients, von_mises
-from flowborne.runs.cell_fields import cell_velocity, vorticity
 from flowborne.runs.open_run import OpenRun
+from flowborne.runs.states import cell_velocity, vorticity
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import scratch

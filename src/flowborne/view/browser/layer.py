@@ -10,7 +10,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from flowborne.fluid.grid import Grid
-from flowborne.runs.cell_fields import cell_velocity
+from flowborne.runs.states import cell_velocity
 from flowborne.view import style
 from flowborne.view.arrows import arrow
 from flowborne.view.browser.nodes import show_mesh
