@@ -10,7 +10,7 @@ import pytest
 from flowborne import cli
 from flowborne.motion.bvh import write_clip
 from flowborne.motion.human.gait import gait_clip
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import standard_skeleton
 from flowborne.progress import ProgressDisplay, RunProgress
 from flowborne.scenes.load import scene_names
 

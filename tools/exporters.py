@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 import flowborne as fb
 from flowborne.formats.creature import Creature
-from flowborne.runs.cell_fields import cell_velocity, vorticity
+from flowborne.runs.states import cell_velocity, vorticity
 from marked import with_part
 from read_back import (
     Alembic,

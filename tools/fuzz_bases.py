@@ -15,7 +15,7 @@ import trimesh
 
 from flowborne.motion.bvh import write_clip
 from flowborne.motion.human.gait import gait_clip
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import standard_skeleton
 from flowborne.scenes.load import library
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh, recipe_of
 from fuzz_changes import OUTSIDE

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from flowborne.motion.human.body import human_mjcf
-from flowborne.motion.human.skeleton import SIDES
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.solids.dynamics import Kinematics, kinematics
-from flowborne.solids.effort import holding
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
 from flowborne.solids.flesh_solve import prescribe_flesh
@@ -18,6 +16,7 @@ from flowborne.solids.momentum import (
     momentum,
     potential_energy,
 )
+from flowborne.solids.prescribed import holding
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solvers.cholesky import symmetric_factor

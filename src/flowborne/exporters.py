@@ -11,7 +11,7 @@ from __future__ import annotations
 from flowborne.files.atomic import replaced_whole, write_atomically
 from flowborne.runs.exporters import EXPORTERS, Exporter, Written, endings
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.state_arrays import StateArray
+from flowborne.runs.states import StateArray
 
 __all__ = [
     "Exporter",

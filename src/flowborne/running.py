@@ -23,12 +23,11 @@ from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
-from flowborne.runs.doubts import doubts_of
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, check_space
 from flowborne.runs.states import check_states
-from flowborne.runs.summary import peak_memory, summarise, versions
+from flowborne.runs.summary import doubts_of, peak_memory, summarise, versions
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of

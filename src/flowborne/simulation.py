@@ -21,7 +21,7 @@ from flowborne.errors import PartError, SceneError, described
 from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
-from flowborne.solids.inversion import inversion
+from flowborne.solids.flesh import inversion
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller

@@ -24,8 +24,8 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
-from flowborne.solids.effort import holding
 from flowborne.solids.model import SolidModel
+from flowborne.solids.prescribed import holding
 from flowborne.solids.state import SolidState
 from flowborne.solids.wind import Wind, WindFaces, WindForce
 

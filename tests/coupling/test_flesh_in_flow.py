@@ -16,7 +16,7 @@ from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, BoundaryOpen, BoundaryPeriodic
 from flowborne.fluid.grid import Grid
 from flowborne.solids.dynamics import kinematics
-from flowborne.solids.inversion import inversion
+from flowborne.solids.flesh import inversion
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Law, Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import flowborne as fb
 from flowborne.formats.vdb import VdbGrid, vdb_bytes
-from flowborne.runs.cell_fields import cell_velocity
+from flowborne.runs.states import cell_velocity
 
 tinyvdb = pytest.importorskip("tinyvdb")
 read_back = pytest.importorskip("read_back", exc_type=ImportError)

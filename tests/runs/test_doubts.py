@@ -7,8 +7,8 @@ from flowborne.boundaries import Boundaries, BoundaryPeriodic
 from flowborne.cli import BLAS_THREADS, main
 from flowborne.coupling.world import Fluid
 from flowborne.running import RunOutcome
-from flowborne.runs.doubts import doubts_of
 from flowborne.runs.history import History
+from flowborne.runs.summary import doubts_of
 
 from ..made_runs import run, summary_of
 

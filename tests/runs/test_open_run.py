@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import flowborne as fb
-from flowborne.runs.state_arrays import StateArray
+from flowborne.runs.states import StateArray
 
 
 @pytest.fixture(scope="module")

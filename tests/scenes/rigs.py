@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.motion.human.gait import gait_clip
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import standard_skeleton
 
 Array = NDArray[np.float64]
 

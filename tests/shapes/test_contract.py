@@ -7,8 +7,8 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from flowborne.shapes.kinds import PRIMITIVES, shape_of
 from flowborne.shapes.mesh import ShapeMesh
+from flowborne.shapes.primitives import PRIMITIVES, shape_of
 from flowborne.shapes.shape import ENDLESS, Shape, lattice_points
 
 SIZE = np.array([0.3, 0.5, 0.2])

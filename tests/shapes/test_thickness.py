@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from flowborne.shapes.kinds import PRIMITIVES, shape_of
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.own import ShapeOwn
+from flowborne.shapes.primitives import PRIMITIVES, shape_of
 from flowborne.shapes.thickness import sides, thin_parts, thinnest
-from flowborne.solids.flesh import outer_surface
+from flowborne.solids.elements import outer_surface
 from flowborne.validation.flesh_bars import bar_mesh
 
 

@@ -11,17 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from flowborne.solids.dynamics import (
-    ACTIVE,
-    FRICTION,
-    OFF,
-    PUSHED_UP,
-    UNDAMPED,
-    Rows,
-    SolidSystem,
-    assemble,
-    kinematics,
-)
+from flowborne.solids.constraints import ACTIVE, FRICTION, OFF, PUSHED_UP, Rows
+from flowborne.solids.dynamics import FULL_NEWTON_STEPS, SolidSystem, assemble, kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum, kinetic_energy, momentum, potential_energy
 from flowborne.solids.state import SolidState
@@ -322,12 +313,11 @@ def test_dry_friction_is_found_where_newton_jumps_over_it() -> None:
     )
     A, push, still = np.ones((1, 1)), np.array([0.1]), np.zeros(1)
     slipping = push + rows.friction
-    system = SolidSystem(
-        A, slipping, 1.0, still, (A, push), rows, np.array([PUSHED_UP]), None, still, still
-    )
+    zones = np.array([PUSHED_UP])
+    system = SolidSystem(A, slipping, 1.0, still, rows, zones, None, still, (A, push), still)
     v = slipping
     while (changed := system.updated(v)) is not None:
         system = changed
         v = np.linalg.solve(system.A, system.impulse)
-        assert system.turns <= UNDAMPED + 2
+        assert system.turns <= FULL_NEWTON_STEPS + 2
     assert v == pytest.approx(0.1 / (1.0 + 1e4))

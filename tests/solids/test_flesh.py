@@ -10,11 +10,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from flowborne.solids.dynamics import ACTIVE, ONE_SIDED, assemble
-from flowborne.solids.flesh import Flesh, surface_of
+from flowborne.solids.constraints import ACTIVE, ONE_SIDED
+from flowborne.solids.dynamics import assemble
+from flowborne.solids.elements import surface_of
+from flowborne.solids.flesh import Flesh, inversion
 from flowborne.solids.flesh_dynamics import assemble_flesh, sparse_mass, static_forces
 from flowborne.solids.flesh_solve import FADING, FINE, prescribe_flesh
-from flowborne.solids.inversion import inversion
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState

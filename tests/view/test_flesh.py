@@ -16,7 +16,7 @@ from flowborne.coupling.world import Setup, World
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder
-from flowborne.solids.flesh import surface_of
+from flowborne.solids.elements import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh, flat_mesh

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.solids.clusters import outboard_dofs, rigidify
 from flowborne.solids.dynamics import kinematics
-from flowborne.solids.following import follow
+from flowborne.solids.following import follow, outboard_dofs, rigidify
 from flowborne.solids.momentum import momentum
 from flowborne.solids.state import SolidState
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole, write_text
-from flowborne.runs.columns import unit_of
 from flowborne.runs.exporters import provided
+from flowborne.runs.history import unit_of
 from flowborne.runs.open_run import OpenRun
 
 COUNTS = ("frame", "solver_iterations", "contacts", "flesh_inside_out")

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically
 from flowborne.fluid.grid import Grid
-from flowborne.runs.cell_fields import cell_velocity
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
+from flowborne.runs.states import cell_velocity
 
 Number = TypeVar("Number", np.bool_, np.float32)
 Single = NDArray[np.float32]

@@ -28,9 +28,9 @@ from flowborne.files.atomic import replaced_whole
 from flowborne.fluid.grid import Grid
 from flowborne.formats.creature import Array, Creature, Integers, has_bodies
 from flowborne.kernels.elastic import STABLE_NEO_HOOKEAN
-from flowborne.runs.cell_fields import cell_velocity, vorticity
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
+from flowborne.runs.states import cell_velocity, vorticity
 from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import shape_gradients
 from flowborne.solids.flesh import Flesh

@@ -1,12 +1,11 @@
-"""How joints are told to move: clips, keyframes and formulas. Knows no scene and no fluid.
+"""Prescribed motion of joints: clips, keyframes and formulas. Uses no scene and no fluid.
 
-bvh_hierarchy, bvh_file, bvh   motion capture (BVH) in and out
-clip, euler                    a motion of joints in time, and rotations in any order of axes
-clip_reading                   the clip of a file: its unit, its axis up, which joint is which
-clip_scale, mapping            the unit that makes a person, and names of joints of many programs
-human/                         the human of Figs. 5 and 9, and a walk of its own
+bvh_file, bvh                 motion capture (BVH) in and out
+clip                          a skeleton of rigid bones and its motion
+mapping                       which joint of a clip drives which joint of the human
+clip_reading                  the clip of a file: its unit, its up axis, its mapping
+human/                        the human of Figs. 5 and 9, and a synthetic walk
 clip_curves, clip_motion,
-clip_following, clip_loop,
-clip_seam                      the motion that a clip gives to the joints of a model
-tracks, formula, dual, inflow  curves, keyframes and formulas of time and place, with derivatives
+clip_following                the motion that a clip gives to the joints of a model
+tracks, formula, inflow       curves, keyframes and formulas of time and place, with derivatives
 """

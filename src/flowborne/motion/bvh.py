@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically, write_text
-from flowborne.motion.bvh_file import BvhFile, BvhJoint, load_bvh
+from flowborne.motion.bvh_file import BvhFile, BvhJoint, angles_of, load_bvh, quaternions_of
 from flowborne.motion.clip import Clip
-from flowborne.motion.euler import angles_of, quaternions_of
 from flowborne.quaternions import angle, inverse, product, turned
 
 Array = NDArray[np.float64]

@@ -18,14 +18,18 @@ from scipy.spatial.transform import Rotation
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.phrases import suggestion
-from flowborne.quaternions import continuous, inverse, product, turned, twist
+from flowborne.quaternions import about, angle, continuous, inverse, product, turned, twist
 from flowborne.solids import geoms
 from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
 
 Array = NDArray[np.float64]
+
 Integers = NDArray[np.int64]
 
 UP = np.array([0.0, 0.0, 1.0])
+
+CLOSED = 1e-4
+"""rad or m within which a clip that ends as it begins is taken for one whole cycle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,3 +194,50 @@ def columns_of(model: SolidModel, joints: Sequence[int]) -> Columns:
         v=np.array(v, dtype=np.int64),
         dofs=np.concatenate([model.dofs_of(name) for name in names]),
     )
+
+
+@dataclass(frozen=True)
+class Stride:
+    """What moves the first cycle onto the second: a turn about the vertical and a level shift.
+
+    The height is no part of it: over many cycles on level ground the least difference between the
+    clip's two ends would lift the feet off or sink them.
+
+    turn   rad
+    shift  m, x + iy, after the turn about the world's origin
+    """
+
+    turn: float = 0.0
+    shift: complex = 0.0j
+
+    def times(self, cycles: int) -> tuple[Array, Array]:
+        """(4,) turn and (3,) shift that this many strides add up to; fewer than 0 go back."""
+        if abs(np.sin(self.turn / 2.0)) < 1e-12:
+            total = self.shift * cycles
+        else:
+            ratio = np.sin(cycles * self.turn / 2.0) / np.sin(self.turn / 2.0)
+            total = self.shift * np.exp(0.5j * (cycles - 1) * self.turn) * ratio
+        turn = about(UP, np.array(cycles * self.turn))
+        return turn, np.array([total.real, total.imag, 0.0])
+
+
+def stride_between(columns: Columns, begin: Array, end: Array) -> Stride:
+    """Stride that brings the first free joint of a row as near to another row as it can."""
+    if not len(columns.free):
+        return Stride()
+    first = columns.free[0]
+    last, before = columns.quaternions(end)[first], columns.quaternions(begin)[first]
+    turn = float(twist(product(last, inverse(before)), UP))
+    shift = columns.places(end)[0] - turned(about(UP, np.array(turn)), columns.places(begin)[0])
+    return Stride(turn, complex(shift[0], shift[1]))
+
+
+def mismatch(columns: Columns, begin: Array, end: Array, stride: Stride) -> tuple[float, str]:
+    """Largest difference, rad or m, between a row and another moved on by a stride; its joint."""
+    moved = columns.moved(begin, *stride.times(1))
+    turns = angle(product(inverse(columns.quaternions(moved)), columns.quaternions(end)))
+    off = np.abs(columns.places(end) - columns.places(moved)).max(axis=-1)
+    hinges = np.abs(columns.angles(end) - columns.angles(moved))
+    differences = np.concatenate([turns, off, hinges])
+    worst = int(np.argmax(differences))
+    return float(differences[worst]), columns.names[columns.owners[worst]]

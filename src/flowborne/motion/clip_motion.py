@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from flowborne.motion.clip_curves import Columns
-from flowborne.motion.clip_loop import Stride
+from flowborne.motion.clip_curves import Columns, Stride
 from flowborne.quaternions import inverse, product
 from flowborne.solids.model import SolidModel
 

@@ -1,7 +1,7 @@
 """Formulas of a scene in the time t, with their exact derivative.
 
-A formula is written as in Python and never run as Python: its syntax tree may hold numbers, names,
-arithmetic and calls of a few functions, and nothing else.
+A formula is written as in Python and never run as Python: its syntax tree may contain only numbers,
+names, arithmetic and calls of a few functions. It is evaluated in dual numbers.
 """
 
 from __future__ import annotations
@@ -14,9 +14,107 @@ from dataclasses import dataclass, field
 from textwrap import shorten
 
 from flowborne.errors import SceneError
-from flowborne.motion import dual
-from flowborne.motion.dual import Dual
 from flowborne.phrases import suggestion
+
+
+@dataclass(frozen=True)
+class Dual:
+    """value + slope e with e^2 = 0: a number and its derivative by time.
+
+    At a kink (`absolute`, `least`, `most`) the slope is the one-sided derivative for later times.
+    """
+
+    value: float
+    slope: float = 0.0
+
+    def __neg__(self) -> Dual:
+        return Dual(-self.value, -self.slope)
+
+    def __pos__(self) -> Dual:
+        return self
+
+    def __add__(self, other: Dual) -> Dual:
+        return Dual(self.value + other.value, self.slope + other.slope)
+
+    def __sub__(self, other: Dual) -> Dual:
+        return Dual(self.value - other.value, self.slope - other.slope)
+
+    def __mul__(self, other: Dual) -> Dual:
+        return Dual(self.value * other.value, self.slope * other.value + self.value * other.slope)
+
+    def __truediv__(self, other: Dual) -> Dual:
+        ratio = self.value / other.value
+        return Dual(ratio, (self.slope - ratio * other.slope) / other.value)
+
+    def __mod__(self, other: Dual) -> Dual:
+        whole = math.floor(self.value / other.value)
+        return Dual(self.value % other.value, self.slope - whole * other.slope)
+
+    def __pow__(self, other: Dual) -> Dual:
+        base, exponent = self.value, other.value
+        power = math.pow(base, exponent)
+        slope = 0.0
+        if self.slope and exponent:
+            slope += exponent * math.pow(base, exponent - 1.0) * self.slope
+        if other.slope:
+            slope += power * math.log(base) * other.slope
+        return Dual(power, slope)
+
+
+def sine(x: Dual) -> Dual:
+    return Dual(math.sin(x.value), math.cos(x.value) * x.slope)
+
+
+def cosine(x: Dual) -> Dual:
+    return Dual(math.cos(x.value), -math.sin(x.value) * x.slope)
+
+
+def tangent(x: Dual) -> Dual:
+    value = math.tan(x.value)
+    return Dual(value, (1.0 + value**2) * x.slope)
+
+
+def exponential(x: Dual) -> Dual:
+    value = math.exp(x.value)
+    return Dual(value, value * x.slope)
+
+
+def logarithm(x: Dual) -> Dual:
+    return Dual(math.log(x.value), x.slope / x.value)
+
+
+def square_root(x: Dual) -> Dual:
+    value = math.sqrt(x.value)
+    return Dual(value, 0.5 * x.slope / value if x.slope else 0.0)
+
+
+def hyperbolic_tangent(x: Dual) -> Dual:
+    value = math.tanh(x.value)
+    return Dual(value, (1.0 - value**2) * x.slope)
+
+
+def absolute(x: Dual) -> Dual:
+    return most(x, -x)
+
+
+def least(*given: Dual) -> Dual:
+    return min(given, key=_shortly_after)
+
+
+def most(*given: Dual) -> Dual:
+    return max(given, key=_shortly_after)
+
+
+def _shortly_after(x: Dual) -> tuple[float, float]:
+    """Sort key: the order of numbers a short time later."""
+    return x.value, x.slope
+
+
+def ramp(x: Dual, length: Dual = Dual(1.0)) -> Dual:
+    """Smooth step 3 s^2 - 2 s^3 with s = x / length from 0 to 1."""
+    s = least(most(x / length, Dual(0.0)), Dual(1.0))
+    return s * s * (Dual(3.0) - Dual(2.0) * s)
+
 
 OPERATORS: Mapping[type[ast.operator], Callable[[Dual, Dual], Dual]] = {
     ast.Add: operator.add,
@@ -26,29 +124,31 @@ OPERATORS: Mapping[type[ast.operator], Callable[[Dual, Dual], Dual]] = {
     ast.Mod: operator.mod,
     ast.Pow: operator.pow,
 }
+
 SIGNS: Mapping[type[ast.unaryop], Callable[[Dual], Dual]] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
+
 FUNCTIONS: Mapping[str, tuple[Callable[..., Dual], int, float]] = {
-    "sin": (dual.sine, 1, 1),
-    "cos": (dual.cosine, 1, 1),
-    "tan": (dual.tangent, 1, 1),
-    "exp": (dual.exponential, 1, 1),
-    "log": (dual.logarithm, 1, 1),
-    "sqrt": (dual.square_root, 1, 1),
-    "tanh": (dual.hyperbolic_tangent, 1, 1),
-    "abs": (dual.absolute, 1, 1),
-    "min": (dual.least, 2, math.inf),
-    "max": (dual.most, 2, math.inf),
-    "ramp": (dual.ramp, 1, 2),
+    "sin": (sine, 1, 1),
+    "cos": (cosine, 1, 1),
+    "tan": (tangent, 1, 1),
+    "exp": (exponential, 1, 1),
+    "log": (logarithm, 1, 1),
+    "sqrt": (square_root, 1, 1),
+    "tanh": (hyperbolic_tangent, 1, 1),
+    "abs": (absolute, 1, 1),
+    "min": (least, 2, math.inf),
+    "max": (most, 2, math.inf),
+    "ramp": (ramp, 1, 2),
 }
-"""Name -> function, fewest and most arguments. Angles of sin, cos and tan are radians."""
+"""Name -> function, fewest and most arguments. Angles of sin, cos and tan are in radians."""
 
 RESERVED = ("t", "pi", *FUNCTIONS)
-"""Names that no constant may have."""
+"""Names that a constant must not have."""
 
-LONGEST = 80
+MOST_LETTERS = 80
 """Letters of a formula in a message."""
 
 GRAMMAR = (
@@ -64,7 +164,7 @@ class Formula:
 
     text       such as "amplitude * ramp(t) * sin(2*pi*t)"
     constants  name -> value
-    raises     SceneError when it is no formula
+    raises     SceneError for a text that is not a formula
     """
 
     text: str
@@ -84,7 +184,7 @@ class Formula:
         object.__setattr__(self, "_tree", tree)
 
     def __str__(self) -> str:
-        return f"formula '{shorten(self.text, LONGEST)}'"
+        return f"formula '{shorten(self.text, MOST_LETTERS)}'"
 
     def names(self) -> set[str]:
         """Constants that it uses."""
@@ -104,7 +204,7 @@ class Formula:
         return found
 
     def _check(self, node: ast.expr) -> None:
-        """Raise SceneError for anything that is not of the grammar."""
+        """Raise SceneError for anything outside the grammar."""
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
             float(node.value)  # type: ignore[arg-type]
         elif isinstance(node, ast.Name):

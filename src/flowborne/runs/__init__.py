@@ -1,1 +1,1 @@
-"""Run folders: what a run leaves behind, checkpoints, resuming."""
+"""Run folders: what a run leaves behind, checkpoints, resuming, summaries."""

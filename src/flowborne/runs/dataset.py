@@ -12,8 +12,8 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from flowborne.fluid.grid import Grid
-from flowborne.runs.columns import HistoryArray
-from flowborne.runs.state_arrays import StateArray
+from flowborne.runs.history import HistoryArray
+from flowborne.runs.states import StateArray
 
 
 class LazyStates(BackendArray):

@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 from flowborne.extras import optional
 from flowborne.files.given import read_json
 from flowborne.fluid.grid import Grid
-from flowborne.runs.columns import history_arrays
-from flowborne.runs.history import history_columns, history_rows
+from flowborne.runs.history import history_arrays, history_columns, history_rows
 from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
-from flowborne.runs.state_arrays import DYE, StateArray, quantity
-from flowborne.runs.states import read_state
+from flowborne.runs.states import DYE, StateArray, quantity, read_state
 
 if TYPE_CHECKING:
     import xarray

@@ -16,13 +16,13 @@ from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import SolidsTable
 from flowborne.solids import mjcf
+from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import element_name
 from flowborne.solids.joint_kinds import FREE, HINGE, SLIDE, joint_kind, joint_unit
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
-from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 

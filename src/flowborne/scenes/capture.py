@@ -14,8 +14,7 @@ from flowborne.motion.clip_motion import TrajectoryClip
 from flowborne.motion.clip_reading import Capture, Reading, read_clip, with_still
 from flowborne.motion.human.body import ELBOWS, human_mjcf
 from flowborne.motion.human.gait import gait_clip
-from flowborne.motion.human.skeleton import SIDES
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_human import ClipTable, HumanTable

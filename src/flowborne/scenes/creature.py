@@ -15,7 +15,7 @@ from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.geoms import solid_geoms
 from flowborne.solids.model import SolidModel
-from flowborne.solids.outline import Outline
+from flowborne.solids.surfaces import Outline
 
 Array = NDArray[np.float64]
 

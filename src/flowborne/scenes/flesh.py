@@ -14,9 +14,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from flowborne.scenes.domain import Domain
+from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
-from flowborne.solids.quiet import compiled_quietly
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
 from flowborne.solids.tissue.mesh import (

@@ -14,9 +14,8 @@ from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.not_taken import not_taken, switched_off
 from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
-from flowborne.solids.joined import joined_pairs
 from flowborne.solids.joint_kinds import HINGE, SLIDE, joint_kind, joint_unit
-from flowborne.solids.mending import mended_meshes
+from flowborne.solids.mending import joined_pairs, mended_meshes
 from flowborne.solids.model import SolidModel
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from flowborne.coupling.world import Setup
 from flowborne.motion.bvh import STILL
-from flowborne.motion.clip_scale import UPRIGHT, leg_length, named, standing_axis
+from flowborne.motion.clip_reading import UPRIGHT, leg_length, named, standing_axis
 from flowborne.motion.human.clip_skeleton import lost_bones
 from flowborne.motion.human.skeleton import PARENTS
 from flowborne.scenes.capture import capture_of

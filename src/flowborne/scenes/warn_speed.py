@@ -19,7 +19,7 @@ from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import InflowSide
 from flowborne.solids.joint_kinds import joint_unit
-from flowborne.solids.outline import Outline
+from flowborne.solids.surfaces import Outline
 from flowborne.tables import MOST_STEPS
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Geometries: one contract, `shape.Shape`, and a file for each kind; and how to add to them.
+"""Geometries: one contract, `shape.Shape`, its kinds, and how to add to them.
 
 A shape knows its volume, its distance, what a slab or a line cuts out of it, its surface and how
 thick it is, all in its own frame; no other room asks what kind it is. The distance at the nodes of

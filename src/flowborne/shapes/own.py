@@ -11,8 +11,8 @@ from flowborne.errors import PartError
 from flowborne.extras import optional
 from flowborne.kernels.node_distance import BAND, allow_for_curvature
 from flowborne.registry import Registry
-from flowborne.shapes.kinds import PRIMITIVES
 from flowborne.shapes.mesh import ShapeMesh
+from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Array, Integers, Mesh, Samples, Shape, lattice, lattice_points
 
 ACROSS = 48

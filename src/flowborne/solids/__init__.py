@@ -1,7 +1,8 @@
 """The articulated body and its flesh: model, assembled A and b, prescribed joints, effort, wind.
 
 A model with flesh is assembled sparsely (tissue, elements, elasticity, flesh, flesh_dynamics,
-flesh_order, flesh_solve); `driven` is what the coupling sees of either.
+flesh_solve); `driven` is the interface of both kinds for the coupling.
 
-Knows no fluid. Paper: sections 2 and 3 (eqs. 1-4), rigid clusters of sections 3.3 and 5.
+No module here uses the fluid. Paper: sections 2 and 3 (eqs. 1-4), rigid clusters of sections 3.3
+and 5.
 """

@@ -1,56 +1,38 @@
-"""Kinematics and the solid's own linear system A (v+ - v) = dt b, assembled by MuJoCo."""
+"""Kinematics, and the linear system A (v+ - v) = dt b of the bodies, assembled by MuJoCo."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from flowborne.solids.halfway import Halfway, halfway
+from flowborne.solids.constraints import Rows, Zones, rows_of
 from flowborne.solids.model import SolidModel
-from flowborne.solids.scratch import Scratch, scratch
+from flowborne.solids.momentum import Halfway, halfway
+from flowborne.solids.scratch import Scratch, scratch, twists_about_origin
 from flowborne.solids.state import SolidState
-from flowborne.solids.twists import twists_about_origin
 
 Array = NDArray[np.float64]
-Zones = NDArray[np.int64]
 
-OFF, ACTIVE, PUSHED_UP, PUSHED_DOWN = 0, 1, 2, 3
-"""State of a constraint row, numbered as mjtConstraintState: no force, a force linear in the
-acceleration, or the whole of the dry friction along or against the row's direction."""
+CORIOLIS_TOLERANCE = 1e-13
+"""Impulses of Coriolis forces are converged to this share of the momentum."""
 
-FRICTION_SIGN = np.array([0.0, 0.0, 1.0, -1.0])
-"""Of the dry friction in each zone."""
-
-TWO_SIDED, FRICTION, ONE_SIDED = 0, 1, 2
-"""Kinds of rows: equalities; dry friction; limits and the edges of contact pyramids."""
-
-KIND_OF_ROW = np.array([TWO_SIDED, FRICTION, FRICTION, *[ONE_SIDED] * 5])
-FIRST_CONTACT = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
-
-NEAR = 1e-11
-"""A row within this share of its reference of a change of zone stays where it is."""
-
-SETTLED = 1e-13
-"""Forces of Coriolis are found to this share of the momentum."""
-
-UNDAMPED = 8
-"""Turns of Newton's method for the contacts after which it searches along its direction."""
+FULL_NEWTON_STEPS = 8
+"""Full steps of Newton's method for the contacts, before it searches along its direction."""
 
 HALVINGS = 40
-"""Of the interval in which such a search looks for the least of a convex function."""
+"""Halvings of the interval in which such a search looks for the minimum of a convex function."""
 
-AT_REST = 1e-12
-"""What is slower than this is at rest, m/s and rad/s."""
+REST_SPEED = 1e-12
+"""Slower motion counts as rest, m/s and rad/s."""
 
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Poses of everything, in world axes.
+    """Poses of bodies, geometries and flesh, in world axes.
 
     body_position   (nbody, 3) m
     body_rotation   (nbody, 3, 3) body's frame to the world's
@@ -58,8 +40,8 @@ class Kinematics:
     geom_rotation   (ngeom, 3, 3) geometry's frame to the world's
     own_centroid    (nbody, 3) centroid of the displaced volume in the body's frame, m
     mass_centre     (nbody, 3) centre of mass, m
-    cdof            (nv, 6) angular velocity that unit velocity of each dof gives what it moves,
-                    and velocity of the point at its `dof_centre`
+    cdof            (nv, 6) for unit velocity of each dof: angular velocity of the bodies that it
+                    moves, and velocity of the point at its `dof_centre`
     dof_centre      (nv, 3) m
     moves           (nbody, nv) whether a dof moves a body
     vertices        (n, 3) of flesh, m
@@ -81,129 +63,100 @@ class Kinematics:
     @cached_property
     def centroid(self) -> Array:
         """(nbody, 3) centroid of the displaced volume, m."""
-        turned = np.matmul(self.body_rotation, self.own_centroid[:, :, None])
-        return self.body_position + turned[:, :, 0]
+        rotated = np.matmul(self.body_rotation, self.own_centroid[:, :, None])
+        return self.body_position + rotated[:, :, 0]
 
     @cached_property
     def twist_jacobian(self) -> Array:
-        """(nbody, 6, nv) from v to each body's twist: velocity of the point at the world origin,
-        then angular velocity."""
+        """(nbody, 6, nv) from v to the twist of each body: velocity of the point at the world
+        origin, then angular velocity."""
         twists = np.ascontiguousarray(twists_about_origin(self.cdof, self.dof_centre).T)
         return np.where(self.moves[:, None, :], twists, 0.0)
 
     @cached_property
     def twist_rows(self) -> Array:
-        """(6 nbody, nv) the same, the twists of all bodies in turn."""
+        """(6 nbody, nv) the same as a matrix, body after body."""
         bodies, components, dofs = self.twist_jacobian.shape
         return self.twist_jacobian.reshape(bodies * components, dofs)
 
     @cached_property
     def jacobian(self) -> csr_array:
-        """(k, nv) T, from v to the motion of everything: all twists, then the velocities of all
-        vertices."""
+        """(k, nv) T, from v to all twists, followed by the velocities of all vertices."""
         both = [csr_array(self.twist_rows), self.vertex_jacobian]
         return csr_array(vstack(both, format="csr"))
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Constraint rows; the row's force on v is J^T D (aref - J a) while active.
-
-    J, D, aref  (k, nv), (k,), (k,) Jacobian, stiffness and reference acceleration
-    friction    (k,) largest dry friction
-    kind        (k,) TWO_SIDED, FRICTION or ONE_SIDED
-    contact     (k,) number of the contact that a row belongs to, -1 for others
-    """
-
-    J: Array
-    D: Array
-    aref: Array
-    friction: Array
-    kind: NDArray[np.int64]
-    contact: NDArray[np.int64]
-
-    def zones(self, acceleration: Array, present: Zones) -> Zones:
-        """(k,) state of each row at an acceleration (nv,); a tie keeps the present state."""
-        motion = self.J @ acceleration
-        slip = motion - self.aref
-        margin = NEAR * (1.0 + np.abs(motion) + np.abs(self.aref))
-        sliding = self.kind == FRICTION
-        edge = np.where(sliding, self.friction / self.D, 0.0)
-        inside = np.where(sliding, np.abs(slip) < edge, slip < 0.0) | (self.kind == TWO_SIDED)
-        beyond = np.where(slip < 0.0, PUSHED_UP, PUSHED_DOWN)
-        zones = np.where(inside, ACTIVE, np.where(sliding, beyond, OFF))
-        tie = (np.abs(np.abs(slip) - edge) <= margin) & (self.kind != TWO_SIDED)
-        return np.where(tie, present, zones)
-
-    def pushing(self, zones: Zones) -> int:
-        """Number of contacts with an active row."""
-        active = self.contact[zones == ACTIVE]
-        return int(np.unique(active[active >= 0]).size)
-
-    def force(self, acceleration: Array, zones: Zones) -> Array:
-        """(k,) force along each row's direction at an acceleration (nv,), if in these zones."""
-        spring = self.D * (self.aref - self.J @ acceleration)
-        return np.where(zones == ACTIVE, spring, FRICTION_SIGN[zones] * self.friction)
-
-    def acting(self, zones: Zones) -> tuple[Array, Array, Array]:
-        """J and D of the active rows, and the force (nv,) of all rows at no acceleration."""
-        on = zones == ACTIVE
-        J, D = self.J[on], self.D[on]
-        slipping = FRICTION_SIGN[zones] * self.friction
-        return J, D, J.T @ (D * self.aref[on]) + self.J.T @ slipping
-
-
-@dataclass(frozen=True)
-class SolidSystem:
-    """A (v+ - v) = dt b, written A v+ = impulse.
+class System:
+    """The equations of motion of a step, A (v+ - v) = dt b, written A v+ = impulse.
 
     A        (nv, nv) symmetric positive definite
     impulse  (nv,) r = A v + dt b
     dt       s
     v        (nv,) velocity before the step
-    smooth   (A, r) without the constraint rows
-    rows     constraint rows, and zones (k,), the state of each that A and impulse are made for
-    halfway  the forces half-way through the step, and own (nv,), the impulse that they give here
-    at       (nv,) velocity whose zones these are, found in as many turns
+    rows     constraint rows, None without any; zones (k,), the zone of each
+    halfway  forces at the half-way velocity of the step, None where they are those at v
+    own      (nv,) impulse of these forces, contained in `impulse`
     """
 
-    A: Array
+    A: Array | csr_array
     impulse: Array
     dt: float
     v: Array
-    smooth: tuple[Array, Array]
     rows: Rows | None
     zones: Zones
     halfway: Halfway | None
     own: Array
-    at: Array
-    turns: int = 0
 
     @property
     def contacts(self) -> int:
-        """Number of contacts that push."""
+        """Number of contacts with an active row."""
         return 0 if self.rows is None else self.rows.pushing(self.zones)
 
-    def updated(self, v_plus: Array) -> SolidSystem | None:
-        """System with the contacts, limits and Coriolis forces that `v_plus` (nv,) implies.
+    def zones_at(self, v: Array) -> Zones:
+        """(k,) zones of the rows for a velocity (nv,) after the step."""
+        if self.rows is None:
+            return self.zones
+        return self.rows.zones((v - self.v) / self.dt, self.zones)
 
-        None when it has them. The repeated solve is Newton's method on a piecewise quadratic
-        function, and a fixed point for the forces of Coriolis. It ends after few turns as a rule;
-        when it has not, contacts are those where the function is least on the way from where they
-        were found before, so that it does not go in circles. The caller bounds the number of turns.
+    def own_at(self, v_plus: Array) -> tuple[Array, bool]:
+        """(nv,) `own` for a velocity (nv,) after the step, and whether it is unchanged."""
+        if self.halfway is None:
+            return self.own, True
+        own, rounding = self.halfway.impulse(v_plus)
+        scale = abs(self.A) @ (np.abs(v_plus) + REST_SPEED)
+        return own, bool((np.abs(own - self.own) <= CORIOLIS_TOLERANCE * scale + rounding).all())
+
+
+@dataclass(frozen=True)
+class SolidSystem(System):
+    """The system of bones alone; A and impulse contain the constraint rows.
+
+    smooth  (A, r) without the rows
+    at      (nv,) velocity whose zones these are
+    turns   number of updates
+    """
+
+    A: Array
+    smooth: tuple[Array, Array]
+    at: Array
+    turns: int = 0
+
+    def updated(self, v_plus: Array) -> SolidSystem | None:
+        """System with the contacts, limits and Coriolis forces at `v_plus` (nv,), or None if equal.
+
+        Repeated solves are Newton's method on a piecewise quadratic function, and a fixed-point
+        iteration for the Coriolis forces. After FULL_NEWTON_STEPS the zones are those at the
+        minimum of the function between the last point and `v_plus`, so that the iteration does not
+        cycle. The caller bounds the number of turns.
         """
-        zones, own, at, settled = self.zones, self.own, v_plus, True
-        if self.rows is not None:
-            zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
-            settled = np.array_equal(zones, self.zones)
-            if not settled and self.turns >= UNDAMPED:
-                at = self._least_towards(v_plus, self.rows)
-                zones = self.rows.zones((at - self.v) / self.dt, self.zones)
-        if self.halfway is not None:
-            own, rounding = self.halfway.impulse(v_plus)
-            room = SETTLED * (np.abs(self.A) @ (np.abs(v_plus) + AT_REST)) + rounding
-            settled = settled and bool((np.abs(own - self.own) <= room).all())
-        if settled:
+        zones, at = self.zones_at(v_plus), v_plus
+        settled = np.array_equal(zones, self.zones)
+        if self.rows is not None and not settled and self.turns >= FULL_NEWTON_STEPS:
+            at = self._least_towards(v_plus, self.rows)
+            zones = self.zones_at(at)
+        own, same = self.own_at(v_plus)
+        if settled and same:
             return None
         A, impulse = self.smooth
         system = self._with(zones, A, impulse + own - self.own)
@@ -212,8 +165,8 @@ class SolidSystem:
     def _least_towards(self, v_plus: Array, rows: Rows) -> Array:
         """(nv,) velocity of least cost between `at` and the solution `v_plus` for its zones.
 
-        The cost is the one whose gradient is A v+ - impulse with the rows' forces as they are at
-        v+. A lacks the fluid's mass, with which the least would lie nearer to `v_plus`.
+        The gradient of the cost is A v+ - impulse with the forces of the rows at v+. A lacks the
+        mass of the fluid, which would move the minimum closer to `v_plus`.
         """
         along = v_plus - self.at
         curvature, pull = along @ self.A @ along, self.dt * (rows.J @ along)
@@ -240,7 +193,7 @@ class SolidSystem:
 
 @cache
 def no_flesh(nv: int) -> csr_array:
-    """(0, nv) the Jacobian of the vertices of a model that has none."""
+    """(0, nv) Jacobian of the vertices of a model without flesh."""
     return csr_array((0, nv))
 
 
@@ -277,18 +230,17 @@ def assemble(
         A = M + dt/2 D + dt^2/4 K + Ja^T Da Ja      b = f + Ja^T Da aref + dry friction
 
     K and D are those of springs and dampers of joints and tendons; Ja are the active rows, first
-    those of MuJoCo's own solution under `applied`. Positions move by dt v before v changes, so that
-    f, the forces there, are half-way between the velocities, and this is Newmark's average
-    acceleration: second order in dt, and springs lose no energy. MuJoCo's own step, with
-    A = M + dt D + dt^2 K, damps an oscillation of frequency omega by omega dt / 2 in each radian.
+    those of MuJoCo's solution under `applied`. Positions move by dt v before v changes, so the
+    forces f at the new positions lie half-way between the velocities, and the scheme is Newmark's
+    average acceleration: second order in dt, and springs lose no energy. MuJoCo's own step, with
+    A = M + dt D + dt^2 K, damps an oscillation of frequency omega by omega dt / 2 per radian.
 
     applied  (nv,) generalised force, N or N m
     dt       s
-    before   state before the positions moved. With it, `updated` brings the forces of Coriolis to
-             the velocity half-way through the step; without, they are those at v, and A a = b is
-             solved by MuJoCo's acceleration
-    guess    (nv,) velocity after the step for which the forces of Coriolis are found at first; v
-             when None
+    before   state before the positions moved. With it, `updated` evaluates the Coriolis forces at
+             the half-way velocity of the step; without it, they are those at v, and MuJoCo's
+             acceleration solves A a = b
+    guess    (nv,) velocity after the step for the first Coriolis forces; v when None
     raises   ValueError when the model has flesh
     """
     if model.flesh is not None:
@@ -305,11 +257,11 @@ def assemble(
         middle = halfway(model, s, before, state, dt, still, mass, force + s.bias)
         impulse, _ = middle.impulse(v if guess is None else guess)
     full = _with_rows(A, impulse, v, dt, rows, zones)
-    return SolidSystem(full[0], full[1], dt, v, (A, impulse), rows, zones, middle, impulse, v)
+    return SolidSystem(*full, dt, v, rows, zones, middle, impulse, (A, impulse), v)
 
 
 def _smooth(model: SolidModel, s: Scratch, mass: Array) -> tuple[Array, Array]:
-    """A and b without constraint rows; after mj_forward, with its mass matrix (nv, nv)."""
+    """A and b without constraint rows, from the mass matrix (nv, nv); call it after mj_forward."""
     data = s.data
     if not data.efm_active:
         return mass, s.smooth.copy()
@@ -324,70 +276,8 @@ def _smooth(model: SolidModel, s: Scratch, mass: Array) -> tuple[Array, Array]:
 
 
 def centred(implicit: Array, stiff: Array, dt: float) -> Array:
-    """dt/2 D + dt^2/4 K of MuJoCo's dt D + dt^2 K and dt K."""
+    """dt/2 D + dt^2/4 K, from MuJoCo's dt D + dt^2 K and dt K."""
     return 0.5 * implicit - 0.25 * dt * stiff
-
-
-def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:
-    """Constraint rows and their zones in MuJoCo's own solution; after mj_forward.
-
-    Contacts without friction have one row, whatever their condim.
-    """
-    data, count = s.data, int(s.data.nefc)
-    if count == 0:
-        return None, np.zeros(0, np.int64)
-    kind = data.efc_type
-    if mujoco.mj_isSparse(s.mj):
-        J = np.zeros((count, model.nv))
-        row = np.repeat(np.arange(count), data.efc_J_rownnz)
-        J[row, data.efc_J_colind[: len(row)]] = data.efc_J[: len(row)]
-    else:
-        J = np.array(data.efc_J).reshape(count, model.nv)
-    rows = Rows(
-        J,
-        np.array(data.efc_D),
-        np.array(data.efc_aref),
-        np.array(data.efc_frictionloss),
-        KIND_OF_ROW[kind],
-        np.where(kind >= FIRST_CONTACT, data.efc_id, -1),
-    )
-    return merge_frictionless(rows, data.efc_state.astype(np.int64), s)
-
-
-def merge_frictionless(rows: Rows, zones: Zones, s: Scratch) -> tuple[Rows, Zones]:
-    """One row along the normal in place of the pyramid of every contact without friction.
-
-    The edges of such a pyramid are the normal, but for a friction of mjMINMU = 1e-5 that MuJoCo
-    leaves, and 1 / (2 mu^2) times as stiff: rounding decides which of them are active, and they
-    take turns without end. Their mean is the normal's row, of stiffness 2 mu^2 D, as MuJoCo makes
-    it for condim 1.
-    """
-    contacts = s.data.contact
-    used = np.arange(contacts.friction.shape[1]) < contacts.dim[:, None] - 1
-    friction = np.where(used, contacts.friction, 0.0).max(axis=1)
-    bare = (contacts.dim > 1) & (friction <= mujoco.mjMINMU)
-    edge = (rows.contact >= 0) & np.isin(rows.contact, np.flatnonzero(bare))
-    if not edge.any():
-        return rows, zones
-    # the number of its new row for every old one
-    follows = edge & np.append(False, edge[:-1] & (rows.contact[1:] == rows.contact[:-1]))
-    first = np.flatnonzero(~follows)
-    group = np.cumsum(~follows) - 1
-    count = np.bincount(group)
-    mean = csr_array((1.0 / count[group], (group, np.arange(len(group)))))
-    D = rows.D[first].copy()
-    D[edge[first]] *= 2.0 * contacts.mu[rows.contact[first[edge[first]]]] ** 2
-    active = np.zeros(len(first), bool)
-    np.logical_or.at(active, group, zones == ACTIVE)
-    merged = Rows(
-        mean @ rows.J,
-        D,
-        mean @ rows.aref,
-        rows.friction[first],
-        rows.kind[first],
-        rows.contact[first],
-    )
-    return merged, np.where(edge[first], np.where(active, ACTIVE, OFF), zones[first])
 
 
 def _with_rows(

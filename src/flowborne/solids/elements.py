@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -106,3 +108,42 @@ def shape_gradients(points: Array, elements: Indices) -> tuple[Array, Array]:
         L[None, :, i, None] * slope[:, None, j] + L[None, :, j, None] * slope[:, None, i]
     )
     return np.concatenate([at_corners, between], axis=2), measures(points, simplices)
+
+
+def prism(triangles: Indices, count: int) -> Indices:
+    """(k, 3) the outward skin of a prism over triangles (m, 3) of `count` nodes, whose vertices are
+    the nodes at its lower end and then those at its upper one."""
+    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, at, shared = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    a, b = sides[np.sort(at[shared == 1])].T
+    walls = [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
+    return np.concatenate([triangles[:, ::-1], triangles + count, *walls])
+
+
+def surface_of(elements: Indices) -> Indices:
+    """(k, 3) the faces of right-handed tetrahedra (m, 4) that only one has, turned outward."""
+    corners = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+    faces = elements[:, corners].reshape(-1, 3)
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.asarray(faces[np.sort(first[count == 1])])
+
+
+def outer_surface(points: Array, elements: Indices) -> Indices:
+    """(k, 3) outward triangles around tetrahedra (m, 4) of points (n, 3), those of holes left out.
+
+    What flesh encloses, bones for the most part, counts as inside. A sheet is what hangs together
+    by edges: where flesh is thin, the one around a bone may have corners in common with the outer.
+    """
+    triangles = surface_of(elements)
+    count = len(triangles)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, edge, around = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    by_edge = np.argsort(edge, kind="stable")
+    of_two = around[edge[by_edge]] == 2  # where sheets touch along an edge it has four
+    one, other = (by_edge[of_two] // 3).reshape(-1, 2).T
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    sheet = connected_components(graph, directed=False)[1]
+    enclosed = np.bincount(sheet, np.linalg.det(points[triangles]))
+    return np.asarray(triangles[enclosed[sheet] > 0.0])

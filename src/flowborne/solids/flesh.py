@@ -20,11 +20,10 @@ from scipy.sparse.linalg import spsolve
 
 from flowborne.shapes.thickness import thinnest
 from flowborne.solids.elasticity import Elasticity
-from flowborne.solids.elements import EDGES, measures, parts
+from flowborne.solids.elements import EDGES, measures, outer_surface, parts, prism
 from flowborne.solids.geoms import rest_poses
-from flowborne.solids.scratch import Compiled, Scratch, scratch
+from flowborne.solids.scratch import Compiled, Scratch, cross, scratch, twists_about_origin
 from flowborne.solids.tissue.growth import Grown
-from flowborne.solids.twists import cross, twists_about_origin
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -224,45 +223,6 @@ def bodies_of(mj: mujoco.MjModel, grown: Grown) -> Indices:
     return np.array([number[name] for name in grown.bodies], np.int64)
 
 
-def prism(triangles: Indices, count: int) -> Indices:
-    """(k, 3) the outward skin of a prism over triangles (m, 3) of `count` nodes, whose vertices are
-    the nodes at its lower end and then those at its upper one."""
-    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, at, shared = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
-    a, b = sides[np.sort(at[shared == 1])].T
-    walls = [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
-    return np.concatenate([triangles[:, ::-1], triangles + count, *walls])
-
-
-def surface_of(elements: Indices) -> Indices:
-    """(k, 3) the faces of right-handed tetrahedra (m, 4) that only one has, turned outward."""
-    corners = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-    faces = elements[:, corners].reshape(-1, 3)
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    return np.asarray(faces[np.sort(first[count == 1])])
-
-
-def outer_surface(points: Array, elements: Indices) -> Indices:
-    """(k, 3) outward triangles around tetrahedra (m, 4) of points (n, 3), those of holes left out.
-
-    What flesh encloses, bones for the most part, counts as inside. A sheet is what hangs together
-    by edges: where flesh is thin, the one around a bone may have corners in common with the outer.
-    """
-    triangles = surface_of(elements)
-    count = len(triangles)
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    _, edge, around = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    by_edge = np.argsort(edge, kind="stable")
-    of_two = around[edge[by_edge]] == 2  # where sheets touch along an edge it has four
-    one, other = (by_edge[of_two] // 3).reshape(-1, 2).T
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    sheet = connected_components(graph, directed=False)[1]
-    enclosed = np.bincount(sheet, np.linalg.det(points[triangles]))
-    return np.asarray(triangles[enclosed[sheet] > 0.0])
-
-
 def _placed(position: Array, rotation: Array, body: Indices, offset: Array) -> Array:
     return np.asarray(position[body] + np.einsum("nij,nj->ni", rotation[body], offset))
 
@@ -308,3 +268,45 @@ def _carried(bones: int, rest: Array, simplices: Indices, bone: Indices) -> Arra
     elif free.size:
         share[free, 0] = 1.0
     return share
+
+
+@dataclass(frozen=True)
+class Inversion:
+    """Elements with det F <= 0.
+
+    elements  (k,) their numbers in the flesh, ascending
+    of        how many elements there are
+    worst     number of the element with the least det F
+    ratio     that det F
+    place     (3,) where its middle is, m
+    name      of its flesh
+    """
+
+    elements: NDArray[np.int64]
+    of: int
+    worst: int
+    ratio: float
+    place: Array
+    name: str
+
+    def sentence(self) -> str:
+        """For the person who runs it, without a full stop."""
+        place = ", ".join(f"{x:.4g}" for x in self.place)
+        return (
+            f"{len(self.elements)} of {self.of} elements of flesh are inside out, "
+            f"the worst in '{self.name}' at ({place}) m with det F = {self.ratio:.3g} (element "
+            f"{self.worst}). Take shorter steps, stiffen the flesh, or give it larger elements "
+            "there"
+        )
+
+
+def inversion(flesh: Flesh, q: Array) -> Inversion | None:
+    """What is inside out at positions q (nq,); None when nothing is."""
+    ratios = flesh.volume_ratios(q)
+    wrong = np.flatnonzero(~(ratios > 0.0))
+    if wrong.size == 0:
+        return None
+    worst = int(wrong[np.argmin(ratios[wrong])])
+    middle = flesh.vertices(q)[flesh.elements[worst]].mean(axis=0)
+    name = flesh.names[int(flesh.of_element[worst])]
+    return Inversion(wrong, len(ratios), worst, float(ratios[worst]), middle, name)

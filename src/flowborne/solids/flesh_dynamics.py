@@ -1,8 +1,8 @@
 """Bones and flesh as one sparse linear system A (v+ - v) = dt b.
 
-MuJoCo assembles bones, joints and tendons, `elasticity` the flesh. Its stiffness is the derivative
-of its forces where that is positive; what compression takes away is left out, and A stays positive
-definite.
+MuJoCo assembles bones, joints and tendons; `elasticity` assembles the flesh. The stiffness is the
+positive semidefinite part of the derivative of the elastic forces: the softening by compression is
+left out, so that A stays positive definite.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, dia_array
 
-from flowborne.solids.dynamics import AT_REST, SETTLED, Rows, Zones, centred, rows_of
-from flowborne.solids.halfway import Halfway, halfway
+from flowborne.solids.constraints import rows_of
+from flowborne.solids.dynamics import System, centred
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import halfway
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
 
@@ -24,59 +25,37 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class FleshSystem:
-    """A v+ = impulse, for bones and flesh; constraint rows apart, so that A stays as it is.
+class FleshSystem(System):
+    """The system of bones and flesh; A and impulse do not contain the constraint rows.
 
-    model    what it is of
-    A        (nv, nv) sparse, symmetric positive definite, without the rows
-    elastic  (nv, nv) sparse, the part dt^2/2 K of A that is the flesh's
-    impulse  (nv,) A v + dt b, without the rows
-    dt       s
-    v        (nv,) velocity before the step
-    rows     constraint rows, and zones (k,), the state of each
-    halfway  the forces half-way through the step, and own (nv,), the impulse that they give here
+    A is sparse and stays the same while the zones of the rows change.
+
+    model    the model
+    elastic  (nv, nv) sparse, the part dt^2/2 K of A from the flesh
     """
 
-    model: SolidModel
     A: csr_array
+    model: SolidModel
     elastic: csr_array
-    impulse: Array
-    dt: float
-    v: Array
-    rows: Rows | None
-    zones: Zones
-    halfway: Halfway | None
-    own: Array
-
-    @property
-    def contacts(self) -> int:
-        """Number of contacts with an active row."""
-        return 0 if self.rows is None else self.rows.pushing(self.zones)
 
     def acting(self) -> tuple[Array, Array, Array]:
-        """J (k, nv) and D (k,) of the active rows, and the impulse (nv,) of all rows at rest:
-        (A + J^T D J) v+ = impulse + it."""
+        """J (k, nv) and D (k,) of the active rows, and the impulse (nv,) of all rows at rest.
+
+        The equations are (A + J^T D J) v+ = impulse + that impulse.
+        """
         if self.rows is None:
             return np.zeros((0, len(self.v))), np.zeros(0), np.zeros(len(self.v))
         J, D, force = self.rows.acting(self.zones)
         return J, D, J.T @ (D * (J @ self.v)) + self.dt * force
 
     def updated(self, v_plus: Array) -> FleshSystem | None:
-        """System with the contacts, limits and Coriolis forces that `v_plus` (nv,) implies.
+        """System with the contacts, limits and Coriolis forces at `v_plus` (nv,), or None if equal.
 
-        None when it has them. The repeated solve is Newton's method on a piecewise quadratic
-        function, and a fixed point for the forces of Coriolis; the caller bounds the number of
-        turns.
+        Repeated solves are Newton's method on a piecewise quadratic function, and a fixed-point
+        iteration for the Coriolis forces; the caller bounds the number of turns.
         """
-        zones, own, settled = self.zones, self.own, True
-        if self.rows is not None:
-            zones = self.rows.zones((v_plus - self.v) / self.dt, self.zones)
-            settled = np.array_equal(zones, self.zones)
-        if self.halfway is not None:
-            own, rounding = self.halfway.impulse(v_plus)
-            room = SETTLED * (abs(self.A) @ (np.abs(v_plus) + AT_REST)) + rounding
-            settled = settled and bool((np.abs(own - self.own) <= room).all())
-        if settled:
+        zones, (own, same) = self.zones_at(v_plus), self.own_at(v_plus)
+        if same and np.array_equal(zones, self.zones):
             return None
         return replace(self, zones=zones, own=own, impulse=self.impulse + own - self.own)
 
@@ -96,9 +75,9 @@ def assemble_flesh(
 
         A = M + dt/2 D + dt^2/4 K      b = f
 
-    As in `assemble`, with the K and D of flesh besides, whose part is dt^2/2 K: no energy is lost
-    with any part from a quarter on, and twice as much keeps steps stable while flesh is up to twice
-    as stiff as at their start. With a quarter the swimmer's legs tore in the eighth frame.
+    As in `assemble`, with the K and D of flesh added, but with dt^2/2 K in place of dt^2/4 K. No
+    factor from 1/4 on loses energy; 1/2 keeps steps stable while flesh becomes up to twice as stiff
+    as at the start of the step. With 1/4 the swimmer's legs tore in the eighth frame.
 
     applied  (nv,) generalised force, N or N m
     dt       s
@@ -121,16 +100,17 @@ def assemble_flesh(
     if before is not None:
         centre = halfway(model, s, before, state, dt, still, M, force + s.bias)
         own, _ = centre.impulse(v)
-    # the half-way pose has overwritten MuJoCo's, and rows need its whole forward pass
+    # `halfway` has changed the pose in `s`, and rows need the whole forward pass at `state`
     rows, zones = None, np.zeros(0, np.int64)
     if s.data.nefc:
         s.forward(state.q, state.v, applied)
         rows, zones = rows_of(model, s)
-    return FleshSystem(model, csr_array(A), csr_array(half), own, dt, v, rows, zones, centre, own)
+    full, elastic_part = csr_array(A), csr_array(half)
+    return FleshSystem(full, own, dt, v, rows, zones, centre, own, model, elastic_part)
 
 
 def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_array, Array]:
-    """Stiffness K (nv, nv), N/m or N m, and the forces (nv,) at rest at q (nq,), without rows."""
+    """Stiffness K (nv, nv), N/m or N m, and forces (nv,) at rest at q (nq,), without rows."""
     s = scratch(model)
     s.smooth_forces(q, np.zeros(model.nv), applied)
     joints = _jointed(s, lambda _, stiff, dt: stiff / dt, s.dt)
@@ -139,7 +119,7 @@ def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_arra
 
 
 def _flesh(model: SolidModel, s: Scratch) -> tuple[csr_array, Array]:
-    """K (nv, nv) and the forces (nv,) of flesh, where `s` has been placed."""
+    """K (nv, nv) and the forces (nv,) of flesh at the pose in `s`."""
     assert model.flesh is not None
     places, J = model.flesh.nodes(s), model.flesh.moving_nodes(s)
     elasticity = model.flesh.elasticity
@@ -148,14 +128,14 @@ def _flesh(model: SolidModel, s: Scratch) -> tuple[csr_array, Array]:
 
 
 def sparse_mass(model: SolidModel, s: Scratch) -> csr_array:
-    """(nv, nv) mass matrix at the present pose, after the forces."""
+    """(nv, nv) mass matrix at the pose in `s`; call it after `Scratch.smooth_forces`."""
     mj, nv = s.mj, model.nv
     lower = csr_array((s.data.M.copy(), mj.M_colind, _starts(mj.M_rownnz)), shape=(nv, nv))
     return csr_array(lower + lower.T - dia_array((lower.diagonal(), 0), shape=(nv, nv)))
 
 
 def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float) -> csr_array:
-    """What `part` makes of MuJoCo's dt D + dt^2 K and dt K of joints and tendons."""
+    """`part` of MuJoCo's dt D + dt^2 K and dt K, of joints and tendons."""
     data = s.data
     active = slice(data.nefmT)
     strength = part(data.efm_ts[active], data.efm_tk[active], dt)
@@ -164,7 +144,7 @@ def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float
 
 
 def _tendons(s: Scratch, strength: Array, active: NDArray[np.int32]) -> csr_array:
-    """Sum of strength J^T J over active tendons; `strength` is theirs alone."""
+    """Sum of strength J^T J over the active tendons."""
     mj, data = s.mj, s.data
     if active.size == 0:
         return csr_array((mj.nv, mj.nv))

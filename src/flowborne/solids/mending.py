@@ -1,4 +1,9 @@
-"""Meshes of a model that are open: closed, taken as their hulls, or refused, all at once."""
+"""Corrections of a model: open meshes are closed, and overlaps at a fixed base do not collide.
+
+MuJoCo ignores contact between a body and its parent, except where the parent is fixed to the
+world. A base that floats in its own simulator, and is fixed here, would push away the hips that
+overlap it.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +14,19 @@ import numpy as np
 
 from flowborne.shapes.closing import SMALL_HOLE, closed, hull, is_closed, open_edges
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.geoms import element_name, mesh_of
+from flowborne.solids.geoms import element_name, floors, mesh_of
 
 MENDED = "(mended)"
-"""End of the names of meshes that are not as in their files, and name of the text about them."""
+"""Suffix of the names of changed meshes, and name of the text that lists them."""
+
+LEFT_OUT = "overlap at rest: "
+"""Prefix of the names of <exclude> elements made here; the names of both bodies follow."""
+
+TURNING = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
 
 
 def mend_meshes(spec: mujoco.MjSpec, mj: mujoco.MjModel, geoms: Iterable[int], hulls: bool) -> bool:
-    """Close the open meshes of some geometries in a spec; gives whether there was one.
+    """Close the open meshes of some geometries in a spec; return whether there was one.
 
     mj      of the spec
     hulls   whether meshes with holes that are not small are replaced by their convex hulls
@@ -50,7 +60,7 @@ def mend_meshes(spec: mujoco.MjSpec, mj: mujoco.MjModel, geoms: Iterable[int], h
 
 
 def mended_meshes(mj: mujoco.MjModel) -> str:
-    """Which meshes of a model are not as in their files, and what was done; "" for none."""
+    """The changed meshes of a model and how each was changed; "" for none."""
     number = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_TEXT, MENDED)
     if number < 0:
         return ""
@@ -88,3 +98,44 @@ def _replace(spec: mujoco.MjSpec, mj: mujoco.MjModel, number: int, mesh: Mesh) -
     for geom in spec.geoms:
         if geom.meshname == own and geom.type == mujoco.mjtGeom.mjGEOM_MESH:
             geom.meshname = added.name
+
+
+def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
+    """Leave out contact between fixed bodies and those that hinges and ball joints hold on them,
+    where they overlap at rest; whether any was left out. Bodies with a floor are as they are."""
+    data = mujoco.MjData(mj)
+    mujoco.mj_kinematics(mj, data)
+    mujoco.mj_comPos(mj, data)
+    mujoco.mj_collision(mj, data)
+    with_floor = mj.geom_bodyid[floors(mj)]
+    overlapping = mj.geom_bodyid[data.contact.geom[data.contact.dist < 0.0]]
+    pairs = {(base, other) for ends in overlapping.tolist() for base, other in (ends, ends[::-1])}
+    bodies = {body.id: body for body in spec.bodies}
+    excluded = False
+    for base, other in sorted(pairs):
+        if mj.body_weldid[base] or base in with_floor or not _hangs_on_the_world(mj, other):
+            continue
+        names = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, body) for body in (base, other)]
+        for body, name in zip((base, other), names, strict=True):
+            bodies[body].name = name  # <exclude> knows bodies by their names alone
+        spec.add_exclude(
+            name=LEFT_OUT + " and ".join(names), bodyname1=names[0], bodyname2=names[1]
+        )
+        excluded = True
+    return excluded
+
+
+def _hangs_on_the_world(mj: mujoco.MjModel, body: int) -> bool:
+    """Whether joints that turn, and no others, hold a body on what does not move."""
+    top = mj.body_weldid[body]
+    first, count = mj.body_jntadr[top], mj.body_jntnum[top]
+    held = top > 0 and mj.body_weldid[mj.body_parentid[top]] == 0
+    return bool(held and count and np.isin(mj.jnt_type[first : first + count], TURNING).all())
+
+
+def joined_pairs(mj: mujoco.MjModel) -> list[str]:
+    """Both names of the pairs whose contact was left out, joined by "and"."""
+    names = [
+        mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_EXCLUDE, number) for number in range(mj.nexclude)
+    ]
+    return [name.removeprefix(LEFT_OUT) for name in names if name and name.startswith(LEFT_OUT)]

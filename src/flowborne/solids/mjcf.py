@@ -13,24 +13,21 @@ from numpy.typing import NDArray
 
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
+from flowborne.solids.compiler import compiled_quietly, refusal, unreadable
 from flowborne.solids.displacing import BY_RULE, Displace, chosen_geoms, write_groups
 from flowborne.solids.geoms import (
     CONTACT_ONLY,
     HIDDEN_GROUP,
+    add_shapes,
     displacing_geoms,
     element_name,
     geom_shape,
     kind_of,
     rest_poses,
 )
-from flowborne.solids.joined import exclude_joined
-from flowborne.solids.mending import mend_meshes
+from flowborne.solids.mending import exclude_joined, mend_meshes
+from flowborne.solids.model_checks import impossible, misgiven, too_large
 from flowborne.solids.model_files import ModelFiles, gathered, parsed
-from flowborne.solids.model_numbers import impossible, misgiven
-from flowborne.solids.model_refusal import refusal, unreadable
-from flowborne.solids.model_size import too_large
-from flowborne.solids.own_shapes import add_shapes
-from flowborne.solids.quiet import compiled_quietly
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
-from flowborne.solids.covered import covered
+from flowborne.solids.displaced import covered
 from flowborne.solids.flesh import flesh_of, points_of_flesh
+from flowborne.solids.geoms import own_by_mesh
 from flowborne.solids.mjcf import NOTHING, Given
-from flowborne.solids.own_shapes import own_by_mesh
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 from flowborne.solvers.cholesky import Ordering

@@ -1,25 +1,35 @@
 """The files that MuJoCo reads for a model, gathered so that they stand on their own.
 
 A model names meshes, height fields, skins, textures, parts to include and models to attach, each
-from a folder that its compiler elements or a package of ROS say. Here they get names in one folder;
-MuJoCo is given exactly these files, and a run folder the same.
+relative to a folder of its compiler elements or to a ROS package. Here they get names in one
+folder; MuJoCo and a run folder get exactly these files.
 """
 
 from __future__ import annotations
 
 import posixpath
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
+from xml.sax.saxutils import escape
 
 import mujoco
 
 from flowborne.files.given import read_file
-from flowborne.solids.model_kinds import check_kind, check_mesh
-from flowborne.solids.model_text import with_attributes
-from flowborne.solids.packages import is_address, located
+from flowborne.solids.model_checks import check_kind, check_mesh
+
+ATTRIBUTE = re.compile(rb"\s+([^\s=/>]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
+
+Changes = Mapping[int, Mapping[str, str | None]]
+"""Number of an element in the order of the text -> attribute -> new value, None to drop it."""
+
+ADDRESS = re.compile(r"(?:package|model):/+([^/]+)/(.+)")
+"""Name of a package, and a path in it."""
 
 ASSETS = "assets"
 """Folder beside the model of all that it names."""
@@ -38,6 +48,76 @@ FOLDERS = ("assetdir", "meshdir", "texturedir")
 
 MOST_NESTED = 500
 """Elements of a model in each other; readers and writers of it call themselves for each."""
+
+
+def with_attributes(text: bytes, changes: Changes) -> bytes:
+    """XML with other values of attributes that it has."""
+    starts: list[int] = []
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda *_: starts.append(parser.CurrentByteIndex)
+    parser.Parse(text, True)
+    pieces, done = [], 0
+    for number in sorted(changes):
+        name = re.compile(rb"<[^\s/>]+").match(text, starts[number])
+        place = name.end() if name else len(text)
+        while found := ATTRIBUTE.match(text, place):
+            place = found.end()
+            key = found[1].decode("utf-8", "replace")
+            if key in changes[number]:
+                value = changes[number][key]
+                pieces += [text[done : found.start(1 if value is None else 2)], _quoted(value)]
+                done = place
+    return b"".join([*pieces, text[done:]])
+
+
+def _quoted(value: str | None) -> bytes:
+    """A value as it stands behind an equals sign; nothing for None."""
+    if value is None:
+        return b""
+    return b'"%s"' % escape(value, {'"': "&quot;"}).encode("ascii", "xmlcharrefreplace")
+
+
+def is_address(given: str) -> bool:
+    """Whether a file is named by its package or as a URL, not by a path."""
+    return given.startswith(("package:", "model:", "file:"))
+
+
+def located(given: str, model: Path, packages: Sequence[Path]) -> Path:
+    """The file that an address means.
+
+    A package is looked for in the folders above the model, then in `packages`; each of them may
+    hold its folder, or be the folder.
+    raises  ValueError where it is not found
+    """
+    if given.startswith("file:"):
+        return Path(unquote(re.sub("^file:/*", "/", given)))
+    address = ADDRESS.fullmatch(given)
+    if address is None:
+        raise ValueError(f"'{given}' names no file. Write it as package://package/path.")
+    name, path = address.groups()
+    for folder in (*model.resolve().parents, *packages):
+        for root in _roots(folder, name):
+            if (root / path).is_file():
+                return root / path
+    raise ValueError(
+        f"{given} is in none of the folders above the model. Name the folder that holds the "
+        f"package '{name}' by packages in [solids]."
+    )
+
+
+def _roots(folder: Path, name: str) -> Iterator[Path]:
+    """What may be the folder of a package in a folder that may hold it or be it."""
+    yield folder / name
+    if folder.name == name or _name(folder / "package.xml") == name:
+        yield folder
+
+
+def _name(manifest: Path) -> str:
+    """The name in a package.xml; "" where there is none."""
+    try:
+        return (ElementTree.parse(manifest).findtext("name") or "").strip()
+    except (OSError, ElementTree.ParseError):
+        return ""
 
 
 def parsed(text: bytes | str) -> Element:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from flowborne.kernels.wind import places, pushed
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.scratch import cross
 from flowborne.solids.surfaces import surfaces
-from flowborne.solids.twists import cross
 
 Array = NDArray[np.float64]
 Bodies = NDArray[np.int64]

@@ -15,7 +15,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.runs.history import history_columns, history_rows
 from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
-from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.primitives import shape_of
 from flowborne.shapes.shape import Shape
 from flowborne.solids.skins import skinned
 from flowborne.view import style

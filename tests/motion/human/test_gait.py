@@ -8,7 +8,7 @@ from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.clip_skeleton import skeleton_of
 from flowborne.motion.human.gait import CYCLE, NAMES, gait_clip, leg_turns
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import standard_skeleton
 from flowborne.solids.model import SolidModel
 
 LANDMARKS = {

@@ -6,8 +6,7 @@ import pytest
 
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.segments import MEASURES, TRUNK, ends_of, segments
-from flowborne.motion.human.skeleton import Skeleton
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import Skeleton, standard_skeleton
 from flowborne.solids.model import SolidModel
 
 MASS = 70.0

@@ -10,8 +10,7 @@ from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.clip_skeleton import NAMES, lost_bones, skeleton_of
-from flowborne.motion.human.skeleton import PARENTS, TIPS, Skeleton
-from flowborne.motion.human.standard import standard_skeleton
+from flowborne.motion.human.skeleton import PARENTS, TIPS, Skeleton, standard_skeleton
 from flowborne.motion.mapping import mapping_of
 from flowborne.solids.model import SolidModel
 

@@ -10,9 +10,8 @@ import pytest
 
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.gait import gait_clip
-from flowborne.motion.human.skeleton import SIDES
+from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.motion.human.soles import STILL, UNEVEN, on_the_floor
-from flowborne.motion.human.standard import standard_skeleton
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
 from flowborne.solids.dynamics import kinematics

@@ -8,8 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flowborne.shapes.closing import is_closed
-from flowborne.solids.tissue.bones import bones_of
-from flowborne.solids.tissue.contour import contour
+from flowborne.solids.tissue.bones import bones_of, contour
 
 Array = NDArray[np.float64]
 

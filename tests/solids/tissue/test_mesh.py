@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from flowborne.files.arrays import read_arrays
 from flowborne.shapes.closing import is_closed
-from flowborne.solids.elements import measures, with_middles
-from flowborne.solids.flesh import outer_surface
+from flowborne.solids.elements import measures, outer_surface, with_middles
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue import mesh_run
-from flowborne.solids.tissue.apart import run_apart
 from flowborne.solids.tissue.bones import bones_of
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import (
@@ -32,6 +30,7 @@ from flowborne.solids.tissue.mesh import (
     surface_mesh,
 )
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh, recipe_of
+from flowborne.solids.tissue.mesher import run_apart
 
 Array = NDArray[np.float64]
 

@@ -16,11 +16,9 @@ from flowborne.scenes.load import load_scene
 from flowborne.shapes.closing import is_closed
 from flowborne.shapes.shape import Mesh
 from flowborne.simulation import Simulation
-from flowborne.solids.elements import measures
-from flowborne.solids.flesh import outer_surface
+from flowborne.solids.elements import measures, outer_surface
 from flowborne.solids.model import SolidModel
-from flowborne.solids.tissue.bones import bones_of
-from flowborne.solids.tissue.contour import contour
+from flowborne.solids.tissue.bones import bones_of, contour
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import ASTRAY, FIDELITY, FleshMesh, skin_mesh
 from flowborne.solids.tissue.symmetry import Chamber, chamber_of, reflection

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from flowborne.cli import main
 from flowborne.colours import to_linear
 from flowborne.errors import SceneError
-from flowborne.runs.cell_fields import cell_velocity
 from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.runs.states import cell_velocity
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.view import style
 from flowborne.view.browser.fluid import velocity_arrows

@@ -10,7 +10,7 @@ import pytest
 
 import flowborne
 from flowborne.fluid.grid import Grid
-from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.primitives import shape_of
 from flowborne.view.run import Geom, Run
 from flowborne.view.shot import Shot
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.grid import Grid
-from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.primitives import shape_of
 from flowborne.view.framing import swept
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot

@@ -21,8 +21,8 @@ from flowborne.fluid.grid import Grid
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder
-from flowborne.shapes.box import ShapeBox
-from flowborne.solids.flesh import surface_of
+from flowborne.shapes.primitives import ShapeBox
+from flowborne.solids.elements import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.shapes.kinds import shape_of
+from flowborne.shapes.primitives import shape_of
 from flowborne.view.run import Geom
 from flowborne.view.space.surfaces import Outside, mesh_of
 

@@ -1,8 +1,9 @@
-"""The human of Figs. 5 and 9: 23 rigid bodies, and a walk of its own.
+"""The human of Figs. 5 and 9: 23 rigid bodies, and a synthetic walk.
 
-skeleton, standard, clip_skeleton   where the joints are at rest: by published proportions, or
-                                    from the bones of a clip
-segments, inertia                   masses, centres of mass and inertias (de Leva 1996)
-shapes, body                        the outer form, and the whole as MJCF
-gait_curves, gait                   a walk from normative joint angles, and standing
+skeleton, clip_skeleton   where the joints are at rest: by published proportions, or from the bones
+                          of a clip
+segments                  masses, centres of mass and inertias (de Leva 1996)
+shapes, body              the outer form, and the MJCF of the whole
+posture, soles            the standing pose of a clip, and the floor under its feet
+gait                      a walk from normative joint angles
 """

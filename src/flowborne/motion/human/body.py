@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flowborne.motion.human.inertia import Inertia, inertias
-from flowborne.motion.human.segments import Sex
+from flowborne.motion.human.segments import Inertia, Sex, inertias
 from flowborne.motion.human.shapes import Shape, shapes
 from flowborne.motion.human.skeleton import BODIES, SIDES, Array, Skeleton, joint_of
 

@@ -9,8 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
-from flowborne.motion.human.skeleton import BODIES, PARENTS, SIDES, TIPS, Array, Link, Skeleton
-from flowborne.motion.human.standard import FOREARM, HAND, standard_skeleton
+from flowborne.motion.human.skeleton import (
+    BODIES,
+    FOREARM,
+    HAND,
+    PARENTS,
+    SIDES,
+    TIPS,
+    Array,
+    Link,
+    Skeleton,
+    standard_skeleton,
+)
 from flowborne.phrases import suggestion
 from flowborne.quaternions import angle, inverse, turned
 

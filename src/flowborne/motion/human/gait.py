@@ -1,4 +1,4 @@
-"""A walk, and standing, as clips of the human's own joints."""
+"""A synthetic walk as a clip of the human's joints."""
 
 from __future__ import annotations
 
@@ -7,8 +7,71 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from flowborne.motion.clip import Clip
-from flowborne.motion.human.gait_curves import ANKLE, HIP, KNEE, PELVIS, curve
 from flowborne.motion.human.skeleton import BODIES, PARENTS, SIDES, TIPS, Array, Skeleton
+
+# fmt: off
+ROWS = np.array(
+    [
+        (0, 12.19, 35.83, 5.55, -2.1),
+        (2, 12.03, 35.69, 7.94, -3.87),
+        (4, 11.84, 35.51, 10.92, -5.55),
+        (6, 11.56, 35.11, 14.12, -5.59),
+        (8, 11.23, 34.24, 16.86, -4.12),
+        (10, 10.94, 32.85, 18.59, -2.11),
+        (12, 10.76, 31.08, 19.29, -0.18),
+        (14, 10.69, 29.07, 19.2, 1.49),
+        (16, 10.72, 26.93, 18.57, 2.92),
+        (18, 10.84, 24.73, 17.62, 4.15),
+        (20, 11.02, 22.52, 16.47, 5.19),
+        (22, 11.21, 20.29, 15.21, 6.07),
+        (24, 11.39, 18.06, 13.9, 6.79),
+        (26, 11.52, 15.83, 12.59, 7.43),
+        (28, 11.62, 13.6, 11.32, 8.01),
+        (30, 11.71, 11.41, 10.12, 8.57),
+        (32, 11.82, 9.3, 9.03, 9.14),
+        (34, 11.96, 7.27, 8.05, 9.69),
+        (36, 12.12, 5.31, 7.22, 10.21),
+        (38, 12.29, 3.43, 6.58, 10.7),
+        (40, 12.41, 1.62, 6.24, 11.15),
+        (42, 12.48, -0.11, 6.28, 11.54),
+        (44, 12.46, -1.72, 6.8, 11.81),
+        (46, 12.36, -3.15, 7.86, 11.84),
+        (48, 12.21, -4.37, 9.47, 11.45),
+        (50, 12.04, -5.28, 11.64, 10.4),
+        (52, 11.88, -5.76, 14.48, 8.37),
+        (54, 11.68, -5.68, 18.1, 4.95),
+        (56, 11.4, -4.93, 22.59, -0.23),
+        (58, 11.07, -3.36, 27.91, -6.92),
+        (60, 10.78, -0.92, 33.88, -13.78),
+        (62, 10.6, 2.32, 40.19, -18.55),
+        (64, 10.54, 6.1, 46.35, -19.79),
+        (66, 10.57, 10.11, 51.69, -18.0),
+        (68, 10.69, 14.08, 55.7, -14.74),
+        (70, 10.86, 17.87, 58.17, -11.19),
+        (72, 11.05, 21.39, 59.13, -7.87),
+        (74, 11.22, 24.59, 58.68, -4.89),
+        (76, 11.35, 27.42, 56.91, -2.36),
+        (78, 11.46, 29.89, 53.9, -0.34),
+        (80, 11.57, 31.98, 49.78, 1.15),
+        (82, 11.69, 33.71, 44.7, 2.1),
+        (84, 11.84, 35.06, 38.83, 2.5),
+        (86, 12.01, 36.02, 32.35, 2.37),
+        (88, 12.19, 36.57, 25.52, 1.79),
+        (90, 12.34, 36.72, 18.71, 0.97),
+        (92, 12.41, 36.53, 12.49, 0.12),
+        (94, 12.4, 36.16, 7.57, -0.59),
+        (96, 12.29, 35.79, 4.64, -1.08),
+        (98, 12.13, 35.56, 4.03, -1.45),
+        (100, 11.95, 35.45, 5.37, -2.32),
+    ]
+)
+# fmt: on
+"""(51, 5): percent of the cycle from heel strike; degrees of forward tilt of the pelvis, flexion of
+hip and knee and dorsiflexion of the ankle. Means of Schwartz, Rozumalski and Trost 2008,
+J. Biomechanics 41:1639, free speed.
+"""
+
+PELVIS, HIP, KNEE, ANKLE = 1, 2, 3, 4
 
 CYCLE = 1.05
 """s from one heel strike to the next of the same foot."""
@@ -40,15 +103,25 @@ SAMPLES = 1024
 """Instants of a cycle at which the support is found, for its integral."""
 
 
+def curve(column: int) -> CubicSpline:
+    """Periodic spline through a column: phase, 0 to 1 from heel strike -> rad.
+
+    The first and the last row are the same instant; their mean stands for both.
+    """
+    angles = np.radians(ROWS[:, column])
+    angles[0] = angles[-1] = 0.5 * (angles[0] + angles[-1])
+    return CubicSpline(0.01 * ROWS[:, 0], angles, bc_type="periodic")
+
+
 def gait_clip(skeleton: Skeleton, cycle: float = CYCLE) -> Clip:
     """One cycle of a straight walk along x from the right heel's strike, at about 120 Hz.
 
-    The last frame is the first again, one stride on, and so are all derivatives: a loop that
-    leaves it out has no seam. Legs follow the curves of `gait_curves`, the left half a cycle after
-    the right. The trunk stays upright: the lower back takes back the pelvis' tilt. Toes stay flat
-    on the floor while the heel lifts. The root is where the soles touch the ground and do not
-    slide; where the support passes from one point of the soles to another, their heights and
-    speeds are mixed over `SUPPORT`, so that the root moves smoothly.
+    The last frame is the first frame one stride later, in all derivatives too: a loop without the
+    last frame has no seam. Legs follow `ROWS`, the left half a cycle after the right. The trunk
+    stays upright: the lower back compensates the tilt of the pelvis. Toes stay flat on the floor
+    while the heel lifts. The root moves such that the soles touch the ground and do not slide;
+    where the support passes from one point of the soles to another, their heights and speeds are
+    mixed over `SUPPORT`, so that the root moves smoothly.
 
     skeleton  upright at rest, arms down, feet forward
     cycle     s

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.motion.human.inertia import axes_of
+from flowborne.motion.human.segments import axes_of
 from flowborne.motion.human.skeleton import Array, Skeleton
 
 SKIN, SHIRT, TROUSERS, SHOES = (

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.motion.clip import Clip
-from flowborne.motion.human.inertia import inertias
-from flowborne.motion.human.segments import Sex
+from flowborne.motion.human.segments import Sex, inertias
 from flowborne.motion.human.shapes import shapes
 from flowborne.motion.human.skeleton import PARENTS, SIDES, Array, Skeleton, joint_of
 from flowborne.quaternions import turned

@@ -1,4 +1,4 @@
-"""What the bones fill at rest, as a signed distance in world axes."""
+"""What the bones fill at rest: signed distances, and closed surfaces around them, in world axes."""
 
 from __future__ import annotations
 
@@ -9,19 +9,30 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.extras import flesh_library
 from flowborne.phrases import suggestion
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh, Shape
+from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.geoms import (
     displacing_geoms,
     element_name,
     geom_shape,
     rest_poses,
 )
-from flowborne.solids.quiet import compiled_quietly
-from flowborne.solids.tissue.distance import signed_distance
 
 Array = NDArray[np.float64]
+
+MOST_SAMPLES = 2_000_000
+"""Where a lattice would have more samples than this, it is coarser than asked for."""
+
+
+def signed_distance(points: Array, surface: Mesh) -> Array:
+    """(n,) signed distances of points (n, 3) to a closed surface, negative inside, m."""
+    pv = flesh_library()
+    cloud = pv.PolyData(points)
+    cloud.compute_implicit_distance(pv.PolyData.from_regular_faces(*surface), inplace=True)
+    return np.asarray(cloud["implicit_distance"], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -135,3 +146,27 @@ def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: A
         half,
         shape.triangles() if isinstance(shape, ShapeMesh) else None,
     )
+
+
+def finest(bones: Bones, level: float) -> float:
+    """Least distance of the samples from which a contour is made, m."""
+    low, high = bones.box
+    return float(np.cbrt((high - low + 2.0 * level).prod() / MOST_SAMPLES))
+
+
+def contour(bones: Bones, level: float, pitch: float) -> Mesh:
+    """Closed outward surface `level` m outside the union of the bones, in world axes.
+
+    Sampled `pitch` m apart: edges that are sharper than that are cut off.
+    """
+    pv = flesh_library()
+    low, high = bones.box
+    low, high = low - level, high + level
+    pitch = max(pitch, finest(bones, level))
+    counts = np.ceil((high - low) / pitch).astype(int) + 5
+    lattice = pv.ImageData(dimensions=counts, spacing=(pitch,) * 3, origin=low - 2.0 * pitch)
+    distance = bones.distance(np.asarray(lattice.points, dtype=np.float64))
+    lattice.point_data["distance"] = distance
+    surface = lattice.contour([level], scalars="distance", method="flying_edges")
+    inward = surface.regular_faces.astype(np.int64)
+    return np.asarray(surface.points, dtype=np.float64), inward[:, ::-1]

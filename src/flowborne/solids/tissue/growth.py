@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels import elastic
+from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.elements import lumped, measures, with_middles
 from flowborne.solids.mjcf import ARENA
-from flowborne.solids.quiet import compiled_quietly
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

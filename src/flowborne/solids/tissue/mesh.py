@@ -15,11 +15,15 @@ from scipy.sparse.csgraph import connected_components
 
 from flowborne.phrases import rounded_up
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.elements import with_middles
-from flowborne.solids.flesh import outer_surface
-from flowborne.solids.tissue.bones import Bones, bones_of
-from flowborne.solids.tissue.contour import MOST_SAMPLES, contour, finest
-from flowborne.solids.tissue.distance import signed_distance
+from flowborne.solids.elements import outer_surface, with_middles
+from flowborne.solids.tissue.bones import (
+    MOST_SAMPLES,
+    Bones,
+    bones_of,
+    contour,
+    finest,
+    signed_distance,
+)
 from flowborne.solids.tissue.mesher import tetrahedra_within
 from flowborne.solids.tissue.surface_file import check_covers, place, read_surface
 from flowborne.solids.tissue.symmetry import Chamber, chamber_of

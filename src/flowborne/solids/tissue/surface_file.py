@@ -14,9 +14,7 @@ from trimesh.exchange.load import mesh_formats
 from flowborne.extras import flesh_library
 from flowborne.files.given import read_file
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.tissue.bones import Bones
-from flowborne.solids.tissue.contour import contour
-from flowborne.solids.tissue.distance import signed_distance
+from flowborne.solids.tissue.bones import Bones, contour, signed_distance
 
 if TYPE_CHECKING:
     import pyvista as pv

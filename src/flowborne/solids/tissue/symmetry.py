@@ -16,9 +16,8 @@ from scipy.sparse.csgraph import connected_components
 
 from flowborne.extras import flesh_library
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.flesh import surface_of
-from flowborne.solids.tissue.bones import Bones
-from flowborne.solids.tissue.distance import signed_distance
+from flowborne.solids.elements import surface_of
+from flowborne.solids.tissue.bones import Bones, signed_distance
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -11,7 +11,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from flowborne.fluid.grid import Grid
-from flowborne.runs.cell_fields import cell_velocity
+from flowborne.runs.states import cell_velocity
 from flowborne.view import style
 from flowborne.view.browser.meshes import Mesh, joined, nothing, show_mesh
 from flowborne.view.browser.settings import Settings

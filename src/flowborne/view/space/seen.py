@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.runs.cell_fields import velocity_gradients, vorticity
+from flowborne.runs.states import velocity_gradients, vorticity
 from flowborne.view import style
 from flowborne.view.fields import NUMBERS, FieldNumber, Scale, dye_colours, dyes_of
 from flowborne.view.run import Run, State

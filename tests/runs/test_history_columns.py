@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from flowborne.runs.columns import history_arrays, unit_of
+from flowborne.runs.history import history_arrays, unit_of
 
 BODIES = ("world", "head", "head_fin")
 JOINTS = ("root", "neck", "slide_x", "fin")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.solids.clusters import outboard_dofs, rigidify
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.following import outboard_dofs, rigidify
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import kinetic_energy, momentum
 from flowborne.solids.state import SolidState

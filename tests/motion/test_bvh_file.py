@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from flowborne.motion.euler import angles_of, quaternions_of
+from flowborne.motion.bvh_file import angles_of, quaternions_of
 from flowborne.quaternions import angle, inverse, product
 
 ORDERS = list(permutations(range(3)))

@@ -1,4 +1,4 @@
-"""A clip in the wrong unit is told so, and in which one it makes a person."""
+"""A clip in the wrong unit is refused, with the unit that makes it a person."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from flowborne.errors import SceneError
 from flowborne.motion.bvh import TO_WORLD
 from flowborne.motion.clip import Clip
-from flowborne.motion.clip_scale import check_scale, leg_length, likely_unit, standing_axis
+from flowborne.motion.clip_reading import check_scale, leg_length, likely_unit, standing_axis
 
 STILL = np.array([1.0, 0.0, 0.0, 0.0])
 

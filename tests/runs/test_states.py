@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from flowborne.fluid.grid import Grid
-from flowborne.runs.cell_fields import cell_velocity, velocity_gradients, vorticity
+from flowborne.runs.states import cell_velocity, velocity_gradients, vorticity
 
 SLOPES = np.array([[0.3, -0.2, 0.5], [1.1, 0.4, -0.6], [0.7, -0.9, -0.7]])
 """Derivative of each component along each axis, 1/s."""

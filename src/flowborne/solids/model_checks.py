@@ -1,0 +1,207 @@
+"""What is wrong with a model although MuJoCo would accept it, or would refuse it with no remedy.
+
+Models in other languages, sizes that exhaust the memory, and numbers that no body can have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import prod
+from xml.etree.ElementTree import Element
+
+import mujoco
+import numpy as np
+
+ROOTS = {
+    "sdf": (
+        "it is SDFormat of Gazebo, and MJCF and URDF are read. Convert it to MJCF by `sdf2mjcf` of "
+        "the package sdformat-mjcf."
+    ),
+    "mujocoinclude": ("it is a part for other models to include. Give the model that includes it."),
+    "COLLADA": "it is a COLLADA scene, and MJCF and URDF are read. Give the model that names it.",
+}
+"""Root of another kind of file -> what is wrong, and what to do."""
+
+XACRO = "/xacro}"
+"""End of the namespace of macros, before a tag."""
+
+MOST_BYTES = 1 << 30
+"""Most bytes that one element of a model may take."""
+
+MOST_COPIES = 20_000
+"""Most copies that a model may make of its parts."""
+
+UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "E": 1 << 60}
+"""MuJoCo's letters after a size of memory."""
+
+NUMBER = 8
+"""Bytes of a number."""
+
+OBJ = mujoco.mjtObj
+
+FINITE = {
+    OBJ.mjOBJ_BODY: ("pos", "quat", "ipos", "iquat"),
+    OBJ.mjOBJ_GEOM: ("pos", "quat", "size", "margin", "gap"),
+    OBJ.mjOBJ_JOINT: ("pos", "axis", "range"),
+    OBJ.mjOBJ_TENDON: ("range", "lengthspring"),
+    OBJ.mjOBJ_EQUALITY: ("data", "solref", "solimp"),
+}
+"""Kind of an element -> attributes that may have any finite value."""
+
+NOT_NEGATIVE = {
+    OBJ.mjOBJ_BODY: ("mass", "inertia"),
+    OBJ.mjOBJ_GEOM: ("friction",),
+    OBJ.mjOBJ_JOINT: ("stiffness",),
+    OBJ.mjOBJ_TENDON: ("stiffness", "damping", "frictionloss", "armature"),
+}
+"""Kind of an element -> attributes that must be 0 or more."""
+
+OF_DOFS = ("damping", "armature", "frictionloss")
+"""Attributes of joints that MuJoCo stores per degree of freedom, 0 or more."""
+
+PREFIX = {
+    OBJ.mjOBJ_BODY: ("body", "body"),
+    OBJ.mjOBJ_GEOM: ("geom", "geom"),
+    OBJ.mjOBJ_JOINT: ("jnt", "joint"),
+    OBJ.mjOBJ_TENDON: ("tendon", "tendon"),
+    OBJ.mjOBJ_EQUALITY: ("eq", "equality"),
+}
+"""Kind of an element -> its name in the model's arrays and in MJCF."""
+
+
+def check_kind(root: Element, suffix: str) -> None:
+    """Raise ValueError for a model in a language that MuJoCo does not read.
+
+    suffix  of the file name
+    """
+    if root.tag in ROOTS:
+        raise ValueError(ROOTS[root.tag])
+    if suffix == ".xacro" or any(XACRO in e.tag for e in root.iter()):
+        raise ValueError(
+            "it is written in xacro, the macros of ROS. Expand it by "
+            "`xacro robot.urdf.xacro > robot.urdf`, and give that."
+        )
+    if root.tag not in ("mujoco", "robot"):
+        raise ValueError(
+            f"its root is <{root.tag}>, and that of MJCF is <mujoco>, that of URDF <robot>. "
+            "Give a model."
+        )
+    if root.find(".//composite") is not None:
+        raise ValueError(
+            "it has a <composite>, which MuJoCo 4 does not have. Load it in MuJoCo 3, save it by "
+            "`mujoco.mj_saveLastXML`, which writes the bodies themselves, and give that."
+        )
+
+
+def check_mesh(name: str) -> None:
+    """Raise ValueError for a mesh file of a kind that MuJoCo does not read."""
+    if name.lower().endswith(".dae"):
+        raise ValueError(
+            f"its mesh {name} is COLLADA, which MuJoCo does not read. Save it as .obj or .stl and "
+            "name that."
+        )
+
+
+def too_large(model: Element) -> Iterator[str]:
+    """Sentences about elements above MOST_BYTES, and about more copies than MOST_COPIES."""
+    for field in model.iter("hfield"):
+        size = NUMBER * _count(field, "nrow") * _count(field, "ncol")
+        yield from _above_limit("hfield", field.get("name", ""), size)
+    for flex in model.iter("flexcomp"):
+        size = NUMBER * 3 * prod(_whole(n) for n in flex.get("count", "1").split())
+        yield from _above_limit("flexcomp", flex.get("name", ""), size)
+    for sizes in model.iter("size"):
+        for key in sizes.attrib:
+            if key == "memory":
+                yield from _above_limit("size memory", "", _bytes(sizes.get(key, "")))
+            elif key.startswith("nuser") or key in ("njmax", "nconmax", "nkey"):
+                yield from _above_limit(f"size {key}", "", NUMBER * _count(sizes, key))
+    copies = _copies(model)
+    if copies > MOST_COPIES:
+        yield f"<replicate> makes {copies:.2g} copies, and {MOST_COPIES} are the most. Take fewer."
+
+
+def _above_limit(tag: str, name: str, size: int) -> Iterator[str]:
+    if size > MOST_BYTES:
+        called = f"<{tag}>" + (f" '{name}'" if name else "")
+        yield (
+            f"{called} asks for {size / 2**30:.3g} GB, and {MOST_BYTES / 2**30:g} GB is the most. "
+            "Make it smaller."
+        )
+
+
+def _copies(element: Element) -> int:
+    """Number of copies that <replicate> elements make; nested ones multiply."""
+    inside = sum(map(_copies, element))
+    return _count(element, "count") * max(inside, 1) if element.tag == "replicate" else inside
+
+
+def _count(element: Element, key: str) -> int:
+    return _whole(element.get(key, "0"))
+
+
+def _whole(text: str) -> int:
+    """A whole number; 0 for a text that MuJoCo refuses."""
+    try:
+        return max(int(float(text)), 0)
+    except (ValueError, OverflowError):
+        return 0
+
+
+def _bytes(text: str) -> int:
+    letter = text[-1:].upper()
+    return _whole(text[:-1]) * UNITS[letter] if letter in UNITS else _whole(text)
+
+
+def misgiven(spec: mujoco.MjSpec) -> Iterator[str]:
+    """Sentences about wrong numbers that compiling, or a density from the scene, would hide."""
+    for geom in spec.geoms:
+        for attribute in ("density", "mass"):
+            value = getattr(geom, attribute)
+            given = attribute == "density" or not np.isnan(value)
+            if given and not _possible(np.array(value), 0.0):
+                called = f"'{geom.name}'" if geom.name else f"of body '{geom.parent.name}'"
+                yield f"geom {called} has {attribute} {value:g}. Give a number of 0 or more."
+    for called, elements in (("joint", spec.joints), ("tendon", spec.tendons)):
+        for element in elements:
+            low, high = element.range
+            if low > high:
+                yield (
+                    f"{called} '{element.name}' has a range from {low:g} to {high:g}. "
+                    "Put the smaller number first."
+                )
+
+
+def impossible(mj: mujoco.MjModel) -> Iterator[str]:
+    """Sentences about wrong numbers of a compiled model, element by element."""
+    for table, least in ((FINITE, -np.inf), (NOT_NEGATIVE, 0.0)):
+        for kind, attributes in table.items():
+            for attribute in attributes:
+                values = getattr(mj, f"{PREFIX[kind][0]}_{attribute}")
+                rows = values.reshape(len(values), -1 if values.size else 1)
+                wrong = ~_possible(rows, least)
+                for element in np.flatnonzero(wrong.any(axis=1)):
+                    value = rows[element, wrong[element]][0]
+                    yield _wrong(mj, kind, int(element), attribute, value, least)
+    for attribute in OF_DOFS:
+        values = getattr(mj, f"dof_{attribute}")
+        for dof in np.flatnonzero(~_possible(values, 0.0)):
+            joint = mj.dof_jntid[dof]
+            yield _wrong(mj, OBJ.mjOBJ_JOINT, joint, attribute, values[dof], 0.0)
+
+
+def _possible(values: np.ndarray, least: float) -> np.ndarray:
+    return np.isfinite(values) & (values >= least)
+
+
+def _wrong(
+    mj: mujoco.MjModel,
+    kind: mujoco.mjtObj,
+    element: int,
+    attribute: str,
+    value: float,
+    least: float,
+) -> str:
+    name = mujoco.mj_id2name(mj, kind, element) or str(element)
+    wanted = "a number of 0 or more" if least == 0.0 else "a finite number"
+    return f"{PREFIX[kind][1]} '{name}' has {attribute} {value:g}. Give {wanted}."
