@@ -438,6 +438,16 @@ def test_progress_says_that_it_compiles_and_how_long_the_first_frame_took(capsys
     assert len(lines) == 4
 
 
+def test_a_full_memory_is_said_with_what_helps(command, small_scene, monkeypatch):
+    def fail(*_, **__):
+        raise MemoryError("Unable to allocate 530. MiB")
+
+    monkeypatch.setattr("flowborne.scenes.load.load_scene", fail)
+    code, _, told = command("check", small_scene)
+    assert code == cli.WRONG
+    assert "memory of this machine is full (Unable to allocate 530. MiB). Make the grid" in told
+
+
 def test_an_error_that_nobody_expected_is_one_line_and_its_traceback_with_debug(
     command, small_scene, monkeypatch
 ):

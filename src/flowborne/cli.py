@@ -463,6 +463,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (KeyboardInterrupt, typer.Abort):
         complain("interrupted")
         code = INTERRUPTED
+    except MemoryError as error:
+        complain(
+            f"the memory of this machine is full ({error}). Make the grid coarser by [domain] "
+            "resolution or cells, or the files smaller"
+        )
+        code = WRONG
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = FAILED

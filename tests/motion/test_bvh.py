@@ -193,6 +193,10 @@ WRONG = {
         lambda t: t.replace("CHANNELS 3", "CHANNELS 4"),
         r"line 9: CHANNELS says 4 and na",
     ),
+    "huge offset": (
+        lambda t: t.replace("0 -4 0.5", "0 -4 1e164"),
+        r"line 8: OFFSET '0 -4 1e164' is not three numbers of a size up to 1e\+09",
+    ),
     "bad offset": (lambda t: t.replace("0 -4 0.5", "0 -4"), r"line 8: OFFSET '0 -4' is not three"),
     "no offset": (
         lambda t: t.replace("OFFSET 0 -4 0.5\n", "\n"),

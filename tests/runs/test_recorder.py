@@ -187,3 +187,22 @@ def test_a_state_of_times_in_place_of_places_is_refused(tmp_path):
     np.savez(path, time=np.array(0.0), geom_position=np.zeros((1, 3), "datetime64[s]"))
     with pytest.raises(RunFolderError, match="its 'geom_position' holds no numbers"):
         read_state(path)
+
+
+def test_a_state_whose_arrays_do_not_fit_each_other_is_refused(tmp_path):
+    path = tmp_path / "000001.npz"
+    sound = {
+        "time": np.array(0.0),
+        "geom_position": np.zeros((2, 3)),
+        "geom_rotation": np.zeros((2, 3, 3)),
+        "fluid_centre": np.zeros((4, 3)),
+        "fluid_force": np.zeros((4, 3)),
+    }
+    np.savez(path, **sound)
+    read_state(path)
+    for wrong in (np.zeros(4), np.zeros((4, 2)), np.zeros((3, 3))):
+        np.savez(path, **sound | {"fluid_centre": wrong})
+        with pytest.raises(
+            RunFolderError, match=r"its 'fluid_\w+' has the shape .*not \(body, axis\)"
+        ):
+            read_state(path)

@@ -20,6 +20,11 @@ from flowborne.files.given import read_file
 from flowborne.quaternions import about, product
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LARGEST = 1e9
+"""Largest number of a clip, in its unit of length or degrees: in whatever unit, no creature is as
+large."""
 
 LOCKED = 1e-7
 """Cosine of the middle angle below which only the sum or difference of the others is known."""
@@ -146,11 +151,18 @@ def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
                 yield number, part.strip()
 
 
+def _usable(numbers: Array) -> Mask:
+    """Which numbers are finite, and no larger than LARGEST."""
+    return np.abs(numbers) <= LARGEST  # false for nan
+
+
 def _three(text: str, where: str) -> Array:
     words = text.split()
     numbers = [number_in(word) for word in words]
-    if len(numbers) != 3 or not np.isfinite(numbers).all():
-        raise SceneError(f"{where}: OFFSET '{text}' is not three numbers. Mend it.")
+    if len(numbers) != 3 or not _usable(np.array(numbers)).all():
+        raise SceneError(
+            f"{where}: OFFSET '{text}' is not three numbers of a size up to {LARGEST:g}. Mend it."
+        )
     return np.array(numbers)
 
 
@@ -322,11 +334,13 @@ def _row(bvh: BvhFile, words: list[str], frame: int) -> Array:
         row = np.array(words, dtype=np.float64)
     except ValueError:
         row = np.array([number_in(word) for word in words])
-    if np.isfinite(row).all():
+    usable = _usable(row)
+    if usable.all():
         return row
-    column = int(np.flatnonzero(~np.isfinite(row))[0])
+    column = int(np.flatnonzero(~usable)[0])
     joint = next(j for j in reversed(bvh.joints) if j.channels and j.first <= column)
     raise SceneError(
         f"{bvh.name}, line {bvh.lines[frame]}: '{words[column]}' in frame {frame + 1}, joint "
-        f"'{joint.name}', is not a finite number. Mend the frame or export the clip anew."
+        f"'{joint.name}', is not a number of a size up to {LARGEST:g}. "
+        "Mend the frame or export the clip anew."
     )

@@ -119,10 +119,28 @@ def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDAr
     for name, values in arrays.items():
         if values.dtype.kind not in NUMBERS:
             raise _without(path, ValueError(f"its '{name}' holds no numbers"))
+    _check_shapes(path, arrays)
     lacking = [] if names else [name for name in IN_EVERY_STATE if name not in arrays]
     if lacking:
         raise _without(path, ValueError(f"it lacks {', '.join(lacking)}"))
     return arrays
+
+
+def _check_shapes(path: Path, arrays: Arrays) -> None:
+    """Raise RunFolderError unless arrays have their axes, with the same size along the same one."""
+    sizes = {"axis": 3, "row": 3, "column": 3}
+    for name, values in arrays.items():
+        if name not in QUANTITIES:
+            continue
+        axes = QUANTITIES[name].dimensions
+        shape = tuple(
+            sizes.setdefault(axis, size) for axis, size in zip(axes, values.shape, strict=False)
+        )
+        if len(axes) != values.ndim or shape != values.shape:
+            raise _without(
+                path,
+                ValueError(f"its '{name}' has the shape {values.shape}, not ({', '.join(axes)})"),
+            )
 
 
 def check_states(folder: RunFolder, frame: int) -> None:
