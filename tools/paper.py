@@ -6,6 +6,7 @@ from typing import Any
 
 from failing import REPORT, ROOT
 from failing import number as shown
+from flowborne.validation.reference import reference
 from flowborne.validation.report import Data, grid_of, read_report, tier_of
 from markdown_text import plain, table
 from marked import with_part
@@ -48,14 +49,24 @@ def section() -> str:
         for figure, name, begins in SHOWN
         for finding in found(data, name, begins)
     ]
-    return f"{table(HEAD, rows)}\nThe runs: {', '.join(runs(data))}.\n"
+    return f"{table(HEAD, rows)}\n{paper_frames()}\n\n{runs(data)}\n"
 
 
-def runs(data: Data) -> list[str]:
-    """Tier and date of each case, in the tier that counts."""
-    names = dict.fromkeys(name for _, name, _ in SHOWN)
-    tiers = {name: tier_of(data[name]) for name in names}
-    return [f"{name} `{tier}` of {data[name][tier]['date']}" for name, tier in tiers.items()]
+def paper_frames() -> str:
+    """The frames in the paper's Fig. 2, in a sentence."""
+    said = "; ".join(f"{row}: {count}" for row, count in reference("K6", "paper frames").items())
+    return f"Frames in the paper's Fig. 2: {said}."
+
+
+def runs(data: Data) -> str:
+    """The tier and date of each case, in the tier that counts, in a sentence."""
+    cases: dict[str, list[str]] = {}
+    for name in data:
+        if name in {shown for _, shown, _ in SHOWN}:
+            tier = tier_of(data[name])
+            cases.setdefault(f"`{tier}` of {data[name][tier]['date']}", []).append(name)
+    said = "; ".join(f"tier {run}: {', '.join(names)}" for run, names in cases.items())
+    return f"The runs: {said}."
 
 
 def found(data: Data, name: str, begins: tuple[str, ...]) -> list[dict[str, Any]]:
