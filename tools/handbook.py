@@ -17,6 +17,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 import api_pages
+import citation
 import command_help
 import parts
 import scene_keys
@@ -25,7 +26,7 @@ from docstrings import entries, paragraphs
 
 MAKERS = {
     module.__name__: module
-    for module in (api_pages, command_help, parts, scene_keys, validation_table)
+    for module in (api_pages, citation, command_help, parts, scene_keys, validation_table)
 }
 """Modules whose functions give parts of pages. They are imported before autodoc imports anything:
 it does so as type checkers do, which pydantic does not bear."""
