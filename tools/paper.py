@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from flowborne.validation.reference import reference
-
 from failing import REPORT, ROOT
 from failing import number as shown
+from flowborne.validation.case import reference
 from flowborne.validation.report import Data, grid_of, read_report, tier_of
 from markdown_text import plain, table
 from marked import with_part
