@@ -218,13 +218,13 @@ class Odd:
     def __init__(self, given: object) -> None:
         self.given = given
 
-    def pace(self, pace: object, before: object, gradient: object) -> object:
+    def step_scale(self, scale: object, before: object, gradient: object) -> object:
         return self.given
 
     def step(self, poses: object, gradient: object, limit: object) -> object:
         return self.given
 
-    def of(self, places: object, pace: object) -> Odd:
+    def of(self, indices: object, scale: object) -> Odd:
         return self
 
     def estimate(self, poses: object) -> object:
@@ -295,7 +295,7 @@ def test_a_name_of_ours_a_class_without_its_method_and_a_taken_key_are_refused()
 
     with pytest.raises(ValueError, match="has a field 'weight', which is a key of every objective"):
         fb.objectives.register("weighty")(Weighty)
-    with pytest.raises(ValueError, match=r"has no method pace\(\): add it"):
+    with pytest.raises(ValueError, match=r"has no method step_scale\(\): add it"):
         fb.rules.register("weighty")(Weighty)
 
 

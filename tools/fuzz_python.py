@@ -84,8 +84,8 @@ class Wish:
 @dataclass(frozen=True)
 class Rule:
     part: float = 0.5
-    def pace(self, pace, before, gradient):
-        return np.ones_like(pace)  # pace
+    def step_scale(self, scale, before, gradient):
+        return np.ones_like(scale)  # step_scale
     def step(self, poses, gradient, limit):
         return self.part * rules.descent(gradient, limit)  # step
 

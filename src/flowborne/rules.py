@@ -1,7 +1,7 @@
 """How far to go down a gradient, and how to add a rule.
 
-A rule is a dataclass with `step` and `pace`; `WholePace` brings the latter for rules that always
-use the whole of strength and probe.
+A rule is a dataclass with `step` and `step_scale`. `FullStep` has the latter for rules that always
+use the full strength and probe.
 """
 
 from __future__ import annotations
@@ -10,22 +10,22 @@ from flowborne.control.gradients import Poses
 from flowborne.control.rules import (
     RULES,
     FixedStep,
+    FullStep,
     GoldenSection,
     QuasiNewton,
     ResilientStep,
     Rule,
-    WholePace,
     descent,
 )
 
 __all__ = [
     "FixedStep",
+    "FullStep",
     "GoldenSection",
     "Poses",
     "QuasiNewton",
     "ResilientStep",
     "Rule",
-    "WholePace",
     "descent",
     "register",
 ]

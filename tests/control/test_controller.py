@@ -257,7 +257,7 @@ def test_decision_touches_nothing_but_memory(make_world: MakeWorld, step: Step) 
     controller_of((0.3, 0.4), iterations=3, rule=GoldenSection()).decide(world, FRAME, step)
     after = world.arrays()
     assert {name: after[name].tobytes() for name in before} == before
-    names = ("target", "displacement", "gradient", "objective", "pace", "schedule")
+    names = ("target", "displacement", "gradient", "objective", "step_scale", "schedule")
     assert set(after) - set(before) == {f"memory/{name}" for name in names}
 
 

@@ -25,7 +25,7 @@ SWIMMER = {
 def gradient(controller: Controller, world: World) -> np.ndarray:
     """(n,) of the objectives in force, per rad."""
     parts = []
-    for places, wanted in controller.objective.shared_out(controller.dofs):
+    for places, wanted in controller.objective.group_by_joints(controller.dofs):
         if wanted.active(world.time):
             trials = controller.trials(world, step, None, wanted, places)
             estimate = controller.gradient.of(places, np.ones(places.size)).estimate(trials)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from flowborne.control.approach import approach
 from flowborne.control.controller import Controller
 from flowborne.control.course import TrialError
+from flowborne.control.creature import approach
 from flowborne.control.executors import Serial
 from flowborne.control.gradients import GradientCentral
 from flowborne.control.measurement import Measurement

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flowborne.control.gradients import Displaced, GradientCentral
+from flowborne.control.gradients import GradientCentral, OffsetPoses
 from flowborne.control.rules import (
     FixedStep,
     GoldenSection,
@@ -37,7 +37,7 @@ class Line:
         return np.array([self.function(d) for d in displacements])
 
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
-        return GradientCentral(1e-4).estimate(Displaced(self, displacement)).gradient
+        return GradientCentral(1e-4).estimate(OffsetPoses(self, displacement)).gradient
 
 
 @given(
@@ -97,38 +97,38 @@ def test_bad_searches_are_refused() -> None:
         GoldenSection(tolerance=1.0)
 
 
-def test_resilient_pace_halves_where_the_gradient_turns_and_grows_back_to_one() -> None:
-    rule, pace = ResilientStep(), np.ones(3)
+def test_resilient_scale_halves_where_the_gradient_turns_and_grows_back_to_one() -> None:
+    rule, scale = ResilientStep(), np.ones(3)
     before = np.array([2.0, -1.0, 0.0])
-    pace = rule.pace(pace, before, np.array([-1.0, -3.0, 5.0]))
-    assert pace.tolist() == [0.5, 1.0, 1.0]
+    scale = rule.step_scale(scale, before, np.array([-1.0, -3.0, 5.0]))
+    assert scale.tolist() == [0.5, 1.0, 1.0]
     for _ in range(20):
-        pace = rule.pace(pace, before, -before)
-    assert pace.tolist() == [rule.least, rule.least, 1.0]
+        scale = rule.step_scale(scale, before, -before)
+    assert scale.tolist() == [rule.least, rule.least, 1.0]
     for _ in range(30):
-        pace = rule.pace(pace, before, before)
-    assert pace.tolist() == [1.0, 1.0, 1.0]
-    assert FixedStep().pace(pace, before, -before).tolist() == [1.0, 1.0, 1.0]
+        scale = rule.step_scale(scale, before, before)
+    assert scale.tolist() == [1.0, 1.0, 1.0]
+    assert FixedStep().step_scale(scale, before, -before).tolist() == [1.0, 1.0, 1.0]
 
 
 @given(kink=st.floats(-0.4, 0.4), steep=st.floats(1.5, 20.0))
 def test_resilient_steps_and_probes_find_a_lopsided_kink(kink: float, steep: float) -> None:
     """A central difference of 0.1 balances such a kink up to 0.09 away from it."""
-    rule, at, pace, before, probe = ResilientStep(), 1.0, np.ones(1), np.zeros(1), 0.1
+    rule, at, scale, before, probe = ResilientStep(), 1.0, np.ones(1), np.zeros(1), 0.1
 
     def value(x: float) -> float:
         return abs(x - kink) * (steep if x > kink else 1.0)
 
     for _ in range(120):
-        d = probe * float(pace[0])
+        d = probe * float(scale[0])
         gradient = np.array([(value(at + d) - value(at - d)) / (2.0 * d)])
-        pace, before = rule.pace(pace, before, gradient), gradient
-        at += float((pace * descent(gradient, np.array([0.05])))[0])
+        scale, before = rule.step_scale(scale, before, gradient), gradient
+        at += float((scale * descent(gradient, np.array([0.05])))[0])
     assert abs(at - kink) < 0.01
 
 
 @pytest.mark.parametrize("bad", [{"shorten": 1.0}, {"lengthen": 1.0}, {"least": 0.0}])
-def test_paces_that_cannot_settle_are_refused(bad: dict[str, float]) -> None:
+def test_scales_that_cannot_settle_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="give"):
         ResilientStep(**bad)
 

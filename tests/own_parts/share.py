@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-from flowborne.rules import Poses, WholePace, descent, register
+from flowborne.rules import FullStep, Poses, descent, register
 
 
 @register("share")
 @dataclass(frozen=True)
-class Share(WholePace):
+class Share(FullStep):
     part: float = 0.5
 
     def step(self, poses: Poses, gradient, limit):

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.control import creature
-from flowborne.control.approach import approach
 from flowborne.control.course import Course, Step, Trials
 from flowborne.control.executors import Mapper, Threads
 from flowborne.control.gradients import Gradient, GradientCentral
@@ -67,12 +66,12 @@ class Decision:
 class StrengthInPhase:
     """Strength that some dofs have in place of their usual one while its phases are on.
 
-    places    (m,) which of the controlled dofs, counted from 0
+    indices    (m,) which of the controlled dofs, counted from 0
     strength  rad/s or m/s; one for all of them or one each
     phases    when
     """
 
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     strength: float | tuple[float, ...]
     phases: Phases
 
@@ -82,9 +81,9 @@ class Controller:
     """Gradient descent on an objective over the controlled joints, within the creature's strength.
 
     Its own state is in the world's memory: "target" (nq,), "displacement" (n,), "gradient" (n,),
-    "objective" (1,), "pace" (2, n): that of the rule and the gradient that it came from,
+    "objective" (1,), "step_scale" (2, n): that of the rule and the gradient that it came from,
     "schedule" (2,): frames left after this one until the next decision, and the frame time in s,
-    and with a horizon "plan" (knots, n): displacements from knot to knot; "pace" is then
+    and with a horizon "plan" (knots, n): displacements from knot to knot; "step_scale" is then
     (2, knots n).
 
     dofs        (n,) controlled dofs, indices into v
@@ -176,7 +175,7 @@ class Controller:
             "displacement": (n,),
             "gradient": (n,),
             "objective": (1,),
-            "pace": (2, knots * n),
+            "step_scale": (2, knots * n),
             "schedule": (2,),
             "plan": (knots, n),
         }
@@ -186,15 +185,15 @@ class Controller:
         strength = self._strengths()
         for other in self.in_phases:
             if other.phases.active(time):
-                strength[list(other.places)] = other.strength
+                strength[list(other.indices)] = other.strength
         return strength
 
     def greatest_strength(self) -> Array:
         """(n,) as `strength_at`, the most of all times."""
         greatest = self._strengths()
         for other in self.in_phases:
-            places = list(other.places)
-            greatest[places] = np.maximum(greatest[places], other.strength)
+            indices = list(other.indices)
+            greatest[indices] = np.maximum(greatest[indices], other.strength)
         return greatest
 
     def _strengths(self) -> Array:
@@ -214,7 +213,7 @@ class Controller:
         left, frame_time = world.memory["schedule"]
         remaining = float(frame_end_time + left * frame_time - world.time)
         target = world.memory["target"]
-        return approach(world, self.dofs, self.servo, target, remaining, dt)
+        return creature.approach(world, self.dofs, self.servo, target, remaining, dt)
 
     def measure(self, world: World, report: StepReport) -> dict[str, float]:
         """Every term's own value after a real step."""
@@ -226,25 +225,25 @@ class Controller:
         step: Step,
         course: Course | None = None,
         objective: ObjectiveSum | None = None,
-        places: Integers | None = None,
-        pace: Array | None = None,
+        indices: Integers | None = None,
+        scale: Array | None = None,
     ) -> Trials:
         """An objective as a function of what a course in `world` is displaced by.
 
         course     the present pose when None
         objective  the controller's own when None
-        places     (m,) those of the course's numbers that are displaced; all when None
-        pace       (N,) part of the gradient's displacements, 1 when None
+        indices     (m,) those of the course's numbers that are displaced; all when None
+        scale       (N,) part of the gradient's displacements, 1 when None
         """
         course = self._here(world, step) if course is None else course
-        places = np.arange(course.count) if places is None else places
-        pace = np.ones(course.count) if pace is None else pace
+        indices = np.arange(course.count) if indices is None else indices
+        scale = np.ones(course.count) if scale is None else scale
         return Trials(
             course,
             self.objective if objective is None else objective,
-            self.gradient.of(places % self.dofs.size, pace[places]),
+            self.gradient.of(indices % self.dofs.size, scale[indices]),
             self.executor,
-            places,
+            indices,
         )
 
     def course(self, world: World, frame_time: float, step: Step) -> Course:
@@ -299,25 +298,25 @@ class Controller:
         course = self.course(world, frame_time, step)
         size, value, evaluations = course.count, 0.0, 0
         gradient = np.zeros(size)
-        pace, slope = world.memory.get("pace", np.array([np.ones(size), gradient])).copy()
+        scale, slope = world.memory.get("step_scale", np.array([np.ones(size), gradient])).copy()
         limit = self._limit(world.time, frame_time)
         groups = self._groups(world, size)
         for iteration in range(self.iterations):
             displacement = np.zeros(size)
-            for places, wanted in groups:
-                trials = self.trials(world, step, course, wanted, places, pace)
+            for indices, wanted in groups:
+                trials = self.trials(world, step, course, wanted, indices, scale)
                 estimate, slopes = self._estimate(trials)
                 if iteration == 0:
-                    value, gradient[places] = value + estimate, slopes
-                pace[places] = self._pace(pace[places], slope[places], slopes)
-                slope[places] = slopes
-                way = pace[places] * self._step(trials, slopes, limit[places])
-                displacement[places] = trials.within_range(way)
+                    value, gradient[indices] = value + estimate, slopes
+                scale[indices] = self._step_scale(scale[indices], slope[indices], slopes)
+                slope[indices] = slopes
+                way = scale[indices] * self._step(trials, slopes, limit[indices])
+                displacement[indices] = trials.within_range(way)
                 evaluations += trials.evaluations
             if not displacement.any():
                 break
             course = course.displaced(displacement)
-        world.memory["pace"] = np.array([pace, slope])
+        world.memory["step_scale"] = np.array([scale, slope])
         return course, value, gradient, evaluations
 
     def _groups(self, world: World, size: int) -> list[tuple[Integers, ObjectiveSum]]:
@@ -326,8 +325,8 @@ class Controller:
         way."""
         knots = self.dofs.size * np.arange(size // self.dofs.size)[:, None]
         return [
-            ((knots + places).ravel(), wanted)
-            for places, wanted in self.objective.shared_out(self.dofs)
+            ((knots + indices).ravel(), wanted)
+            for indices, wanted in self.objective.group_by_joints(self.dofs)
             if isinstance(self.hypothesis, Horizon) or wanted.active(world.time)
         ]
 
@@ -341,11 +340,11 @@ class Controller:
         (number,) = _numbers("gradient", self.gradient, [value], asked, (1,))
         return float(number), _numbers("gradient", self.gradient, gradient, asked, (trials.count,))
 
-    def _pace(self, pace: Array, before: Array, gradient: Array) -> Array:
+    def _step_scale(self, scale: Array, before: Array, gradient: Array) -> Array:
         """(m,) the part of strength that the rule uses. Raises PartError when it is none."""
         with _guarding("rule", self.rule):
-            given = self.rule.pace(pace, before, gradient)
-        asked = "a pace above 0 and at most 1"
+            given = self.rule.step_scale(scale, before, gradient)
+        asked = "a scale above 0 and at most 1"
         found = _numbers("rule", self.rule, given, asked, gradient.shape)
         if not ((found > 0.0) & (found <= 1.0)).all():
             raise _wrong("rule", self.rule, given, asked, gradient.shape)

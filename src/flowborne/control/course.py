@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.control.executors import Mapper
-from flowborne.control.gradients import Displaced, Gradient
+from flowborne.control.gradients import Gradient, OffsetPoses
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
@@ -108,7 +108,7 @@ class Trials:
 
     estimator    of the gradient
     mapper       runs the trials
-    places       (m,) those of the course's numbers that are displaced, of which all displacements
+    indices       (m,) those of the course's numbers that are displaced, of which all displacements
                  here speak; the others stay
     evaluations  number of trials run so far
     """
@@ -117,21 +117,21 @@ class Trials:
     objective: ObjectiveSum
     estimator: Gradient
     mapper: Mapper
-    places: Integers
+    indices: Integers
     evaluations: int = 0
 
     @property
     def count(self) -> int:
         """m, how many numbers are displaced."""
-        return int(self.places.size)
+        return int(self.indices.size)
 
     def within_range(self, displacement: Array) -> Array:
         """(m,) the part of a displacement (m,) that the joints allow."""
-        return self.course.within_range(self._full(displacement))[self.places]
+        return self.course.within_range(self._full(displacement))[self.indices]
 
     def gradient(self, displacement: Array) -> Array:
         """(m,) gradient on a displaced course by the displacement (m,). Raises TrialError."""
-        return self.estimator.estimate(Displaced(self, displacement)).gradient
+        return self.estimator.estimate(OffsetPoses(self, displacement)).gradient
 
     def values(self, displacements: Array) -> Array:
         """(k,) objective on courses displaced by the rows of (k, m). Raises TrialError."""
@@ -142,5 +142,5 @@ class Trials:
     def _full(self, displacement: Array) -> Array:
         """(N,) a displacement (m,) among all numbers of the course."""
         full = np.zeros(self.course.count)
-        full[self.places] = displacement
+        full[self.indices] = displacement
         return full

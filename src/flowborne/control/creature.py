@@ -1,4 +1,4 @@
-"""What the controller has to know about joints: the one place where control looks into solids.
+"""Joints as the controller knows them: the one module of control that looks into solids.
 
 A displacement is a velocity times a time, (nv,) like a velocity, so that it is defined for ball
 joints (a rotation about axes of the joint's own frame) as for hinges and slides.
@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.servo import Servo
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow, outboard_dofs, rigidify
 from flowborne.solids.momentum import momentum
@@ -156,3 +158,24 @@ def whole_velocity(world: World) -> Array:
     """(3,) velocity of the centre of mass of all bodies and their flesh, m/s."""
     model, state = parts(world)
     return momentum(model, state)[0] / model.body_mass.sum()
+
+
+def approach(
+    world: World, dofs: Integers, servo: Servo, target: Array, remaining: float, dt: float
+) -> JointCommand:
+    """Command to `dofs` (n,) for the next step, of dt (s), on their way to a pose.
+
+    target     (nq,)
+    remaining  s until it is due
+    """
+    model, state = parts(world)
+    remaining = max(remaining, dt)
+    gap = model.difference(state.q, target)[dofs]
+    v = state.v[dofs]
+    rate, final = servo.velocity(gap, v, remaining, dt)
+    # a drive that may give way moves with the velocity it has: it steers the step after
+    ahead, _ = servo.velocity(gap - dt * v, v, max(remaining - dt, dt), dt)
+    limit = np.asarray(servo.torque_limit, dtype=np.float64)
+    command = JointCommand.none(model.nv)
+    command.set(dofs, rate, np.where(np.isfinite(limit), ahead, final), limit)
+    return command

@@ -39,7 +39,7 @@ class Poses(Protocol):
 
 
 @dataclass(frozen=True)
-class Displaced:
+class OffsetPoses:
     """Poses about a displaced one: displacements add up.
 
     poses  about the present pose
@@ -78,7 +78,7 @@ class Estimate:
 class Gradient(Protocol):
     """Estimates the gradient of the objective."""
 
-    def of(self, places: NDArray[np.int64], pace: Array) -> Gradient:
+    def of(self, indices: NDArray[np.int64], scale: Array) -> Gradient:
         """The same for some of the dofs, with these parts (m,) of their displacements."""
         ...
 
@@ -120,10 +120,10 @@ class FiniteDifference:
         if not 0.0 <= self.resolution < 1.0:
             raise ValueError(f"resolution is {self.resolution}: give a number from 0 to below 1")
 
-    def of(self, places: NDArray[np.int64], pace: Array) -> Self:
-        """The same for the dofs at some places (m,) of all, with parts (m,) of their d."""
+    def of(self, indices: NDArray[np.int64], scale: Array) -> Self:
+        """The same for the dofs at some indices (m,) of all, with parts (m,) of their d."""
         d = np.asarray(self.displacement, dtype=np.float64)
-        return replace(self, displacement=tuple((pace * (d[places] if d.ndim else d)).tolist()))
+        return replace(self, displacement=tuple((scale * (d[indices] if d.ndim else d)).tolist()))
 
     def displacements(self, count: int) -> Array:
         """(n,) d of each dof. Raises ValueError when there are not as many as dofs."""

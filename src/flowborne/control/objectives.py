@@ -122,8 +122,8 @@ class ObjectiveSum:
         """Sum of a single objective that always counts."""
         return cls((WeightedObjective(objective, weight),))
 
-    def shared_out(self, dofs: Integers) -> list[tuple[Integers, ObjectiveSum]]:
-        """Groups of places in `dofs` (n,) that want the same terms, each with their sum.
+    def group_by_joints(self, dofs: Integers) -> list[tuple[Integers, ObjectiveSum]]:
+        """Groups of indices in `dofs` (n,) that want the same terms, each with their sum.
 
         raises  ValueError when a dof wants nothing
         """
@@ -138,8 +138,8 @@ class ObjectiveSum:
                 raise ValueError(f"controlled dof {dof} wants nothing: give it an objective")
             groups.setdefault(wanted, []).append(place)
         return [
-            (np.array(places), ObjectiveSum(tuple(self.terms[n] for n in wanted)))
-            for wanted, places in groups.items()
+            (np.array(indices), ObjectiveSum(tuple(self.terms[n] for n in wanted)))
+            for wanted, indices in groups.items()
         ]
 
     def active(self, time: float) -> bool:

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.control import creature
-from flowborne.control.approach import approach
 from flowborne.control.course import Step, TrialError, advance
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
@@ -54,7 +53,7 @@ class Horizon:
 
 
 @dataclass(frozen=True, eq=False)
-class Rehearsal:
+class RolloutEvaluation:
     """One evaluation of a plan, complete in itself: it may run in any thread or process.
 
     world      as it is now; only its copy is stepped
@@ -80,7 +79,7 @@ class Rehearsal:
         world.setup = world.setup.rehearsed
         for pose in self.poses:
             for left in range(self.horizon.steps, 0, -1):
-                command = approach(world, self.dofs, self.servo, pose, left * dt, dt)
+                command = creature.approach(world, self.dofs, self.servo, pose, left * dt, dt)
                 report = advance(self, world, dt, command)
                 total += self.objective.value(Measurement(world, report))
         if not np.isfinite(total):
@@ -97,7 +96,7 @@ class Rehearsal:
 class PlanCourse:
     """Going along a plan, pose by pose.
 
-    world, step, horizon, dofs, servo  as in `Rehearsal`
+    world, step, horizon, dofs, servo  as in `RolloutEvaluation`
     most   (knots n,) the farthest that strength allows from knot to knot, rad or m
     moves  (knots n,) displacement of the dofs from knot to knot, those to the first knot first
     """
@@ -122,8 +121,8 @@ class PlanCourse:
         allowed = [move[self.dofs] for move, _ in self._way(wanted)]
         return np.concatenate(allowed) - self.moves
 
-    def trial(self, objective: ObjectiveSum, displacement: Array) -> Rehearsal:
-        return Rehearsal(
+    def trial(self, objective: ObjectiveSum, displacement: Array) -> RolloutEvaluation:
+        return RolloutEvaluation(
             self.world,
             self.step,
             objective,

@@ -23,12 +23,12 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 class Rule(Protocol):
     """Turns a gradient into a displacement of the controlled dofs."""
 
-    def pace(self, pace: Array, before: Array, gradient: Array) -> Array:
+    def step_scale(self, scale: Array, before: Array, gradient: Array) -> Array:
         """(n,) part of strength and probe that a decision uses, above 0 and at most 1.
 
-        pace      (n,) of the last decision; 1 before the first
+        scale     (n,) of the last decision; 1 before the first
         before    (n,) gradient of the last decision, per rad or m
-        gradient  (n,) of this one, found with probes of the last pace
+        gradient  (n,) of this one, found with probes of the last scale
         """
         ...
 
@@ -39,7 +39,7 @@ class Rule(Protocol):
 
 RULES: Registry[Rule] = Registry(
     "rule",
-    methods=("pace", "step"),
+    methods=("step_scale", "step"),
     taken=("fixed", "resilient", "golden-section", "quasi-newton"),
 )
 """Rules of one's own."""
@@ -62,15 +62,15 @@ def descent(gradient: Array, limit: Array) -> Array:
     return -limit * (demand / largest)
 
 
-class WholePace:
-    """The whole of strength and probe, always."""
+class FullStep:
+    """Always the full strength and probe."""
 
-    def pace(self, pace: Array, before: Array, gradient: Array) -> Array:
-        return np.ones_like(pace)
+    def step_scale(self, scale: Array, before: Array, gradient: Array) -> Array:
+        return np.ones_like(scale)
 
 
 @dataclass(frozen=True)
-class FixedStep(WholePace):
+class FixedStep(FullStep):
     """One step as long as strength allows, whatever the size of the gradient.
 
     So the frames to an optimum are the distance over strength times frame time, rounded up, and
@@ -92,8 +92,8 @@ class ResilientStep:
     a probe wider than a kink no longer moves it. Where the sign stays they grow again, to no more
     than strength and the scene's probe: an optimum that moves is followed.
 
-    shorten, lengthen  factors on the pace after a change of sign, and after none
-    least              pace below which nothing shortens
+    shorten, lengthen  factors on the scale after a change of sign, and after none
+    least              scale below which nothing shortens
     raises             ValueError unless 0 < shorten < 1 < lengthen and 0 < least <= 1
     source             Riedmiller and Braun 1993 (RPROP), without a step back
     """
@@ -109,19 +109,19 @@ class ResilientStep:
                 "give one between 0 and 1 and one above 1"
             )
         if not 0.0 < self.least <= 1.0:
-            raise ValueError(f"least pace is {self.least}: give a number above 0, at most 1")
+            raise ValueError(f"least scale is {self.least}: give a number above 0, at most 1")
 
-    def pace(self, pace: Array, before: Array, gradient: Array) -> Array:
+    def step_scale(self, scale: Array, before: Array, gradient: Array) -> Array:
         way = np.sign(before) * np.sign(gradient)
         factor = np.where(way < 0.0, self.shorten, np.where(way > 0.0, self.lengthen, 1.0))
-        return np.clip(pace * factor, self.least, 1.0)
+        return np.clip(scale * factor, self.least, 1.0)
 
     def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
         return descent(gradient, limit)
 
 
 @dataclass(frozen=True)
-class GoldenSection(WholePace):
+class GoldenSection(FullStep):
     """Search for the least objective along -gradient; the step then goes there, within strength.
 
     reach      rad or m, travel at the far end of the search of the dof that moves most; None: as
@@ -168,7 +168,7 @@ class GoldenSection(WholePace):
 
 
 @dataclass(frozen=True)
-class QuasiNewton(WholePace):
+class QuasiNewton(FullStep):
     """Least objective within strength, by limited-memory BFGS: joints know of each other.
 
     Gradients in several poses tell how the slope of one joint changes with another, so that a

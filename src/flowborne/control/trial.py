@@ -115,7 +115,7 @@ class Trial:
         whole = hypothesis.steps + hypothesis.last_steps
         for number in range(1, whole + 1):
             if number == hypothesis.steps + 1:
-                command.rate[self.dofs] = self._pace(command)
+                command.rate[self.dofs] = self._last_rate(command)
             # what is on the way to the last step is not read, and where all is told, not felt
             if number == whole or not move_as_told(world, hypothesis.dt, command):
                 report = advance(self, world, hypothesis.dt, command)
@@ -145,11 +145,11 @@ class Trial:
         command = JointCommand.none(state.v.size)
         command.set(rigid, 0.0, 0.0)
         command.set(self.dofs, rate, final)
-        ahead = hypothesis.last_steps * hypothesis.dt * self._pace(command)
+        ahead = hypothesis.last_steps * hypothesis.dt * self._last_rate(command)
         command.rate[self.dofs] -= ahead / hypothesis.duration
         return command
 
-    def _pace(self, command: JointCommand) -> Array:
+    def _last_rate(self, command: JointCommand) -> Array:
         """(n,) velocity of the controlled dofs' positions in the last steps."""
         final = command.final_velocity[self.dofs]
         return final if self.hypothesis.velocities == "present" else np.zeros_like(final)

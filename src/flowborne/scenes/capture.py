@@ -106,7 +106,7 @@ def human_of(scene: Scene) -> str:
 def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, ...]:
     """Joints of the model that follow the clip, in the model's order."""
     assert scene.clip is not None
-    taken = {*scene.told_joints(), *scene.clip.free, *earlier_joints(scene)}
+    taken = {*scene.moved_joints(), *scene.clip.free, *earlier_joints(scene)}
     chosen = capture.mapping if scene.clip.joints is None else scene.clip.joints
     return tuple(
         joint

@@ -76,7 +76,7 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
         return
     capture = capture_of(scene)
     assert capture is not None
-    others = scene.told_joints() | dict.fromkeys(scene.clip.free, "free")
+    others = scene.moved_joints() | dict.fromkeys(scene.clip.free, "free")
     others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
     found = False
     for joint in (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free):

@@ -91,7 +91,7 @@ def earlier_joints(scene: Scene) -> tuple[str, ...]:
         return ()
     if table.joints is not None:
         return table.joints
-    told = scene.told_joints()
+    told = scene.moved_joints()
     return tuple(joint for joint in earlier.poses if joint not in told)
 
 
@@ -168,7 +168,7 @@ def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
     scene, earlier = draft.scene, earlier_of(draft.scene)
     if earlier is None:
         return
-    others, joints = scene.told_joints(), earlier_joints(scene)
+    others, joints = scene.moved_joints(), earlier_joints(scene)
     if not joints:
         yield (
             f"{draft.at('earlier')}: what was controlled there is so here, or has a [[motion]]: "

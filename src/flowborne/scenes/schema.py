@@ -258,7 +258,7 @@ class Scene(Table):
             table.rests and table.phases is None for table in self.objectives
         )
 
-    def told_joints(self) -> dict[str, str]:
+    def moved_joints(self) -> dict[str, str]:
         """Joints that [[control]] and [[motion]] move -> which of them does, in words."""
         told = dict.fromkeys(self.controlled_joints(), "controlled")
         return told | {table.joint: "moved by a [[motion]]" for table in self.motion}

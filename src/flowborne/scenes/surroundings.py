@@ -22,7 +22,7 @@ def surroundings_of(
     unread  tables of which something was left out because it was wrong
     """
     capture, path = capture_of(scene), scene.model_path
-    driven = {*scene.told_joints(), *earlier_joints(scene)}
+    driven = {*scene.moved_joints(), *earlier_joints(scene)}
     driven |= set() if capture is None else set(followers(scene, capture, model))
     tables = {table.joint: table for table in scene.motion}
 
