@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from flowborne.exporting import export
     from flowborne.fluid.grid import Array, Faces, Grid
     from flowborne.fluid.state import FluidState
-    from flowborne.frame_report import FrameReport
     from flowborne.running import RunInterrupted, RunResult, run
+    from flowborne.runs.frame_report import FrameReport
     from flowborne.runs.open_run import OpenRun, open_run
     from flowborne.runs.run_folder import RunFolderError
     from flowborne.scenes.load import load_scene
@@ -144,7 +144,7 @@ _PLACES = {
     "Faces": "flowborne.fluid.grid",
     "Fluid": "flowborne.coupling.world",
     "FluidState": "flowborne.fluid.state",
-    "FrameReport": "flowborne.frame_report",
+    "FrameReport": "flowborne.runs.frame_report",
     "Grid": "flowborne.fluid.grid",
     "Hypothesis": "flowborne.control.trial",
     "Imported": "flowborne.characters.folder",

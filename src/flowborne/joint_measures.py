@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.world import Setup
-from flowborne.frame_report import FrameReport
+from flowborne.runs.frame_report import FrameReport
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
 
 Array = NDArray[np.float64]

@@ -6,12 +6,12 @@ from time import perf_counter
 
 import numpy as np
 
-from flowborne.frame_report import PARTS
+from flowborne.control.executors import GRACE, end_with_parent
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.kernels.vectors import turn
 from flowborne.runs.checkpoint import state_bytes
+from flowborne.runs.frame_report import PARTS
 from flowborne.runs.summary import peak_memory
-from flowborne.worker_process import GRACE, end_with_parent
 
 __all__ = [
     "GRACE",

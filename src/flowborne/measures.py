@@ -14,8 +14,8 @@ from flowborne.control.objectives import name_of
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import SceneError
-from flowborne.frame_report import FrameReport
 from flowborne.joint_measures import JointMeasures
+from flowborne.runs.frame_report import FrameReport
 from flowborne.solids.dynamics import kinematics
 
 if TYPE_CHECKING:

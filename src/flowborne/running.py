@@ -19,10 +19,10 @@ import numpy as np
 from flowborne.coupling.seen import seen_bodies
 from flowborne.errors import PartError, SceneError, WorkerError
 from flowborne.extras import missing_to_draw
-from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.compilation import compilation_watched
 from flowborne.progress import RunProgress, Stage
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
+from flowborne.runs.frame_report import PARTS, FrameReport
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, check_space

@@ -18,9 +18,9 @@ from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import PartError, SceneError, described
-from flowborne.frame_report import PARTS, FrameReport
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
+from flowborne.runs.frame_report import PARTS, FrameReport
 from flowborne.solids.flesh import inversion
 
 if TYPE_CHECKING:
@@ -90,11 +90,11 @@ class Simulation:
         workers: int | None = None,
         executor: str | object | None = None,
     ) -> None:
-        from flowborne.compiling import compile_solver_beside
         from flowborne.control.executors import mapper
         from flowborne.coupling.step import step
         from flowborne.scenes.build import build
         from flowborne.scenes.load import load_scene
+        from flowborne.solvers.compiling import compile_solver_beside
 
         if workers is not None and workers < 1:
             raise ValueError(f"workers is {workers}; give 1 or more")

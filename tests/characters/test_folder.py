@@ -16,7 +16,7 @@ from flowborne.characters.gltf import GltfSource
 from flowborne.characters.model import as_cycle, posed
 from flowborne.characters.rig import Z_UP, Action, Rig, Surface
 from flowborne.characters.source import read_source
-from flowborne.colours import to_linear
+from flowborne.files.colours import to_linear
 from flowborne.formats.creature import Creature
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip import Clip

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from flowborne.characters.model import MAX_COLOURS, few_colours
 from flowborne.characters.rig import Z_UP
 from flowborne.characters.source import Source, clip_number, read_source
-from flowborne.colours import to_srgb
 from flowborne.errors import SceneError
+from flowborne.files.colours import to_srgb
 
 from . import rigged
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.motion.clip import Clip
-from flowborne.quaternions import about
+from flowborne.motion.quaternions import about
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from flowborne.motion.bvh_file import angles_of, quaternions_of
-from flowborne.quaternions import angle, inverse, product
+from flowborne.motion.quaternions import angle, inverse, product
 
 ORDERS = list(permutations(range(3)))
 AXES = np.eye(3)

@@ -14,7 +14,7 @@ from flowborne.motion import bvh
 from flowborne.motion.bvh import read_bvh, write_bvh, write_clip
 from flowborne.motion.bvh_file import load_bvh
 from flowborne.motion.clip import Clip
-from flowborne.quaternions import about, angle, inverse, product
+from flowborne.motion.quaternions import about, angle, inverse, product
 
 from .bvh_texts import CHAIN, Written, written
 

@@ -19,7 +19,7 @@ from flowborne.errors import SceneError
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.clip_motion import KEPT, TrajectoryClip
-from flowborne.quaternions import about, angle, inverse, product
+from flowborne.motion.quaternions import about, angle, inverse, product
 from flowborne.solids.model import SolidModel
 
 from .clip_models import BODIES, MAPPING, NAMES, REST, circling, model, wandering

@@ -13,7 +13,7 @@ import pytest
 from flowborne.motion.bvh import TO_WORLD, read_bvh, write_clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import standard_skeleton
-from flowborne.quaternions import product
+from flowborne.motion.quaternions import product
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.load import check_scene, load_scene

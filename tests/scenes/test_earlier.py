@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flowborne import cli
 from flowborne.errors import SceneError
-from flowborne.quaternions import inverse, product
+from flowborne.motion.quaternions import inverse, product
 from flowborne.scenes.bodies import trajectories_of
 from flowborne.scenes.build import build
 from flowborne.scenes.earlier import TIME, earlier_of

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.motion.human.skeleton import SIDES
-from flowborne.quaternions import twist
+from flowborne.motion.quaternions import twist
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics

@@ -14,7 +14,7 @@ from flowborne.errors import SceneError
 from flowborne.motion.bvh import TO_WORLD, read_bvh, write_clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import standard_skeleton
-from flowborne.quaternions import angle, inverse, product
+from flowborne.motion.quaternions import angle, inverse, product
 from flowborne.running import run
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.capture import capture_of

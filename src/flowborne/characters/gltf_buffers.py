@@ -24,8 +24,8 @@ from flowborne.characters.gltf_document import (
     embedded,
 )
 from flowborne.characters.rig import PLAIN, Array, Integers
-from flowborne.colours import to_linear, to_srgb
 from flowborne.errors import SceneError
+from flowborne.files.colours import to_linear, to_srgb
 
 KINDS = {
     5120: np.int8,

@@ -16,7 +16,7 @@ from flowborne.characters.division import Division
 from flowborne.characters.rig import Action, Array, Integers, Rig, Surface
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import CLOSED
-from flowborne.quaternions import angle, inverse, product
+from flowborne.motion.quaternions import angle, inverse, product
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.geoms import DISPLACED
 

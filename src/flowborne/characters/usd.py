@@ -37,8 +37,8 @@ from flowborne.characters.usd_gate import (
     points_of,
     reading_usd,
 )
-from flowborne.colours import to_srgb
 from flowborne.errors import SceneError
+from flowborne.files.colours import to_srgb
 
 EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
 

@@ -11,7 +11,11 @@ from __future__ import annotations
 import io
 import math
 import multiprocessing
+import os
 import pickle
+import signal
+import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -20,10 +24,12 @@ from typing import Any, Protocol, TypeVar
 
 from flowborne.errors import WorkerError
 from flowborne.kernels.jit import allowed_threads, cores, kernel_threads
-from flowborne.worker_process import end_with_parent
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
+
+GRACE = 10.0
+"""Seconds that a process has to clean up once it is told to end."""
 
 
 class Mapper(Protocol):
@@ -263,3 +269,20 @@ def run_on(threads: int, function: Callable[[Task], Answer], task: Task) -> Answ
     """Apply the function to a task, its kernels on at most so many threads."""
     with kernel_threads(threads):
         return function(task)
+
+
+def end_with_parent() -> None:
+    """Let this process, a child of multiprocessing's, end when its parent has.
+
+    A pool's worker that waits for work would wait for ever: it holds both ends of the queue.
+    """
+    threading.Thread(target=_outlive_no_parent, daemon=True).start()
+
+
+def _outlive_no_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "this process is not a worker"
+    parent.join()
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(GRACE)
+    os._exit(1)

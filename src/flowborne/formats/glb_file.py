@@ -11,10 +11,10 @@ import pygltflib as gl
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flowborne.colours import to_linear
+from flowborne.files.colours import to_linear
 from flowborne.formats.creature import SKIN_COLOUR, Array, Bound, Creature, Integers, Skin, Surface
 from flowborne.formats.morphs import MorphedSkin, strongest
-from flowborne.quaternions import continuous
+from flowborne.motion.quaternions import continuous
 from flowborne.version import __version__
 
 Y_UP = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, UsdVol, Vt
 from scipy.spatial.transform import Rotation
 
-from flowborne.colours import to_linear
+from flowborne.files.colours import to_linear
 from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Surface
 from flowborne.formats.morphs import strongest
-from flowborne.quaternions import continuous
+from flowborne.motion.quaternions import continuous
 from flowborne.runs.open_run import OpenRun
 from flowborne.version import __version__
 

@@ -17,7 +17,7 @@ from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically, write_text
 from flowborne.motion.bvh_file import BvhFile, BvhJoint, angles_of, load_bvh, quaternions_of
 from flowborne.motion.clip import Clip
-from flowborne.quaternions import angle, inverse, product, turned
+from flowborne.motion.quaternions import angle, inverse, product, turned
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.files.given import read_file
-from flowborne.quaternions import about, product
+from flowborne.motion.quaternions import about, product
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

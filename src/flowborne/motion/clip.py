@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.quaternions import product, turned
+from flowborne.motion.quaternions import product, turned
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
+from flowborne.motion.quaternions import about, angle, continuous, inverse, product, turned, twist
 from flowborne.phrases import suggestion
-from flowborne.quaternions import about, angle, continuous, inverse, product, turned, twist
 from flowborne.solids import geoms
 from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
 

@@ -22,7 +22,7 @@ from flowborne.motion.clip_curves import (
     stride_between,
 )
 from flowborne.motion.clip_motion import TrajectoryClip, normalise
-from flowborne.quaternions import about, continuous, inverse, product, twist
+from flowborne.motion.quaternions import about, continuous, inverse, product, twist
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]

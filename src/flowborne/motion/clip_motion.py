@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flowborne.motion.clip_curves import Columns, Stride
-from flowborne.quaternions import inverse, product
+from flowborne.motion.quaternions import inverse, product
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]

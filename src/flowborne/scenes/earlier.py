@@ -17,8 +17,8 @@ from flowborne.files.arrays import read_arrays
 from flowborne.files.given import read_json
 from flowborne.motion.clip_curves import columns_of, row_of
 from flowborne.motion.clip_motion import TrajectoryClip
+from flowborne.motion.quaternions import continuous
 from flowborne.phrases import suggestion
-from flowborne.quaternions import continuous
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.scenes.draft import Draft

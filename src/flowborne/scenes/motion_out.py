@@ -16,7 +16,7 @@ from flowborne.motion.bvh import write_bvh, write_clip
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import UP
 from flowborne.motion.clip_reading import Capture
-from flowborne.quaternions import inverse, product, turned
+from flowborne.motion.quaternions import inverse, product, turned
 from flowborne.runs.run_folder import STATE_NAME, RunFolder
 from flowborne.runs.states import read_state
 from flowborne.scenes.bodies import load_model

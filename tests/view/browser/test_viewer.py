@@ -16,8 +16,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flowborne.cli import main
-from flowborne.colours import to_linear
 from flowborne.errors import SceneError
+from flowborne.files.colours import to_linear
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.runs.states import cell_velocity
 from flowborne.scenes.schema_film import FilmTable

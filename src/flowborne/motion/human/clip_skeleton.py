@@ -21,8 +21,8 @@ from flowborne.motion.human.skeleton import (
     Skeleton,
     standard_skeleton,
 )
+from flowborne.motion.quaternions import angle, inverse, turned
 from flowborne.phrases import suggestion
-from flowborne.quaternions import angle, inverse, turned
 
 NAMES = tuple(joint for _, joint, _ in BODIES)
 """Joints, parents first."""

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.skeleton import SIDES, Array, standard_skeleton
-from flowborne.quaternions import angle, inverse, product, turned
+from flowborne.motion.quaternions import angle, inverse, product, turned
 from flowborne.shapes.shape import unit
 
 BODY = {

@@ -13,7 +13,7 @@ from flowborne.motion.clip import Clip
 from flowborne.motion.human.segments import Sex, inertias
 from flowborne.motion.human.shapes import shapes
 from flowborne.motion.human.skeleton import PARENTS, SIDES, Array, Skeleton, joint_of
-from flowborne.quaternions import turned
+from flowborne.motion.quaternions import turned
 
 STILL = 0.3
 """m/s below which the lowest place of a foot stands. In a walk a foot swings by at 1 m/s and more,

@@ -2,15 +2,15 @@ from types import SimpleNamespace
 
 import numba
 
-from flowborne import compiling
-from flowborne.compiling import (
+from flowborne.kernels import conjugate_gradients, jit
+from flowborne.kernels.compilation import compilation_watched
+from flowborne.solvers import compiling
+from flowborne.solvers.compiling import (
     compile_iteration,
     compile_solver,
     compile_solver_beside,
     solve_small_slab,
 )
-from flowborne.kernels import conjugate_gradients, jit
-from flowborne.kernels.compilation import compilation_watched
 
 
 def test_kernels_are_counted_once_and_only_while_watching():
@@ -38,7 +38,7 @@ def test_another_process_compiles_the_solver_unless_it_is_there(tmp_path, monkey
     empty = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
     monkeypatch.setattr(conjugate_gradients, "solve", SimpleNamespace(serial=empty))
     compile_solver_beside.__wrapped__()
-    assert [command[1:] for command in started] == [["-m", "flowborne.compiling"]]
+    assert [command[1:] for command in started] == [["-m", "flowborne.solvers.compiling"]]
     monkeypatch.setattr(jit, "cores", lambda: 1)
     compile_solver_beside.__wrapped__()
     assert len(started) == 1

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from flowborne.quaternions import about, angle, continuous, inverse, product, turned, twist
+from flowborne.motion.quaternions import about, angle, continuous, inverse, product, turned, twist
 
 RNG = np.random.default_rng(1)
 P, Q = Rotation.random(20, random_state=2), Rotation.random(20, random_state=3)

@@ -30,7 +30,7 @@ def compile_solver_beside() -> None:
     if cores() == 1 or any(index.glob("conjugate_gradients.solve-*.nbi")):
         return
     quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", "flowborne.compiling"]
+    command = [sys.executable, "-m", "flowborne.solvers.compiling"]
     subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
 
 
