@@ -175,7 +175,7 @@ def test_other_processes_draw_the_same_frames_in_order(
     numbers = [*range(10), 3]
     with closing(drawn_frames(run, run.shot, numbers, cores=1)) as alone:
         expected = [frame.copy() for frame in alone]
-    monkeypatch.setattr(drawing, "STARTING", 0.0)
+    monkeypatch.setattr(drawing, "START_TIME", 0.0)
     started: list[list[str]] = []
     start = subprocess.Popen
 
@@ -194,7 +194,7 @@ def test_a_film_that_is_given_up_leaves_no_process(
     write_run: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = Run.read(write_run(frames=9))
-    monkeypatch.setattr(drawing, "STARTING", 0.0)
+    monkeypatch.setattr(drawing, "START_TIME", 0.0)
     artists = []
     start = subprocess.Popen
 

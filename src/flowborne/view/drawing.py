@@ -1,4 +1,4 @@
-"""The frames of a film one after the other, drawn by as many processes as there are cores."""
+"""The frames of a film in order, drawn by one process per core. It runs as a process itself."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from flowborne.view.shot import Shot
 
 Pixels = NDArray[np.uint8]
 
-STARTING = 4.0
-"""s that further processes take to start: where less is left to draw, they do not pay."""
+START_TIME = 4.0
+"""Time that further processes take to start, s; they are used only if they save more."""
 
-TRIED = 3
-"""Frames drawn here before that is known; the first one also fills caches."""
+TIMED_FRAMES = 3
+"""Frames drawn in this process before the time per frame is known; the first one fills caches."""
 
 
 def drawn_frames(
@@ -32,69 +32,69 @@ def drawn_frames(
 ) -> Generator[Pixels, None, None]:
     """(height, width, 4) pictures of the states `numbers`, in order, each valid until the next.
 
-    Where it pays, other processes draw them, at most one frame each ahead of what is asked for.
-    They end when the generator is closed.
+    If it saves time, other processes draw them, each at most one frame ahead of the caller. They
+    end when the generator is closed.
 
-    cores   processes at most; as many as this one may run on when None
-    raises  ValueError when the shot does not suit the run, or nothing can draw it here
+    cores   maximum number of processes; None is the number of cores available to this process
+    raises  ValueError if the shot does not fit the run, or this machine cannot draw it
     """
     cores = cores_here() if cores is None else cores
     with closing(Picture(run, 1.0, shot)) as picture:
         for done, number in enumerate(numbers, start=1):
-            began = perf_counter()
+            start = perf_counter()
             frame = picture.draw(number)
-            spent = perf_counter() - began
+            time_per_frame = perf_counter() - start
             yield frame
-            left = (len(numbers) - done) * spent
-            if done >= TRIED and cores > 1 and left * (1.0 - 1.0 / cores) > STARTING:
+            saved = (len(numbers) - done) * time_per_frame * (1.0 - 1.0 / cores)
+            if done >= TIMED_FRAMES and cores > 1 and saved > START_TIME:
                 break
         else:
             return
-    yield from _drawn_elsewhere(run, shot, numbers[done:], frame.shape, cores)
+    yield from _drawn_by_processes(run, shot, numbers[done:], frame.shape, cores)
 
 
-def _drawn_elsewhere(
+def _drawn_by_processes(
     run: Run, shot: Shot, numbers: Sequence[int], shape: tuple[int, ...], cores: int
 ) -> Generator[Pixels, None, None]:
     """The same by `cores` processes, each of which draws every `cores`-th frame into a pipe."""
     paths = os.pathsep.join(path for path in sys.path if path)
-    # the rasteriser of a machine without a graphics card has threads of its own, and so has BLAS
+    # one thread each for Mesa's software rasteriser and for BLAS
     single = {"LP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": paths}
-    artists = []
+    processes = []
     try:
         for first in range(cores):
-            artist = subprocess.Popen(
+            process = subprocess.Popen(
                 [sys.executable, "-m", __spec__.name],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 env=os.environ | single,
-                # Ctrl-C is for the process that asked, which ends the others
+                # Ctrl-C reaches the parent alone, which ends the others
                 start_new_session=True,
             )
-            artists.append(artist)
-            assert artist.stdin is not None
-            artist.stdin.write(pickle.dumps((run, shot, list(numbers[first::cores]))))
-            artist.stdin.close()
-        for place in range(len(numbers)):
-            stream = artists[place % cores].stdout
+            processes.append(process)
+            assert process.stdin is not None
+            process.stdin.write(pickle.dumps((run, shot, list(numbers[first::cores]))))
+            process.stdin.close()
+        for index, number in enumerate(numbers):
+            stream = processes[index % cores].stdout
             assert stream is not None
             frame = stream.read(int(np.prod(shape)))
             if len(frame) < np.prod(shape):
-                raise ChildProcessError(f"drawing frame {numbers[place]} failed")
+                raise ChildProcessError(f"drawing frame {number} failed")
             yield np.frombuffer(frame, np.uint8).reshape(shape)
     finally:
-        for artist in artists:
-            artist.kill()
-            artist.wait()
-            for pipe in (artist.stdin, artist.stdout):
+        for process in processes:
+            process.kill()
+            process.wait()
+            for pipe in (process.stdin, process.stdout):
                 assert pipe is not None
                 pipe.close()
 
 
 def _draw() -> None:
-    """Draw into standard output what standard input asks for."""
+    """Draw frames into standard output; standard input has the pickled run, shot and numbers."""
     out = os.dup(sys.stdout.fileno())
-    # whatever a library prints must not get between the frames
+    # output that a library prints must not end up between the frames
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     run, shot, numbers = pickle.load(sys.stdin.buffer)
     with open(out, "wb") as stream, closing(Picture(run, 1.0, shot)) as picture:

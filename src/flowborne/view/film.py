@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from itertools import chain
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -22,7 +23,7 @@ Progress = Callable[[int, int], None]
 Pixels = NDArray[np.uint8]
 
 PICTURE_SCALE = 1.5
-"""Size of preview.png relative to that of the film."""
+"""Size of preview.png relative to the film."""
 
 CODING = {
     ".mp4": (
@@ -32,8 +33,8 @@ CODING = {
     ),
     ".webp": ("libwebp_anim", "yuva420p", ("-loop", "0", "-quality", "75", "-f", "webp")),
 }
-"""Ending -> codec, pixels and options: small, sharp, and playing before it is loaded whole; a page
-shows the second one as an image, over and over."""
+"""Ending -> codec, pixel format and options: small, sharp, and playable while it loads. Web pages
+show WebP as an image in a loop."""
 
 ENDINGS = (*CODING, ".png")
 
@@ -42,17 +43,17 @@ def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | No
     """Draw preview.png (the last frame) and preview.mp4 (all frames) of a run.
 
     folder    of the run; nothing else is read
-    progress  called with (frames drawn, frames in all)
-    shot      what they show, that of the run's scene when None
-    raises    ValueError when there is no frame, when there is only one (the picture is then drawn
-              and the film is not), when the shot does not suit the run, or when it has three
-              dimensions and nothing can draw them here; OSError when the disc refuses
+    progress  called with (frames drawn, total frames)
+    shot      what they show; None is the shot of the run's scene
+    raises    ValueError if there is no frame, if there is only one (then only the picture is
+              drawn), if the shot does not fit the run, or if the run has three dimensions and this
+              machine cannot draw them; OSError if a file cannot be written
     """
     files = RunFolder(folder)
     run = Run.read(folder)
     shot = run.shot if shot is None else shot
     numbers = shot.frames(run.times, run.frames_per_second)
-    # a picture of a size that was asked for has that size
+    # a picture of a given size has that size
     with closing(Picture(run, PICTURE_SCALE if shot.size is None else 1.0, shot)) as picture:
         _write_image(files.picture, picture.draw(numbers[-1]), shot)
     if len(numbers) < 2:
@@ -66,11 +67,11 @@ def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | No
 def write_shot(
     folder: Path, path: Path, progress: Progress | None = None, shot: Shot | None = None
 ) -> str:
-    """Draw a run into a file of one's own; what was written, for people.
+    """Draw a run into a file chosen by the user; returns a text that names the written files.
 
-    path    film.mp4, film.webp, an image that moves, or frames.png for an image sequence
-            frames_0000.png, frames_0001.png, ...; its folder is made when there is none
-    raises  as `make_preview`; ValueError when the name ends in something else, too
+    path    film.mp4, film.webp (an animated image), or frames.png for an image sequence
+            frames_0000.png, frames_0001.png, ...; its folder is created if missing
+    raises  as `make_preview`; also ValueError for another ending
     """
     if path.suffix.lower() not in ENDINGS:
         raise ValueError(
@@ -90,9 +91,9 @@ def write_film(
 ) -> None:
     """Draw frames of `run` into an MP4 file (H.264, plays everywhere) or an animated WebP.
 
-    shot    what they show, that of the run's scene when None
-    raises  ValueError when the shot does not suit the run, or is transparent in MP4; OSError when
-            the file cannot be written; what was there is then still there
+    shot    what they show; None is the shot of the run's scene
+    raises  ValueError if the shot does not fit the run, or is transparent in MP4; OSError if the
+            file cannot be written; an earlier file is then kept
     """
     shot = run.shot if shot is None else shot
     if shot.transparent and path.suffix.lower() == ".mp4":
@@ -105,7 +106,7 @@ def write_film(
     with closing(drawn_frames(run, shot, numbers)) as frames:
         first = next(frames)
         with film_file(path, (first.shape[1], first.shape[0]), rate) as send:
-            for done, frame in enumerate(_and_then(first, frames), start=1):
+            for done, frame in enumerate(chain([first], frames), start=1):
                 send(frame)
                 if progress is not None:
                     progress(done, len(numbers))
@@ -114,9 +115,9 @@ def write_film(
 def write_sequence(
     run: Run, path: Path, progress: Progress | None = None, shot: Shot | None = None
 ) -> str:
-    """Draw frames of `run` into numbered files beside `path`; from which to which, for people.
+    """Draw frames of `run` into numbered files like `path`; returns a text with first and last.
 
-    raises  ValueError when the shot does not suit the run; OSError when the disc refuses
+    raises  ValueError if the shot does not fit the run; OSError if a file cannot be written
     """
     shot = run.shot if shot is None else shot
     numbers = shot.frames(run.times, run.frames_per_second)
@@ -134,19 +135,14 @@ def _write_image(path: Path, frame: Pixels, shot: Shot) -> None:
     write_atomically(path, lambda file: imageio.imwrite(file, kept, extension=".png"))
 
 
-def _and_then(first: Pixels, rest: Iterator[Pixels]) -> Iterator[Pixels]:
-    yield first
-    yield from rest
-
-
 @contextmanager
 def film_file(
     path: Path, size: tuple[int, int], rate: float
 ) -> Iterator[Callable[[Pixels], object]]:
-    """What takes one frame after the other into a file beside `path`, which then takes its place.
+    """Context with a function that writes the next frame; `path` is replaced at the end.
 
     size  width and height of the frames
-    rate  of the film, 1/s
+    rate  frames per second
     """
     partial = path.with_name(partial_name(path.name))
     partial.unlink(missing_ok=True)

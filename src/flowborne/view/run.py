@@ -1,4 +1,4 @@
-"""A run folder as the pictures need it."""
+"""A run folder, read for drawing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ State = dict[str, NDArray[Any]]
 """Arrays of one file of states/, by name."""
 
 PLOTTED = ("objective", "measured_", "angle_", "position_")
-"""Beginnings of the columns of the history that are read besides frame and time."""
+"""Prefixes of the columns of the history that are read in addition to frame and time."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Geom:
 
     shape    in its own frame
     body     number of the body
-    rgba     colour that the model gives it
-    covered  whether flesh is all around it, or a skin stands for it
+    rgba     colour in the model
+    covered  whether flesh surrounds it, or a skin replaces it
     """
 
     shape: Shape
@@ -48,7 +48,7 @@ class Geom:
 class Skin(Protocol):
     """A surface that deforms from frame to frame.
 
-    triangles  (m, 3) of vertices, outward
+    triangles  (m, 3) vertices of each, outward
     rgb        (3,) colour
     """
 
@@ -67,7 +67,7 @@ class Skin(Protocol):
 class Flesh:
     """The skin of all flesh; its vertices are the `flesh_vertices` (k, 3) of a state.
 
-    triangles  (m, 3) of vertices, outward
+    triangles  (m, 3) vertices of each, outward
     bodies     numbers of the bodies that carry flesh
     """
 
@@ -85,12 +85,14 @@ class Flesh:
 
 @dataclass(frozen=True)
 class CarriedSkin:
-    """A skin of the model, which bodies carry.
+    """A skin of the model, bound to bodies.
 
-    rest       (k, 3) its vertices in the model's own pose, m
-    triangles  (m, 3) of them, outward
-    bodies     (n,) numbers of those that carry it, and weights (k, n) their shares, together 1
-    position   (n, 3) m and rotation (n, 3, 3), where the bodies are in the model's own pose
+    rest       (k, 3) vertices in the model's rest pose, m
+    triangles  (m, 3) vertices of each, outward
+    bodies     (n,) numbers of the bodies that carry it
+    weights    (k, n) weight of each body for each vertex; rows sum to 1
+    position   (n, 3) m, of the bodies in the rest pose
+    rotation   (n, 3, 3) of the bodies in the rest pose
     rgb        (3,) colour
     """
 
@@ -104,31 +106,31 @@ class CarriedSkin:
 
     def vertices(self, state: State) -> Array:
         """(k, 3) m, in a state."""
-        turn = state["body_rotation"][self.bodies].astype(float) @ self.rotation.swapaxes(1, 2)
-        moved = state["body_position"][self.bodies].astype(float)
-        shift = moved - np.einsum("nij,nj->ni", turn, self.position)
-        return skinned(self.rest, self.weights, turn, shift)
+        R = state["body_rotation"][self.bodies].astype(float) @ self.rotation.swapaxes(1, 2)
+        position = state["body_position"][self.bodies].astype(float)
+        t = position - np.einsum("nij,nj->ni", R, self.position)
+        return skinned(self.rest, self.weights, R, t)
 
 
 @dataclass(frozen=True)
 class Run:
-    """What a run folder says that holds for all frames; `state` reads one frame.
+    """The data of a run folder that are the same for all frames; `state` reads one frame.
 
     name               of the scene
-    bodies             their names, the world's first
-    accented           numbers of the bodies that controlled joints carry
+    bodies             names, the world first
+    accented           numbers of the bodies that controlled joints move
     controlled         names of the controlled joints
     grid               of the fluid; None without fluid
-    slab               whether it is a run in two dimensions
+    slab               whether the run is two-dimensional
     gravity            (3,) m/s^2
-    geoms              what is drawn of the bodies, in the order of geom_position
+    geoms              drawn geometries, in the order of geom_position
     frames_per_second  of the film
-    wind               (n, 3) streams to draw where there is no fluid
-    shot               what its scene wants to see, and from where
-    history            column -> values, a number per frame of the run from the first on
+    wind               (n, 3) m/s, winds that are drawn if there is no fluid
+    shot               of the scene
+    history            column -> values, a number per frame from frame 1
     states             files of states/, in order
-    flesh              what is drawn of flesh; None without
-    carried            the model's skins, in a room
+    flesh              skin of the flesh; None without flesh
+    carried            skins of the model, in 3D
     sources            (n, 2, 3) m, lower and upper corners of sources of dye
     """
 
@@ -153,10 +155,10 @@ class Run:
     def read(cls, path: Path) -> Self:
         """The run in folder `path`.
 
-        raises  ValueError when it has no frame; RunFolderError when a file is missing or cut
+        raises  ValueError if it has no frame; RunFolderError if a file is missing or damaged
         """
         folder = RunFolder(path)
-        states = _states(folder.states)
+        states = state_files(folder)
         if not states:
             raise ValueError(f"{path} has no frame to draw; let the run go on with --resume")
         with reading(path):
@@ -167,17 +169,17 @@ class Run:
         path = folder.path
         scene = folder.read_scene()
         model = read_json(folder.model)
-        carriers = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
+        body_of = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
         geoms = tuple(_geom(entry) for entry in model["geoms"])
         flesh = _flesh(model.get("flesh"))
         carried = tuple(_carried(entry) for entry in model.get("skins", ()))
-        carrying = [*carriers.values(), *(geom.body for geom in geoms)]
-        carrying += [body for skin in carried for body in skin.bodies]
-        _check_numbers([*carrying, *(flesh.bodies if flesh else ())], model["bodies"], "body")
+        bodies = [*body_of.values(), *(geom.body for geom in geoms)]
+        bodies += [body for skin in carried for body in skin.bodies]
+        _check_numbers([*bodies, *(flesh.bodies if flesh else ())], model["bodies"], "body")
         return cls(
             name=scene.get("name", path.name),
             bodies=tuple(model["bodies"]),
-            accented=frozenset(carriers[j] for j in model["controlled"] if j in carriers),
+            accented=frozenset(body_of[j] for j in model["controlled"] if j in body_of),
             controlled=tuple(model["controlled"]),
             grid=_grid(model["grid"]),
             slab=bool(model["slab"]),
@@ -195,11 +197,11 @@ class Run:
 
     @property
     def skins(self) -> tuple[Skin, ...]:
-        """All that deforms."""
+        """All deforming surfaces."""
         return self.carried if self.flesh is None else (self.flesh, *self.carried)
 
     def __len__(self) -> int:
-        """Number of frames that can be drawn, the initial state included."""
+        """Number of frames that can be drawn, including the initial state."""
         return len(self.states)
 
     def state(self, number: int) -> State:
@@ -208,21 +210,21 @@ class Run:
         self._check_geoms(arrays["geom_position"])
         return arrays
 
-    def _check_geoms(self, places: Array) -> None:
-        """Raise RunFolderError unless there is a place for each of the geometries."""
-        if len(places) != len(self.geoms):
+    def _check_geoms(self, positions: Array) -> None:
+        """Raise RunFolderError unless there is a position of each geometry."""
+        if len(positions) != len(self.geoms):
             raise RunFolderError(
                 f"model.json of the run has {len(self.geoms)} geometries and its states "
-                f"{len(places)}; start the run again with --replace"
+                f"{len(positions)}; start the run again with --replace"
             )
 
     def sampled(self, most: int) -> list[State]:
-        """At most `most` states, evenly spread, the last one among them."""
+        """At most `most` states at even intervals, including the last one."""
         picks = np.unique(np.linspace(len(self) - 1, 0, min(most, len(self))).round().astype(int))
         return [self.state(int(pick)) for pick in picks]
 
     def every(self, name: str) -> Array:
-        """(n, ...) a small array of all states, such as "fluid_force"."""
+        """(n, ...) values of a small array in all states, such as "fluid_force"."""
         values = np.asarray([read_state(path, (name,))[name] for path in self.states], float)
         if name in ("geom_position", "geom_rotation"):
             self._check_geoms(values[0])
@@ -230,20 +232,21 @@ class Run:
 
     @property
     def times(self) -> Array:
-        """(n,) s, of all states."""
+        """(n,) times of all states, s."""
         return self.every("time")
 
     def row(self, number: int) -> int | None:
-        """Row of the history that goes with the `number`-th state; None for the initial one."""
+        """Row of the history of the `number`-th state; None for the initial one."""
         frame = int(self.states[number].stem)
         rows = np.flatnonzero(self.history["frame"] == frame)
         return int(rows[0]) if rows.size else None
 
 
-def _states(folder: Path) -> tuple[Path, ...]:
-    if not folder.is_dir():
+def state_files(folder: RunFolder) -> tuple[Path, ...]:
+    """Files of the states of a run, in order."""
+    if not folder.states.is_dir():
         return ()
-    return tuple(sorted(p for p in folder.iterdir() if STATE_NAME.fullmatch(p.name)))
+    return tuple(sorted(p for p in folder.states.iterdir() if STATE_NAME.fullmatch(p.name)))
 
 
 def _grid(entry: dict[str, Any] | None) -> Grid | None:
@@ -255,7 +258,7 @@ def _grid(entry: dict[str, Any] | None) -> Grid | None:
 
 
 def _check_numbers(numbers: ArrayLike, of: Sized, what: str) -> None:
-    """Raise ValueError unless all of them count what is there, from 0."""
+    """Raise ValueError unless all numbers are valid indices of `of`."""
     found = np.asarray(numbers, np.int64).ravel()
     wrong = found[(found < 0) | (found >= len(of))]
     if wrong.size:
@@ -293,19 +296,19 @@ def _carried(entry: dict[str, Any]) -> CarriedSkin:
 
 
 def _sources(scene: dict[str, Any]) -> Array:
-    """Of a scene in space."""
+    """(n, 2, 3) m, lower and upper corners of the sources of dye in a 3D scene."""
     boxes = [(t["lower"], t["upper"]) for t in scene.get("sources", ()) if t.get("dye")]
     return np.array([box for box in boxes if len(box[0]) == 3], float).reshape(-1, 2, 3)
 
 
 def _history(path: Path) -> dict[str, Array]:
-    """The columns that are drawn; those that a run does not have are left out.
+    """The plotted columns that the run has.
 
-    raises  ValueError for a history without its frames and times
+    raises  ValueError for a history without frames or times
     """
-    always = "frame", "time_s"
-    columns = [n for n in history_columns(path) if n in always or n.startswith(PLOTTED)]
-    for name in always:
+    required = "frame", "time_s"
+    columns = [n for n in history_columns(path) if n in required or n.startswith(PLOTTED)]
+    for name in required:
         if name not in columns:
             raise ValueError(f"{path.name} has no column '{name}'")
     rows = np.array(list(history_rows(path, columns)), float).reshape(-1, len(columns))

@@ -1,4 +1,4 @@
-"""What a film shows of a run, and from where: the table [film] of its scene."""
+"""What a film shows of a run, and from which viewpoint: the table [film] of its scene."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from flowborne.view import style
 
 Place = tuple[float, float, float]
 
-MOST_FRAMES = 1_000_000
-"""Frames of a film."""
+MAX_FRAMES = 1_000_000
+"""Maximum number of frames of a film."""
 
 
 @dataclass(frozen=True)
 class CameraShot:
-    """Where a run is seen from; keys, units and defaults of [film.camera]."""
+    """The viewpoint; keys, units and defaults of [film.camera]."""
 
     azimuth: float = -58.0
     elevation: float = 13.0
@@ -48,34 +48,32 @@ class Shot:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Shot:
-        """The shot that a checked table describes; what it lacks has its default."""
-        camera = table.get("camera", {})
-        given: dict[str, Any] = {
-            key: tuple(v) if isinstance(v, list) else v for key, v in camera.items()
-        }
-        size = table.get("size")
-        rest = {key: value for key, value in table.items() if key not in ("camera", "size")}
-        size = None if size is None else tuple(size)
-        return cls(**rest, size=size, camera=CameraShot(**given))
+        """The shot of a validated table; missing keys have their defaults."""
+
+        def hashable(keys: Mapping[str, Any]) -> dict[str, Any]:
+            return {key: tuple(v) if isinstance(v, list) else v for key, v in keys.items()}
+
+        camera = CameraShot(**hashable(table.get("camera", {})))
+        return cls(**hashable(table) | {"camera": camera})
 
     @property
     def transparent(self) -> bool:
-        """Whether there is nothing where neither fluid nor bodies are seen."""
+        """Whether the background is transparent."""
         return self.background == "transparent"
 
     @property
     def colour(self) -> str:
-        """Of the background, "#rrggbb"; of one that is not there, that of water."""
+        """Colour of the background, "#rrggbb"; that of water if it is transparent or not given."""
         return style.WATER if self.background is None or self.transparent else self.background
 
     def frames(self, times: NDArray[np.float64], run_rate: float) -> list[int]:
-        """Numbers of the states that the frames of the film show, one after the other.
+        """Numbers of the states that the frames of the film show, in order.
 
-        A film of another rate than the run's keeps its time: each frame shows the nearest state.
+        A film with another rate than the run keeps its speed: each frame shows the nearest state.
 
         times     (n,) s, of the states
         run_rate  frames per second of the run
-        raises    ValueError when none lies between start and stop, or more than MOST_FRAMES do
+        raises    ValueError if no state is between start and stop, or more than MAX_FRAMES are
         """
         start = times[0] if self.start is None else self.start
         stop = times[-1] if self.stop is None else self.stop
@@ -90,20 +88,20 @@ class Shot:
             return [int(number) for number in inside]
         first, last = times[inside[0]], times[inside[-1]]
         count = int(np.floor((last - first + slack) * self.frames_per_second)) + 1
-        if count > MOST_FRAMES:
+        if count > MAX_FRAMES:
             raise ValueError(
                 f"the film has {count} frames at {self.frames_per_second:g} a second, and "
-                f"{MOST_FRAMES} are the most; lower its frames_per_second, or give start and stop"
+                f"{MAX_FRAMES} are the most; lower its frames_per_second, or give start and stop"
             )
         wanted = first + np.arange(count) / self.frames_per_second
-        # of two as near the earlier one
+        # the earlier one of two equally near
         nearest = np.abs(times[inside] - (wanted[:, None] - slack)).argmin(axis=1)
         return [int(number) for number in inside[nearest]]
 
     def followed(self, bodies: Sequence[str]) -> int | None:
-        """Number of the one body that the camera follows; None when it follows all, or nothing.
+        """Number of the body that the camera follows; None if it follows all, or nothing.
 
-        raises  ValueError when there is no such body
+        raises  ValueError if there is no such body
         """
         name = self.camera.follow
         if name in ("bodies", "nothing"):
@@ -115,7 +113,7 @@ class Shot:
         return list(bodies).index(name)
 
     def pictured(self, dyes: Sequence[str]) -> None:
-        """Raise ValueError when it shows dye, and there are no dyes."""
+        """Raise ValueError if it shows dye and there are no dyes."""
         if self.field == "dye" and not dyes:
             raise ValueError(
                 "the run has no dye to show; draw another field with --set field=vorticity, speed "

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.extras import optional
-from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError
+from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.runs.states import read_state
 from flowborne.view.browser.fluid import Fluid
 from flowborne.view.browser.page import dress, only_own_requests
@@ -23,7 +23,7 @@ from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.solids import Bodies, Pushes, SkinMesh
 from flowborne.view.browser.surroundings import surround
 from flowborne.view.browser.viewpoint import CameraKeys, FilmView
-from flowborne.view.run import Run
+from flowborne.view.run import Run, state_files
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -49,7 +49,7 @@ class GrowingRun(Run):
         raises  RunFolderError when it is none, has no frame yet, or cannot be read
         """
         files = RunFolder.existing(path)
-        if not _states(files):
+        if not state_files(files):
             raise RunFolderError(f"{path} has no frame yet; view it when the run has begun")
         try:
             started = files.model.stat().st_mtime_ns
@@ -66,7 +66,7 @@ class GrowingRun(Run):
         raises  RunFolderError when it cannot be read, as while it is being replaced
         """
         files = RunFolder(self.states[0].parent.parent)
-        if _states(files) == len(self):
+        if len(state_files(files)) == len(self):
             return None
         new = self.opened(files.path)
         if new.continues(self):
@@ -83,13 +83,6 @@ class GrowingRun(Run):
         for path in self.states[len(values) :]:
             values.append(read_state(path, (name,))[name])
         return np.asarray(values, float)
-
-
-def _states(files: RunFolder) -> int:
-    """Number of states in a run folder."""
-    if not files.states.is_dir():
-        return 0
-    return sum(1 for path in files.states.iterdir() if STATE_NAME.fullmatch(path.name))
 
 
 TICK = 1.0 / 60.0
