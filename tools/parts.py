@@ -12,7 +12,7 @@ from flowborne.control.objective_kinds import ObjectiveTable
 from flowborne.control.objectives import OBJECTIVES
 from flowborne.control.rules import RULES
 from flowborne.registry import Registry
-from flowborne.runs.exporters import EXPORTERS, FORMATS
+from flowborne.runs.exporters import EXPORTERS, own_exporters
 from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.load import library, scene_names
 from flowborne.scenes.schema import Scene
@@ -60,8 +60,8 @@ def chosen() -> str:
 def exporters() -> str:
     """The endings that `flowborne export` writes."""
     rows = []
-    for ending, module in FORMATS.items():
-        found = import_module(f"flowborne.formats.{module}")
+    for ending, module in own_exporters().items():
+        found = import_module(module)
         rows.append([f"`{ending}`", plain(prose(found.__doc__)[0])])
     return table(["ending", "what it is"], rows)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import flowborne as fb
-from flowborne.runs.exporters import FORMATS
+from flowborne.runs.exporters import own_exporters
 
 ROOM = """
 dimensions = 2
@@ -49,7 +49,7 @@ def test_a_run_without_bodies_is_refused(ending: str, room: Path, tmp_path: Path
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("ending", own_exporters())
 def test_what_stays_is_written_too(ending: str, pillar: Path, tmp_path: Path) -> None:
     for file in fb.export(pillar, tmp_path / f"out{ending}").files:
         assert file.stat().st_size > 0

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import NamedTuple, Protocol, TypeVar
 
 from flowborne.registry import Registry
@@ -12,19 +14,8 @@ from flowborne.runs.open_run import OpenRun
 
 Class = TypeVar("Class", bound=type)
 
-FORMATS = {
-    ".bvh": "bvh",
-    ".usd": "usd",
-    ".usda": "usd",
-    ".usdc": "usd",
-    ".glb": "glb",
-    ".abc": "abc",
-    ".vdb": "vdb",
-    ".vtkhdf": "vtkhdf",
-    ".csv": "table",
-    ".parquet": "table",
-}
-"""Ending -> module of flowborne.formats that registers it, imported when it is first asked for."""
+FORMATS = "flowborne.formats"
+"""Package of flowborne's own exporters. Imported by name: it is above this room."""
 
 
 class Written(NamedTuple):
@@ -50,19 +41,34 @@ EXPORTERS: Registry[Exporter] = Registry("exporter", ("write",), keys=("file",))
 """All exporters that are in use, by the ending of the files that they write: ".csv"."""
 
 
+_own: dict[str, str] = {}
+"""Endings of flowborne's own exporters -> their modules."""
+
+
 def provided(ending: str) -> Callable[[Class], Class]:
     """Class decorator of flowborne's own exporters; a user's for the same ending stays."""
-    return EXPORTERS.register(ending) if ending not in EXPORTERS else lambda exporter: exporter
+
+    def add(exporter: Class) -> Class:
+        _own[ending] = exporter.__module__
+        return exporter if ending in EXPORTERS else EXPORTERS.register(ending)(exporter)
+
+    return add
+
+
+@cache
+def own_exporters() -> dict[str, str]:
+    """Endings of flowborne's own exporters -> their modules, which are imported."""
+    for module in iter_modules(import_module(FORMATS).__path__):
+        import_module(f"{FORMATS}.{module.name}")
+    return dict(sorted(_own.items()))
 
 
 def endings() -> tuple[str, ...]:
     """Endings that can be written."""
-    return (*FORMATS, *(kind for kind in EXPORTERS.kinds if kind not in FORMATS))
+    own = own_exporters()
+    return (*own, *(kind for kind in EXPORTERS.kinds if kind not in own))
 
 
 def can_write(ending: str) -> bool:
-    """Whether there is an exporter for an ending, one's own before flowborne's."""
-    if ending not in EXPORTERS and ending in FORMATS:
-        # by name, for formats see scenes and bodies, which stand above this room
-        import_module(f"flowborne.formats.{FORMATS[ending]}")
-    return ending in EXPORTERS
+    """Whether there is an exporter for an ending."""
+    return ending in endings()
