@@ -13,8 +13,8 @@ import numpy as np
 from flowborne import Scene, Simulation, load_scene
 from flowborne.control.creature import away
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
+from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.controller import input_motions
-from flowborne.scenes.surroundings import surroundings_of
 
 SCENE = "human-wind-all"
 FACTORS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)

@@ -354,7 +354,7 @@ def test_the_controller_is_that_of_the_scene(write: Write) -> None:
     assert_allclose(controller.dofs, [*model.dofs_of("wrist"), *model.dofs_of("rail")])
     assert_allclose(controller.strength, [math.radians(20.0), 20.0])
     (other,) = controller.in_phases
-    assert other.places == (0, 1)
+    assert other.indices == (0, 1)
     assert_allclose(other.strength, [math.radians(10.0), 10.0])
     rises = made.world.setup.motions[0].velocity(0.1)[0] >= 0.0
     assert other.phases.active(0.1) == rises

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flowborne.coupling.world import Setup
 from flowborne.errors import SceneError
 from flowborne.scenes.bodies import initial_state, load_model
-from flowborne.scenes.build import mouths_of
+from flowborne.scenes.build import mouths_of, surroundings_of
 from flowborne.scenes.check_bodies import check_bodies, check_without_bodies
 from flowborne.scenes.check_clip import check_clip, check_followers
 from flowborne.scenes.controller import check_control
@@ -14,7 +14,6 @@ from flowborne.scenes.earlier import check_earlier, check_earlier_joints
 from flowborne.scenes.flesh import check_flesh
 from flowborne.scenes.fluid import check_dimensions, check_fluid, fluid_of
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
-from flowborne.scenes.surroundings import surroundings_of
 
 
 def cross_check(draft: Draft) -> list[str]:

@@ -1,13 +1,188 @@
-"""A scene that the schema accepts and whose tables are to be held against each other."""
+"""A scene under inspection: where its problems are, and how they are described."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic_core import ErrorDetails
 
 from flowborne.control.surroundings import unknown_bodies, unknown_joints
+from flowborne.phrases import suggestion
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.wording import Key, place
 from flowborne.solids.model import SolidModel
+from flowborne.tables import BUILT_IN, OWN, OwnTable, Table
+
+Key = str | int
+
+WHAT = {
+    "float_type": "is not a number. Give a number without quotes",
+    "int_type": "is not a whole number. Give a whole number",
+    "int_from_float": "is not a whole number. Give a whole number",
+    "finite_number": "is not a finite number. Give a finite number",
+    "string_type": "is not text. Put it in quotes",
+    "string_too_short": "is empty. Give at least one letter",
+    "string_pattern_mismatch": 'is not of the form "module:function". Write it so',
+    "tuple_type": "is not a list. Put it in square brackets",
+    "too_short": "has too few entries. Give at least one",
+    "too_long": "has too many entries. Give fewer",
+    "model_type": "is not a table. Write it as a table with keys",
+    "dict_type": "is not a table. Write it as a table with keys",
+    "model_attributes_type": "is not a table. Write it as a table with keys",
+}
+"""pydantic's type of error -> what is wrong with the value, and the remedy."""
+
+BOUNDS = {
+    "greater_than": "gt",
+    "greater_than_equal": "ge",
+    "less_than": "lt",
+    "less_than_equal": "le",
+}
+COMPARED = {
+    "greater_than": "is not greater than",
+    "greater_than_equal": "is less than",
+    "less_than": "is not less than",
+    "less_than_equal": "is greater than",
+}
+
+
+def place(file: str, keys: tuple[Key, ...], numbers: dict[str, list[int]] | None = None) -> str:
+    """Where something is: "scene swim.toml, [[control]] 2, joints".
+
+    keys     from the top of the file, list entries counted from 0
+    numbers  table -> number that each of its entries has in the file, from 1
+    """
+    where = f"scene {file}"
+    if not keys:
+        return where
+    top, rest = keys[0], list(keys[1:])
+    listed = bool(rest) and isinstance(rest[0], int) and _is_list_of_tables(str(top))
+    if listed:
+        index = int(rest.pop(0))
+        number = numbers[str(top)][index] if numbers and str(top) in numbers else index + 1
+        where += f", [[{top}]] {number}"
+    elif isinstance(top, str) and tables_of(Scene, top):
+        where += f", [{top}]"
+    else:
+        where += f", {top}"
+    inner = ""
+    for key in rest:
+        inner += f", entry {key + 1}" if isinstance(key, int) else f".{key}" if inner else f" {key}"
+    return where + ("," if listed and inner else "") + inner
+
+
+def tables_of(table: type[Table], key: str) -> list[type[Table]]:
+    """The tables that may stand at `key` of a table."""
+    known = table.model_fields
+    return _tables_in(known[key].annotation) if key in known else []
+
+
+def _tables_in(annotation: Any) -> list[type[Table]]:
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return [annotation]
+    return [table for part in get_args(annotation) for table in _tables_in(part)]
+
+
+def _is_list_of_tables(key: str) -> bool:
+    field = Scene.model_fields.get(key)
+    listed = field is not None and get_origin(field.annotation) is tuple
+    return listed and bool(tables_of(Scene, key))
+
+
+def _kind_of(value: Any) -> Any:
+    return value.get("kind") if isinstance(value, dict) else value
+
+
+def _allowed(keys: tuple[Key, ...], raw: Any) -> list[str]:
+    """Keys that the table at `keys` may have."""
+    tables: list[type[Table]] = [Scene]
+    value = raw
+    for key in keys:
+        value = _inside(value, key)
+        if isinstance(key, int):
+            continue
+        tables = [inner for table in tables for inner in tables_of(table, key)]
+    kind = _kind_of(value)
+    fitting = [table for table in tables if kind in _kinds(table)] or tables
+    return sorted({name for table in fitting for name in table.model_fields})
+
+
+def _kinds(table: type[Table]) -> tuple[Any, ...]:
+    field = table.model_fields.get("kind")
+    return get_args(field.annotation) if field and get_origin(field.annotation) is Literal else ()
+
+
+def _inside(value: Any, key: Key) -> Any:
+    try:
+        return value[key]
+    except (KeyError, IndexError, TypeError):
+        return None
+
+
+def keys_of(location: tuple[Key, ...], raw: Any) -> tuple[Key, ...]:
+    """pydantic's location without the kinds that it puts in where a table was chosen by kind."""
+    keys: list[Key] = []
+    tables: list[type[Table]] = [Scene]
+    value = raw
+    choosing = False
+    for key in location:
+        if choosing and key in (BUILT_IN, OWN):
+            continue
+        if choosing and key == _kind_of(value):
+            choosing = False
+            continue
+        keys.append(key)
+        value = _inside(value, key)
+        if isinstance(key, str):
+            tables = [inner for table in tables for inner in tables_of(table, key)]
+        choosing = any(_kinds(table) for table in tables)
+    return tuple(keys)
+
+
+def explain(error: ErrorDetails, raw: Any, file: str) -> str:
+    """One of pydantic's errors for people."""
+    keys = keys_of(error["loc"], raw)
+    kind, value, context = error["type"], error["input"], error.get("ctx", {})
+    where = place(file, keys)
+    if kind == "extra_forbidden":
+        name = str(keys[-1])
+        end = suggestion(name, _allowed(keys[:-1], raw), "The keys here are")
+        return f"{place(file, keys[:-1])}: unknown key '{name}'{end}"
+    if kind == "missing":
+        return f"{place(file, keys[:-1])}: key '{keys[-1]}' is missing. Add it."
+    if kind == "union_tag_not_found":
+        kinds = [k for table in _choices(keys, raw) for k in _kinds(table)]
+        return f"{where}: key 'kind' is missing. Give one of: {', '.join(kinds)}."
+    if kind in ("union_tag_invalid", "literal_error"):
+        known = str(context.get("expected_tags", context.get("expected", "")))
+        names = [part.strip(" '") for part in known.replace(" or ", ",").split(",")]
+        own = [table for table in _choices(keys, raw) if issubclass(table, OwnTable)]
+        names += [kind for table in own for kind in table.registry.kinds]
+        given = context.get("tag", value)
+        return f"{where}: '{given}' is not known{suggestion(str(given), names, 'Give one of')}"
+    if kind == "value_error":
+        return f"{where} {context['error']}."
+    if kind in BOUNDS:
+        bound = context[BOUNDS[kind]]
+        remedy = "Give a larger number" if kind.startswith("greater") else "Give a smaller number"
+        return f"{where}: {_shown(value)} {COMPARED[kind]} {bound:g}. {remedy}."
+    if kind == "tuple_type" and isinstance(value, dict) and _is_list_of_tables(str(keys[0])):
+        return f"scene {file}: [{keys[0]}] may be there several times. Write [[{keys[0]}]]."
+    what = WHAT.get(kind, f"is not right ({error['msg'].lower()}). Correct it")
+    return f"{where}: {_shown(value)} {what}."
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _choices(keys: tuple[Key, ...], raw: Any) -> list[type[Table]]:
+    tables: list[type[Table]] = [Scene]
+    for key in keys:
+        if isinstance(key, str):
+            tables = [inner for table in tables for inner in tables_of(table, key)]
+    return tables
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from pydantic import ValidationError
 
 from flowborne.errors import SceneError
 from flowborne.runs.run_folder import RunFolder
+from flowborne.scenes.draft import explain
 from flowborne.scenes.load import override
 from flowborne.scenes.schema_film import FilmTable
-from flowborne.scenes.wording import explain
 
 
 def film_settings(folder: RunFolder, overrides: Mapping[str, str]) -> dict[str, Any]:

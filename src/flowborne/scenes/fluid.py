@@ -9,11 +9,10 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
 from flowborne.motion.inflow import Bands, DyeBandsValue
 from flowborne.scenes.domain import check_memory
-from flowborne.scenes.draft import Draft
+from flowborne.scenes.draft import Draft, Key
 from flowborne.scenes.dye import DyeBands, DyeBox, check_bands, check_boxes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import DyeValue, check_outlet, check_sides
-from flowborne.scenes.wording import Key
 from flowborne.tables import triple
 
 NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")

@@ -16,7 +16,7 @@ from typing import Any
 from flowborne.errors import SceneError
 from flowborne.files.given import possible_name, read_file
 from flowborne.phrases import suggestion
-from flowborne.scenes.wording import place
+from flowborne.scenes.draft import place
 
 
 def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:

@@ -20,11 +20,10 @@ from flowborne.phrases import suggestion
 from flowborne.runs.run_folder import reading
 from flowborne.scenes.check import cross_check
 from flowborne.scenes.contact_steps import with_steps
-from flowborne.scenes.draft import Draft
+from flowborne.scenes.draft import Draft, explain, keys_of
 from flowborne.scenes.keyframe_file import inline_keyframes
 from flowborne.scenes.plugins import load_plugins
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.wording import explain, keys_of
 
 
 def join_elbows(raw: dict[str, Any]) -> None:

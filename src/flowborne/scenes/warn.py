@@ -11,9 +11,14 @@ from collections.abc import Callable, Iterator
 from flowborne.coupling.world import Setup
 from flowborne.scenes.notes_clip import lying
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.warn_bodies import (
+    bodies_not_met,
+    fixed_outside,
+    floors_in_fluid,
+    implausible_density,
+    mass_apart,
+)
 from flowborne.scenes.warn_drives import angles_in_radians, limp_joints, too_slow
-from flowborne.scenes.warn_mass import implausible_density, mass_apart
-from flowborne.scenes.warn_model import bodies_not_met, fixed_outside, floors_in_fluid
 from flowborne.scenes.warn_size import lost_in_domain, thin_bodies
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow
 

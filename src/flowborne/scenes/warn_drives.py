@@ -11,11 +11,11 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import HYPOTHETICAL, Setup
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.phrases import listed, rounded_up
+from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.controller import input_motions
 from flowborne.scenes.holding import undriven
 from flowborne.scenes.motions import ServoPDTable
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.surroundings import surroundings_of
 from flowborne.solids.joint_kinds import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
