@@ -52,7 +52,7 @@ def test_the_sense_is_that_which_the_camera_sees(box_of_fluid: Grid, sense: floa
 
 
 def test_the_legend_says_what_the_surfaces_are(box_of_fluid: Grid) -> None:
-    """Slabs that turn at different rates: the strongest hold more than VORTICES of all Q."""
+    """Slabs that turn at different rates: the strongest hold more than VORTEX_SHARE of all Q."""
     state = turning(box_of_fluid, np.array([0.0, 0.0, 1.0]))
     seen = SeenVortices(shown(box_of_fluid, state))  # type: ignore[arg-type]
     assert seen.level == pytest.approx(1.0, rel=0.01)

@@ -1,4 +1,4 @@
-"""Many arrows in space as one mesh, and the wind as rows of arrows behind the bodies."""
+"""Arrows in 3D as one mesh, and a wind as rows of arrows behind the bodies."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from flowborne.view.space.camera import Camera
 Array = NDArray[np.float64]
 
 SIDES = 16
-"""Of a shaft."""
+"""Number of sides of a shaft."""
 
 
 class Arrows:
     """Arrows in a plotter, none at first.
 
-    most    how many are shown at once at most
+    most    maximum number of arrows
     colour  of all
-    lit     how much of their colour depends on the light, from 0 to 1
+    lit     share of their colour that depends on the light, from 0 to 1
     """
 
     def __init__(self, plotter: pv.Plotter, most: int, colour: str, lit: float) -> None:
@@ -35,21 +35,21 @@ class Arrows:
         )
 
     def show(self, tails: Array, vectors: Array, width: float) -> None:
-        """Show arrows from places `tails` along `vectors`, both (n, 3) m; shafts `width` m wide."""
+        """Show arrows from `tails` along `vectors`, both (n, 3) m, with shafts `width` m wide."""
         self._actor.visibility = len(tails) > 0
         if not self._actor.visibility:
             return
         points = np.empty((self._mesh.n_points // (5 * SIDES), 5 * SIDES, 3))
         points[: len(tails)] = arrows(tails, vectors, width)
-        # those that are not needed lie within the others, so that they move no bounds
+        # unused arrows lie inside the others, so that the bounds do not change
         points[len(tails) :] = points[0, 0]
         self._mesh.points = points.reshape(-1, 3)
 
 
 def arrows(tails: Array, vectors: Array, width: float) -> Array:
-    """(n, 5 * SIDES, 3) corners of round arrows; one shorter than its head is that head, smaller.
+    """(n, 5 * SIDES, 3) corners of round arrows; the head of a short arrow is scaled down.
 
-    The tip is the last corner of each.
+    The tip is the last corner of each arrow.
 
     tails, vectors  (n, 3) m; no vector is 0
     """
@@ -60,10 +60,11 @@ def arrows(tails: Array, vectors: Array, width: float) -> Array:
     circle = _CIRCLE @ np.stack([side, np.cross(along, side)], axis=1)
     shaft = np.minimum(width, length / HEAD_LENGTH)
     neck, half, wing = length - HEAD_LENGTH * shaft, 0.5 * shaft, 0.5 * HEAD_WIDTH * shaft
-    nothing = np.zeros_like(shaft)
-    profile = [(nothing, nothing), (nothing, half), (neck, half), (neck, wing), (length, nothing)]
+    zero = np.zeros_like(shaft)
+    profile = [(zero, zero), (zero, half), (neck, half), (neck, wing), (length, zero)]
     rings = [
-        (tails + place * along)[:, None] + radius[:, None] * circle for place, radius in profile
+        (tails + distance * along)[:, None] + radius[:, None] * circle
+        for distance, radius in profile
     ]
     return np.concatenate(rings, axis=1)
 
@@ -81,10 +82,10 @@ _CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
 
 def _faces() -> NDArray[np.int64]:
-    """(m, 4) corners of the faces between each ring of an arrow and the next."""
-    here = np.arange(SIDES)
-    there = np.roll(here, -1)
-    band = np.stack([here, there, there + SIDES, here + SIDES], axis=1)
+    """(m, 4) corners of the faces between successive rings of an arrow."""
+    corner = np.arange(SIDES)
+    following = np.roll(corner, -1)
+    band = np.stack([corner, following, following + SIDES, corner + SIDES], axis=1)
     return np.concatenate([band + n * SIDES for n in range(4)])
 
 
@@ -93,59 +94,58 @@ FACES = _faces()
 
 
 ROWS = 7
-"""Rows of arrows from the lower to the upper edge of the map."""
+"""Rows of arrows between the lower and the upper edge of the map."""
 
 BEHIND = 0.5
-"""Distance of the arrows behind the middle of the bodies, in heights of the map."""
+"""Distance of the arrows behind the centre of the bodies, in heights of the map."""
 
 LENGTH, WIDTH = 0.42, 0.03
-"""Of an arrow and of its shaft, in distances from row to row."""
+"""Length of an arrow and width of its shaft, in row spacings."""
 
-PACE = 0.22
-"""Largest drift from frame to frame, in distances from row to row: the eye takes a faster one for
-one backwards."""
+MAX_DRIFT = 0.22
+"""Maximum drift per frame, in row spacings: a faster drift would look like one backwards."""
 
 
 class WindArrows:
     """Arrows along the wind of a run in a plotter.
 
-    lowest  m, height below which there are none
+    lowest  m, height below which there are no arrows
     """
 
     def __init__(self, plotter: pv.Plotter, run: Run, camera: Camera, lowest: float) -> None:
         wind = run.wind.sum(axis=0)
         speed = float(np.linalg.norm(wind))
-        pitch = camera.height / ROWS
+        spacing = camera.height / ROWS
         self._camera = camera
-        self._drift = wind * min(1.0, PACE * pitch * run.frames_per_second / speed)
-        self._vector = LENGTH * pitch * wind / speed
-        self._width = WIDTH * pitch
-        self._lowest = lowest + 0.5 * pitch
+        self._drift = wind * min(1.0, MAX_DRIFT * spacing * run.frames_per_second / speed)
+        self._vector = LENGTH * spacing * wind / speed
+        self._width = WIDTH * spacing
+        self._lowest = lowest + 0.5 * spacing
         right, up, _ = camera.axes(0)
-        self._set_lattice(pitch, rows=abs(wind @ right) >= abs(wind @ up))
+        self._set_lattice(spacing, rows=abs(wind @ right) >= abs(wind @ up))
         self._arrows = Arrows(plotter, len(self._lattice), style.WIND, 0.3)
 
     def show(self, number: int, time: float) -> None:
-        """Show the arrows of a frame, which stay in the moving air and not before the camera."""
+        """Show the arrows of a frame; they move with the air, not with the camera."""
         focus = self._camera.focus[number]
         axes = self._camera.axes(number)
-        on, toward = axes[:2], axes[2]
-        moved = (self._drift * time - focus) @ on.T
-        on_map = self._lattice + moved % self._period
-        places = focus + on_map @ on - BEHIND * self._camera.height * toward
-        tails = (places - 0.5 * self._vector)[places[:, 2] > self._lowest]
+        plane, toward = axes[:2], axes[2]
+        shift = (self._drift * time - focus) @ plane.T
+        on_map = self._lattice + shift % self._period
+        centres = focus + on_map @ plane - BEHIND * self._camera.height * toward
+        tails = (centres - 0.5 * self._vector)[centres[:, 2] > self._lowest]
         self._arrows.show(tails, np.broadcast_to(self._vector, tails.shape), self._width)
 
-    def _set_lattice(self, pitch: float, rows: bool) -> None:
-        """Places that cover the map behind the bodies wherever in its period the pattern stands.
+    def _set_lattice(self, spacing: float, rows: bool) -> None:
+        """Set points that cover the map behind the bodies for any phase of the pattern.
 
-        Every other row (or column) is shifted by half.
+        Odd rows (or columns) are shifted by half.
         """
         camera = self._camera
         farther = 1.0 + BEHIND * camera.height / camera.distance
         half = 0.5 * farther * np.array([camera.width, camera.height])
-        count = np.ceil(half / pitch).astype(int) + 1
+        count = np.ceil(half / spacing).astype(int) + 1
         a, b = (x.ravel() for x in np.meshgrid(*(np.arange(-n - 2.0, n + 1.0) for n in count)))
         lattice = [a + 0.5 * (b % 2), b] if rows else [a, b + 0.5 * (a % 2)]
-        self._lattice = pitch * np.stack(lattice, axis=1)
-        self._period = pitch * np.array([1.0, 2.0] if rows else [2.0, 1.0])
+        self._lattice = spacing * np.stack(lattice, axis=1)
+        self._period = spacing * np.array([1.0, 2.0] if rows else [2.0, 1.0])

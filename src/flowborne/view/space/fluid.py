@@ -1,4 +1,4 @@
-"""The fluid in space: lit smoke of dye, surfaces of vortices, and a coloured slice."""
+"""The fluid in 3D: lit smoke of dye, surfaces of vortices, and a coloured slice."""
 
 from __future__ import annotations
 
@@ -21,27 +21,35 @@ from flowborne.view.space.surfaces import LIT
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
-THICK = 0.016
-"""Depth of full smoke that lets through a third of the light, in heights of the picture, or in
-sides of a smaller domain."""
+SMOKE_DEPTH = 0.016
+"""Depth of full smoke that transmits 1/e of the light, in heights of the picture, or in sides of a
+smaller domain."""
 
-CELLS = 0.8
-"""The same in cells at least: what is thinner has steps in it."""
+MIN_SMOKE_DEPTH = 0.8
+"""Minimum of that depth in cells; thinner smoke has visible steps."""
 
 FAINT, FULL = 0.06, 0.5
-"""Densities below which smoke is not seen, and from which on it is full."""
+"""Densities below which smoke is invisible, and above which it is full."""
 
-FINE_VOXELS = 1_500_000
+MAX_FINE_VOXELS = 1_500_000
 """Voxels up to which smoke is drawn on a grid twice as fine."""
+
+MAX_FINE_POINTS = 4_000_000
+"""Points up to which vortices are found on a grid twice as fine, by cubic interpolation of Q."""
+
+SLICE_PIXELS = 1024
+"""Longer side of the image of a slice."""
 
 
 class Smoke:
     """A cloud in a plotter."""
 
     def __init__(self, plotter: pv.Plotter, grid: Grid, dye: SeenDye, height: float) -> None:
-        """`height`: m, of what is seen."""
+        """`height`: of the view, m."""
         self._grid, self._dye = grid, dye
-        self._depth = max(THICK * min(max(grid.shape), height / grid.spacing), CELLS)
+        self._depth = max(
+            SMOKE_DEPTH * min(max(grid.shape), height / grid.spacing), MIN_SMOKE_DEPTH
+        )
         self._mapper = vtkGPUVolumeRayCastMapper()
         self._mapper.SetAutoAdjustSampleDistances(False)
         self._mapper.SetUseJittering(True)
@@ -66,7 +74,7 @@ class Smoke:
         last = np.minimum(filled.max(axis=0) + 3, density.shape)
         part = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
         size = np.prod(last - first)
-        finer = 2 if 8 * size <= FINE_VOXELS else 1
+        finer = 2 if 8 * size <= MAX_FINE_VOXELS else 1
         lit = np.clip(colour[part] * light[part], 0.0, 1.0)
         voxels = _voxels(lit, share[part], finer)
         h = self._grid.spacing / finer
@@ -86,44 +94,40 @@ class Smoke:
 def _voxels(colour: NDArray[np.float32], share: NDArray[np.float32], finer: int) -> Pixels:
     """Colours (nx, ny, nz, 3) and shares of full density (nx, ny, nz) as bytes (..., 4).
 
-    The shares are drawn through by cubics before they are sharpened to densities, so that an edge
-    is as smooth as the smoke is, and not as its cells are.
+    The shares are interpolated by cubics before they are sharpened to densities, so that edges
+    follow the smoke and not its cells.
     """
     if finer > 1:
-        how = {"grid_mode": True, "mode": "nearest"}
-        share = np.clip(zoom(share, finer, order=3, **how), 0.0, 1.0)
-        colour = zoom(colour, (finer, finer, finer, 1), order=1, **how)
+        options = {"grid_mode": True, "mode": "nearest"}
+        share = np.clip(zoom(share, finer, order=3, **options), 0.0, 1.0)
+        colour = zoom(colour, (finer, finer, finer, 1), order=1, **options)
     density = share * share * (3.0 - 2.0 * share)
-    return np.rint(255.0 * np.concatenate([colour, density[..., None]], axis=-1)).astype(np.uint8)
+    return style.to_bytes(np.concatenate([colour, density[..., None]], axis=-1))
 
 
 def _property(depth: float) -> vtkVolumeProperty:
-    """Voxels with a colour of their own, of which `depth` m at full density let through 1/e."""
-    wanted = vtkVolumeProperty()
-    wanted.IndependentComponentsOff()
-    wanted.ShadeOff()
-    wanted.SetInterpolationTypeToLinear()
+    """Coloured voxels, of which `depth` m at full density transmit 1/e of the light."""
+    volume = vtkVolumeProperty()
+    volume.IndependentComponentsOff()
+    volume.ShadeOff()
+    volume.SetInterpolationTypeToLinear()
     opacity = vtkPiecewiseFunction()
     opacity.AddPoint(0.0, 0.0)
     opacity.AddPoint(255.0, 1.0 - np.exp(-1.0))
-    wanted.SetScalarOpacity(opacity)
-    wanted.SetScalarOpacityUnitDistance(depth)
-    return wanted
-
-
-FINE_POINTS = 4_000_000
-"""Points up to which surfaces are found on a grid twice as fine, between which Q is cubic."""
+    volume.SetScalarOpacity(opacity)
+    volume.SetScalarOpacityUnitDistance(depth)
+    return volume
 
 
 class VortexSurfaces:
-    """The surfaces of a state as meshes.
+    """The surfaces of vortices in a state as a mesh.
 
-    fine  points up to which they are found on a grid twice as fine
+    max_fine  points up to which they are found on a grid twice as fine
     """
 
-    def __init__(self, grid: Grid, seen: SeenVortices, fine: int = FINE_POINTS) -> None:
+    def __init__(self, grid: Grid, seen: SeenVortices, max_fine: int = MAX_FINE_POINTS) -> None:
         self._seen = seen
-        self._finer = 2 if 8 * np.prod(grid.shape) <= fine else 1
+        self._finer = 2 if 8 * np.prod(grid.shape) <= max_fine else 1
         h = grid.spacing / self._finer
         self._image = pv.ImageData(
             dimensions=[self._finer * n for n in grid.shape],
@@ -132,8 +136,7 @@ class VortexSurfaces:
         )
 
     def of(self, state: State, toward: Array) -> pv.PolyData:
-        """Triangles; their vertices have "sense" from -1, clockwise to a camera in the direction
-        `toward` (3,), to 1."""
+        """Triangles; "sense" of their vertices is -1 (clockwise seen from `toward` (3,)) to 1."""
         for name, values, order in (
             ("q", self._seen.q(state), 3),
             ("sense", self._seen.sense(state, toward), 1),
@@ -146,7 +149,7 @@ class VortexSurfaces:
 
 
 class Vortices:
-    """The surfaces in a plotter."""
+    """Surfaces of vortices in a plotter."""
 
     def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenVortices) -> None:
         self._surfaces = VortexSurfaces(grid, seen)
@@ -163,9 +166,7 @@ class Vortices:
             return
         share = 0.5 + 0.5 * np.clip(surface.point_data["sense"], -1.0, 1.0)[:, None]
         warm, cold = style.rgb(style.SPIN_LEFT[1]), style.rgb(style.SPIN_RIGHT[1])
-        surface.point_data["colour"] = np.rint(255.0 * (cold + share * (warm - cold))).astype(
-            np.uint8
-        )
+        surface.point_data["colour"] = style.to_bytes(cold + share * (warm - cold))
         self._actor = self._plotter.add_mesh(
             surface,
             scalars="colour",
@@ -177,14 +178,10 @@ class Vortices:
         )
 
 
-PIXELS = 1024
-"""Longer side of the plane's image."""
-
-
 class Slice:
-    """The plane in a plotter.
+    """A vertical coloured plane in a plotter, normal to the horizontal axis nearest to `toward`.
 
-    toward  (3,) direction of the camera at first, which says across which axis the slice is
+    toward  (3,) direction of the camera in the first frame
     """
 
     def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenSlice, toward: Array) -> None:
@@ -198,7 +195,7 @@ class Slice:
         self._quad = pv.PolyData(self._corners, faces=[4, 0, 1, 2, 3])
         self._quad.active_texture_coordinates = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
         sides = np.array([grid.shape[first], grid.shape[second]])
-        width, height = np.ceil(PIXELS * sides / sides.max()).astype(int).tolist()
+        width, height = np.ceil(SLICE_PIXELS * sides / sides.max()).astype(int).tolist()
         self._pixels = (width, height)
         self._actor = plotter.add_mesh(
             self._quad, lighting=False, texture=pv.Texture(np.zeros((2, 2, 3), np.uint8))
@@ -206,8 +203,8 @@ class Slice:
 
     def show(self, state: State, focus: Array) -> None:
         """Show the slice of a state through `focus` (3,) m."""
-        place = (focus[self._axis] - self._grid.origin[self._axis]) / self._grid.spacing
-        image = self._seen.image(state, self._axis, place)
+        cell = (focus[self._axis] - self._grid.origin[self._axis]) / self._grid.spacing
+        image = self._seen.image(state, self._axis, cell)
         small = Image.fromarray(np.ascontiguousarray(image.transpose(1, 0, 2)[::-1]))
         large = np.asarray(small.resize(self._pixels, Image.Resampling.BICUBIC))
         self._actor.texture = pv.Texture(large)

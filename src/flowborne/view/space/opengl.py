@@ -1,4 +1,4 @@
-"""The window without a screen in which VTK draws, or why there is none."""
+"""The off-screen window in which VTK draws, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from pyvista import Plotter
 
 LAST_RESORT = "vtkOSOpenGLRenderWindow"
-"""Class of window that VTK makes when no other works, whether it has a library for it or not."""
+"""Class of VTK's window if no other works, even if its library is missing."""
 
 MESA = ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
-"""Names of the library that this window needs; without it the first rendering is a crash."""
+"""Names of the library of that window; without it the first rendering crashes."""
 
 REMEDY = (
     "install OpenGL (on Debian and Ubuntu libegl1 and libgl1-mesa-dri, or libosmesa6), "
@@ -23,9 +23,9 @@ REMEDY = (
 
 
 def off_screen(width: int, height: int) -> Plotter:
-    """Empty plotter of so many pixels that needs no screen. Close it after use.
+    """Empty off-screen plotter of a size in pixels. Close it after use.
 
-    raises  ValueError when this machine has no OpenGL
+    raises  ValueError if this machine has no OpenGL
     """
     try:
         import pyvista
@@ -45,7 +45,7 @@ def off_screen(width: int, height: int) -> Plotter:
 
 @contextmanager
 def _silent(log: Any) -> Iterator[None]:
-    """Keep VTK from telling of each kind of window that it tries in vain."""
+    """Suppress VTK's messages about the kinds of windows that fail."""
     before = log.GetCurrentVerbosityCutoff()
     log.SetStderrVerbosity(log.VERBOSITY_OFF)
     try:

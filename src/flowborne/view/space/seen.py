@@ -1,4 +1,4 @@
-"""What is seen of a fluid in space, as numbers: dye, vortices, or a slice of speed or pressure."""
+"""The visible quantities of a 3D fluid: dye, vortices, or a slice of speed or pressure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flowborne.runs.states import velocity_gradients, vorticity
 from flowborne.view import style
-from flowborne.view.fields import NUMBERS, FieldNumber, Scale, dye_colours, dyes_of
+from flowborne.view.fields import NUMBERS, FieldNumber, Legend, Scale, dye_colours, dyes_of
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 
@@ -19,14 +19,14 @@ Single = NDArray[np.float32]
 SAMPLES = 12
 """Frames from which the scale of a film is taken."""
 
-VORTICES = 0.6
-"""Part of all that turns, positive Q over the fluid, that is within the surfaces of vortices."""
+VORTEX_SHARE = 0.6
+"""Share of the sum of positive Q that is inside the surfaces of vortices."""
 
 
 def seen_of(run: Run, shot: Shot) -> SeenDye | SeenVortices | SeenSlice | None:
-    """What `shot` shows of the fluid of `run`; None when there is nothing to see.
+    """What `shot` shows of the fluid of `run`; None if nothing is visible.
 
-    raises  ValueError when it shows dye and there is none
+    raises  ValueError if it shows dye and there is none
     """
     if run.grid is None or shot.field == "none":
         return None
@@ -40,7 +40,7 @@ def seen_of(run: Run, shot: Shot) -> SeenDye | SeenVortices | SeenSlice | None:
 
 
 class SeenDye:
-    """Carried dyes, each in a colour of its own, mixed where they meet.
+    """Dyes, each in its own colour, mixed where they meet.
 
     legend  (name, colour) of each
     """
@@ -63,12 +63,12 @@ class SeenDye:
 
 
 class SeenVortices:
-    """Where the fluid turns more than it is strained: the surfaces on which Q has one value.
+    """Vortices: iso-surfaces of Q, inside which rotation exceeds strain.
 
-    Q is half of the square of the rotation rate less that of the strain rate (Hunt, Wray and Moin
-    1988). The surfaces are warm where the fluid turns counter-clockwise as the camera sees it.
+    Q is half of (rotation rate squared - strain rate squared) (Hunt, Wray and Moin 1988). The
+    surfaces are warm where the rotation is counter-clockwise for the camera.
 
-    level  1/s^2, of Q on the surfaces: VORTICES of it is within them in the middle one of frames
+    level  1/s^2, Q on the surfaces; see VORTEX_SHARE; the median over frames
     """
 
     scale: Scale | None = None
@@ -76,45 +76,44 @@ class SeenVortices:
     def __init__(self, run: Run) -> None:
         assert run.grid is not None
         self._grid = run.grid
-        levels = [_holding(self.q(state), VORTICES) for state in run.sampled(SAMPLES)]
+        levels = [_level_of(self.q(state), VORTEX_SHARE) for state in run.sampled(SAMPLES)]
         self.level = float(f"{max(float(np.median(levels)), 1e-12):.2g}")
-        self.legend: Sequence[tuple[str, str]] = (
+        self.legend: Legend = (
             (f"vortices, Q = {self.level:g} /s², counter-clockwise", style.SPIN_LEFT[1]),
             ("clockwise", style.SPIN_RIGHT[1]),
         )
 
     def q(self, state: State) -> Array:
-        """(nx, ny, nz) Q in the cells, 1/s^2; 0 in bodies and where a number is lost."""
-        slopes = velocity_gradients(self._grid, state)
-        q = -0.5 * np.einsum("ij...,ji...->...", slopes, slopes)
+        """(nx, ny, nz) Q in the cells, 1/s^2; 0 in bodies and where it is not finite."""
+        gradients = velocity_gradients(self._grid, state)
+        q = -0.5 * np.einsum("ij...,ji...->...", gradients, gradients)
         return np.where(state["open"] > 0.5, np.nan_to_num(q), 0.0)
 
     def sense(self, state: State, toward: Array) -> Array:
-        """(nx, ny, nz) from -1, clockwise as seen from `toward` (3,), to 1."""
+        """(nx, ny, nz) sense of rotation seen from `toward` (3,), from -1 (clockwise) to 1."""
         spin = np.nan_to_num(vorticity(self._grid, state))
         return np.asarray(spin @ toward / np.maximum(np.linalg.norm(spin, axis=-1), 1e-12))
 
 
 class SeenSlice:
-    """Speed or pressure in a plane through what the camera looks at."""
+    """Speed or pressure in a plane through the camera's target."""
 
-    legend: Sequence[tuple[str, str]] = ()
+    legend: Legend = ()
 
     def __init__(self, number: FieldNumber) -> None:
         self._number = number
         self.scale = number.scale
 
-    def image(self, state: State, axis: int, place: float) -> NDArray[np.uint8]:
-        """(n, m, 3) colours of the layer of cells across `axis` at `place`, counted in cells."""
+    def image(self, state: State, axis: int, cell: float) -> NDArray[np.uint8]:
+        """(n, m, 3) colours of the layer of cells normal to `axis` at `cell`, counted in cells."""
         values = np.moveaxis(self._number.values(state), axis, 0)
-        layer = int(np.clip(place, 0, len(values) - 1))
+        layer = int(np.clip(cell, 0, len(values) - 1))
         return self._number.colours(values[layer])
 
 
-def _holding(values: Array, share: float) -> float:
-    """Level above which are values that make up a share of the sum of all positive ones; 0 where
-    there are none."""
-    above = np.sort(values[values > 0.0])[::-1]
-    if not above.size:
+def _level_of(values: Array, share: float) -> float:
+    """Level such that larger values make up a share of the sum of positive ones; 0 if none are."""
+    positive = np.sort(values[values > 0.0])[::-1]
+    if not positive.size:
         return 0.0
-    return float(above[np.searchsorted(np.cumsum(above), share * above.sum())])
+    return float(positive[np.searchsorted(np.cumsum(positive), share * positive.sum())])

@@ -1,4 +1,4 @@
-"""What stands before the camera: lights, bodies, forces, ground, and wind or smoke."""
+"""The 3D scene of a run: lights, bodies, forces, ground, and wind or fluid."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from flowborne.view.space.surroundings import Ground, Motes, stands
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
-SMOOTH = 8
-"""Samples of a pixel on the edges of what is drawn."""
+MULTI_SAMPLES = 8
+"""Samples per pixel of anti-aliasing."""
 
 
 class Stage:
-    """Scene of a run in a plotter, which it takes over.
+    """Scene of a run in a plotter, which it owns from then on.
 
-    seen   what is seen of the fluid, if anything
+    seen   visible quantity of the fluid, if any
     pixel  m, size of a pixel of the film
-    shot   background, and whether flesh is seen through, to the bones in it
+    shot   background, and whether flesh is transparent to show its bones
     """
 
     def __init__(
@@ -82,14 +82,16 @@ class Stage:
     def image(self, number: int, state: State) -> Pixels:
         """(height, width, 3 or 4) picture of the `number`-th state, lowest row first."""
         focus, toward = self._camera.focus[number], self._camera.axes(number)[2]
-        centres, turns = state["geom_position"].astype(float), state["geom_rotation"].astype(float)
-        for actor, hidden, *pose in zip(self._bodies, self._hidden, centres, turns, strict=True):
-            _place(actor, *pose, hidden=hidden)
+        positions = state["geom_position"].astype(float)
+        rotations = state["geom_rotation"].astype(float)
+        poses = zip(self._bodies, self._hidden, positions, rotations, strict=True)
+        for actor, hidden, position, rotation in poses:
+            _place(actor, position, rotation, hidden=hidden)
         corners = np.concatenate(
             [np.zeros((0, 3, 3)), *(surface.show(state) for surface in self._skins)]
         )
         if self._ground is not None:
-            self._ground.show(focus, self._placed(centres, turns), corners)
+            self._ground.show(focus, self._placed(positions, rotations), corners)
         if self._motes is not None:
             self._motes.show(focus, toward)
         if self._wind is not None:
@@ -109,7 +111,7 @@ class Stage:
         self._plotter.close()
 
     def _look(self, number: int) -> None:
-        """Put the camera where it is in a frame."""
+        """Set the camera of a frame."""
         view, focus = self._plotter.camera, self._camera.focus[number]
         view.focal_point = focus
         view.position = focus + self._camera.away[number]
@@ -118,30 +120,30 @@ class Stage:
         self._plotter.renderer.ResetCameraClippingRange()
 
     def _render(self, background: str) -> Pixels:
-        """(height, width, 3) what is seen before a background, lowest row first."""
+        """(height, width, 3) image with a background, lowest row first."""
         self._plotter.set_background(background)
-        # a screenshot renders the first time alone
+        # a screenshot renders only the first time
         self._plotter.render()
         return np.asarray(self._plotter.screenshot(return_img=True))[::-1]
 
     def _cut_out(self) -> Pixels:
-        """(height, width, 4) what is seen, and how much of what is behind is not."""
+        """(height, width, 4) image with opacity, from images on black and on white."""
         black, white = (self._render(colour).astype(float) for colour in ("#000000", "#ffffff"))
         opacity = 1.0 - np.clip((white - black).mean(axis=-1, keepdims=True) / 255.0, 0.0, 1.0)
         colour = np.clip(black / np.maximum(opacity, 1.0 / 255.0), 0.0, 255.0)
         return np.rint(np.concatenate([colour, 255.0 * opacity], axis=-1)).astype(np.uint8)
 
-    def _placed(self, centres: Array, turns: Array) -> list[Array]:
-        """(n, 3) points in the world of each geometry whose place is known."""
+    def _placed(self, positions: Array, rotations: Array) -> list[Array]:
+        """(n, 3) points in the world of each geometry with a finite pose."""
         placed = [
-            centre + points @ turn.T
-            for centre, turn, points in zip(centres, turns, self._points, strict=True)
+            position + points @ rotation.T
+            for position, rotation, points in zip(positions, rotations, self._points, strict=True)
         ]
         return [points for points in placed if np.isfinite(points).all()]
 
 
 def _light(plotter: pv.Plotter) -> None:
-    plotter.enable_anti_aliasing("msaa", multi_samples=SMOOTH)
+    plotter.enable_anti_aliasing("msaa", multi_samples=MULTI_SAMPLES)
     for direction, strength, colour in LIGHTS:
         light = pv.Light(color=colour, intensity=strength, light_type="scene light")
         light.position, light.focal_point = -np.array(direction), (0.0, 0.0, 0.0)
@@ -151,23 +153,24 @@ def _light(plotter: pv.Plotter) -> None:
 def _add_body(
     plotter: pv.Plotter, mesh: pv.PolyData, geom: Geom, accented: frozenset[int]
 ) -> pv.Actor:
-    """Add a geometry."""
     colour, opacity = colour_of(geom, accented)
     return plotter.add_mesh(mesh, color=tuple(colour), opacity=opacity, **LIT)
 
 
-def _place(actor: pv.Actor, centre: Array, turn: Array, *, hidden: bool) -> None:
-    """Move a body; one whose numbers are lost is not seen."""
+def _place(actor: pv.Actor, position: Array, rotation: Array, *, hidden: bool) -> None:
+    """Move a body; hide it if its pose is not finite."""
     matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn, centre
+    matrix[:3, :3], matrix[:3, 3] = rotation, position
     actor.visibility = not hidden and bool(np.isfinite(matrix).all())
     if actor.visibility:
         actor.user_matrix = matrix
 
 
 def _edges(plotter: pv.Plotter, grid: Grid) -> list[tuple[Array, pv.Actor]]:
-    """The edges of the fluid's domain, and the outward normals (2, 3) of the faces that each joins:
-    one between two faces that look at the camera is before the fluid, and is not to be seen."""
+    """The edges of the fluid's domain, each with the outward normals (2, 3) of its two faces.
+
+    An edge between two faces towards the camera is in front of the fluid, and is hidden.
+    """
     low, high = np.array(grid.origin), np.array(grid.upper)
     edges = []
     for axis in range(3):

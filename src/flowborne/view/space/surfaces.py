@@ -17,10 +17,10 @@ from flowborne.view.glyphs import Forces
 from flowborne.view.run import Geom, Skin, State
 
 SHARP = 35.0
-"""Angle between two faces from which on their edge is seen, degrees."""
+"""Angle between two faces above which their edge is sharp, degrees."""
 
 UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
-"""Colour of a geometry to which the model gives none."""
+"""MuJoCo's default colour, of a geometry without one in the model."""
 
 LIT: dict[str, Any] = {
     "ambient": 0.22,
@@ -29,39 +29,41 @@ LIT: dict[str, Any] = {
     "specular_power": 18.0,
     "interpolation": "phong",
 }
-"""How bodies and flesh take the light."""
+"""Material of bodies and flesh."""
+
+CREASE = 60.0
+"""Angle between two triangles of a skin at first above which their edge is sharp, degrees."""
 
 
 def mesh_of(geom: Geom) -> pv.PolyData:
-    """Surface of a geometry in its own frame, m, with normals to shade it by."""
+    """Surface of a geometry in its own frame, m, with normals for shading."""
     return pv.PolyData.from_regular_faces(*geom.shape.triangles()).compute_normals(
         feature_angle=SHARP, split_vertices=True, consistent_normals=False
     )
 
 
 def colour_of(geom: Geom, accented: frozenset[int]) -> tuple[NDArray[np.float64], float]:
-    """(3,) colour of a geometry, the model's own unless it stands fixed or is accented, and its
-    opacity, from 0 to 1."""
-    own = np.round(geom.rgba, 6)
-    plain = tuple(own) == UNCOLOURED or geom.body == 0 or geom.body in accented
-    colour = style.rgb(style.body_colour(geom.body, accented)) if plain else own[:3]
+    """(3,) colour of a geometry and its opacity, from 0 to 1.
+
+    The colour is the model's unless the geometry is fixed, accented or has none.
+    """
+    rgba = np.round(geom.rgba, 6)
+    plain = tuple(rgba) == UNCOLOURED or geom.body == 0 or geom.body in accented
+    colour = style.rgb(style.body_colour(geom.body, accented)) if plain else rgba[:3]
     return colour, float(geom.rgba[3])
 
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-CREASE = 60.0
-"""Angle between two triangles at first from which on their edge is seen, degrees."""
-
 
 class SkinSurface:
-    """A skin in a plotter."""
+    """A skin, of flesh or of the model, in a plotter."""
 
     def __init__(
         self, plotter: pv.Plotter, skin: Skin, first: State, *, seen_through: bool
     ) -> None:
-        """`first`: the state that says where there are edges to be seen."""
+        """`first`: state that defines the sharp edges."""
         self._skin, vertices = skin, skin.vertices(first)
         self._vertex, self._faces = creased(vertices, skin.triangles)
         points = vertices[self._vertex]
@@ -76,8 +78,8 @@ class SkinSurface:
         )
 
     def show(self, state: State) -> Array:
-        """Show the skin; one whose numbers are lost is not seen. (m, 3, 3) m, the corners of its
-        triangles."""
+        """Show the skin unless its vertices are not finite; returns the corners (m, 3, 3) of its
+        triangles, m."""
         vertices = self._skin.vertices(state)
         self._actor.visibility = bool(np.isfinite(vertices).all())
         if self._actor.visibility:
@@ -93,19 +95,20 @@ def creased(vertices: Array, triangles: Indices) -> tuple[Indices, Indices]:
 
     A vertex on a crease has a point, and so a normal, on each side of it.
 
-    vertices   (k, 3) m;  triangles  (m, 3) of them
+    vertices   (k, 3) m
+    triangles  (m, 3) vertices of each
     """
     faces = np.arange(triangles.size).reshape(-1, 3)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     corners = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
     order = np.lexsort(np.sort(edges, axis=1).T)
-    here, there = order[:-1], order[1:]
-    facing = unit(_across(vertices[triangles]))
-    joined = (edges[here] == edges[there][:, ::-1]).all(axis=1)
-    joined &= (facing[here // 3] * facing[there // 3]).sum(axis=1) > np.cos(np.radians(CREASE))
-    here, there = here[joined], there[joined]
-    # the two triangles of an edge go along it in opposite directions
-    pairs = np.concatenate([corners[here], corners[there][:, ::-1]], axis=1)
+    one, other = order[:-1], order[1:]
+    normal = unit(_area_normals(vertices[triangles]))
+    smooth = (edges[one] == edges[other][:, ::-1]).all(axis=1)
+    smooth &= (normal[one // 3] * normal[other // 3]).sum(axis=1) > np.cos(np.radians(CREASE))
+    one, other = one[smooth], other[smooth]
+    # the two triangles of an edge have it in opposite directions
+    pairs = np.concatenate([corners[one], corners[other][:, ::-1]], axis=1)
     first, second = pairs[:, :2].ravel(), pairs[:, 2:].ravel()
     graph = coo_array((np.ones(first.size), (first, second)), shape=2 * (triangles.size,))
     count, point = connected_components(graph, directed=False)
@@ -115,32 +118,35 @@ def creased(vertices: Array, triangles: Indices) -> tuple[Indices, Indices]:
 
 
 def normals(points: Array, triangles: Indices) -> Array:
-    """(n, 3) mean normal of the triangles (m, 3) around each point, weighted by their areas."""
+    """(n, 3) area-weighted mean normal of the triangles (m, 3) around each point."""
     total = np.zeros((len(points), 3))
-    np.add.at(total, triangles, _across(points[triangles])[:, None])
+    np.add.at(total, triangles, _area_normals(points[triangles])[:, None])
     return unit(total)
 
 
-def _across(corners: Array) -> Array:
-    """(m, 3) normals of triangles with corners (m, 3, 3), as long as twice their areas."""
+def _area_normals(corners: Array) -> Array:
+    """(m, 3) normals of triangles with corners (m, 3, 3); their length is twice the area."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def way_out(place: Array, along: Array, corners: Array) -> float:
-    """m along the unit vector `along` (3,) from `place` (3,) to where it leaves a closed skin of
-    triangles with corners (m, 3, 3) m; 0 from outside it (Moeller and Trumbore 1997)."""
+def way_out(start: Array, along: Array, corners: Array) -> float:
+    """Distance along a unit vector `along` (3,) from `start` (3,) to the exit of a closed skin, m.
+
+    Its triangles have corners (m, 3, 3) m. The distance is 0 from a start outside (Moeller and
+    Trumbore 1997).
+    """
     known = corners[np.isfinite(corners).all(axis=(1, 2))]
-    slope = _across(known) @ along
+    slope = _area_normals(known) @ along
     crossed, slope = known[slope != 0.0], slope[slope != 0.0]
-    first = crossed[:, 0] - place
+    first = crossed[:, 0] - start
     one, other = crossed[:, 1] - crossed[:, 0], crossed[:, 2] - crossed[:, 0]
-    turn = np.cross(first, along)
-    u, v = (turn * other).sum(axis=1) / slope, -(turn * one).sum(axis=1) / slope
-    distance = (first * _across(crossed)).sum(axis=1) / slope
-    met = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0)
-    if not met.any():
+    moment = np.cross(first, along)
+    u, v = (moment * other).sum(axis=1) / slope, -(moment * one).sum(axis=1) / slope
+    distance = (first * _area_normals(crossed)).sum(axis=1) / slope
+    hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0)
+    if not hit.any():
         return 0.0
-    nearest = np.flatnonzero(met)[np.argmin(distance[met])]
+    nearest = np.flatnonzero(hit)[np.argmin(distance[hit])]
     return float(distance[nearest]) if slope[nearest] > 0.0 else 0.0
 
 
@@ -160,30 +166,30 @@ class Outside:
             self._parts.setdefault(geom.body, []).append(n)
 
     def around(self, state: State) -> list[Array]:
-        """(m, 3, 3) m, the corners of each skin's triangles in a state."""
+        """(m, 3, 3) m, corners of the triangles of each skin in a state."""
         return [skin.vertices(state)[skin.triangles] for skin in self._skins]
 
     def reach(
-        self, body: int, place: Array, vector: Array, state: State, around: Sequence[Array]
+        self, body: int, start: Array, vector: Array, state: State, around: Sequence[Array]
     ) -> float:
-        """m along `vector` (3,) from `place` (3,) to the surface of a body or of the skin around
-        the place; 0 from outside both. `around` is that of the state."""
+        """Distance, m, along `vector` (3,) from `start` (3,) to the exit of a body or of a skin.
+
+        Of several the farthest counts; it is 0 from a start outside. `around` is that of the state.
+        """
         along = vector / np.linalg.norm(vector)
-        farthest = 0.0
-        for corners in around:
-            farthest = max(farthest, way_out(place, along, corners))
+        farthest = max((way_out(start, along, corners) for corners in around), default=0.0)
         for part in self._parts.get(body, ()):
-            turn, centre = state["geom_rotation"][part], state["geom_position"][part]
+            rotation, position = state["geom_rotation"][part], state["geom_position"][part]
             normals, heights = self._planes[part]
-            room = heights - normals @ ((place - centre) @ turn)
-            slope = normals @ (along @ turn)
-            if (room > 0.0).all():
-                farthest = max(farthest, float((room[slope > 0.0] / slope[slope > 0.0]).min()))
+            depth = heights - normals @ ((start - position) @ rotation)
+            slope = normals @ (along @ rotation)
+            if (depth > 0.0).all():
+                farthest = max(farthest, float((depth[slope > 0.0] / slope[slope > 0.0]).min()))
         return farthest
 
 
 def pushes(forces: Forces, outside: Outside, state: State, pixel: float) -> tuple[Array, Array]:
-    """Tails, on the bodies' surfaces, and vectors (n, 3) of the arrows of forces, m.
+    """Tails, on the surfaces of the bodies, and vectors (n, 3) of the arrows of forces, m.
 
     pixel  size of a pixel, m
     """
@@ -198,7 +204,7 @@ def pushes(forces: Forces, outside: Outside, state: State, pixel: float) -> tupl
 
 
 def _planes(mesh: pv.PolyData) -> tuple[Array, Array]:
-    """Outward normals (m, 3) of a mesh's faces, and their heights (m,) over the origin, m."""
+    """Outward normals (m, 3) of a mesh's faces, and their distances (m,) from the origin, m."""
     normals = np.asarray(mesh.face_normals, float)
-    middles = np.asarray(mesh.cell_centers().points, float)
-    return normals, np.einsum("ij,ij->i", normals, middles)
+    centres = np.asarray(mesh.cell_centers().points, float)
+    return normals, np.einsum("ij,ij->i", normals, centres)

@@ -1,8 +1,9 @@
-"""What is fixed around the bodies: the ground with their shadow, or motes in the water."""
+"""The fixed surroundings of the bodies: the ground with their shadow, or motes in the water."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -18,41 +19,52 @@ from flowborne.view.run import Run
 
 Array = NDArray[np.float64]
 
-NEAR = 0.11
-"""The lowest place of bodies that stand on z = 0 is as near to it, in heights of the bodies."""
+MAX_STANDING_GAP = 0.11
+"""Maximum distance of the lowest point of standing bodies from z = 0, in heights of the bodies."""
 
-SEEN = 3.2
-"""Distance from the focus at which the floor has faded away, in heights of the map."""
+FLOOR_RADIUS = 3.2
+"""Distance from the focus at which the floor is faded out, in heights of the map."""
 
 SQUARE = 0.6
-"""Largest side of a square, in heights of the map; the side is a round number of metres."""
+"""Maximum side of a square, in heights of the map; the side is a round number of metres."""
 
-PIXELS = 192
-"""Sides of the image of the shadow."""
+SHADOW_PIXELS = 192
+"""Side of the image of the shadow."""
 
-BLUR = 1.6
+SHADOW_BLUR = 1.6
 """Softness of the shadow's edge, pixels of its image."""
 
-DARK = 0.62
-"""How much of the light the shadow takes away."""
+SHADOW_OPACITY = 0.62
+"""Share of the light that the shadow removes."""
+
+MOTES = 1200
+"""Number of motes within reach."""
+
+MOTES_REACH = 1.1
+"""Distance from the focus at which motes are faded out, in heights of the map."""
+
+MOTE_SIZE = 3.0
+"""Size of a mote, pixels."""
 
 
 def stands(run: Run) -> bool:
-    """Whether the bodies stand on z = 0: nothing pulls them elsewhere, and they come down to it."""
+    """Whether the bodies stand on z = 0: gravity is downward or 0, and they come down to it."""
     if run.gravity[:2].any() or run.gravity[2] > 0.0 or not (run.geoms or run.flesh):
         return False
     heights = swept(run, range(len(run.geoms)))[..., 2]
     heights = heights[np.isfinite(heights).all(axis=1)]
-    return bool(heights.size) and abs(heights.min()) <= NEAR * np.ptp(heights, axis=1).max()
+    return (
+        bool(heights.size)
+        and abs(heights.min()) <= MAX_STANDING_GAP * np.ptp(heights, axis=1).max()
+    )
 
 
 class Ground:
-    """Floor at z = 0 in a plotter, as much of it as is seen.
+    """The visible part of a floor at z = 0 in a plotter.
 
-    height  m, of what is seen
-    light   (3,) direction in which light travels, down
-    colour  "#rrggbb" of what the floor fades into; None where that is nothing, and of the ground
-            the shadow alone is seen
+    height  m, of the view
+    light   (3,) direction of the light, downward
+    colour  background into which the floor fades, "#rrggbb"; None draws only the shadow
     """
 
     def __init__(
@@ -62,12 +74,12 @@ class Ground:
         self._slope = light[:2] / light[2]
         self._extent = 1.5 * height
         self._lift = 2e-3 * height
-        self._seen = SEEN * height
+        self._radius = FLOOR_RADIUS * height
         self._side = round_number(SQUARE * height)
-        floor = pv.Disc(inner=0.0, outer=self._seen, r_res=24, c_res=64)
+        floor = pv.Disc(inner=0.0, outer=self._radius, r_res=24, c_res=64)
         self._shade(floor, style.FLOOR, np.zeros(2))
         self._floor = _add(plotter, floor)
-        self._squares = _squares(self._side, int(np.ceil(self._seen / self._side)))
+        self._squares = _squares(self._side, int(np.ceil(self._radius / self._side)))
         self._shade(self._squares, style.SQUARES, np.zeros(2))
         self._lines = _add(plotter, self._squares, line_width=1.5)
         self._floor.visibility = self._lines.visibility = colour is not None
@@ -80,58 +92,58 @@ class Ground:
     def show(self, focus: Array, bodies: Sequence[Array], skin: Array) -> None:
         """Show the floor around `focus` (3,) with the shadow of bodies and flesh.
 
-        bodies  points (n, 3) of each convex part of them, m
+        bodies  points (n, 3) of each convex part, m
         skin    (m, 3, 3) corners of the triangles of flesh, m
         """
-        # the squares stay where they are in the world, and fade around the focus
-        whole = self._side * np.round(focus[:2] / self._side)
-        self._shade(self._squares, style.SQUARES, focus[:2] - whole)
+        # the squares are fixed in the world, and fade around the focus
+        corner = self._side * np.round(focus[:2] / self._side)
+        self._shade(self._squares, style.SQUARES, focus[:2] - corner)
         self._floor.position = (*focus[:2], 0.0)
-        self._lines.position = (*whole, 0.5 * self._lift)
+        self._lines.position = (*corner, 0.5 * self._lift)
         self._shadow.position = (*focus[:2], self._lift)
         self._shadow.texture = _texture(self._cast(focus[:2] - 0.5 * self._extent, bodies, skin))
 
     def _cast(self, corner: Array, bodies: Sequence[Array], skin: Array) -> NDArray[np.uint8]:
-        """(PIXELS, PIXELS) where bodies and skin keep light from the floor, lowest row first."""
-        image = Image.new("L", (PIXELS, PIXELS))
+        """(SHADOW_PIXELS, SHADOW_PIXELS) shadow of bodies and skin, lowest row first."""
+        image = Image.new("L", (SHADOW_PIXELS, SHADOW_PIXELS))
         draw = ImageDraw.Draw(image)
         known = skin[np.isfinite(skin).all(axis=(1, 2))]
-        outlines = [_hull(self._fallen(points, corner)) for points in bodies]
-        for outline in [*outlines, *self._fallen(known, corner)]:
+        outlines = [_hull(self._projected(points, corner)) for points in bodies]
+        for outline in [*outlines, *self._projected(known, corner)]:
             if len(outline) > 2:
-                draw.polygon([tuple(place) for place in outline.tolist()], fill=255)
-        return np.asarray(image.filter(ImageFilter.GaussianBlur(BLUR)))
+                draw.polygon([tuple(point) for point in outline.tolist()], fill=255)
+        return np.asarray(image.filter(ImageFilter.GaussianBlur(SHADOW_BLUR)))
 
-    def _fallen(self, points: Array, corner: Array) -> Array:
-        """(..., 2) where on the image the shadows of points (..., 3) fall."""
+    def _projected(self, points: Array, corner: Array) -> Array:
+        """(..., 2) position of the shadows of points (..., 3) on the image, pixels."""
         height = np.maximum(points[..., 2:], 0.0)
-        fallen = points[..., :2] - height * self._slope - corner
-        return np.asarray(PIXELS * fallen / self._extent)
+        shadow = points[..., :2] - height * self._slope - corner
+        return np.asarray(SHADOW_PIXELS * shadow / self._extent)
 
     def _shade(self, mesh: pv.PolyData, colour: str, centre: Array) -> None:
-        """Give a mesh a colour that fades into the background away from a centre."""
-        away = np.linalg.norm(mesh.points[:, :2] - centre, axis=1, keepdims=True)
-        share = np.clip(1.0 - away / self._seen, 0.0, 1.0) ** 1.5
+        """Colour a mesh so that it fades into the background away from a centre."""
+        distance = np.linalg.norm(mesh.points[:, :2] - centre, axis=1, keepdims=True)
+        share = np.clip(1.0 - distance / self._radius, 0.0, 1.0) ** 1.5
         mix = style.rgb(self._colour or style.WATER) * (1.0 - share) + style.rgb(colour) * share
-        mesh.point_data["colour"] = np.rint(255.0 * mix).astype(np.uint8)
+        mesh.point_data["colour"] = style.to_bytes(mix)
 
 
-def _add(plotter: pv.Plotter, mesh: pv.PolyData, **drawn: float) -> pv.Actor:
+def _add(plotter: pv.Plotter, mesh: pv.PolyData, **drawn: Any) -> pv.Actor:
     return plotter.add_mesh(mesh, scalars="colour", rgb=True, lighting=False, **drawn)
 
 
 def _squares(side: float, count: int) -> pv.PolyData:
-    """Lines along x and y, `side` apart and `count` each way from the origin, of short pieces."""
+    """Lines along x and y at a distance `side`, `count` on each side of the origin, in segments."""
     ticks = side * np.arange(-count, count + 1.0)
-    pieces = np.linspace(ticks[0], ticks[-1], 8 * count + 1)
-    nothing = np.zeros_like(pieces)
-    lines = [np.column_stack([np.full_like(pieces, tick), pieces, nothing]) for tick in ticks]
+    points = np.linspace(ticks[0], ticks[-1], 8 * count + 1)
+    zero = np.zeros_like(points)
+    lines = [np.column_stack([np.full_like(points, tick), points, zero]) for tick in ticks]
     lines += [line[:, [1, 0, 2]] for line in lines]
     return pv.merge([pv.lines_from_points(line) for line in lines])
 
 
 def _hull(points: Array) -> Array:
-    """(k, 2) places of the convex hull of points in the plane; none when they have no area."""
+    """(k, 2) corners of the convex hull of points in the plane; none if they have no area."""
     if len(points) < 3:
         return points[:0]
     try:
@@ -141,51 +153,39 @@ def _hull(points: Array) -> Array:
 
 
 def _texture(shade: NDArray[np.uint8]) -> pv.Texture:
-    """Black, as opaque as `shade` (lowest row first) says."""
+    """Black with opacity `shade`, lowest row first."""
     pixels = np.zeros((*shade.shape, 4), np.uint8)
-    pixels[..., 3] = DARK * shade[::-1]
+    pixels[..., 3] = SHADOW_OPACITY * shade[::-1]
     return pv.Texture(pixels)
 
 
-COUNT = 1200
-"""Points within reach."""
-
-REACH = 1.1
-"""Distance from the focus at which they have faded away, in heights of the map."""
-
-SIZE = 3.0
-"""Pixels."""
-
-
 class Motes:
-    """The points in a plotter.
+    """Motes, points that are fixed in the water, in a plotter.
 
-    height  m, of what is seen
-    grid    of the fluid in which they are; None for all of space
+    height  m, of the view
+    grid    of the fluid that contains them; None for all of space
     """
 
     def __init__(self, plotter: pv.Plotter, height: float, grid: Grid | None) -> None:
-        self._reach, self._grid = REACH * height, grid
-        self._mesh = pv.PolyData(motes(COUNT, np.zeros(3), self._reach))
+        self._reach, self._grid = MOTES_REACH * height, grid
+        self._mesh = pv.PolyData(motes(MOTES, np.zeros(3), self._reach))
         self._mesh.point_data["colour"] = np.tile(
-            np.append(np.rint(255.0 * style.rgb(style.MOTES)), 255.0).astype(np.uint8), (COUNT, 1)
+            style.to_bytes(np.append(style.rgb(style.MOTES), 1.0)), (MOTES, 1)
         )
-        plotter.add_mesh(
-            self._mesh, style="points", point_size=SIZE, scalars="colour", rgb=True, lighting=False
-        )
+        _add(plotter, self._mesh, style="points", point_size=MOTE_SIZE)
 
     def show(self, focus: Array, toward: Array) -> None:
-        """Show those around `focus` (3,), of which those before it, in the direction `toward` (3,)
-        of the camera, are clear."""
-        points = motes(COUNT, focus, self._reach)
-        away = points - focus
-        share = 1.0 - np.linalg.norm(away, axis=1) / self._reach
-        share = np.minimum(share, -(away @ toward) / self._reach)
+        """Show the motes around `focus` (3,).
+
+        Those in front of it, in the direction `toward` (3,) of the camera, are transparent.
+        """
+        points = motes(MOTES, focus, self._reach)
+        offset = points - focus
+        share = 1.0 - np.linalg.norm(offset, axis=1) / self._reach
+        share = np.minimum(share, -(offset @ toward) / self._reach)
         if self._grid is not None:
             low, high = np.array(self._grid.origin), np.array(self._grid.upper)
             share[((points < low) | (points > high)).any(axis=1)] = 0.0
         self._mesh.points = points
-        self._mesh.point_data["colour"][:, 3] = np.rint(
-            255.0 * np.clip(3.0 * share, 0.0, 1.0)
-        ).astype(np.uint8)
+        self._mesh.point_data["colour"][:, 3] = style.to_bytes(np.clip(3.0 * share, 0.0, 1.0))
         self._mesh.Modified()
