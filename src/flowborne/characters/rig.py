@@ -64,7 +64,7 @@ class Rig:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles that joints carry by linear blend skinning, where the rig has them at rest.
+    """Triangles with weights for linear blend skinning, in the rest pose of the rig.
 
     vertices  (k, 3) m
     faces     (m, 3) outward

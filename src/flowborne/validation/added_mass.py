@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from flowborne import Grid
+from flowborne import Array, Grid
 from flowborne.motions import JointCommand
 from flowborne.validation.case import Case, reference, table
 from flowborne.validation.findings import Finding, GridSeries, at_most, near
@@ -71,24 +71,26 @@ def coefficient(grid: Grid, geom: str, direction: Vector = UP, walls: str = "") 
 
 
 def turned(grid: Grid, geom: str) -> float:
-    """Added moment of inertia about the origin over the fluid's density, m^4: from the torque of
-    the pressure while a drive starts the body turning."""
-    body = f'<body name="body"><joint name="turn" axis="0 0 1"/>{geom}</body>'
-    world = make_world(mjcf(body), grid, solid_density=1.0, tolerance=1e-11)
-    command = JointCommand.none(1)
-    command.set(np.array([0]), 0.0, DT)
-    return -float(advance(world, DT, command=command).pressure_wrench[1, 5])
+    """Added moment of inertia about the origin over the fluid's density, m^4."""
+    return -float(started(grid, geom, 'axis="0 0 1"')[5])
 
 
 def pushed(grid: Grid, geom: str, direction: Vector) -> float:
-    """Added mass over the fluid's density, from the pressure as a drive starts the body."""
+    """Added mass over the fluid's density, m^3, or m^2 in a slab."""
     axis = " ".join(str(x) for x in direction)
-    body = f'<body name="body"><joint name="slide" type="slide" axis="{axis}"/>{geom}</body>'
+    return -float(started(grid, geom, f'type="slide" axis="{axis}"')[:3] @ np.array(direction))
+
+
+def started(grid: Grid, geom: str, joint: str) -> Array:
+    """(6,) wrench of the pressure while a drive starts the body with unit acceleration.
+
+    joint  its attributes in MJCF
+    """
+    body = f'<body name="body"><joint name="drive" {joint}/>{geom}</body>'
     world = make_world(mjcf(body), grid, solid_density=1.0, tolerance=1e-11)
     command = JointCommand.none(1)
     command.set(np.array([0]), 0.0, DT)
-    force = advance(world, DT, command=command).pressure_wrench[1, :3]
-    return -float(force @ np.array(direction))
+    return advance(world, DT, command=command).pressure_wrench[1]
 
 
 def judged(title: str, label: str, grids: Grids, values: Sequence[float], exact: float) -> Finding:
@@ -124,12 +126,12 @@ def oblongs(quick: bool) -> list[Finding]:
         width = float(key.removeprefix("D/L="))
         if quick and width < 0.5:
             continue
-        for said, direction, exact in zip(("across", "along"), (SIDEWAYS, UP), pair, strict=True):
+        for side, direction, exact in zip(("across", "along"), (SIDEWAYS, UP), pair, strict=True):
             values = [
                 coefficient(box(round(n / width), long=2), round_body(width), direction)
                 for n in grids
             ]
-            title = f"Ca of a cylinder {said} a 1 x 2 box, D/L = {width:g}"
+            title = f"Ca of a cylinder {side} a 1 x 2 box, D/L = {width:g}"
             findings.append(judged(title, ACROSS, grids, values, exact))
     return findings
 
@@ -151,8 +153,8 @@ def ellipse_in_box(quick: bool) -> list[Finding]:
         ("I_a over the unbounded one", turning, [turned(g, geom) / unbounded for g in spaces]),
     )
     return [
-        judged(f"ellipse in a box, {said}", LONGWISE, grids, values, exact)
-        for said, exact, values in rows
+        judged(f"ellipse in a box, {label}", LONGWISE, grids, values, exact)
+        for label, exact, values in rows
     ]
 
 
@@ -270,8 +272,8 @@ def density_ratios(quick: bool) -> list[Finding]:
                 findings.append(at_most(f"a/g of a neutral {name}", measured, 1e-10))
                 continue
             found = -free_rise(measured, ratio, displaced, solid)
-            said = f"a/g of a {name}, rho_s/rho_f = {ratio:g}, 32 cells across D"
-            findings.append(near(said, found, exact, relative=0.01))
+            title = f"a/g of a {name}, rho_s/rho_f = {ratio:g}, 32 cells across D"
+            findings.append(near(title, found, exact, relative=0.01))
     return findings
 
 
@@ -282,11 +284,11 @@ def ellipses(quick: bool) -> list[Finding]:
     spaces = [box(round(n / (2.0 * LONG))) for n in grids]
     rows = reference("I1", "rise a/g for rho_s/rho_f=0.01")
     findings = []
-    for said, direction in (("a=2b along long axis", SIDEWAYS), ("across", UP)):
-        exact = rows[f"ellipse {said}"]
+    for axis, direction in (("a=2b along long axis", SIDEWAYS), ("across", UP)):
+        exact = rows[f"ellipse {axis}"]
         boxed = [rise(space, geom, LIGHT, direction) for space in spaces]
         values = [free_rise(found, LIGHT, area, False) for found in boxed]
-        title = f"rise over g of an ellipse {said}"
+        title = f"rise over g of an ellipse {axis}"
         findings.append(judged(title, LONGWISE, grids, values, exact))
     inertia = turning(LONG, SHORT)
     values = [free_turning(turned(space, geom), LONG, SHORT) / inertia for space in spaces]

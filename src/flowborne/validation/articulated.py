@@ -212,9 +212,9 @@ def free_chain(quick: bool) -> list[Finding]:
     findings = []
     for flat in (True, False):
         linear, angular = kept(flat, 0.01, 0.5 if quick else 5.0)
-        said = f"momentum over its first value, chain in {2 if flat else 3}D"
-        findings.append(at_most(f"change of linear {said}", linear, 1e-10))
-        findings.append(at_most(f"change of angular {said}", angular, 1e-10))
+        title = f"momentum over its first value, chain in {2 if flat else 3}D"
+        findings.append(at_most(f"change of linear {title}", linear, 1e-10))
+        findings.append(at_most(f"change of angular {title}", angular, 1e-10))
     exact = cat_turn_by_geometry()
     steps: Sequence[int] = (100, 200, 400) if quick else (200, 400, 800, 1600)
     turns = [cat_turn(n, 1.0) for n in steps]

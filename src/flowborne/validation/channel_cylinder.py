@@ -22,7 +22,7 @@ from flowborne.validation.shedding import (
     judged,
     watch,
 )
-from flowborne.validation.worlds import begin
+from flowborne.validation.worlds import refined
 from flowborne.worlds import advance, make_world
 
 DIAMETER, CENTRE = 0.1, 0.2
@@ -132,15 +132,11 @@ def steady_flow(world: World, change: float) -> tuple[float, float]:
 
 def steady_cylinder(quick: bool) -> list[Finding]:
     """B1: from the undisturbed flow on the coarsest grid, from the coarser one's on the others."""
-    grids = STEADY_GRIDS[quick]
+    grids, inflow = STEADY_GRIDS[quick], Parabola(CREEPING.fastest)
     rows = []
-    coarser = None
-    for n in grids:
-        world = channel(n, Parabola(CREEPING.fastest))
-        begin(world, coarser, Parabola(CREEPING.fastest))
+    for _, world, _ in refined(grids, lambda n: channel(n, inflow), inflow):
         forces = steady_flow(world, STEADY[quick])
         rows.append((*forces, pressure_drop(world), recirculation(world)))
-        coarser = world
     drag, lift, drop, length = zip(*rows, strict=True)
     return [
         judged("B1", "cD", grids, drag, (5.57, 5.59), falling=True),
@@ -154,12 +150,11 @@ def shedding_in_channel(quick: bool) -> list[Finding]:
     """B2: largest coefficients over some periods, frequency, and the pressure drop half a period
     after the largest lift."""
     grids, periods = SHEDDING_GRIDS[quick], PERIODS[quick]
+    inflow = Parabola(SHEDDING.fastest)
+    field = Kicked(inflow, SHEDDING, CENTRE, CENTRE)
     rows, lines = [], []
-    coarser = None
-    for n in grids:
-        world = channel(n, Parabola(SHEDDING.fastest))
-        begin(world, coarser, Kicked(Parabola(SHEDDING.fastest), SHEDDING, CENTRE, CENTRE))
-        before = AFTER if coarser else BEFORE[quick]
+    for n, world, first in refined(grids, lambda n: channel(n, inflow), field):
+        before = BEFORE[quick] if first else AFTER
         seen, drags, drops = watch(world, SHEDDING, before, 0.3, periods, pressure_drop)
         steps, period = seen.last(periods)
         lifts, later = seen.signal[steps], drops[steps]
@@ -167,7 +162,6 @@ def shedding_in_channel(quick: bool) -> list[Finding]:
         fallen = float(np.interp(half, np.arange(later.size), later))
         rows.append((crest(drags[steps])[0], crest(lifts)[0], SHEDDING.time / period, fallen))
         lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
-        coarser = world
     drag, lift, strouhal, drop = zip(*rows, strict=True)
     return [
         judged("B2", "cD max", grids, drag, (3.22, 3.24), falling=True, lines=lines),

@@ -99,11 +99,11 @@ def uniform_wind(quick: bool) -> list[Finding]:
         best = float(np.degrees(np.arctan(share)))
         frames = round((best + 20.0) / pace) + 20
         found = settled(block(0.0, G, wind), effort, frames)
-        said = f"angle of least effort at F_w = {share:g} m g, degrees"
-        findings.append(near(said, found, best, absolute=tolerance))
+        title = f"angle of least effort at F_w = {share:g} m g, degrees"
+        findings.append(near(title, found, best, absolute=tolerance))
     found = settled(block(best + 180.0 - 60.0, G, wind), effort, round(60.0 / pace) + 20)
-    said = "the same from near the far root, degrees"
-    findings.append(near(said, found, best + 180.0, absolute=tolerance))
+    title = "the same from near the far root, degrees"
+    findings.append(near(title, found, best + 180.0, absolute=tolerance))
     size = 0.5 * LENGTH * WEIGHT * FRAME
     world = block(0.0, G, wind)
     least = float(landscape(world, effort, np.array([best]))[0]) / size
@@ -111,8 +111,8 @@ def uniform_wind(quick: bool) -> list[Finding]:
     angles = np.arange(-180.0, 180.0, 10.0 if quick else 5.0)
     law = np.hypot(1.0, share) * np.abs(np.sin(np.radians(angles - best)))
     wrong = float(np.abs(landscape(world, effort, angles) / size - law).max())
-    said = "error of |tau| = (L/2) sqrt((m g)^2 + F_w^2) |sin(psi - psi*)| over m g L/2"
-    return [*findings, at_most(said, wrong, 1e-6)]
+    title = "error of |tau| = (L/2) sqrt((m g)^2 + F_w^2) |sin(psi - psi*)| over m g L/2"
+    return [*findings, at_most(title, wrong, 1e-6)]
 
 
 def faces_wind(quick: bool) -> list[Finding]:
@@ -128,15 +128,15 @@ def faces_wind(quick: bool) -> list[Finding]:
         wind = WindFaces((speed, 0.0, 0.0), rho, ("block",))
         world = block(exact - 5.0, G, wind)
         found = settled(world, effort, 90)
-        said = f"angle of least effort at Lam = {load:g}, degrees"
-        findings.append(near(said, found, exact, absolute=0.2))
+        title = f"angle of least effort at Lam = {load:g}, degrees"
+        findings.append(near(title, found, exact, absolute=0.2))
         model, state = world.setup.solid, world.solid
         pose = kinematics(model, state.q)
         force = wind.wrench(model, pose, np.zeros(model.nv), 0.0)[1, :2] + [0.0, -WEIGHT]
         axis = -pose.body_rotation[1][:2, 1]
         off = np.degrees(np.arctan2(axis[0] * force[1] - axis[1] * force[0], force @ axis))
-        said = f"net force off the block's axis at Lam = {load:g}, degrees"
-        findings.append(at_most(said, float(off), 1.0))
+        title = f"net force off the block's axis at Lam = {load:g}, degrees"
+        findings.append(at_most(title, float(off), 1.0))
     return findings
 
 
@@ -170,12 +170,12 @@ def drag_at_rest(quick: bool) -> list[Finding]:
     for turn in (0.0, 30.0) if quick else (0.0, 30.0, 75.0, -50.0):
         along, wind = wind_towards(turn)
         drag = ObjectiveWindDrag(np.array([1]), along)
-        for said, weight, incidence in (("most", -1.0, 90.0), ("least", 1.0, corner)):
+        for extreme, weight, incidence in (("most", -1.0, 90.0), ("least", 1.0, corner)):
             # incidence 0 is the block along the wind, hinge windward: at angle turn + 90
             goal = turn + 90.0 - incidence
             controller = controller_of(drag, weight, pace, "removed")
             found = settled(block(goal + 15.0, 0.0, wind), controller, 50)
-            title = f"angle of {said} drag, wind turned by {turn:g} degrees"
+            title = f"angle of {extreme} drag, wind turned by {turn:g} degrees"
             findings.append(near(f"{title}, degrees", found, goal, absolute=1.0))
     along, wind = wind_towards(0.0)
     controller = controller_of(ObjectiveWindDrag(np.array([1]), along), -1.0, pace, "removed")
@@ -184,8 +184,8 @@ def drag_at_rest(quick: bool) -> list[Finding]:
     findings.append(near("most drag over 2 rho U^2 L", most, 1.0, relative=1e-6))
     angles = np.arange(-180.0, 180.0, 10.0 if quick else 5.0)
     wrong = -landscape(world, controller, angles) / scale - drag_law(angles + 90.0)
-    said = "error of D(phi) over 2 rho U^2 L"
-    law = at_most(said, float(np.abs(wrong).max()), 1e-6)
+    title = "error of D(phi) over 2 rho U^2 L"
+    law = at_most(title, float(np.abs(wrong).max()), 1e-6)
     return [*findings, law, *drag_of_slender_blocks(quick)]
 
 
@@ -210,9 +210,9 @@ def drag_of_slender_blocks(quick: bool) -> list[Finding]:
                 }
                 with Simulation(load_scene("block-drag-min", settings), workers=1) as simulation:
                     angles = [at_hinge(simulation) for _ in range(simulation.frames)]
-                said = f"{aspect:g}:1, angle of {goal} drag with the scene's defaults, degrees"
+                title = f"{aspect:g}:1, angle of {goal} drag with the scene's defaults, degrees"
                 found = float(np.mean(angles[-10:]))
-                findings.append(near(said, found, angle, absolute=0.1))
+                findings.append(near(title, found, angle, absolute=0.1))
     return findings
 
 
@@ -230,12 +230,12 @@ def drag_in_motion(quick: bool) -> list[Finding]:
     frames = 60 if quick else 160
     findings: list[Finding] = []
     rows: tuple[tuple[str, float, float], ...] = (("most", -1.0, -1.0), ("least", 1.0, 1.0))
-    for said, weight, towards in rows:
+    for kind, weight, towards in rows:
         world = block(-towards * 70.0, 0.0, wind)
         rates = np.diff(path(world, controller_of(drag, weight, pace, "probe"), frames)) / pace
         where = "against" if towards < 0.0 else "with"
         for extreme, rate in (("slowest", rates.min()), ("fastest", rates.max())):
-            title = f"{said} drag: {extreme} rate over strength, + is {where} the wind"
+            title = f"{kind} drag: {extreme} rate over strength, + is {where} the wind"
             findings.append(near(title, float(rate * towards), 1.0, relative=0.01))
     return findings
 

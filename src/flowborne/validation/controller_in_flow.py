@@ -132,15 +132,15 @@ def block_in_stream(quick: bool) -> list[Finding]:
     lines = [f"{a:>6g} degrees: {d / unit:.4g}" for a, d in zip(angles, drags, strict=True)]
     middle = len(angles) // 2
     rise = float(drags[middle] - 0.5 * (drags[0] + drags[-1])) / unit
-    said = "drag across the stream less that along it, over rho U^2 L/2"
-    findings.append(Finding(said, rise, "> 0", "sign", rise > 0.0, lines=tuple(lines)))
+    title = "drag across the stream less that along it, over rho U^2 L/2"
+    findings.append(Finding(title, rise, "> 0", "sign", rise > 0.0, lines=tuple(lines)))
     for scene, best in (
         ("ns-block-drag-max", angles[drags.argmax()]),
         ("ns-block-drag-min", angles[drags.argmin()]),
     ):
         apart = abs((finals[scene] - best + 90.0) % 180.0 - 90.0)
-        said = f"{scene}: final angle from that of held blocks, degrees"
-        findings.append(near(said, apart, 0.0, absolute=float(angles[1] - angles[0])))
+        title = f"{scene}: final angle from that of held blocks, degrees"
+        findings.append(near(title, apart, 0.0, absolute=float(angles[1] - angles[0])))
     return findings
 
 
@@ -197,18 +197,18 @@ def frames_and_strength(quick: bool) -> list[Finding]:
                 f"{s:g} degrees/s: {run.frames} frames, law {law}, final {run.final:.3f} degrees, "
                 f"chatter {run.chatter:.2f} steps"
             )
-        said = f"{scene}: frames less ceil(|phi0 - phi*| / (strength dt)), largest"
-        findings.append(near(said, off, 0.0, absolute=1.0, lines=lines))
+        title = f"{scene}: frames less ceil(|phi0 - phi*| / (strength dt)), largest"
+        findings.append(near(title, off, 0.0, absolute=1.0, lines=lines))
         products = [run.frames * s for s, run in zip(strengths, runs, strict=True)]
         rounds = [
             abs(p - products[0]) / max(s, strengths[0])
             for s, p in zip(strengths, products, strict=True)
         ]
-        said = f"{scene}: N x strength, largest difference in frames"
-        findings.append(near(said, max(rounds), 0.0, absolute=1.0))
+        title = f"{scene}: N x strength, largest difference in frames"
+        findings.append(near(title, max(rounds), 0.0, absolute=1.0))
         apart = max(abs(run.final - best) / run.step for run in runs)
-        said = f"{scene}: final angle from the optimum, in steps"
-        findings.append(near(said, apart, 0.0, absolute=1.0))
+        title = f"{scene}: final angle from the optimum, in steps"
+        findings.append(near(title, apart, 0.0, absolute=1.0))
         chatter = max(run.chatter for run in runs)
         findings.append(near(f"{scene}: chatter, in steps", chatter, 0.0, absolute=1.0))
     if quick:
@@ -219,8 +219,8 @@ def frames_and_strength(quick: bool) -> list[Finding]:
     flow, simple = (
         found[f"{kind} max drag"] + found[f"{kind} min drag"] for kind in ("NS", "simple")
     )
-    said = "frames to reach most and least drag together, NS over simple wind"
-    return [*findings, near(said, flow / simple, 1.0, relative=0.1, lines=lines)]
+    title = "frames to reach most and least drag together, NS over simple wind"
+    return [*findings, near(title, flow / simple, 1.0, relative=0.1, lines=lines)]
 
 
 def frames_enough(away: float, strength: float) -> int:
@@ -238,9 +238,9 @@ def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Find
         late = max(late, near_it - float(np.ceil((away - PROBE) / run.step)))
         off = max(off, abs(run.final - best))
         chatter = max(chatter, run.chatter)
-    said = f"{scene}, own rule: frames to a probe's width of the optimum, more than the law's"
+    title = f"{scene}, own rule: frames to a probe's width of the optimum, more than the law's"
     return [
-        near(said, late, 0.0, absolute=1.0),
+        near(title, late, 0.0, absolute=1.0),
         near(f"{scene}, own rule: final angle from the optimum, degrees", off, 0.0, absolute=0.1),
         near(f"{scene}, own rule: chatter, in steps", chatter, 0.0, absolute=0.1),
     ]

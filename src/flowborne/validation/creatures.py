@@ -230,8 +230,8 @@ def control_is_worth_it(quick: bool) -> list[Finding]:
 def legs_gain(scene: str, whole: Swim, jet: Swim, lines: tuple[str, ...]) -> Finding:
     """Rise of a swimmer over that with its jet alone."""
     gain = whole.risen() / jet.risen()
-    said = f"{scene}: way up with jet and control over that with the jet alone"
-    return Finding(said, gain, f">= {LEAST_GAIN:g}", "more", gain >= LEAST_GAIN, lines=lines)
+    title = f"{scene}: way up with jet and control over that with the jet alone"
+    return Finding(title, gain, f">= {LEAST_GAIN:g}", "more", gain >= LEAST_GAIN, lines=lines)
 
 
 def legs_are_worth_it(quick: bool) -> list[Finding]:

@@ -183,8 +183,8 @@ def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[s
         last = rows[-max(2, round(LAST * len(rows))) :]
         found.append(last.mean(axis=0))
         drag, lift, *_ = np.ptp(last, axis=0)
-        said = f"drag still changes by {drag:.2g}, lift by {lift:.2g}"
-        lines.append(f"{n:>6g} cells across the channel: {said}")
+        title = f"drag still changes by {drag:.2g}, lift by {lift:.2g}"
+        lines.append(f"{n:>6g} cells across the channel: {title}")
         coarser = world
     return np.array(found), lines
 
@@ -212,9 +212,9 @@ def between(
     """A figure within the range of published ones."""
     exact, low, high = reference(flow.case, flow.name)[quantity]
     value = float(values[-1])
-    series = GridSeries.toward(LABEL, grids, values, exact)
-    said, within = f"{low:g} to {high:g}", bool(low <= value <= high)
-    return Finding(f"{flow.name}, {quantity}", value, exact, said, within, series, tuple(lines))
+    series, title = GridSeries.toward(LABEL, grids, values, exact), f"{flow.name}, {quantity}"
+    inside = bool(low <= value <= high)
+    return Finding(title, value, exact, f"{low:g} to {high:g}", inside, series, tuple(lines))
 
 
 PERIODS = 4
@@ -310,8 +310,8 @@ def flag_of_flesh(quick: bool) -> list[Finding]:
             exact = reference("D3", flow.name)[f"{name} mean"]
             found = ", ".join(f"{v:.4g}" for v in means[:, axis])
             shown = [f"mean {found} from grid to grid, published {exact:g}"]
-            said = f"{name} amplitude"
-            findings.append(judged(flow, said, grids, swings[:, axis], 0.05, shown + lines))
+            title = f"{name} amplitude"
+            findings.append(judged(flow, title, grids, swings[:, axis], 0.05, shown + lines))
         frequencies = np.array([s.frequency for s in seen])
         findings.append(judged(flow, "frequency", grids, frequencies, 0.03))
     return findings

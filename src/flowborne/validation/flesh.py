@@ -53,7 +53,7 @@ def flags(quick: bool) -> list[Finding]:
     findings = []
     flat = FLAG_CELLS[:3] if quick else FLAG_CELLS
     deep = tuple((*cells, 1) for cells in FLAG_CELLS[:3])
-    for name, said, young, grids in (
+    for name, label, young, grids in (
         ("CSM1", "triangles", 1.4e6, flat),
         ("CSM2", "triangles", 5.6e6, flat),
         ("CSM1", "tetrahedra", 1.4e6, deep),
@@ -61,15 +61,15 @@ def flags(quick: bool) -> list[Finding]:
         build = partial(
             bar_of, size=FLAG, tissue=flag_tissue(young), gravity=FLAG_DOWN, root=round_root
         )
-        findings += _of_end(f"{name} A, {said}", name, sunk(build, grids), grids)
+        findings += _of_end(f"{name} A, {label}", name, sunk(build, grids), grids)
     return findings
 
 
-def _of_end(said: str, name: str, found: Array, grids: Sequence[Cells]) -> list[Finding]:
+def _of_end(label: str, name: str, found: Array, grids: Sequence[Cells]) -> list[Finding]:
     findings = []
     for axis, (quantity, exact) in enumerate(reference("D1", f"{name} A [1e-3]").items()):
         series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, axis], exact)
-        findings.append(near(f"{said}, {quantity} in mm", series, exact, relative=0.02))
+        findings.append(near(f"{label}, {quantity} in mm", series, exact, relative=0.02))
     return findings
 
 
@@ -91,12 +91,12 @@ def elastica(quick: bool) -> list[Finding]:
         "uniform load beta": table("D4", "uniform load"),
     }
     findings = []
-    for said, exact in loads.items():
+    for label, exact in loads.items():
         chosen = [k for k in exact if not quick or k in (1.0, 10.0)]
-        found = np.array([_bent(grid, said.startswith("tip"), chosen) for grid in grids])
+        found = np.array([_bent(grid, label.startswith("tip"), chosen) for grid in grids])
         for i, load in enumerate(chosen):
             for j, quantity in enumerate(("w/L", "u/L", "angle of the tip in degrees")):
-                value, title = exact[load][j], f"{said} = {load:g}, {quantity}"
+                value, title = exact[load][j], f"{label} = {load:g}, {quantity}"
                 series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, i, j], value)
                 findings.append(near(title, series, value, relative=0.01))
     return findings

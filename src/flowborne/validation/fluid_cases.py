@@ -74,8 +74,8 @@ def vortex_decay(quick: bool) -> list[Finding]:
             for m, name in enumerate(("E(t)/E(0)", "max|u|(t)")):
                 values = [run[m] for run in runs]
                 series = GridSeries.toward("cells a side", grids, values, exact[m])
-                said = f"order of {name}, nu = {nu:g}, mean flow ({mean:g}, {mean:g})"
-                findings.append(order_of(said, series, least=1.9))
+                title = f"order of {name}, nu = {nu:g}, mean flow ({mean:g}, {mean:g})"
+                findings.append(order_of(title, series, least=1.9))
     return findings
 
 
@@ -231,10 +231,10 @@ def free_stream(quick: bool) -> list[Finding]:
     steps = 10 if quick else 50
     driven, _ = carried_body(True, steps)
     free, slip = carried_body(False, steps)
-    said = "max|u - u0|/u0, body"
+    title = "max|u - u0|/u0, body"
     return [
-        at_most(f"{said} told to go with the stream", driven, 1e-10),
-        at_most(f"{said} free and neutral", free, 1e-10),
+        at_most(f"{title} told to go with the stream", driven, 1e-10),
+        at_most(f"{title} free and neutral", free, 1e-10),
         at_most("slip of the free body / u0", slip, 1e-10),
     ]
 

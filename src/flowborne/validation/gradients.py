@@ -61,14 +61,14 @@ def difference_error(quick: bool) -> list[Finding]:
     sizes = [4.0, 2.0, 1.0, 0.5] if quick else [4.0, 2.0, 1.0, 0.5, 0.25]
     exact = drag_slope(LEANING)
     findings = []
-    for said, kind, order in (
+    for label, kind, order in (
         ("central", GradientCentral, 2.0),
         ("one-sided", GradientOneSided, 1.0),
     ):
         found = slopes(kind, sizes, LEANING)
         inverse = [1.0 / size for size in sizes]
         series = GridSeries.toward("h^-1 in 1/degree", inverse, found, exact, relative=True)
-        findings.append(order_of(f"order of {said} differences", series, expected=order))
+        findings.append(order_of(f"order of {label} differences", series, expected=order))
     scale = 2.0 * AIR * SPEED**2 * LENGTH
     level = slopes(GradientCentral, [5.0], 0.0)[0] / scale
     biased = slopes(GradientOneSided, [5.0], 0.0)[0] / scale

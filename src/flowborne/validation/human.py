@@ -176,10 +176,10 @@ def back_over_hips(quick: bool) -> list[Finding]:
     findings = []
     for lean in LEANS[: 1 if quick else None]:
         free = settled(standing("human-gravity-back", {**SPREAD, BACK: lean}, initial={}))
-        said = f"centre of mass beside the back's joint from a lean of {lean} degrees, m"
-        findings.append(at_most(said, Load.on(free, BACK).off_centre, 0.01))
-    said = "torque at the back over M g (x_c - x_j), less one, about both horizontal axes"
-    return [*findings, at_most(said, max(map(torque_off_moment, LEANS)), 1e-6)]
+        title = f"centre of mass beside the back's joint from a lean of {lean} degrees, m"
+        findings.append(at_most(title, Load.on(free, BACK).off_centre, 0.01))
+    title = "torque at the back over M g (x_c - x_j), less one, about both horizontal axes"
+    return [*findings, at_most(title, max(map(torque_off_moment, LEANS)), 1e-6)]
 
 
 def torque_off_moment(lean: tuple[float, float, float]) -> float:
@@ -214,8 +214,8 @@ def arms_hang(quick: bool) -> list[Finding]:
 def arms_serve_the_back() -> Finding:
     """Effort of a leaning back with arms that reduce it alone, over that with arms that hang."""
     serving, hanging = back_held(arms_serve=True), back_held(arms_serve=False)
-    said = "back's effort with arms that serve it alone, over arms that hang"
-    return Finding(said, serving / hanging, "< 1", "less", serving < hanging)
+    title = "back's effort with arms that serve it alone, over arms that hang"
+    return Finding(title, serving / hanging, "< 1", "less", serving < hanging)
 
 
 def back_held(arms_serve: bool) -> float:
@@ -249,9 +249,9 @@ def arm_is_blocked() -> list[Finding]:
     free = Finding(
         "blocked arm's centre of mass ahead of the free one's, m", ahead, "> 0", "ahead", ahead > 0
     )
-    said = "torso's shift that balances the blocked arm, less -m_arm d / M_rest, m"
+    title = "torso's shift that balances the blocked arm, less -m_arm d / M_rest, m"
     lines = (f"shift {shift:.4f} m, -m_arm d / M_rest = {expected:.4f} m",)
-    return [free, at_most(said, shift - expected, 0.01, lines=lines)]
+    return [free, at_most(title, shift - expected, 0.01, lines=lines)]
 
 
 def torso_shift(back: Load, arm: Load) -> tuple[float, float]:
@@ -283,12 +283,12 @@ def leans_into_the_wind() -> list[Finding]:
     ]
 
 
-def lean_findings(said: str, simulation: Simulation) -> list[Finding]:
+def lean_findings(label: str, simulation: Simulation) -> list[Finding]:
     """The back lies along the net force, into the wind."""
     back = Load.on(simulation, BACK)
     return [
-        at_most(f"{said}: net force off the back's line, degrees", back.off_line, 1.0),
-        Finding(f"{said}: lean into it, degrees", back.lean, "> 0", "sign", back.lean > 0.0),
+        at_most(f"{label}: net force off the back's line, degrees", back.off_line, 1.0),
+        Finding(f"{label}: lean into it, degrees", back.lean, "> 0", "sign", back.lean > 0.0),
     ]
 
 
@@ -305,8 +305,8 @@ def arms_in_the_wind() -> list[Finding]:
         ]
     held = settled(standing("human-wind-drag", {}))
     drags = [drag_of_arms(simulation) for simulation in (held, trailing)]
-    said = "drag of arms that want little of it over that of arms that want little effort"
-    findings.append(Finding(said, drags[0] / drags[1], "<= 1", "less", drags[0] <= drags[1]))
+    title = "drag of arms that want little of it over that of arms that want little effort"
+    findings.append(Finding(title, drags[0] / drags[1], "<= 1", "less", drags[0] <= drags[1]))
     return findings
 
 

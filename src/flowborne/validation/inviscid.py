@@ -81,12 +81,14 @@ def neutrally_buoyant(quick: bool) -> list[Finding]:
     flat = Grid.slab(32, 32, 2.0 / 32, (-1.0, -1.0))
     solid = Grid((16, 16, 16), 2.0 / 16, (-1.0, -1.0, -1.0))
     findings = []
-    for said, grid, bodies in (("2D", flat, FLAT_BODIES), ("3D", solid, SOLID_BODIES)):
+    for label, grid, bodies in (("2D", flat, FLAT_BODIES), ("3D", solid, SOLID_BODIES)):
         if quick and grid is solid:
             continue
         moved, fast = neutral(grid, bodies, 0.02, steps)
-        findings.append(at_most(f"displacement over {steps} steps at rest, {said}, m", moved, 1e-8))
-        findings.append(at_most(f"velocity after {steps} steps at rest, {said}, m/s", fast, 1e-8))
+        findings += [
+            at_most(f"displacement over {steps} steps at rest, {label}, m", moved, 1e-8),
+            at_most(f"velocity after {steps} steps at rest, {label}, m/s", fast, 1e-8),
+        ]
     stream = (0.4, 0.23, 0.0)
     moved, slip = neutral(flat, FLAT_BODIES, 5e-4, steps, stream)
     findings.append(at_most("displacement from the stream's, m", moved, 1e-8))
@@ -278,7 +280,7 @@ def piston(quick: bool) -> list[Finding]:
     steps = 10 if quick else 100
     ends = BoundaryOpen()
     findings = []
-    for said, sides in (
+    for label, sides in (
         ("open channel", Boundaries(ends, ends)),
         ("ring", Boundaries(PERIODIC, PERIODIC)),
     ):
@@ -294,7 +296,7 @@ def piston(quick: bool) -> list[Finding]:
             "a plug 0.53 m long, no whole number of cells, displaces whole faces:",
             *series.lines(),
         ]
-        title = f"largest error of (m + M_f) a / F, {said}, plug of whole cells"
+        title = f"largest error of (m + M_f) a / F, {label}, plug of whole cells"
         findings.append(at_most(title, wrong, 1e-6, lines=lines))
     return findings
 

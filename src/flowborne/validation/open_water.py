@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from flowborne.validation.shedding import (
     judged,
     watch,
 )
-from flowborne.validation.worlds import Vector, begin, mjcf, whole_steps
+from flowborne.validation.worlds import Vector, mjcf, refined, whole_steps
 from flowborne.worlds import advance, make_world, velocity_at
 
 STEADY_GRIDS = {True: (4, 8), False: (8, 16, 24, 32)}
@@ -85,17 +86,13 @@ def steady_cylinder(quick: bool) -> list[Finding]:
     """B4: drag, length of the backflow and the angle at which the flow leaves the cylinder."""
     grids = STEADY_GRIDS[quick]
     rows, lines = [], []
-    coarser = None
-    for n in grids:
-        world = open_water(n, 1.0 / 40.0)
-        begin(world, coarser, STREAM)
+    for n, world, first in refined(grids, lambda n: open_water(n, 1.0 / 40.0), STREAM):
         dt = CFL / n
-        steps = round((NEXT if coarser else FIRST[quick]) / dt)
+        steps = round((FIRST[quick] if first else NEXT) / dt)
         before, _ = UNBOUNDED.coefficients(advance(world, dt, steps - n))
         drag, _ = UNBOUNDED.coefficients(advance(world, dt, n))
         rows.append((drag, bubble(world), 180.0 - separation(world, (0.0, 1.0, 0.0))))
         lines.append(f"{n:>6g} cells across D: Cd changes by {drag - before:.2g} in the last D/U")
-        coarser = world
     drags, lengths, angles = zip(*rows, strict=True)
     return [
         judged("B4", "Cd", grids, drags, (1.48, 1.62), lines=lines),
@@ -112,18 +109,15 @@ def shed_in_the_open(
     strouhal  rough value of the expected frequency
     """
     periods = PERIODS[quick]
+    field = Kicked(STREAM, UNBOUNDED, 0.0, 0.0)
     rows, lines = [], []
-    coarser = None
-    for n in grids:
-        world = open_water(n, 1.0 / reynolds)
-        begin(world, coarser, Kicked(STREAM, UNBOUNDED, 0.0, 0.0))
-        before = AFTER if coarser else 2.0 * BEFORE[quick]
+    for n, world, first in refined(grids, lambda n: open_water(n, 1.0 / reynolds), field):
+        before = 2.0 * BEFORE[quick] if first else AFTER
         seen, drags, _ = watch(world, UNBOUNDED, before, strouhal, periods)
         steps, period = seen.last(periods)
         mean = float(drags[steps].mean())
         rows.append((mean, amplitude(seen.signal[steps]), UNBOUNDED.time / period))
         lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
-        coarser = world
     return [list(column) for column in zip(*rows, strict=True)], lines
 
 
@@ -260,15 +254,12 @@ def sphere(quick: bool) -> list[Finding]:
     findings = []
     for reynolds in (100, 150):
         rows, lines = [], []
-        coarser = None
-        for n in grids:
-            world = quarter(n, reynolds)
-            begin(world, coarser, STREAM)
-            duration = SPHERE_NEXT if coarser else SPHERE_FIRST[quick]
+        build = partial(quarter, reynolds=reynolds)
+        for n, world, first in refined(grids, build, STREAM):
+            duration = SPHERE_FIRST[quick] if first else SPHERE_NEXT
             coefficient, change = steady_drag(world, duration)
             rows.append((coefficient, recirculation(world), separation(world, BETWEEN)))
             lines.append(f"{n:>6g} cells across D: Cd changes by {change:.2g} in the last D/U")
-            coarser = world
         drags, lengths, angles = zip(*rows, strict=True)
         exact = float(reference("B7", f"Cd({reynolds})"))
         series = GridSeries.toward(LABEL, grids, drags, exact)

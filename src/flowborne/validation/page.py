@@ -132,7 +132,7 @@ def _case(name: str, tier: str, tiers: dict[str, Case]) -> list[str]:
         f"<td>{escape(_number(f['tolerance']))}</td><td>{escape(grid_of(f))}</td></tr>"
         for f in case["findings"]
     ]
-    said = [escape(line) for f in case["findings"] for line in f["lines"] if "series" not in f]
+    title = [escape(line) for f in case["findings"] for line in f["lines"] if "series" not in f]
     finest = "its finest grids" if is_finest(name, tier) else "not its finest grids"
     verdict = verdict_of(tiers)
     return [
@@ -143,7 +143,7 @@ def _case(name: str, tier: str, tiers: dict[str, Case]) -> list[str]:
         "<th>accepted</th><th>grid</th></tr>",
         *rows,
         "</table></div>",
-        *(["<p>" + "<br>".join(said) + "</p>"] if said else []),
+        *(["<p>" + "<br>".join(title) + "</p>"] if title else []),
         *(draw() for _, draw in plots_of(case["findings"])),
     ]
 

@@ -66,10 +66,10 @@ def pendulum_period(quick: bool) -> list[Finding]:
         findings.append(near(f"T/T0 let go at {degrees:g} degrees", series, ratio, relative=1e-3))
     swing = np.radians(5.0)
     factor = table("A1", "T/T0")[5.0]
-    for said, wide in (("block 1.2 x 0.3", width), ("thin rod", 1e-4 * length)):
+    for label, wide in (("block 1.2 x 0.3", width), ("thin rod", 1e-4 * length)):
         exact = small_period(length, wide)
         found = period(bar(length, wide), swing, exact / steps[-1], 1.3 * exact) / factor
-        findings.append(near(f"T0 of a {said}, s", found, exact, relative=1e-3))
+        findings.append(near(f"T0 of a {label}, s", found, exact, relative=1e-3))
     return findings
 
 

@@ -221,9 +221,9 @@ def apart(
     bottom = START - FREE_FALL * (START - 0.5 * DIAMETER)
     high = np.interp(times, moments, height) > bottom
     lines = [
-        f"{said}: {away[part].max():.3g} at {times[part][away[part].argmax()]:.3g} s, "
+        f"{label}: {away[part].max():.3g} at {times[part][away[part].argmax()]:.3g} s, "
         f"{np.sqrt(np.mean(away[part] ** 2)):.3g} in the mean"
-        for said, part in (("all the way", high | True), ("first nine tenths of the way", high))
+        for label, part in (("all the way", high | True), ("first nine tenths of the way", high))
     ]
     return float(away.max()), lines
 

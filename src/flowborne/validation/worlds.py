@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +64,23 @@ def begin(world: World, coarser: World | None, field: Field) -> None:
         set_velocity(world, field)
     else:
         start_from(coarser, world)
+
+
+def refined(
+    grids: Iterable[int], build: Callable[[int], World], field: Field
+) -> Iterator[tuple[int, World, bool]]:
+    """A world for each grid, from coarse to fine.
+
+    The first starts from a field, the others from the last flow on the coarser grid.
+
+    yields  (cells, world, whether it is the first)
+    """
+    coarser = None
+    for cells in grids:
+        world = build(cells)
+        begin(world, coarser, field)
+        yield cells, world, coarser is None
+        coarser = world
 
 
 def whole_steps(duration: float, longest: float) -> tuple[int, float]:
