@@ -15,7 +15,7 @@ from flowborne.solids.dynamics import assemble
 from flowborne.solids.elements import surface_of
 from flowborne.solids.flesh import Flesh, inversion
 from flowborne.solids.flesh_dynamics import assemble_flesh, sparse_mass, static_forces
-from flowborne.solids.flesh_solve import FADING, FINE, prescribe_flesh
+from flowborne.solids.flesh_solve import DAMPED_SHARE, DAMPING_ORDER, prescribe_flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState
@@ -431,7 +431,7 @@ def swung(model: SolidModel, v: Array, dt: float, steps: int) -> tuple[Array, Ar
 
 @pytest.mark.parametrize("steps_a_period", [6, 8, 12, 40])
 def test_only_vibrations_that_a_step_cannot_follow_fade(steps_a_period: int) -> None:
-    """The damping ratio of a bar's slowest vibration is FADING s^FINE / (2 w dt)."""
+    """The damping ratio of a bar's slowest vibration is DAMPED_SHARE s^DAMPING_ORDER / (2 w dt)."""
     model = clamped_bar(0.0)
     nothing = np.zeros(model.nv)
     K = static_forces(model, model.rest().q, nothing)[0].toarray()
@@ -446,7 +446,9 @@ def test_only_vibrations_that_a_step_cannot_follow_fade(steps_a_period: int) -> 
     v = 1e-6 * modes[:, 0]
     _, energy = swung(model, v, dt, periods * steps_a_period)
     kept = stretched**2 / (2.0 + stretched**2)
-    lost = 1.0 - (1.0 - 0.5 * FADING * kept**FINE) ** (2 * (periods - 1) * steps_a_period)
+    lost = 1.0 - (1.0 - 0.5 * DAMPED_SHARE * kept**DAMPING_ORDER) ** (
+        2 * (periods - 1) * steps_a_period
+    )
     first, last = energy[:steps_a_period].mean(), energy[-steps_a_period:].mean()
     assert 1.0 - last / first == pytest.approx(lost, rel=0.15, abs=1e-6)
     if steps_a_period == 40:

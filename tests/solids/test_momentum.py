@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import (
-    KEPT,
+    MOST_MOMENTA,
     subtree_halfway_momentum,
     subtree_momentum,
     weight,
@@ -63,14 +63,14 @@ def test_weight_acts_at_the_centre_of_each_subtree() -> None:
 
 def test_halfway_momenta_are_remembered_by_state_and_step() -> None:
     s, dt = scratch(MODEL), 0.01
-    for seed in (*range(2 * KEPT), 0, 1):
+    for seed in (*range(2 * MOST_MOMENTA), 0, 1):
         state = tumbled(seed)
         for step in (dt, 2.0 * dt, dt):
             found = subtree_halfway_momentum(MODEL, s, state, step)
             q = MODEL.integrate(state.q, state.v, 0.5 * step)
             assert_array_equal(found, subtree_momentum(MODEL, s, SolidState(q, state.v)))
             assert not found.flags.writeable
-        assert len(s.momenta) <= KEPT
+        assert len(s.momenta) <= MOST_MOMENTA
     assert subtree_halfway_momentum(MODEL, s, state, dt) is found
 
 

@@ -21,7 +21,7 @@ SLAB_COLUMNS = 4000
 
 @dataclass(frozen=True)
 class Solid:
-    """One geometry as the quadrature sees it.
+    """One geometry for the quadrature.
 
     shape     in its own frame
     position  (3,) centre in the frame of the quadrature, m
@@ -43,11 +43,10 @@ class Solid:
 def united(solids: list[Solid], slab: bool) -> tuple[float, Array]:
     """Volume and centroid of the union of the geometries of one body.
 
-    Geometries that share no space add up exactly. What several of them share (the joints of a
-    curved bone made of capsules) would be counted more than once: it is measured along a fixed
-    lattice of parallel lines, exactly along each line, and taken away. The lines are 200 x 200
-    over the shared region (4000 in a slab), which leaves a relative error of some 1e-4 of the
-    shared part (1e-5 in a slab).
+    Disjoint geometries add up exactly. Space that several geometries share (the joints of a curved
+    bone made of capsules) would be counted more than once. It is integrated along a fixed lattice
+    of parallel lines, exactly along each line, and subtracted. The lines are 200 x 200 over the
+    shared region (4000 in a slab); the error is about 1e-4 of the shared part (1e-5 in a slab).
 
     returns   volume in m^3 and (3,) centroid in the frame of the solids
     """
@@ -67,7 +66,7 @@ def united(solids: list[Solid], slab: bool) -> tuple[float, Array]:
 
 
 def _shared_region(solids: list[Solid]) -> tuple[Array, Array] | None:
-    """Box around every overlap of two bounding boxes, or None when there is none."""
+    """Box around every overlap of two bounding boxes, or None without overlaps."""
     lows, highs = [], []
     for i, a in enumerate(solids):
         for b in solids[:i]:
@@ -81,7 +80,7 @@ def _shared_region(solids: list[Solid]) -> tuple[Array, Array] | None:
 
 
 def _lines(low: Array, high: Array, slab: bool) -> tuple[Array, Array, float]:
-    """Origins (n, 3), direction (3,) and measure of one of the lines through the region."""
+    """Origins (n, 3), direction (3,) and weight of the lines through the region."""
     if slab:
         step = (high[0] - low[0]) / SLAB_COLUMNS
         x = low[0] + step * (np.arange(SLAB_COLUMNS) + 0.5)
@@ -110,7 +109,7 @@ def _excess(
 
 
 def winding(point: Array, vertices: Array, triangles: NDArray[np.int64]) -> float:
-    """How often a closed surface goes around a point (van Oosterom and Strackee 1983)."""
+    """Winding number of a closed surface around a point (van Oosterom and Strackee 1983)."""
     u, v, w = np.moveaxis((vertices - point)[triangles], 1, 0)
     lengths = [np.sqrt(np.einsum("td,td->t", x, x)) for x in (u, v, w)]
     below = lengths[0] * lengths[1] * lengths[2]

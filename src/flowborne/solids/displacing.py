@@ -1,11 +1,11 @@
 """Which geoms of a model displace fluid.
 
-Models of others draw a body by some geoms and let others collide in its place; the fluid meets one
-of both sets, never their union. A geom is drawn in the groups 0 to 2, as in MuJoCo's viewer, and
-touches where its contype or conaffinity is above 0. Planes and height fields, which have no volume,
-do neither here: they take part in contact alone.
+Many models draw a body with some geoms and collide with others; only one of both sets displaces
+fluid, never their union. A geom is drawn in the groups 0 to 2, as in MuJoCo's viewer, and collides
+if its contype or conaffinity is above 0. Planes and height fields have no volume and take part in
+contact only.
 
-The choice is written into the groups of the geoms: from then on those below HIDDEN_GROUP displace.
+The choice is written into the groups of the geoms: afterwards, geoms below HIDDEN_GROUP displace.
 """
 
 from __future__ import annotations
@@ -28,22 +28,21 @@ from flowborne.solids.geoms import (
 )
 
 DRAWN = HIDDEN_GROUP - 1
-"""Group of geoms that displace, but were not drawn."""
+"""Group for geoms that displace fluid but were not drawn."""
 
 DECORATION = 0.5
-"""Drawn geoms with less than this part of the volume of those that touch are decoration, such as
-eyes: what draws a body has about its size."""
+"""Drawn geoms with less than this part of the volume of colliding geoms are decoration (eyes)."""
 
 
 @dataclass(frozen=True)
 class Displace:
-    """Geoms that displace fluid, as a scene names them.
+    """Geoms that displace fluid, as chosen in a scene.
 
     groups   0 to 5
-    classes  of defaults in MJCF, or patterns with * and ?
-    names    or patterns; nameless geoms are geom0, geom1, ...
-    without  names or patterns of geoms that displace nothing, whatever else is said; alone they
-             are taken off what displaces by rule
+    classes  classes of defaults in MJCF, or patterns with * and ?
+    names    names or patterns; nameless geoms are geom0, geom1, ...
+    without  names or patterns of geoms that never displace fluid; they are removed from the choice,
+             or from the geoms chosen by rule
     """
 
     groups: tuple[int, ...] = ()
@@ -58,7 +57,7 @@ class Displace:
 
 BY_RULE = Displace()
 
-LISTED = 12
+MOST_LISTED = 12
 """Most names that a message lists."""
 
 
@@ -66,7 +65,7 @@ def chosen_geoms(spec: mujoco.MjSpec, mj: mujoco.MjModel, displace: Displace) ->
     """MuJoCo's numbers of the geoms that displace fluid.
 
     mj      of the spec
-    raises  ValueError when a name, class or group of `displace` is of no geom that could
+    raises  ValueError when no geom with a volume has a name, class or group of `displace`
     """
     names = {g: element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, g) for g in solid_geoms(mj)}
     classes = {geom.id: geom.classname.name for geom in spec.geoms if geom.id in names}
@@ -81,9 +80,9 @@ def chosen_geoms(spec: mujoco.MjSpec, mj: mujoco.MjModel, displace: Displace) ->
 
 
 def write_groups(spec: mujoco.MjSpec, chosen: set[int]) -> bool:
-    """Write a choice into the groups of the geoms; gives whether that changes one.
+    """Write a choice into the groups of the geoms; return whether a geom changes.
 
-    Geoms outside the groups that the compiler takes inertia from get no mass instead.
+    Geoms outside the groups that the compiler takes inertia from get zero mass instead.
     """
     lowest, highest = spec.compiler.inertiagrouprange
     changed = False
@@ -98,14 +97,14 @@ def write_groups(spec: mujoco.MjSpec, chosen: set[int]) -> bool:
 
 
 def _found(values: Mapping[int, str], pattern: str, what: str) -> set[int]:
-    """Geoms with a value of a pattern. Raises ValueError without any."""
+    """Geoms with a value that matches a pattern. Raises ValueError without any."""
     found = {g for g, value in values.items() if fnmatchcase(value, pattern)}
     if not found:
         known = list(dict.fromkeys(values.values()))
-        more = f" and {len(known) - LISTED} more" if len(known) > LISTED else ""
+        more = f" and {len(known) - MOST_LISTED} more" if len(known) > MOST_LISTED else ""
         raise ValueError(
             f"no geom with a volume has the {what} '{pattern}'. There are: "
-            f"{', '.join(known[:LISTED]) or 'none'}{more}."
+            f"{', '.join(known[:MOST_LISTED]) or 'none'}{more}."
         )
     return found
 
@@ -118,40 +117,41 @@ def _by_body(mj: mujoco.MjModel, geoms: Iterable[int]) -> Iterable[list[int]]:
 
 
 def _of_body(mj: mujoco.MjModel, geoms: Sequence[int]) -> Sequence[int]:
-    """Of the geoms of one body those that displace by rule: the drawn ones, or those that touch
-    where the drawn ones are not closed or are decoration. Those on the world are no one body: of
-    them the drawn ones displace."""
+    """The geoms of one body that displace fluid by rule.
+
+    They are the drawn geoms, or the colliding ones if the drawn ones are open or decoration. On the
+    world, which is not one body, the drawn geoms displace.
+    """
     if mj.geom_bodyid[geoms[0]] == 0:
         return [g for g in geoms if mj.geom_group[g] < HIDDEN_GROUP]
-    drawn, touching = _drawn_and_touching(mj, geoms)
-    if not drawn or not touching or drawn == touching:
-        return drawn or touching
-    volume, other = _volume(mj, drawn), _volume(mj, touching)
+    drawn, colliding = _drawn_and_colliding(mj, geoms)
+    if not drawn or not colliding or drawn == colliding:
+        return drawn or colliding
+    volume, other = _volume(mj, drawn), _volume(mj, colliding)
     if np.isnan(volume):
-        return drawn if np.isnan(other) else touching
-    return touching if volume < DECORATION * other else drawn
+        return drawn if np.isnan(other) else colliding
+    return colliding if volume < DECORATION * other else drawn
 
 
-def _drawn_and_touching(mj: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[int], list[int]]:
-    """Geoms of one body that draw it, and those that collide for it; the same ones where the model
-    does not tell them apart."""
+def _drawn_and_colliding(mj: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[int], list[int]]:
+    """Drawn and colliding geoms of one body; the same if the model does not distinguish them."""
     groups = mj.geom_group
-    touches = (mj.geom_contype != 0) | (mj.geom_conaffinity != 0)
+    collides = (mj.geom_contype != 0) | (mj.geom_conaffinity != 0)
     drawn = [g for g in geoms if groups[g] < HIDDEN_GROUP]
-    touching = [g for g in geoms if touches[g]]
-    passive = [g for g in drawn if not touches[g]]
-    if passive and not {groups[g] for g in passive} & {groups[g] for g in touching}:
-        return passive, touching
-    hidden = [g for g in touching if groups[g] >= HIDDEN_GROUP]
+    colliding = [g for g in geoms if collides[g]]
+    passive = [g for g in drawn if not collides[g]]
+    if passive and not {groups[g] for g in passive} & {groups[g] for g in colliding}:
+        return passive, colliding
+    hidden = [g for g in colliding if groups[g] >= HIDDEN_GROUP]
     return (drawn, hidden) if drawn and hidden else (drawn or hidden, drawn or hidden)
 
 
 def _volume(mj: mujoco.MjModel, geoms: Sequence[int]) -> float:
-    """What geoms have together, m^3, overlaps counted twice; not a number with an open one."""
-    return sum(_own_volume(mj, g) for g in geoms)
+    """Total volume of geoms, m^3, overlaps counted twice; nan if one is open."""
+    return sum(_volume_of(mj, g) for g in geoms)
 
 
-def _own_volume(mj: mujoco.MjModel, geom: int) -> float:
+def _volume_of(mj: mujoco.MjModel, geom: int) -> float:
     mesh = mesh_of(mj, geom)
     if kind_of(mj, geom) == "sdf" or (mesh is not None and not is_closed(mesh)):
         return np.nan

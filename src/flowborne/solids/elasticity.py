@@ -1,9 +1,9 @@
 """Elastic forces and stiffness of the nodes of flesh, as sparse matrices.
 
-Nearly incompressible elements lock where all of their volume change costs energy at every
-quadrature point. What lambda is beyond MIXED mu is taken at the element's centroid alone (selective
-reduced integration, Malkus and Hughes 1978); the rest at all points, for one layer of elements
-would bend too easily without.
+Nearly incompressible elements lock if their volume change costs energy at every quadrature point.
+The part of lambda above FULL_RATIO mu is integrated at the centroid of the element only (selective
+reduced integration, Malkus and Hughes 1978), the rest at all points: without the rest, one layer of
+elements would bend too easily.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-MIXED = 12.0
-"""Largest lambda over mu that is integrated in full, that of Poisson's ratio 0.46: one layer of
-elements then bends 1 to 5 % too little or too much at any ratio from 0 to 0.49."""
+FULL_RATIO = 12.0
+"""Largest lambda over mu that is fully integrated, that of Poisson's ratio 0.46: the bending of one
+layer of elements is then right to 1 to 5 % at any ratio from 0 to 0.49."""
 
 
 @dataclass(frozen=True)
 class Elasticity:
-    """What nodes of flesh exert on each other.
+    """Elastic forces between nodes of flesh.
 
-    rest      (n, 3) places at rest, m
+    rest      (n, 3) positions at rest, m
     elements  (m, 6) or (m, 10) nodes
     moduli    (m, 2) Lame's constants mu and lambda of each element, N/m^2
     laws      (m,) see kernels.elastic
@@ -48,30 +48,30 @@ class Elasticity:
     moduli: Array
     laws: Indices
 
-    def forces(self, places: Array) -> Array:
-        """(n, 3) forces on nodes at `places` (n, 3), N."""
-        return elastic_forces(places - self.rest, self._elements)
+    def forces(self, positions: Array) -> Array:
+        """(n, 3) forces on nodes at `positions` (n, 3), N."""
+        return elastic_forces(positions - self.rest, self._elements)
 
-    def energy(self, places: Array) -> float:
-        """J."""
-        return elastic_energy(places - self.rest, self._elements)
+    def energy(self, positions: Array) -> float:
+        """Elastic energy, J."""
+        return elastic_energy(positions - self.rest, self._elements)
 
-    def volume_ratios(self, places: Array) -> Array:
+    def volume_ratios(self, positions: Array) -> Array:
         """(m,) least det F of each element."""
-        return volume_ratios(places - self.rest, self._elements)
+        return volume_ratios(positions - self.rest, self._elements)
 
-    def stiffness(self, places: Array) -> csr_array:
-        """(3n, 3n) derivative of minus the forces, N/m, where it is positive semidefinite."""
+    def stiffness(self, positions: Array) -> csr_array:
+        """(3n, 3n) positive semidefinite part of minus the derivative of the forces, N/m."""
         indices, starts, slot, stride = self._pattern
         values = np.zeros(len(indices))
-        add_stiffness(places - self.rest, self._elements, slot, stride, values)
+        add_stiffness(positions - self.rest, self._elements, slot, stride, values)
         return csr_array((values, indices, starts), shape=(self.rest.size, self.rest.size))
 
     @cached_property
     def _elements(self) -> Elements:
         gradients, volume = shape_gradients(self.rest, self.elements)
         mu, lame = self.moduli.T
-        points, beyond = gradients.shape[1] - 1, np.maximum(lame - MIXED * mu, 0.0)
+        points, beyond = gradients.shape[1] - 1, np.maximum(lame - FULL_RATIO * mu, 0.0)
         volumes = np.repeat(volume[:, None] / points, points + 1, axis=1)
         volumes[:, points] = volume
         moduli = np.repeat(np.stack([mu, lame - beyond], axis=1)[:, None], points + 1, axis=1)
@@ -87,7 +87,7 @@ class Elasticity:
 
     @cached_property
     def _pattern(self) -> tuple[Indices, Indices, Indices, Indices]:
-        """Columns and starts of rows of the matrix, and `slot` and `stride` of `add_stiffness`."""
+        """Columns and row starts of the matrix, and `slot` and `stride` of `add_stiffness`."""
         count, k = len(self.rest), self.elements.shape[1]
         row, column = np.repeat(self.elements, k, axis=1), np.tile(self.elements, (1, k))
         pairs, at = np.unique(row.ravel() * count + column.ravel(), return_inverse=True)

@@ -1,4 +1,4 @@
-"""Quadratic simplices: tetrahedra of 10 nodes in rooms, triangles of 6 in plane strain in slabs.
+"""Quadratic simplices (tetrahedra of 10 nodes, in slabs triangles of 6), and surfaces around them.
 
 Nodes are the corners and the middles of the edges. Shape functions in barycentric coordinates L:
 L_i (2 L_i - 1) at corners, 4 L_i L_j between them (Zienkiewicz and Taylor, section 8.8).
@@ -18,7 +18,7 @@ EDGES = {
     3: np.array([[0, 1], [0, 2], [1, 2]]),
     4: np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]),
 }
-"""Ends of the edges of a triangle and a tetrahedron, by their corners."""
+"""Corners at the ends of the edges of a triangle and of a tetrahedron."""
 
 PARTS = {
     6: np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]]),
@@ -29,14 +29,14 @@ PARTS = {
         ]
     ),
 }  # fmt: skip
-"""Linear simplices that make up a quadratic one, with its orientation, by its nodes."""
+"""Nodes of the linear simplices that make up a quadratic one, with its orientation."""
 
 CORNER = {6: 1.0 / 19.0, 10: 1.0 / 36.0}
-"""Part of an element's mass at each corner: as the diagonal of the consistent mass matrix has it
+"""Part of the mass of an element at each corner, from the diagonal of the consistent mass matrix
 (Hinton, Rock and Zienkiewicz 1976)."""
 
 CENTRAL = {3: 2.0 / 3.0, 4: 0.25 + 0.15 * np.sqrt(5.0)}
-"""Largest barycentric coordinate of each quadrature point, one for each corner, second order."""
+"""Largest barycentric coordinate of each quadrature point; one point per corner, second order."""
 
 
 def measures(points: Array, simplices: Indices) -> Array:
@@ -50,7 +50,7 @@ def measures(points: Array, simplices: Indices) -> Array:
 
 
 def oriented(points: Array, simplices: Indices) -> Indices:
-    """The same simplices, those of negative measure with two corners exchanged."""
+    """The simplices, with two corners exchanged in those of negative measure."""
     left = measures(points, simplices) < 0.0
     swapped = np.concatenate([simplices[:, :-2], simplices[:, :-3:-1]], axis=1)
     return np.where(left[:, None], swapped, simplices)
@@ -59,8 +59,8 @@ def oriented(points: Array, simplices: Indices) -> Indices:
 def with_middles(count: int, simplices: Indices) -> tuple[Indices, Indices]:
     """Quadratic elements of simplices of `count` points.
 
-    returns  (e, 2) ends of the edges, whose middles follow the points as nodes; (m, 6) or (m, 10)
-             nodes of the elements
+    returns  (e, 2) ends of the edges; their middles follow the points in the list of nodes.
+             (m, 6) or (m, 10) nodes of the elements
     """
     ends = np.sort(simplices[:, EDGES[simplices.shape[1]]], axis=2)
     edges, middle = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
@@ -69,7 +69,7 @@ def with_middles(count: int, simplices: Indices) -> tuple[Indices, Indices]:
 
 
 def parts(elements: Indices) -> Indices:
-    """Linear simplices of the nodes, those of each element in turn."""
+    """Linear simplices of the nodes, element after element."""
     split = PARTS[elements.shape[1]]
     return np.asarray(elements[:, split].reshape(-1, split.shape[1]))
 
@@ -90,8 +90,8 @@ def lumped(points: Array, elements: Indices) -> Array:
 
 
 def shape_gradients(points: Array, elements: Indices) -> tuple[Array, Array]:
-    """Gradients (m, q + 1, k, 3) of the shape functions at the quadrature points, of which there
-    are q, and at the centroid, 1/m; volume (m,) of the elements, m^3, or m^2 of triangles."""
+    """Gradients (m, q + 1, k, 3) of the shape functions at q quadrature points and at the centroid,
+    1/m; volume (m,) of the elements, m^3, or m^2 of triangles."""
     simplices = corners(elements)
     count = simplices.shape[1]
     sides = (points[simplices[:, 1:]] - points[simplices[:, :1]])[..., : count - 1]
@@ -111,8 +111,10 @@ def shape_gradients(points: Array, elements: Indices) -> tuple[Array, Array]:
 
 
 def prism(triangles: Indices, count: int) -> Indices:
-    """(k, 3) the outward skin of a prism over triangles (m, 3) of `count` nodes, whose vertices are
-    the nodes at its lower end and then those at its upper one."""
+    """(k, 3) outward surface of a prism over triangles (m, 3) of `count` nodes.
+
+    Its vertices are the nodes at the lower end, then those at the upper end.
+    """
     sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     _, at, shared = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
     a, b = sides[np.sort(at[shared == 1])].T
@@ -121,7 +123,7 @@ def prism(triangles: Indices, count: int) -> Indices:
 
 
 def surface_of(elements: Indices) -> Indices:
-    """(k, 3) the faces of right-handed tetrahedra (m, 4) that only one has, turned outward."""
+    """(k, 3) outward faces of right-handed tetrahedra (m, 4) that belong to only one of them."""
     corners = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
     faces = elements[:, corners].reshape(-1, 3)
     _, first, count = np.unique(
@@ -131,17 +133,17 @@ def surface_of(elements: Indices) -> Indices:
 
 
 def outer_surface(points: Array, elements: Indices) -> Indices:
-    """(k, 3) outward triangles around tetrahedra (m, 4) of points (n, 3), those of holes left out.
+    """(k, 3) outward triangles around tetrahedra (m, 4) of points (n, 3), without those of holes.
 
-    What flesh encloses, bones for the most part, counts as inside. A sheet is what hangs together
-    by edges: where flesh is thin, the one around a bone may have corners in common with the outer.
+    Enclosed space, mostly bones, counts as inside. A sheet is a set of triangles connected by
+    edges: where flesh is thin, the sheet around a bone may share corners with the outer sheet.
     """
     triangles = surface_of(elements)
     count = len(triangles)
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, edge, around = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     by_edge = np.argsort(edge, kind="stable")
-    of_two = around[edge[by_edge]] == 2  # where sheets touch along an edge it has four
+    of_two = around[edge[by_edge]] == 2  # an edge along which sheets touch has four triangles
     one, other = (by_edge[of_two] // 3).reshape(-1, 2).T
     graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
     sheet = connected_components(graph, directed=False)[1]

@@ -1,7 +1,7 @@
-"""The flesh of a model: its nodes, elements and skin, and where they are.
+"""The flesh of a model: its nodes, elements and skin at any pose, and inverted elements.
 
-The fluid meets the skin at vertices. In rooms they are the nodes; in a slab each node in the plane
-z = 0 has one at either end of a prism of unit depth.
+The skin is made of vertices. In three dimensions they are the nodes; in a slab each node in the
+plane z = 0 has one vertex at either end of a prism of unit depth.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Indices = NDArray[np.int64]
 
 
 class Jointed(Compiled, Protocol):
-    """What flesh asks of the model that it is a part of; see `SolidModel`."""
+    """What flesh needs of its model; see `SolidModel`."""
 
     slab: bool
     nv: int
@@ -39,21 +39,21 @@ class Jointed(Compiled, Protocol):
 
 @dataclass(frozen=True)
 class Flesh:
-    """What of a model is flesh. A node is a body of its own, or rides on the bone that holds it.
+    """The flesh of a model. A node is a separate body, or is fixed to the bone that holds it.
 
     model       the model
-    names       of its fleshes
-    body        (np,) body that each node is or rides on
+    names       names of its fleshes
+    body        (np,) body that each node is, or is fixed to
     offset      (np, 3) the node in that body's frame, m
-    weights     (n, np) which node each vertex goes with, and lift (n, 3), how far from it, m
-    rest        (n, 3) vertices at rest, m; the first are the nodes but for their lift
+    weights     (n, np) node of each vertex, and lift (n, 3), offset of the vertex from it, m
+    rest        (n, 3) vertices at rest, m; the first are the nodes, apart from their lift
     elements    (m, 10) nodes of quadratic tetrahedra, or (m, 6) of triangles in a slab
-    surface     (k, 3) triangles of vertices, outward; none around a bone that is all inside
-    of_surface  (k,) number of the flesh in `names` that each belongs to
-    of_element  (m,) the same of elements
-    dofs        (nv,) dofs that move nodes alone; the others are those of bones
+    surface     (k, 3) triangles of vertices, outward; none around enclosed bones
+    of_surface  (k,) number of the flesh in `names` of each triangle
+    of_element  (m,) the same for elements
+    dofs        (nv,) dofs that move only nodes; the others are those of bones
     moved       (2, k) pairs of a node and a dof that moves it
-    carried     (n, nbody) share of each bone in carrying a vertex, from 0 to 1, together 1
+    carried     (n, nbody) share of each bone in the motion of a vertex, from 0 to 1, sum 1
     elasticity  forces between the nodes
     damping     s, Rayleigh's: the damping matrix is this times the stiffness matrix
     """
@@ -76,7 +76,7 @@ class Flesh:
     damping: float
 
     def vertices(self, q: Array) -> Array:
-        """(n, 3) places of the vertices at positions q (nq,), m."""
+        """(n, 3) positions of the vertices at q (nq,), m."""
         s = scratch(self.model)
         s.place(q)
         return self.placed(s)
@@ -88,19 +88,19 @@ class Flesh:
         return self.moving(s)
 
     def placed(self, s: Scratch) -> Array:
-        """(n, 3) the vertices where `s` has been placed, m."""
+        """(n, 3) the vertices at the pose in `s`, m."""
         return np.asarray(self.weights @ self.nodes(s) + self.lift)
 
     def moving(self, s: Scratch) -> csr_array:
-        """(3n, nv) `jacobian` where `s` has been placed."""
+        """(3n, nv) `jacobian` at the pose in `s`."""
         return csr_array(self._of_nodes @ self.moving_nodes(s))
 
     def nodes(self, s: Scratch) -> Array:
-        """(np, 3) the nodes where `s` has been placed, m."""
+        """(np, 3) the nodes at the pose in `s`, m."""
         return _placed(s.xpos, s.xmat.reshape(-1, 3, 3), self.body, self.offset)
 
     def moving_nodes(self, s: Scratch) -> csr_array:
-        """(3np, nv) from v to the velocities of the nodes where `s` has been placed."""
+        """(3np, nv) from v to the velocities of the nodes at the pose in `s`."""
         places = self.nodes(s)
         twists = twists_about_origin(s.cdof, s.subtree_com[self.model.dof_root])
         node, dof = self.moved
@@ -118,15 +118,15 @@ class Flesh:
 
     @cached_property
     def _entries(self) -> csr_array:
-        """(3np, nv) where `moving_nodes` may have entries, by their number among the velocities,
-        x y z of each of the pairs `moved` in turn."""
+        """(3np, nv) the possible entries of `moving_nodes`: each is the index of its value in the
+        velocities, x y z of the pairs `moved` one after the other."""
         node, dof = self.moved
         row = (3 * node[:, None] + np.arange(3)).ravel()
         shape = (3 * len(self.body), self.model.nv)
         return csr_array((np.arange(row.size), (row, np.repeat(dof, 3))), shape=shape)
 
     def of_vertices(self, velocity: Array) -> Array:
-        """(nv,) velocity of the free points from that of vertices (n, 3), each point being one."""
+        """(nv,) velocity of the free nodes from that of the vertices (n, 3)."""
         carried = self.weights.T @ velocity / self.weights.sum(axis=0)[:, None]
         point, dof = self.moved
         own = self.dofs[dof]
@@ -137,7 +137,7 @@ class Flesh:
 
     @cached_property
     def places(self) -> NDArray[np.bool_]:
-        """(nq,) places in q of points of flesh alone."""
+        """(nq,) the entries of q that belong to nodes of flesh."""
         mj = self.model.mj
         own = np.zeros(mj.nq, bool)
         own[mj.jnt_qposadr[mj.dof_jntid[self.dofs]]] = True
@@ -145,7 +145,7 @@ class Flesh:
 
     @cached_property
     def thickness(self) -> tuple[float, ...]:
-        """Of each flesh at rest but for its rims, m."""
+        """Thickness of each flesh at rest, without its rims, m."""
         return tuple(thinnest(self.rest, skin, self.model.slab) for skin in self.skins)
 
     @property
@@ -170,7 +170,7 @@ class Flesh:
 
 
 def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
-    """The flesh of a model that has some."""
+    """The flesh of a model from the grown parts."""
     mj, position, rotation = model.mj, *rest_poses(model.mj)[:2]
     first = np.cumsum([0, *(len(g.nodes) for g in grown)])
     nodes = np.concatenate([g.nodes for g in grown])
@@ -210,7 +210,7 @@ def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
 
 
 def points_of_flesh(mj: mujoco.MjModel, grown: Sequence[Grown]) -> NDArray[np.bool_]:
-    """(nbody of MuJoCo,) bodies that are a node of flesh and nothing else."""
+    """(nbody of MuJoCo,) bodies that are free nodes of flesh."""
     own = np.zeros(mj.nbody, bool)
     for g in grown:
         own[bodies_of(mj, g)[g.free]] = True
@@ -218,7 +218,7 @@ def points_of_flesh(mj: mujoco.MjModel, grown: Sequence[Grown]) -> NDArray[np.bo
 
 
 def bodies_of(mj: mujoco.MjModel, grown: Grown) -> Indices:
-    """(n,) MuJoCo's numbers of the bodies that nodes are or ride on."""
+    """(n,) MuJoCo's numbers of the bodies that nodes are, or are fixed to."""
     number = {name: mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name) for name in grown.bodies}
     return np.array([number[name] for name in grown.bodies], np.int64)
 
@@ -228,7 +228,7 @@ def _placed(position: Array, rotation: Array, body: Indices, offset: Array) -> A
 
 
 def _moved(mj: mujoco.MjModel, body: Indices) -> Indices:
-    """(2, k) pairs of a point, riding on `body` (np,), and a dof that moves it."""
+    """(2, k) pairs of a node, fixed to `body` (np,), and a dof that moves it."""
     chains: list[list[int]] = [[]]
     for b in range(1, mj.nbody):
         first = int(mj.body_dofadr[b])
@@ -240,10 +240,10 @@ def _moved(mj: mujoco.MjModel, body: Indices) -> Indices:
 
 
 def _carried(bones: int, rest: Array, simplices: Indices, bone: Indices) -> Array:
-    """(np, bones) share of each bone in carrying a node: harmonic along the simplices' edges.
+    """(np, bones) share of each bone in the motion of a node, harmonic along the edges.
 
-    bone  (np,) bone that holds the node, -1 for none; nodes that no bone is joined to are the
-          world's
+    bone  (np,) bone that holds the node, -1 for none; nodes that are connected to no bone belong to
+          the world
     """
     pairs = EDGES[simplices.shape[1]]
     edges = np.unique(np.sort(simplices[:, pairs].reshape(-1, 2), axis=1), axis=0)
@@ -272,14 +272,17 @@ def _carried(bones: int, rest: Array, simplices: Indices, bone: Indices) -> Arra
 
 @dataclass(frozen=True)
 class Inversion:
-    """Elements with det F <= 0.
+    """Elements with det F <= 0: they are inside out.
 
-    elements  (k,) their numbers in the flesh, ascending
-    of        how many elements there are
-    worst     number of the element with the least det F
-    ratio     that det F
-    place     (3,) where its middle is, m
-    name      of its flesh
+    A St. Venant-Kirchhoff material softens under compression. Below 1/sqrt(3) of its length it
+    collapses, and its mirror image is at rest, so an inverted element can stay inverted.
+
+    elements  (k,) numbers of the elements, ascending
+    of        number of all elements
+    worst     number of the element with the smallest det F
+    ratio     its det F
+    place     (3,) its middle, m
+    name      name of its flesh
     """
 
     elements: NDArray[np.int64]
@@ -290,7 +293,7 @@ class Inversion:
     name: str
 
     def sentence(self) -> str:
-        """For the person who runs it, without a full stop."""
+        """A message for the user, without a full stop."""
         place = ", ".join(f"{x:.4g}" for x in self.place)
         return (
             f"{len(self.elements)} of {self.of} elements of flesh are inside out, "
@@ -301,7 +304,7 @@ class Inversion:
 
 
 def inversion(flesh: Flesh, q: Array) -> Inversion | None:
-    """What is inside out at positions q (nq,); None when nothing is."""
+    """The inverted elements at positions q (nq,); None without any."""
     ratios = flesh.volume_ratios(q)
     wrong = np.flatnonzero(~(ratios > 0.0))
     if wrong.size == 0:

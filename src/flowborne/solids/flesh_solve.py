@@ -1,25 +1,25 @@
-"""One sparse factorisation of bones and flesh a step, with prescribed dofs projected out.
+"""One sparse factorisation of bones and flesh per step, with prescribed dofs eliminated.
 
-As solids.prescribed does with dense matrices: with P the prescribed dofs and F the free ones,
+As in solids.prescribed, with P the prescribed dofs and F the free ones,
 
     v+_P = hold        v+_F = B_FF^-1 (r_F + impulse_F - B_FP hold)
     tau dt = B v+ - r - impulse      on P
 
-where B = A + J^T D J holds the active constraint rows. Their number is small, so that A_FF alone is
-factorised and B_FF^-1 is found by the formula of Sherman, Morrison and Woodbury:
+where B = A + J^T D J contains the active constraint rows. Their number is small, so only A_FF is
+factorised, and B_FF^-1 follows from the formula of Sherman, Morrison and Woodbury:
 
     B^-1 = A^-1 - Y (D^-1 + J Y)^-1 Y^T      Y = A^-1 J^T
 
-Flesh that turns moves along a straight line in a step, which stretches it by half the square of
-the angle. Vibrations too fast for the step take that up and keep it: undamped, a flag that swings
-through a third of its length tore after 90 steps. Of a velocity v whose frequency is w, S = A^-1 E
-keeps s = (w dt)^2 / (2 + (w dt)^2), with E = dt^2/2 K the flesh's part of A, and a step takes the
-impulse
+In a step, rotating flesh moves along straight lines, which stretches it by half the square of the
+angle. Vibrations that the step cannot resolve absorb this energy and keep it: without damping, a
+flag that swings through a third of its length tore after 90 steps. For a velocity v of frequency w,
+S = A^-1 E scales v by s = (w dt)^2 / (2 + (w dt)^2), where E = dt^2/2 K is the part of A from the
+flesh. Each step subtracts the impulse
 
-    FADING E S^(FINE - 1) v
+    DAMPED_SHARE E S^(DAMPING_ORDER - 1) v,
 
-from the flesh: a share FADING s^FINE, nearly all of it from what the step cannot follow. The
-damping ratio of a vibration in n steps a period is FADING (2 pi / n)^5 / 16.
+a share DAMPED_SHARE s^DAMPING_ORDER of v, which acts almost only on unresolved vibrations. The
+damping ratio of a vibration of n steps per period is DAMPED_SHARE (2 pi / n)^5 / 16.
 """
 
 from __future__ import annotations
@@ -44,12 +44,15 @@ Array = NDArray[np.float64]
 
 Mask = NDArray[np.bool_]
 
-FADING, FINE = 0.25, 3
-"""What a step takes from vibrations that it cannot follow, and how sharply those are told."""
+DAMPED_SHARE, DAMPING_ORDER = 0.25, 3
+"""Share that a step takes from unresolved vibrations, and how sharply it selects them."""
 
 
 def ordered(model: SolidModel, free: NDArray[np.int64]) -> Ordering:
-    """Ordering of A (see `flesh_dynamics`) for the free dofs (nf,), whatever the pose."""
+    """Elimination order of A (see `flesh_dynamics`) for the free dofs (nf,), valid for all poses.
+
+    It is computed once per model and set of free dofs.
+    """
     found = model.orderings
     key = free.tobytes()
     if key not in found:
@@ -58,8 +61,8 @@ def ordered(model: SolidModel, free: NDArray[np.int64]) -> Ordering:
 
 
 def pattern(model: SolidModel) -> csr_array:
-    """(nv, nv) ones where two dofs can act on each other: those of a chain, of a tendon, and those
-    that move nodes of one element."""
+    """(nv, nv) ones where two dofs can couple: dofs of a chain, of a tendon, and dofs that move
+    nodes of one element."""
     assert model.flesh is not None
     groups = [moving(model, model.flesh), chains(model), tendons(model)]
     return csr_array(sum(g.T @ g for g in groups) > 0).astype(np.float64)
@@ -75,7 +78,7 @@ def moving(model: SolidModel, flesh: Flesh) -> csr_array:
 
 
 def chains(model: SolidModel) -> csr_array:
-    """(nv, nv) which dofs each dof lies behind on its way to the world, and itself."""
+    """(nv, nv) for each dof, itself and the dofs between it and the world."""
     parent, nv = model.mj.dof_parentid, model.nv
     pairs = []
     for dof in range(nv):
@@ -101,18 +104,18 @@ def _ones(row: NDArray[np.int64], column: NDArray[np.int64], shape: tuple[int, i
 
 @dataclass(frozen=True)
 class PrescribedFlesh:
-    """The answer of bones and flesh to impulses when some dofs are prescribed.
+    """The response of bones and flesh to impulses when some dofs are prescribed.
 
     system      the system it was made from
     prescribed  (nv,) dofs that end the step with velocity `hold`
-    hold        (nv,) rad/s or m/s; free dofs' entries are not used
-    velocity    (nv,) v*, velocity after the step when there is no impulse
+    hold        (nv,) rad/s or m/s; entries of free dofs are not used
+    velocity    (nv,) v*, velocity after the step without an impulse
     free        (nf,) the free dofs
     factor      of A_FF
     rows        Y_F (nf, k) and the factor of D^-1 + J Y, for the active rows
-    limited     (nv,) dofs whose drive reached its limit; they are free and pushed by `push`
+    limited     (nv,) dofs with a drive at its limit; they are free, and `push` acts on them
     push        (nv,) generalised force of limited drives, already in `system`
-    turns       times that drives were released or taken up
+    turns       number of changes of the drives
     """
 
     system: FleshSystem
@@ -135,7 +138,7 @@ class PrescribedFlesh:
         return change
 
     def after(self, impulse: Array) -> Array:
-        """(nv,) velocity after the step with a generalised impulse (nv,), the fluid's for one."""
+        """(nv,) velocity after the step with a generalised impulse (nv,), such as the fluid's."""
         return self.velocity + self.answer(impulse)
 
     def actuator(self, v_plus: Array, impulse: Array) -> Array:
@@ -144,21 +147,21 @@ class PrescribedFlesh:
         return np.where(self.prescribed, -left / self.system.dt, self.push)
 
     def updated(self, v_plus: Array) -> PrescribedFlesh | None:
-        """With the contacts and limits that `v_plus` implies; None when it has them already."""
+        """With the contacts and limits at `v_plus`; None when they do not change."""
         system = self.system.updated(v_plus)
         if system is None:
             return None
         return _solved(replace(self, system=system))
 
     def mobility(self, pose: Kinematics) -> Mobility:
-        """The motion that a unit impulsive push gives: M = T B_FF^-1 T^T."""
+        """The motion caused by a unit impulse: M = T B_FF^-1 T^T."""
         T = csr_array(pose.jacobian[:, self.free])
         return factored_mobility(
             T, self.factor, self._constraints(), T @ self._soft(pose.twist_rows)
         )
 
     def answering(self, pose: Kinematics, drag: csr_array) -> SparseAnswer:
-        """How bones and flesh answer a drag (k, k), kg."""
+        """The response of bones and flesh to a drag (k, k), kg."""
         J, D, _ = self.system.acting()
         held = csr_array(J[:, self.free])
         B = self.system.A[self.free][:, self.free] + held.T @ (D[:, None] * held)
@@ -172,7 +175,7 @@ class PrescribedFlesh:
         return np.asarray(solve_triangular(np.tril(small[0]), Y.T, lower=True).T)
 
     def _soft(self, jacobian: Array) -> Array:
-        """(nf, m) Z with Z Z^T the part of B_FF^-1 that moves bones, flesh following at its ease.
+        """(nf, m) Z with Z Z^T the part of B_FF^-1 that moves bones, with flesh responding freely.
 
         jacobian  (6 nbody, nv) from v to the twists of the bones
         """
@@ -185,7 +188,7 @@ class PrescribedFlesh:
         return np.asarray(answers @ (axes / np.sqrt(np.maximum(share, np.finfo(float).tiny))))
 
     def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> PrescribedFlesh:
-        """With other drives that keep their dofs, and others at their limits."""
+        """With other prescribed dofs, and other drives at their limits."""
         system = self.system.pushed(push - self.push)
         free, factor = _factored(system, prescribed)
         return _solved(
@@ -202,7 +205,7 @@ class PrescribedFlesh:
         )
 
     def answers_as(self, other: object) -> bool:
-        """Whether both give the same answer to any impulse."""
+        """Whether both respond equally to any impulse."""
         if not isinstance(other, PrescribedFlesh) or self.factor is not other.factor:
             return False
         return np.array_equal(self.system.zones, other.system.zones)
@@ -211,7 +214,7 @@ class PrescribedFlesh:
 def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> PrescribedFlesh:
     """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly."""
     free, factor = _factored(system, prescribed)
-    system = _faded(system, free, factor)
+    system = _damped(system, free, factor)
     none = np.zeros(len(hold))
     rows = np.zeros((len(free), 0)), None
     return _solved(
@@ -229,14 +232,14 @@ def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> Presc
     )
 
 
-def _faded(system: FleshSystem, free: NDArray[np.int64], factor: Cholesky) -> FleshSystem:
-    """With the impulse that takes from vibrations too fast for the step."""
+def _damped(system: FleshSystem, free: NDArray[np.int64], factor: Cholesky) -> FleshSystem:
+    """With the impulse that damps unresolved vibrations."""
     v = system.v
-    for _ in range(FINE - 1):
+    for _ in range(DAMPING_ORDER - 1):
         kept = np.zeros_like(v)
         kept[free] = factor.solve((system.elastic @ v)[free])
         v = kept
-    return replace(system, impulse=system.impulse - FADING * (system.elastic @ v))
+    return replace(system, impulse=system.impulse - DAMPED_SHARE * (system.elastic @ v))
 
 
 def _factored(system: FleshSystem, prescribed: Mask) -> tuple[NDArray[np.int64], Cholesky]:
@@ -245,7 +248,7 @@ def _factored(system: FleshSystem, prescribed: Mask) -> tuple[NDArray[np.int64],
 
 
 def _solved(driven: PrescribedFlesh) -> PrescribedFlesh:
-    """With the active rows of its system in the factor, and the velocity that they give."""
+    """With the active rows of its system, and the velocity v* for them."""
     system, free, factor = driven.system, driven.free, driven.factor
     J, D, _ = system.acting()
     Y = factor.solve(J[:, free].T) if len(D) else np.zeros((len(free), 0))

@@ -1,4 +1,4 @@
-"""Velocity changes of bones that take flesh and outboard bodies with them."""
+"""Velocity changes of bones, and the flesh and the rigid clusters of bodies that follow them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 def follow(model: SolidModel, q: Array, change: Array) -> Array:
     """(nv,) change of velocity of bones (nv,), and of the flesh that they carry, at pose q (nq,).
 
-    Every point of flesh takes its share of the motion of each bone (`Flesh.carried`): bones that
-    are moved or stopped at once would otherwise leave it behind for a step, and tear it.
+    Each point of flesh moves with its shares of the motion of the bones (`Flesh.carried`). Without
+    this, flesh would lag one step behind bones that start or stop suddenly, and tear.
     """
     if model.flesh is None or not change.any():
         return change
@@ -28,16 +28,16 @@ def follow(model: SolidModel, q: Array, change: Array) -> Array:
 
 
 def posed_flesh(model: SolidModel, q: Array) -> Array:
-    """(nq,) the pose q with flesh brought from rest to where its bones are.
+    """(nq,) the pose q with flesh moved from rest to its bones.
 
-    Each point goes to the mean of where its bones would carry it, by its shares of them.
+    Each point moves to the mean, weighted by its shares, of its positions relative to the bones.
     """
     flesh = model.flesh
     if flesh is None:
         return q
     rest, now = kinematics(model, model.rest().q), kinematics(model, q)
-    turn = now.body_rotation @ np.swapaxes(rest.body_rotation, 1, 2)
-    carried = np.einsum("bij,bnj->bni", turn, flesh.rest - rest.body_position[:, None])
+    rotation = now.body_rotation @ np.swapaxes(rest.body_rotation, 1, 2)
+    carried = np.einsum("bij,bnj->bni", rotation, flesh.rest - rest.body_position[:, None])
     carried += now.body_position[:, None]
     return model.integrate(
         np.where(flesh.places, model.rest().q, q),
@@ -47,7 +47,7 @@ def posed_flesh(model: SolidModel, q: Array) -> Array:
 
 
 def follow_each(model: SolidModel, q: Array) -> tuple[NDArray[np.int64], Array]:
-    """The dofs (k,) of bones, and (nv, k) the velocities that go with unit velocity of each."""
+    """The dofs (k,) of bones, and (nv, k) the velocities of all dofs for unit velocity of each."""
     if model.flesh is None:
         return np.arange(model.nv), np.eye(model.nv)
     bones = np.flatnonzero(~model.flesh.dofs)
@@ -64,7 +64,7 @@ def _followed(model: SolidModel, pose: Kinematics, change: Array) -> Array:
 
 
 def outboard_dofs(model: SolidModel, dofs: int | NDArray[np.int64]) -> NDArray[np.int64]:
-    """Dofs of all joints on the bodies below one that any of `dofs` moves, none of its own."""
+    """Dofs of all joints on the descendants of the bodies that `dofs` move."""
     return model.outboard[np.atleast_1d(dofs)].any(axis=0).nonzero()[0]
 
 
@@ -74,14 +74,14 @@ def rigidify(
     dofs: NDArray[np.int64],
     fixed: NDArray[np.bool_] | None = None,
 ) -> SolidState:
-    """State whose joints `dofs` do not move, by impulses at these joints alone.
+    """State in which the joints `dofs` do not move, by impulses at these joints only.
 
-    With c the joints and f the other dofs, the impulse changes v_f by M_ff^-1 M_fc v_c: linear and
-    angular momentum of a floating creature stay as they are, which they would not if v_c were just
-    set to zero. Flesh rides on the bones.
+    With c the joints and f the other dofs, the impulse changes v_f by M_ff^-1 M_fc v_c. Linear and
+    angular momentum of a floating creature do not change; setting v_c to zero alone would change
+    them. Flesh moves with the bones.
 
-    dofs     (k,) joints whose relative velocity is removed
-    fixed    (nv,) dofs that keep their velocity whatever it takes (driven or locked ones)
+    dofs     (k,) joints that lose their relative velocity
+    fixed    (nv,) dofs that keep their velocity (driven or locked ones)
     returns  new state with the same positions
     source   Lentine et al. 2011, sections 3.3 and 5
     """
@@ -105,7 +105,7 @@ def rigidify(
 
 
 def carried_mass(model: SolidModel, q: Array) -> Array:
-    """(nbones, nbones) mass matrix of the bones' dofs when flesh rides on them: F^T M F."""
+    """(nbones, nbones) mass matrix of the bones' dofs with flesh moving along: F^T M F."""
     if model.flesh is None:
         return mass_matrix(model, q)
     _, following = follow_each(model, q)

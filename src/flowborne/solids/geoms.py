@@ -13,7 +13,7 @@ from flowborne.shapes.primitives import shape_of
 from flowborne.shapes.shape import Mesh, Shape
 
 Own = dict[str, OwnGeometry]
-"""Name of a mesh of the model -> the geometry that it stands for."""
+"""Name of a mesh of the model -> the user's geometry that it represents."""
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ HIDDEN_GROUP = 3
 """Geometries in this group and above collide but displace no fluid (MuJoCo's convention)."""
 
 DISPLACED = "displaced by "
-"""What stands before a body's name in the name of its <numeric>, see `said_to_displace`."""
+"""Prefix of the name of a body's <numeric>, see `said_to_displace`."""
 
 KINDS = {
     mujoco.mjtGeom.mjGEOM_PLANE: "plane",
@@ -41,16 +41,16 @@ NONE: Own = {}
 
 
 def own_by_mesh(shapes: Sequence[PlacedShape]) -> Own:
-    """The geometries by the meshes that `add_shapes` makes of them."""
+    """The user's geometries by the meshes that `add_shapes` makes of them."""
     return {f"own_shape_{n}": one.geometry for n, one in enumerate(shapes)}
 
 
 def add_shapes(spec: mujoco.MjSpec, shapes: Sequence[PlacedShape]) -> None:
-    """Add geometries of one's own to the bodies of a model.
+    """Add the user's geometries to the bodies of a model, as meshes.
 
-    They have mass, inertia and contact as meshes have; in contact the hull counts, so nothing goes
-    through the hole of a ring.
-    raises  ValueError for one on a body that is not there; PartError as `triangulated`
+    They have the mass, inertia and contact of meshes; contact uses the convex hull, so nothing
+    passes through the hole of a ring.
+    raises  ValueError for an unknown body; PartError as `triangulated`
     """
     for name, one in zip(own_by_mesh(shapes), shapes, strict=True):
         body = spec.body(one.body)
@@ -68,7 +68,7 @@ def add_shapes(spec: mujoco.MjSpec, shapes: Sequence[PlacedShape]) -> None:
 
 
 def own_shape(mj: mujoco.MjModel, mesh: int, geometry: OwnGeometry, triangles: Mesh) -> ShapeOwn:
-    """A geometry of one's own in the frame of the mesh that stands for it.
+    """The user's geometry in the frame of the mesh that represents it.
 
     MuJoCo moves the vertices of a mesh to its centre of mass and along its principal axes.
     """
@@ -115,7 +115,7 @@ def mesh_of(mj: mujoco.MjModel, geom: int) -> Mesh | None:
 
 
 def geom_shape(mj: mujoco.MjModel, geom: int, own: Own = NONE) -> Shape:
-    """A geometry that displaces fluid, in its own frame; `own` are those of the user's own."""
+    """A geometry that displaces fluid, in its own frame; `own` are the user's geometries."""
     mesh = mesh_of(mj, geom)
     if mesh is not None:
         number = int(mj.geom_dataid[geom])
@@ -138,8 +138,11 @@ def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:
 
 
 def said_to_displace(mj: mujoco.MjModel, body: int) -> tuple[float, Array] | None:
-    """Volume, m^3, and (3,) centre in a body's frame, m, that a model gives as a <numeric> of four
-    numbers, DISPLACED before the body's name, where bodies overlap; None where it has none."""
+    """Volume, m^3, and (3,) centre in the frame of a body, m, from the model; None if not given.
+
+    The model gives them, where bodies overlap, as a <numeric> of four numbers. Its name is
+    DISPLACED followed by the name of the body.
+    """
     name = DISPLACED + element_name(mj, mujoco.mjtObj.mjOBJ_BODY, body)
     number = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_NUMERIC, name)
     if number < 0:

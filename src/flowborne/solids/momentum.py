@@ -16,20 +16,20 @@ from flowborne.solids.state import SolidState
 
 Array = NDArray[np.float64]
 
-KEPT = 4
-"""Half-way momenta that a thread remembers of a model."""
+MOST_MOMENTA = 4
+"""Half-way momenta of a model that a thread caches."""
 
 
 def weight(model: SolidModel, s: Scratch) -> Array:
-    """(bodies, 6) force of gravity on each body's subtree and its torque about the world origin;
-    points of flesh count as bodies."""
+    """(bodies, 6) force of gravity on the subtree of each body, and its torque about the world
+    origin; nodes of flesh count as bodies."""
     force = model.subtree_mass[:, None] * model.gravity
     return about_origin(force, np.zeros(force.shape), s.subtree_com)
 
 
 def subtree_momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
-    """(bodies, 6) momentum of each body's subtree, linear and about the world origin; points of
-    flesh count as bodies."""
+    """(bodies, 6) momentum of the subtree of each body, linear and about the world origin; nodes
+    of flesh count as bodies."""
     s.place(state.q, state.v)
     mujoco.mj_subtreeVel(s.mj, s.data)
     linear = model.subtree_mass[:, None] * s.subtree_linvel
@@ -37,10 +37,10 @@ def subtree_momentum(model: SolidModel, s: Scratch, state: SolidState) -> Array:
 
 
 def subtree_halfway_momentum(model: SolidModel, s: Scratch, state: SolidState, dt: float) -> Array:
-    """As `subtree_momentum`, when the positions have moved on for half a step. Read only.
+    """As `subtree_momentum`, after the positions have moved for half a step. Read only.
 
-    The last few are remembered: all trials of a decision start from one state, and a step's report
-    asks for what its solve has found.
+    The last few are cached: all trials of a decision start from one state, and the report of a step
+    needs the same momenta as its solve.
     """
     key = state.q.tobytes(), state.v.tobytes(), dt
     known = s.momenta.get(key)
@@ -48,11 +48,11 @@ def subtree_halfway_momentum(model: SolidModel, s: Scratch, state: SolidState, d
         q = model.integrate(state.q, state.v, 0.5 * dt)
         known = subtree_momentum(model, s, SolidState(q, state.v))
         known.setflags(write=False)
-        if len(s.momenta) >= KEPT:
+        if len(s.momenta) >= MOST_MOMENTA:
             s.momenta.pop(next(iter(s.momenta)))
     else:
         del s.momenta[key]
-    s.momenta[key] = known  # the last one used goes last, the first one is dropped first
+    s.momenta[key] = known  # least recently used first
     return known
 
 
@@ -65,8 +65,8 @@ def halfway_momentum(model: SolidModel, state: SolidState, dt: float) -> Array:
     """(2, 3) momentum of the pose half a step after `state` at the state's velocity.
 
     The time scheme moves positions by dt v and then changes v, as leapfrog does: v belongs to the
-    middle of the next step, and this is the momentum that a free creature keeps to rounding.
-    `momentum` wavers about it by O(dt).
+    middle of the next step, and a free creature conserves this momentum to rounding. `momentum`
+    oscillates about it by O(dt).
     """
     return subtree_halfway_momentum(model, scratch(model), state, dt)[0].reshape(2, 3)
 
@@ -99,17 +99,21 @@ def potential_energy(model: SolidModel, state: SolidState) -> float:
 
 @dataclass(frozen=True)
 class Halfway:
-    """What the half-way impulse of one step is made from.
+    """Coriolis and centrifugal forces at the half-way velocity of a step.
+
+    Positions move by dt v before v changes, as in leapfrog, so velocity-dependent forces are second
+    order in time, and do no work, only at (v + v+)/2. Along dofs that carry a whole tree, the
+    equation of motion is written as the change of momentum itself, which then holds to rounding.
 
     state  at the end of the motion, with the velocity before the step
     dt     s
-    outer  (nv,) generalised forces other than gravity and those of Coriolis
+    outer  (nv,) generalised forces other than gravity and Coriolis forces
     still  (nv,) A v: impulse that keeps the velocity, A without constraint rows
     mass   (nv, nv) mass matrix, dense or sparse
-    given  (bodies, 6) momentum of each body's subtree when the positions were half-way, and what
-           gravity adds to it during the step
-    cdof   (nv, 6) angular velocity that unit velocity of each dof gives what it moves, and velocity
-           of the point at its centre
+    given  (bodies, 6) momentum of the subtree of each body when the positions were half-way, plus
+           the impulse of gravity during the step
+    cdof   (nv, 6) for unit velocity of each dof: angular velocity of the bodies that it moves, and
+           velocity of the point at its centre
     centre (nv, 3) m
     """
 
@@ -125,8 +129,8 @@ class Halfway:
     _found: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def impulse(self, v_plus: Array) -> tuple[Array, Array]:
-        """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,), and (nv,) how much of it
-        may be rounding errors; the last answer is kept, and is not to be written to."""
+        """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,), and (nv,) a bound of its
+        rounding errors. The last result is cached; do not write to it."""
         key = v_plus.tobytes()
         if key not in self._found:
             self._found.clear()
@@ -166,8 +170,10 @@ def halfway(
     mass: Array | csr_array,
     outer: Array,
 ) -> Halfway:
-    """The forces of a step from `before`, after MuJoCo's forward pass at `state`; the rest as in
-    `Halfway`."""
+    """The forces of a step from `before`; call it after MuJoCo's forward pass at `state`.
+
+    The arguments are those of `Halfway`.
+    """
     cdof, centre, fall = s.cdof.copy(), s.subtree_com[model.dof_root], dt * weight(model, s)
     given = subtree_halfway_momentum(model, s, before, dt) + fall
     return Halfway(model, state.copy(), dt, outer, still, mass, given, cdof, centre)

@@ -1,4 +1,4 @@
-"""Prescribed dofs: their velocity after the step is given, the force that they need is computed.
+"""Prescribed dofs: their velocity after the step is given, and their force is computed.
 
 Partial inverse dynamics: with P the prescribed dofs and F the free ones,
 
@@ -26,22 +26,22 @@ Array = NDArray[np.float64]
 
 Mask = NDArray[np.bool_]
 
-ROUNDS = 50
+MOST_ROUNDS = 50
 """Most changes of the set of active contacts and limits."""
 
 
 @dataclass(frozen=True)
 class PrescribedSystem:
-    """The solid's answer to an impulse when some dofs are prescribed.
+    """The response of bones to an impulse when some dofs are prescribed.
 
     system      the system it was made from
     prescribed  (nv,) dofs that end the step with velocity `hold`
-    hold        (nv,) rad/s or m/s; free dofs' entries are not used
+    hold        (nv,) rad/s or m/s; entries of free dofs are not used
     inverse     (nv, nv) A_FF^-1, zero in rows and columns of prescribed dofs; symmetric
-    velocity    (nv,) v*, velocity after the step when there is no impulse
-    limited     (nv,) dofs whose drive reached its limit; they are free and pushed by `push`
+    velocity    (nv,) v*, velocity after the step without an impulse
+    limited     (nv,) dofs with a drive at its limit; they are free, and `push` acts on them
     push        (nv,) generalised force of limited drives, already in `system`
-    turns       times that drives were released or taken up
+    turns       number of changes of the drives
     """
 
     system: SolidSystem
@@ -54,7 +54,7 @@ class PrescribedSystem:
     turns: int = 0
 
     def after(self, impulse: Array) -> Array:
-        """(nv,) velocity after the step with a generalised impulse (nv,), the fluid's for one."""
+        """(nv,) velocity after the step with a generalised impulse (nv,), such as the fluid's."""
         return np.asarray(self.velocity + self.inverse @ impulse)
 
     def actuator(self, v_plus: Array, impulse: Array) -> Array:
@@ -64,27 +64,27 @@ class PrescribedSystem:
         return np.where(self.prescribed, needed, self.push)
 
     def updated(self, v_plus: Array) -> PrescribedSystem | None:
-        """With the contacts and limits that `v_plus` implies; None when it has them already."""
+        """With the contacts and limits at `v_plus`; None when they do not change."""
         system = self.system.updated(v_plus)
         if system is None:
             return None
         return _solved(system, self.prescribed, self.hold, self.limited, self.push, self.turns)
 
     def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> PrescribedSystem:
-        """With other drives that keep their dofs, and others at their limits."""
+        """With other prescribed dofs, and other drives at their limits."""
         system = self.system.pushed(push - self.push)
         return _solved(system, prescribed, self.hold, limited, push, self.turns + 1)
 
     def answers_as(self, other: object) -> bool:
-        """Whether both give the same answer to any impulse."""
+        """Whether both respond equally to any impulse."""
         return isinstance(other, PrescribedSystem) and np.array_equal(self.inverse, other.inverse)
 
     def mobility(self, pose: Kinematics) -> Mobility:
-        """The motion that a unit impulsive push gives: M = T A^-1 T^T."""
+        """The motion caused by a unit impulse: M = T A^-1 T^T."""
         return dense_mobility(self._response(pose))
 
     def answering(self, pose: Kinematics, drag: csr_array) -> DenseAnswer:
-        """How the bodies answer a drag (k, k), kg."""
+        """The response of the bodies to a drag (k, k), kg."""
         return DenseAnswer(self._response(pose), drag.toarray())
 
     def _response(self, pose: Kinematics) -> Array:
@@ -94,7 +94,7 @@ class PrescribedSystem:
 def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedSystem:
     """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly.
 
-    raises  BreakdownError when the free dofs' matrix is not positive definite
+    raises  BreakdownError when the matrix of the free dofs is not positive definite
     """
     none = np.zeros(len(hold), bool)
     return _solved(system, prescribed, hold, none, np.zeros(len(hold)))
@@ -143,13 +143,13 @@ def holding(
 ) -> Array:
     """Generalised force that keeps the present velocities of `dofs` against every other force.
 
-    The dofs accelerate by nothing, the others fall freely (a slab's locked dofs stay locked). The
+    The dofs do not accelerate, the others move freely (locked dofs of a slab stay locked). The
     effort of eq. (1) is this force times dt, an impulse.
 
-    applied  (nv,) generalised force besides gravity, springs and contact: the fluid's, the wind's
+    applied  (nv,) generalised force of fluid and wind; gravity, springs and contact are added
     dt       s, for the implicit springs and the contacts
     dofs     (k,) held dofs; every dof when None
-    returns  (nv,) N or N m, zero on the dofs that are not held
+    returns  (nv,) N or N m, zero on dofs that are not held
     raises   ValueError when contacts and limits find no consistent set
     source   Lentine et al. 2011, section 2.3
     """
@@ -159,13 +159,13 @@ def holding(
         held[dofs] = True
     none = np.zeros(model.nv)
     system = prescribe(assemble(model, state, applied, dt), held | model.locked, state.v)
-    for _ in range(ROUNDS):
+    for _ in range(MOST_ROUNDS):
         v_plus = system.after(none)
         changed = system.updated(v_plus)
         if changed is None:
             return np.where(held, system.actuator(v_plus, none), 0.0)
         system = changed
     raise ValueError(
-        f"contacts and limits still change after {ROUNDS} rounds of the held pose. "
+        f"contacts and limits still change after {MOST_ROUNDS} rounds of the held pose. "
         "Use a shorter time step or softer contacts."
     )

@@ -1,8 +1,7 @@
-"""MuJoCo's working memory: one per thread and model, never part of the state.
+"""MuJoCo's working memory, one per thread and model, and twists of its dofs; not part of the state.
 
-Nothing in it carries over: every use sets positions, velocities and applied forces anew, and
-warm starts are off, so results depend on arguments only. What is remembered of momenta is found by
-these arguments, to the last bit.
+Every use sets positions, velocities and applied forces, and warm starts are off, so results depend
+on arguments only. Cached momenta are looked up by the exact bits of these arguments.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from numpy.typing import NDArray
 from flowborne.kernels.momentum import about_origin
 
 Array = NDArray[np.float64]
-# MuJoCo would leave a file of warnings where the user works: of its own solution, a mere start here
+# MuJoCo would write a file of warnings about its own solution into the working folder
 mujoco.set_mju_user_warning(logging.getLogger(__name__).debug)
 
 
 class Compiled(Protocol):
-    """A model of which MuJoCo's is known, whatever else of it is still to be built.
+    """A model with at least its compiled MuJoCo model.
 
     mj  MuJoCo's model
     """
@@ -34,11 +33,11 @@ class Compiled(Protocol):
 
 
 class Scratch:
-    """MjData and a private MjModel, whose time step may be set without other threads seeing it.
+    """MjData and a private MjModel; its time step can be set without effect on other threads.
 
     mj, data    MuJoCo's model and data
-    q, v, ...   lasting views into `data`
-    momenta     the last few half-way momenta by their state, see solids.momentum
+    q, v, ...   views into `data`
+    momenta     cached half-way momenta by state, see solids.momentum
     """
 
     def __init__(self, model: Compiled) -> None:
@@ -57,12 +56,12 @@ class Scratch:
         self.geom_xpos, self.geom_xmat = data.geom_xpos, data.geom_xmat
 
     def set_time_step(self, dt: float) -> None:
-        """Time step that implicit terms and constraint references are made for, s."""
+        """Set the time step of implicit terms and constraint references, s."""
         if dt != self.dt:
             self.mj.opt.timestep = self.dt = dt
 
     def place(self, q: Array, v: Array | None = None) -> None:
-        """Poses of everything at `q`, and velocities of everything when `v` is given."""
+        """Compute all poses at `q`, and all velocities when `v` is given."""
         self.q[:] = q
         mujoco.mj_kinematics(self.mj, self.data)
         mujoco.mj_comPos(self.mj, self.data)
@@ -71,14 +70,14 @@ class Scratch:
             mujoco.mj_comVel(self.mj, self.data)
 
     def forward(self, q: Array, v: Array, applied: Array) -> None:
-        """Everything up to the acceleration, with constraints."""
+        """Compute everything up to the acceleration, with constraints."""
         self.q[:] = q
         self.v[:] = v
         self.applied[:] = applied
         mujoco.mj_forward(self.mj, self.data)
 
     def smooth_forces(self, q: Array, v: Array, applied: Array) -> None:
-        """Everything up to the forces other than those of constraints, without solving for them."""
+        """Compute everything up to the forces, without solving for constraint forces."""
         self.q[:] = q
         self.v[:] = v
         self.applied[:] = applied
@@ -89,7 +88,7 @@ class Scratch:
 
     def mass_matrix(self) -> Array:
         """(nv, nv) mass matrix at the present pose; overwritten by the next call."""
-        if self._mass is None:  # gigabytes where there is much flesh, which does not ask for it
+        if self._mass is None:  # gigabytes for models with flesh, which never call this
             self._mass = np.zeros((self.mj.nv, self.mj.nv))
         if self._mass.size:
             mujoco.mj_fullM(self.mj, self.data, self._mass)
@@ -111,7 +110,7 @@ def scratch(model: Compiled) -> Scratch:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """(k, 3) vector products of rows; np.cross takes ten times as long for few rows."""
+    """(k, 3) cross products of rows; np.cross takes ten times as long for few rows."""
     product = np.empty((len(b), 3))
     product[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
     product[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
@@ -120,7 +119,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def twists_about_origin(cdof: Array, centre: Array) -> Array:
-    """(nv, 6) velocity of the point at the world origin, and angular velocity, of unit velocity of
+    """(nv, 6) velocity of the point at the world origin, and angular velocity, for unit velocity of
     each dof.
 
     cdof    (nv, 6) angular velocity, and velocity of the point at `centre`
