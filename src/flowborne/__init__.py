@@ -1,6 +1,6 @@
-"""flowborne: creatures that answer the fluid around them.
+"""flowborne: creatures that react to the fluid around them.
 
-All that a script needs is here, and on the pages beside it:
+The public names are here and in these modules:
 
     bodies        models, poses, momentum and energy of bodies
     boundaries    what the sides of a domain do
@@ -9,16 +9,16 @@ All that a script needs is here, and on the pages beside it:
     flesh         flesh as a [[flesh]] table grows it
     gradients     how a gradient is estimated
     machine       threads, memory, seconds by part
-    motions       joints that are told how to move
-    objectives    what a creature may want
+    motions       prescribed motions of joints
+    objectives    objectives of the controller
     operators     the operators of a step, one by one
     pictures      pictures and plots
-    rules         how far to go down a gradient
-    shapes        geometries of one's own
+    rules         step rules of the gradient descent
+    shapes        geometries that a user defines
     winds         simple winds
     worlds        worlds made and stepped in code
 
-Every other module is flowborne's own and may change.
+All other modules are internal and may change.
 """
 
 from __future__ import annotations

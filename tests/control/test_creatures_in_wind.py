@@ -249,5 +249,5 @@ def test_joints_that_want_different_things_each_follow_their_own() -> None:
 
 def test_a_joint_that_wants_nothing_is_named() -> None:
     wish = WeightedObjective(ObjectiveEffort(np.array([0])), wanted_by=np.array([0]))
-    with pytest.raises(ValueError, match="controlled dof 1 wants nothing"):
+    with pytest.raises(ValueError, match="controlled dof 1 has no objective"):
         ObjectiveSum((wish,)).group_by_joints(np.array([0, 1]))

@@ -64,7 +64,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class StrengthInPhase:
-    """Strength that some dofs have in place of their usual one while its phases are on.
+    """Strength of some dofs while its phases are on; it replaces their usual strength.
 
     indices    (m,) which of the controlled dofs, counted from 0
     strength  rad/s or m/s; one for all of them or one each
@@ -247,7 +247,7 @@ class Controller:
         )
 
     def course(self, world: World, frame_time: float, step: Step) -> Course:
-        """From which a decision sets out: the present pose, or what is left of the last plan.
+        """Start of a decision: the present pose, or the rest of the last plan.
 
         frame_time  s
         """
@@ -284,7 +284,7 @@ class Controller:
         return creature.positions_in(model, world.memory.get("target", state.q), self.dofs)
 
     def close(self) -> None:
-        """Let the workers go."""
+        """Stop the workers."""
         self.executor.close()
 
     def _descend(
@@ -293,7 +293,7 @@ class Controller:
         """Course to take; objective and gradient (N,) on that from which the decision set out;
         number of trials run.
 
-        Dofs that want different things each descend on what they want, all from the same course.
+        Dofs with different objectives each descend on their own, all from the same course.
         """
         course = self.course(world, frame_time, step)
         size, value, evaluations = course.count, 0.0, 0
@@ -320,9 +320,9 @@ class Controller:
         return course, value, gradient, evaluations
 
     def _groups(self, world: World, size: int) -> list[tuple[Integers, ObjectiveSum]]:
-        """Places among the numbers (N,) of a course that want the same, each group with its sum;
-        none of those whose sum has no term that counts. On a plan terms come into force on the
-        way."""
+        """Groups of indices into the numbers (N,) of a course with the same objectives, each with
+        their sum. Groups without an active term are left out, except on a plan, where terms can
+        become active later."""
         knots = self.dofs.size * np.arange(size // self.dofs.size)[:, None]
         return [
             ((knots + indices).ravel(), wanted)

@@ -1,7 +1,7 @@
-"""What a decision is about, and its trials: the objective as a function of a displacement.
+"""The variables of a decision, and its trials: the objective as a function of a displacement.
 
-A decision changes a course: the pose that the joints go straight to (`trial`), or the poses of a
-plan that looks ahead (`plan`). Gradients and rules see neither, but numbers in rad or m.
+A decision changes a course: the pose to which the joints move (`trial`), or the poses of a plan
+that looks ahead (`plan`). Gradients and rules get numbers in rad or m only.
 """
 
 from __future__ import annotations
@@ -73,11 +73,11 @@ def run(evaluation: Evaluation) -> float:
 
 
 class Course(Protocol):
-    """What the controlled joints are to do, and what it may change by.
+    """The motion of the controlled joints that a decision changes.
 
-    world  in the flow and time of which it is tried
-    count  N, numbers that say by how much it differs from another one
-    goal   (nq,) pose in which it is when the next decision is due
+    world  its flow and time are those of the trials
+    count  N, number of decision variables
+    goal   (nq,) pose at the time of the next decision
     """
 
     @property
@@ -94,7 +94,7 @@ class Course(Protocol):
         ...
 
     def trial(self, objective: ObjectiveSum, displacement: Array) -> Evaluation:
-        """What the objective is on the course displaced by (N,)."""
+        """Evaluation of the objective on the course displaced by (N,)."""
         ...
 
     def displaced(self, displacement: Array) -> Self:

@@ -35,7 +35,7 @@ def parts(world: World) -> tuple[SolidModel, SolidState]:
 
 
 def given(setup: Setup, model: SolidModel) -> Mask:
-    """(nv,) dofs whose velocity is not the controller's to choose: keyframed and locked ones."""
+    """(nv,) dofs whose velocity the controller cannot choose: prescribed and locked ones."""
     mask = np.asarray(model.locked, dtype=bool).copy()
     for motion in setup.motions:
         mask[motion.dofs] = True
@@ -54,7 +54,7 @@ def outboard(world: World, dofs: Integers) -> Integers:
 def give_velocity(world: World, dofs: Integers, velocity: Array, kept: Integers) -> None:
     """Give `dofs` these velocities; linear and angular momentum stay, and so does `kept`.
 
-    What rigidify does to velocities is linear: it takes the difference to the wanted ones out.
+    `rigidify` is linear in the velocities: it removes the difference to the required ones.
 
     source  Lentine et al. 2011, sections 3.3 and 5
     """

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class Poses(Protocol):
-    """The objective as a function of the pose, which is all that gradients and rules see.
+    """The objective as a function of the pose: the only input of gradients and rules.
 
     count  n, number of controlled dofs
     """
@@ -33,8 +33,7 @@ class Poses(Protocol):
         ...
 
     def gradient(self, displacement: Array) -> Array:
-        """(n,) gradient in a displaced pose by the displacement, per rad or m, as the scene wants
-        it estimated."""
+        """(n,) gradient with respect to the displacement in a displaced pose, per rad or m."""
         ...
 
 
@@ -93,7 +92,7 @@ GRADIENTS: Registry[Gradient] = Registry(
     taken=("central", "one-sided"),
     given=("displacement",),
 )
-"""Gradients of one's own; `displacement` is what the scene's probes say, rad or m for each dof."""
+"""Gradients that users have registered; `displacement` comes from the probes, rad or m per dof."""
 
 
 @dataclass(frozen=True)

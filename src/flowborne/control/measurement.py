@@ -1,4 +1,4 @@
-"""What an objective may look at: a world after a step, and the step's report."""
+"""The input of an objective: a world after a step, and the report of the step."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ Integers = NDArray[np.int64]
 class Measurement:
     """A world after a step, real or hypothetical.
 
-    `body("head").velocity` and `joint("leg_1").position` say by name all that a step tells of a
-    body or a joint, in SI units; see `BodyState` and `JointState`.
+    `body("head").velocity` and `joint("leg_1").position` give the quantities of a body or a joint
+    by name, in SI units; see `BodyState` and `JointState`.
 
     world   the state after the step
-    report  what the step said
-    now     s, the time at which phases are looked up: that of the decision. None: the world's
+    report  of the step
+    now     s, time for phases: that of the decision. None: that of the world
     """
 
     world: World

@@ -47,13 +47,13 @@ Names = Annotated[tuple[Text, ...], Field(min_length=1)]
 
 
 class ObjectiveTable(Table):
-    """What every objective has.
+    """Keys of every objective.
 
-    goal       "least" or "most" of it
-    weight     its share in the sum
-    phases     when it counts; always unless given
-    wanted_by  controlled joints that want it; all of them unless given. Joints that want different
-               things each follow their own sum
+    goal       "least" or "most"
+    weight     its factor in the sum
+    phases     when it is active; always by default
+    wanted_by  controlled joints to which it applies; all by default. Joints with different
+               objectives each follow their own sum
     """
 
     goal: Literal["least", "most"] = "least"
@@ -115,7 +115,7 @@ class ObjectiveEffort:
 class ObjectiveEffortTable(ObjectiveTable):
     """Effort of joints (eq. 1).
 
-    joints  whose effort; that of every controlled joint unless given
+    joints  joints whose effort counts; all controlled joints by default
     """
 
     kind: Literal["effort"]
@@ -146,7 +146,7 @@ class DirectedTable(ObjectiveTable):
     """A force on bodies along a direction.
 
     direction  of any length
-    bodies     on which it acts; every moving body unless given
+    bodies     bodies on which it acts; every moving body by default
     """
 
     direction: Vector
@@ -248,7 +248,7 @@ class ObjectivePressureDrag:
 class ObjectivePressureTable(DirectedTable):
     """Pressure force (eq. 10) on bodies along a direction; drag and lift differ by the name alone.
 
-    frame      body on which the direction rides; fixed in the world unless given
+    frame      body in whose frame the direction is given; the world by default
     """
 
     kind: Literal["pressure-drag", "pressure-lift"]
@@ -271,7 +271,7 @@ class ObjectivePressureTable(DirectedTable):
 class ObjectiveInputMotion:
     """Sum of squared distances of joints from a given motion, rad^2 or m^2.
 
-    The distance of a ball joint is the angle of the rotation that is left.
+    The distance of a ball joint is the angle of the remaining rotation.
 
     dofs       (k,) all dofs of the joints, ascending
     reference  motion of these joints
@@ -287,7 +287,7 @@ class ObjectiveInputMotion:
 
 
 class ObjectiveInputMotionTable(ObjectiveTable):
-    """Squared distance of a controlled joint from a motion that it would have on its own.
+    """Squared distance of a controlled joint from a given motion.
 
     joint          the joint
     times, values  keyframes of the motion of a hinge or slide, s and degrees or m; one value alone
@@ -364,7 +364,7 @@ class ObjectiveInputMotionTable(ObjectiveTable):
 class MovingTable(ObjectiveTable):
     """A velocity.
 
-    body  whose velocity; that of the centre of mass of all bodies unless given
+    body  body whose velocity counts; by default the centre of mass of all bodies
     """
 
     body: Text | None = None
@@ -431,7 +431,7 @@ class ObjectiveSpeed:
 
 
 class ObjectiveSpeedTable(MovingTable):
-    """Velocity along a direction; on a plan of several `knots`, the way made by its time.
+    """Velocity along a direction; on a plan of several `knots`, the distance over its time.
 
     direction  of any length
     """
@@ -465,7 +465,7 @@ class ObjectiveDistance:
 class ObjectiveDistanceTable(ObjectiveTable):
     """Distance of a body from a point.
 
-    body   whose; the origin of its frame counts
+    body   the body; the origin of its frame counts
     point  m
     """
 

@@ -22,13 +22,13 @@ Integers = NDArray[np.int64]
 
 
 class Objective(Protocol):
-    """A number that the creature wants small.
+    """A number that the controller minimises.
 
-    One that has a `name` is written to the history under it, any other under its kind.
+    The history calls it by its `name`, or by its kind if it has none.
     """
 
     def value(self, measurement: Measurement) -> float:
-        """The number in the measured state."""
+        """Its value in the measured state."""
         ...
 
 
@@ -49,7 +49,7 @@ OBJECTIVES: Registry[Objective] = Registry(
     ),
     keys=("goal", "weight", "phases", "wanted_by"),
 )
-"""Objectives of one's own."""
+"""Objectives that users have registered."""
 
 
 def name_of(objective: Objective) -> str:
@@ -87,9 +87,9 @@ class ObjectiveCallable:
 
 @dataclass(frozen=True, eq=False)
 class WeightedObjective:
-    """An objective in a sum: its weight (negative to maximise), when it counts, and for whom.
+    """An objective in a sum: its weight (negative to maximise), its phases and its joints.
 
-    wanted_by  (k,) controlled dofs that want it; every one when None
+    wanted_by  (k,) controlled dofs to which it applies; all when None
     """
 
     objective: Objective
@@ -123,9 +123,9 @@ class ObjectiveSum:
         return cls((WeightedObjective(objective, weight),))
 
     def group_by_joints(self, dofs: Integers) -> list[tuple[Integers, ObjectiveSum]]:
-        """Groups of indices in `dofs` (n,) that want the same terms, each with their sum.
+        """Groups of indices into `dofs` (n,) with the same terms, each with the sum of these.
 
-        raises  ValueError when a dof wants nothing
+        raises  ValueError when a dof has no objective
         """
         groups: dict[tuple[int, ...], list[int]] = {}
         for place, dof in enumerate(dofs):
@@ -135,7 +135,7 @@ class ObjectiveSum:
                 if term.wanted_by is None or dof in term.wanted_by
             )
             if not wanted:
-                raise ValueError(f"controlled dof {dof} wants nothing: give it an objective")
+                raise ValueError(f"controlled dof {dof} has no objective: give it one")
             groups.setdefault(wanted, []).append(place)
         return [
             (np.array(indices), ObjectiveSum(tuple(self.terms[n] for n in wanted)))

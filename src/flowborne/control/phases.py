@@ -1,4 +1,4 @@
-"""When an objective counts, or a strength: always, at times, or while a track rises or falls."""
+"""When an objective or a strength is active: always, at times, or while a motion rises or falls."""
 
 from __future__ import annotations
 
@@ -133,9 +133,9 @@ class PhaseIntervalsTable(Table):
 
 
 class PhaseMotionTable(Table):
-    """On while a prescribed motion moves, or is, on one side of a threshold.
+    """On while the position or velocity of a prescribed motion is on one side of a threshold.
 
-    joint      whose [[motion]] it follows
+    joint      joint of the [[motion]]
     quantity   "velocity" (degrees/s or m/s) or "position" (degrees or m)
     side       "above" (threshold included) or "below"
     threshold  in the unit of the quantity

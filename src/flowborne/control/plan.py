@@ -1,10 +1,10 @@
 """A decision that looks ahead: poses at the times of several decisions, tried by going there.
 
-A plan has a knot at the time of each decision that it reaches over: a pose that the drives approach
-from the one before. A trial rehearses it: a copy of the world goes on along the plan, step by step,
-and the objective is its mean over the steps. Only the way to the first knot is gone before the next
-decision, which sets out from what is left of the plan (receding horizon). The paper names the lack
-of it as a limit (section 8).
+A plan has a knot at the time of each decision within its horizon: a pose that the drives approach
+from the previous one. A trial simulates the plan on a copy of the world, step by step, and its
+objective is the mean over the steps. Only the motion to the first knot is executed before the next
+decision, which starts from the rest of the plan (receding horizon). The paper names the lack of
+this as a limit (section 8).
 """
 
 from __future__ import annotations

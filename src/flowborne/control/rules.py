@@ -1,4 +1,4 @@
-"""How far to go down the gradient. Paper: section 2.1."""
+"""Step rules of the gradient descent. Paper: section 2.1."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ RULES: Registry[Rule] = Registry(
     methods=("step_scale", "step"),
     taken=("fixed", "resilient", "golden-section", "quasi-newton"),
 )
-"""Rules of one's own."""
+"""Rules that users have registered."""
 
 
 def descent(gradient: Array, limit: Array) -> Array:
     """(n,) the longest displacement along -gradient with no dof beyond its limit.
 
-    The dof that is asked most of, relative to what it can, goes as far as its strength lets it,
-    and the others in proportion: the length does not fade with the gradient. A single dof moves by
-    -sign(gradient) limit. No gradient, no displacement.
+    The dof with the largest gradient relative to its limit moves by its limit, and the others in
+    proportion: the length does not shrink with the gradient. A single dof moves by
+    -sign(gradient) limit. A zero gradient gives no displacement.
 
     gradient  (n,) per rad or m
     limit     (n,) positive, rad or m
@@ -87,10 +87,10 @@ class FixedStep(FullStep):
 class ResilientStep:
     """Steps and probes that shorten where the descent turns back, and grow where it goes on.
 
-    Far from an optimum the step is that of `FixedStep`. A dof whose gradient changes its sign has
-    gone past the optimum: its next step and probe are half as long. So the chatter dies away, and
-    a probe wider than a kink no longer moves it. Where the sign stays they grow again, to no more
-    than strength and the scene's probe: an optimum that moves is followed.
+    Far from an optimum the step is that of `FixedStep`. If the gradient of a dof changes its sign,
+    the dof has passed the optimum, and its next step and probe are half as long. The oscillation
+    decays, and a probe wider than a kink no longer moves the dof. If the sign stays, step and probe
+    grow again, up to strength and the scene's probe, so that a moving optimum is followed.
 
     shorten, lengthen  factors on the scale after a change of sign, and after none
     least              scale below which nothing shortens
@@ -169,14 +169,14 @@ class GoldenSection(FullStep):
 
 @dataclass(frozen=True)
 class QuasiNewton(FullStep):
-    """Least objective within strength, by limited-memory BFGS: joints know of each other.
+    """Least objective within strength, by limited-memory BFGS, which couples the joints.
 
-    Gradients in several poses tell how the slope of one joint changes with another, so that a
-    narrow valley, where the steepest way leads from wall to wall, is followed along its floor. All
-    poses are tried in the flow as it is now. The step goes to the best of them.
+    Gradients in several poses show how the slope of one joint changes with another joint. The
+    search therefore follows the floor of a narrow valley, where steepest descent zigzags. All poses
+    are evaluated in the present flow. The step goes to the best of them.
 
-    gradients  most that are estimated in a decision, that of the present pose among them, and one
-               trial besides for each and for the last pose
+    gradients  most gradients in a decision, including that of the present pose; each takes one
+               further trial, and so does the last pose
     raises     ValueError when gradients < 1
     source     Byrd, Lu, Nocedal and Zhu 1995 (L-BFGS-B, in SciPy)
     """
@@ -257,7 +257,7 @@ class RuleResilient(RuleTable):
     """Steps and probes that halve where the descent turns back, and grow again where it goes on.
 
     least  part of strength and probe below which nothing shortens. In a fluid a probe that moves a
-           body by less than a cell or so feels the grid
+           body by less than about a cell depends on the grid
     """
 
     kind: Literal["resilient"]
@@ -285,7 +285,7 @@ class RuleGoldenSection(RuleTable):
 
 
 class RuleQuasiNewton(RuleTable):
-    """Limited-memory BFGS over all joints that want the same.
+    """Limited-memory BFGS over all joints with the same objectives.
 
     gradients  most in a decision, in as many poses
     """

@@ -116,7 +116,7 @@ class Trial:
         for number in range(1, whole + 1):
             if number == hypothesis.steps + 1:
                 command.rate[self.dofs] = self._last_rate(command)
-            # what is on the way to the last step is not read, and where all is told, not felt
+            # only the last step is measured; before it, prescribed motion needs no solve
             if number == whole or not move_as_told(world, hypothesis.dt, command):
                 report = advance(self, world, hypothesis.dt, command)
         value = self.objective.value(Measurement(world, report, self.world.time))
@@ -224,8 +224,8 @@ class PoseCourse:
 
 
 def without_scalars(world: World) -> World:
-    """The same world, its arrays shared, without dye and smoke, which push nothing: trials do not
-    carry them along, and no objective sees them."""
+    """The same world, its arrays shared, without dye and smoke: they exert no force, so that trials
+    need not advect them, and objectives cannot read them."""
     if world.fluid is None:
         return world
     return replace(world, fluid=replace(world.fluid, scalars={}))

@@ -38,10 +38,10 @@ class ControlTable(Table):
     """[[control]]: joints that the controller moves.
 
     joints        their names
-    strength      fastest rate: degrees/s (hinge, ball) or m/s (slide)
-    probe         displacement d of a hypothetical motion: degrees or m
-    torque_limit  largest torque (N m) or force (N) of the drive; unlimited unless given
-    in_phases     strengths in place of that one at times; where several are on, the last one counts
+    strength      largest rate: degrees/s (hinge, ball) or m/s (slide)
+    probe         displacement d of a trial: degrees or m
+    torque_limit  largest torque (N m) or force (N) of the drive; unlimited by default
+    in_phases     strengths that replace it at times; of several active ones the last counts
     """
 
     joints: Annotated[tuple[Text, ...], Field(min_length=1)]
@@ -54,17 +54,17 @@ class ControlTable(Table):
 class ControllerTable(Table):
     """[controller]: how the controlled joints decide.
 
-    knots               decisions that a plan looks ahead, with a pose at each; a trial goes along
-                        it, and objectives are their means on the way. Without it a decision tries
-                        single poses
-    gradient            "central" (2 trials a dof), "one-sided" (1 a dof and 1), or one's own
-    velocities          during a trial's measurement: "removed" (steady state), "present" (as now),
-                        or "probe" (those of the trial's own motion)
-    hypothetical_steps  steps over which a trial makes its displacement
+    knots               number of decisions that a plan looks ahead, with a pose at each; a trial
+                        simulates the plan, and objectives are means over it. Without it a decision
+                        tries single poses
+    gradient            "central" (2 trials a dof), "one-sided" (1 a dof and 1), or a registered one
+    velocities          of the joints when a trial is measured: "removed" (steady state), "present"
+                        (as now), or "probe" (of the trial's displacement)
+    hypothetical_steps  steps of a trial's displacement
     hypothetical_time   s of one such step, or of one of a plan; the time of a frame unless given
     settle_steps        further steps of a trial in the fixed pose
     rule                "fixed", "resilient", "golden-section" or "quasi-newton" with their options,
-                        or one's own
+                        or a registered one
     every               frames between decisions
     iterations          descent steps per decision, in the flow as it is then
     servo               "exact", or "pd" with its frequency

@@ -169,7 +169,7 @@ def _check_horizon(draft: Draft) -> list[str]:
 
 
 def _check_wishes(draft: Draft) -> Iterator[str]:
-    """Only controlled joints want something, and every one does."""
+    """Only controlled joints have objectives, and every one has."""
     scene, controlled = draft.scene, draft.scene.controlled_joints()
     if not draft.sound("control", "objectives"):
         return

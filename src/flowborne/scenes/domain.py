@@ -132,9 +132,9 @@ class FluidTable(Table):
     advection   scheme that carries the velocity: "flux" keeps its momentum exactly, the paper's
                 "semi-lagrangian" does not
     tolerance   relative residual at which the pressure solve stops
-    coupling    "two-way": fluid and bodies push each other. "one-way": the fluid does not feel the
-                bodies, and pushes them by winds of kind "stream". "none": it is left out, and those
-                winds blow with their own velocity
+    coupling    "two-way": fluid and bodies exert forces on each other. "one-way": the fluid flows
+                as without bodies, and winds of kind "stream" exert its force on them. "none": no
+                fluid is simulated, and those winds have their own velocity
     """
 
     density: Positive = 1000.0

@@ -39,9 +39,9 @@ from flowborne.tables import FileName, NotNegative, Places, PlainName, Positive,
 class FleshTable(Table):
     """[[flesh]]: an elastic body that bones hold, meshed with tetrahedra.
 
-    Where it is thinner with its bones than 1.75 cells of the fluid's grid, the fluid sees all of it
-    thicker by what is missing there, so that it does not leak. Where a mirror plane exchanges
-    bones, as left and right ones, the elements are each other's mirror images too.
+    If flesh and bones together are thinner than 1.75 cells of the grid, the fluid treats all of the
+    flesh as thicker by the difference, so that it does not leak. If a mirror plane exchanges bones,
+    such as left and right ones, the mesh has the same symmetry.
 
     name       the flesh's own
     bones      bodies of the model that lie inside and hold it

@@ -68,11 +68,11 @@ def driven(motion: Trajectory, servo: Servo) -> Trajectory:
 
 
 class DrivenTable(Table):
-    """What every motion has.
+    """Keys of every motion.
 
-    joint         that it moves
-    servo         how the joint's drive follows: "exact", or "pd" with its frequency, which follows
-                  a steady motion 1 / (pi frequency) s late
+    joint         the joint
+    servo         how the drive follows: "exact", or "pd" with its frequency, which lags a steady
+                  motion by 1 / (pi frequency) s
     torque_limit  largest torque (N m) or force (N) of the drive, per m in a slab; unlimited unless
                   given
     """
@@ -97,7 +97,7 @@ class DrivenTable(Table):
 
 
 class MotionConstantTable(DrivenTable):
-    """Joint that keeps its place or its rate: position + rate * time.
+    """Constant position or rate: position + rate * time.
 
     position  degrees or m
     rate      degrees/s or m/s
@@ -173,7 +173,7 @@ class MotionFormulaTable(DrivenTable):
 
 
 class EarlierTable(Table):
-    """[earlier]: the run of the pass before this one, whose joints do again what they did there.
+    """[earlier]: an earlier run; joints repeat the motion that they had there.
 
     run     its folder, found from the folder of the scene file; in the folder of a run the file of
             what was taken from it

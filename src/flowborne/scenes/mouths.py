@@ -54,7 +54,7 @@ class MouthTable(FactorsTable):
     factors      of the volume rate at these times
     pulse        instead of keyframes: a pulse with volume_rate at its height
     factor       instead of both: a formula of the factor; negative turns the flow about
-    dye          name -> value of a dye in what is expelled; what is taken in has the fluid's own
+    dye          name -> value of a dye in the expelled fluid
     """
 
     body: Text
@@ -108,7 +108,7 @@ class MouthTable(FactorsTable):
 def check_mouths(
     places: Places, mouths: Sequence[MouthTable], coupling: str, around: Surroundings
 ) -> Iterator[str]:
-    """Bodies that are there, in a fluid that feels them and can give way."""
+    """The bodies of mouths exist, and the fluid is coupled two-way."""
     unknown = []
     for index, mouth in enumerate(mouths):
         where = places.at("mouths", index)

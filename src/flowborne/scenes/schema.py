@@ -1,4 +1,4 @@
-"""A scene: everything that a run needs to know, as its TOML file says it."""
+"""A scene: all input of a run, as in its TOML file."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ def _named_file(value: Any) -> Any:
 
 
 class ExportTable(Table):
-    """A file that a run leaves behind for another program; further keys are its exporter's.
+    """A file for another program; further keys are parameters of its exporter.
 
-    file  its name, in the run folder; the ending says which exporter writes it
+    file  name in the run folder; the ending chooses the exporter
     """
 
     model_config = ConfigDict(extra="allow")
@@ -92,14 +92,13 @@ class ExportTable(Table):
 
 
 class OutputTable(Table):
-    """[output]: what a run leaves behind.
+    """[output]: files that a run writes.
 
     checkpoint_every  frames between checkpoints
-    bodies            whose centre of mass, velocity, and force and torque of the fluid the history
-                      holds
-    joints            torque or force, power and target of their drives are in the history: true
-                      for all driven joints, false for none, or names
-    exports           files for other programs, written at the end: names, or tables with file
+    bodies            bodies in the history: centre of mass, velocity, force and torque of the fluid
+    joints            joints in the history: torque or force, power and target of their drives;
+                      true for all driven joints, false for none, or names
+    exports           files for other programs, written at the end: names, or tables with `file`
     """
 
     checkpoint_every: Count = 24
@@ -143,12 +142,12 @@ class Scene(Table):
     """A scene, checked and with every default filled in.
 
     name         that of the file unless given; runs are kept in runs/name
-    description  one line that says what is seen
-    figure       the paper's figure or section that it shows, or the case that it is of
+    description  what the film shows, in one line
+    figure       figure or section of the paper, or the case
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
     constants    name -> number, for the formulas of [[motion]] and [[mouths]]
-    plugins      Python files, found from the scene's folder, that register parts of one's own
+    plugins      Python files in the scene's folder that register parts of the user
     """
 
     name: PlainName

@@ -21,14 +21,14 @@ MOST_RATE = 1000.0
 
 
 class CameraTable(Table):
-    """[film.camera]: where a run is seen from. A slab is seen from above, whatever the angles.
+    """[film.camera]: the camera. It looks at a slab from above, whatever the angles.
 
-    azimuth    degrees about z from x, of the camera as seen from what it looks at
+    azimuth    degrees about z from x, from the target to the camera
     elevation  degrees above the horizon
     lens       degrees between the lower and the upper edge of the picture
-    distance   m from what it looks at; what is to be seen just fits when absent
-    position   m, a place of its own, in place of azimuth, elevation and distance
-    target     m, place looked at, in place of what is followed
+    distance   m from the target; by default the creature just fits
+    position   m; replaces azimuth, elevation and distance
+    target     m; replaces the followed body
     follow     name of a body, "bodies" for all of them, or "nothing"
     orbit      degrees per second about z, counter-clockwise from above
     """
@@ -52,8 +52,8 @@ class CameraTable(Table):
 class FilmTable(Table):
     """[film]: what picture and film of a run show.
 
-    field              what is seen of the fluid
-    bones              see through flesh, to the bones in it
+    field              field of the fluid that is drawn
+    bones              draw flesh transparent, with the bones in it
     plots              title, legend and curves around the map; without them it is the whole picture
     scale_bar          a bar of a round length, in the legend or, without it, on the picture itself;
                        never on a transparent one

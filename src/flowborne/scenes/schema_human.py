@@ -20,10 +20,10 @@ from flowborne.tables import (
 
 
 class HumanTable(Table):
-    """[human]: a body of 23 rigid parts, in place of [solids].
+    """[human]: a body of 23 rigid parts; replaces [solids].
 
     mass    kg
-    sex     whose proportions of mass it has
+    sex     selects the proportions of mass
     height  m, of the standard skeleton; where a clip's file gives the bones it is not used
     elbows  whether each elbow goes with its shoulder wherever the scene names that: controlled as a
             hinge, wanting what the shoulder wants
@@ -54,8 +54,8 @@ class ClipTable(Table):
     smooth       Hz below which motion is kept; all of it unless given
     floor        "soles" puts those that stand on z = 0, where floors of captures are neither at 0
                  nor even, or "file": heights are the file's own (both for [human])
-    heading      degrees by which it is turned to the left, about where it begins
-    offset       m by which it is then moved
+    heading      degrees; turns the clip to the left about its start
+    offset       m; moves the clip after that
     mapping      joint of the model -> joint of the clip, where their names do not tell
     joints       joints of the model that follow; unless given all that the clip has and that are
                  not controlled, moved by a [[motion]] or free

@@ -50,8 +50,8 @@ class SolidsTable(Table):
     """[solids]: the bodies.
 
     model      MJCF or URDF file, found from the folder of the scene file
-    density    kg/m^3 of every body, in place of the model's densities
-    densities  body -> kg/m^3 of that body, in place of the model's density and of `density`
+    density    kg/m^3 of every body; replaces the model's densities
+    densities  body -> kg/m^3 of that body; replaces the model's density and `density`
     floating   bodies that hang on the world without a joint, such as the root of a URDF: each gets
                a free joint of its own name
     displace   which geoms the fluid meets
@@ -75,13 +75,13 @@ class SolidsTable(Table):
 
 
 class ShapeTable(Table, OwnTable):
-    """[[shapes]]: a geometry of the user's own on a body; every further key is a parameter of it.
+    """[[shapes]]: a geometry that the user defines, on a body; further keys are its parameters.
 
     kind      as it is registered, in a file that `plugins` names
     body      of the model
     position  of its origin in the body's frame, m
     euler     turns about its own x, y and z one after the other, degrees
-    axis      direction of its z in the body's frame, in place of euler
+    axis      direction of its z in the body's frame; replaces euler
     density   kg/m^3; that of the model's geoms unless given
     """
 
@@ -131,10 +131,10 @@ class ShapeTable(Table, OwnTable):
 
 
 class InitialTable(Table):
-    """[initial]: where the joints start. What is not named starts as in the model, at rest; a hinge
-    or slide whose place in the model is outside its range starts at the nearest end of it.
+    """[initial]: where the joints start. By default they start as in the model, at rest; a hinge or
+    slide that the model has outside its range starts at the nearest end.
 
-    keyframe    of the model, whose positions and velocities take the place of those at rest
+    keyframe    keyframe of the model with the initial positions and velocities
     positions   joint -> degrees (hinge) or m (slide); a ball joint takes a quaternion (w, x, y, z),
                 a free joint (x, y, z) in m and a quaternion
     velocities  joint -> degrees/s or m/s; a ball joint takes (x, y, z) in degrees/s, a free joint

@@ -66,7 +66,7 @@ class AnyWindTable(Table):
 
 
 class WindFacesTable(AnyWindTable, FactorsTable):
-    """Simple wind of the paper's eq. (2): every face is pushed by its own exposure.
+    """Simple wind of the paper's eq. (2): the force on a face depends on its exposure.
 
     velocity  of the wind, m/s; with an exponent, at `height`
     density   kg/m^3
@@ -99,11 +99,10 @@ class WindFacesTable(AnyWindTable, FactorsTable):
 
 
 class WindStreamTable(AnyWindTable):
-    """The fluid as a simple wind of eq. (2), for a fluid that does not feel the bodies.
+    """The fluid as a simple wind of eq. (2), for a fluid without two-way coupling.
 
-    It blows with the fluid's own velocity where fluid.coupling is "one-way", with `velocity` where
-    it is "none" or there is no fluid. Where it is "two-way" the fluid itself pushes and it does not
-    blow at all.
+    It has the fluid's velocity if fluid.coupling is "one-way", and `velocity` if that is "none" or
+    there is no fluid. With "two-way" the fluid itself acts on the bodies, and this wind does not.
 
     velocity  m/s
     density   kg/m^3
