@@ -29,28 +29,46 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
-SHARP = 768
-"""Longer side of the image that is sent, pixels."""
+MIN_IMAGE_SIDE = 768
+"""Minimum longer side of the image that is sent, pixels."""
 
 ARROWS = 28
 """Arrows along the longer side of the plane."""
 
-SLOWEST = 0.04
-"""Shares of the highest speed below which there is no arrow."""
+MIN_SPEED = 0.04
+"""Speed below which there is no arrow, in highest speeds."""
 
 
-APART = 0.05
-"""Distance of the arrows from the image, in distances between them."""
+ARROW_OFFSET = 0.05
+"""Distance of the arrows from the image, in arrow spacings."""
+
+ARROW = np.array([[0, 6, 1], [6, 5, 1], [2, 4, 3]])
+"""Triangles of the corners of a flat arrow."""
+
+FINE = 2_000_000
+"""Points up to which vortices are found on a grid twice as fine: limited by transfer time."""
+
+MAX_SPLATS = 60_000
+"""Maximum number of cells of dye that are sent; beyond it, blocks of eight cells are merged."""
+
+FAINT = 0.08
+"""Density of dye below which it is invisible."""
+
+SPLAT_DEVIATION = 0.6
+"""Standard deviation of the Gaussian of a cell of dye, in cells."""
+
+DYE_DEPTH = 1.6
+"""Depth of full dye that transmits 1/e of the light, in cells."""
 
 
 class Layer:
-    """The plane in the scene."""
+    """A plane in the scene with an image of the cells and arrows of the velocity."""
 
     def __init__(self, scene: SceneApi, grid: Grid) -> None:
         self._scene, self._grid = scene, grid
 
     def show_image(self, image: Pixels, axis: int, place: float) -> None:
-        """Show colours (n, m, 3) of the cells of a plane across an axis, at `place` m on it.
+        """Show colours (n, m, 3) of the cells in a plane normal to an axis at `place`, m.
 
         Rows are along the later of the other two axes, columns along the earlier one.
         """
@@ -58,8 +76,8 @@ class Layer:
         low, high = np.array(self._grid.origin), np.array(self._grid.upper)
         centre = 0.5 * (low + high)
         centre[axis] = place
-        frame = np.eye(3)[[first, second]]
-        turn = np.column_stack([*frame, np.cross(*frame)])
+        axes = np.eye(3)[[first, second]]
+        rotation = np.column_stack([*axes, np.cross(*axes)])
         self._scene.add_image(
             "/run/slice",
             enlarged(image),
@@ -69,7 +87,7 @@ class Layer:
             jpeg_quality=90,
             cast_shadow=False,
             receive_shadow=False,
-            wxyz=Rotation.from_matrix(turn).as_quat(scalar_first=True),
+            wxyz=Rotation.from_matrix(rotation).as_quat(scalar_first=True),
             position=centre,
         )
 
@@ -79,7 +97,7 @@ class Layer:
     def show_velocity(
         self, state: State, axis: int, place: float, speed: float, wanted: bool
     ) -> None:
-        """Show arrows of the velocity in the plane; one of `speed` m/s reaches the next arrow."""
+        """Show arrows of the velocity in the plane; that of `speed` m/s reaches the next arrow."""
         mesh = velocity_arrows(self._grid, state, axis, place, speed) if wanted else nothing()
         show_mesh(
             self._scene,
@@ -100,9 +118,9 @@ def across(axis: int) -> tuple[int, int]:
 
 
 def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: float) -> Mesh:
-    """Flat arrows of the velocity of the fluid in a plane across an axis, at `place` m on it.
+    """Flat arrows of the fluid's velocity in a plane normal to an axis at coordinate `place`, m.
 
-    speed  m/s, of the arrow that reaches the next one; faster ones are as long
+    speed  m/s, of an arrow that reaches the next one; faster ones have the same length
     """
     sides = across(axis)
     shape = [grid.shape[side] for side in sides]
@@ -118,11 +136,11 @@ def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: fl
     middle = np.array([grid.origin[side] for side in sides])
     middle = middle + grid.spacing * (np.stack([i, j], axis=1) + 0.5)
     meshes = []
-    for n in np.flatnonzero(free & (share > SLOWEST)):
+    for n in np.flatnonzero(free & (share > MIN_SPEED)):
         vector = spacing / speed / max(1.0, share[n]) * velocity[n]
         corners = arrow(middle[n] - 0.5 * vector, vector, 0.09 * spacing)
         # on both sides of the image
-        for side in (-APART, APART):
+        for side in (-ARROW_OFFSET, ARROW_OFFSET):
             points = np.empty((7, 3))
             points[:, list(sides)], points[:, axis] = corners, place + side * spacing
             meshes.append((points, ARROW))
@@ -130,46 +148,26 @@ def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: fl
 
 
 def enlarged(image: Pixels) -> Pixels:
-    """An image (n, m, 3), smoothly enlarged until its longer side has SHARP pixels."""
+    """An image (n, m, 3), smoothly enlarged until its longer side has MIN_IMAGE_SIDE pixels."""
     height, width = image.shape[:2]
-    scale = SHARP / max(height, width)
+    scale = MIN_IMAGE_SIDE / max(height, width)
     if scale <= 1.0:
         return image
     small = Image.fromarray(np.ascontiguousarray(image))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))
     large = np.asarray(small.resize(size, Image.Resampling.BICUBIC))
-    # a cubic swings below its knots, which would show as dark seams
+    # cubics undershoot, which would show as dark seams
     return np.maximum(large, image.min(axis=(0, 1)))
-
-
-ARROW = np.array([[0, 6, 1], [6, 5, 1], [2, 4, 3]])
-"""Triangles of the corners of a flat arrow."""
 
 
 Legend = list[tuple[str, str]]
 
-FINE = 2_000_000
-"""Points up to which vortices are found on a grid twice as fine: what a browser takes in time."""
-
-SPLATS = 60_000
-"""Cells of dye that are sent at most; beyond, eight of them are sent as one."""
-
-FAINT = 0.08
-"""Density of dye that is not seen."""
-
-WIDE = 0.6
-"""Standard deviation of the Gaussian that a cell of dye is drawn as, in cells."""
-
-DEPTH = 1.6
-"""Cells of full dye that let through a third of the light."""
-
 
 class Fluid:
-    """What is seen of the fluid of a run, on scales that are taken from its frames when they are
-    asked for.
+    """The visible fluid of a run, on scales that are taken from its frames on first use.
 
-    grid    of it
-    toward  (3,) to the camera, which says what is clockwise
+    grid    of the fluid
+    toward  (3,) to the camera, which defines clockwise
     """
 
     def __init__(self, scene: SceneApi, run: Run, toward: Array) -> None:
@@ -179,14 +177,15 @@ class Fluid:
         self._scene, self._run = scene, run
         self._layer = Layer(scene, run.grid)
         self._fields: dict[str, Field | None] = {}
+        self._numbers: dict[str, FieldNumber] = {}
 
     @property
     def frames(self) -> int:
-        """Frames of the run from which the scales are taken."""
+        """Number of frames from which the scales are taken."""
         return len(self._run)
 
     def show(self, state: State, wanted: Settings) -> None:
-        """Show of a state what is wanted."""
+        """Show a state by the settings."""
         if self._run.slab:
             self._show_slab(state, wanted)
         else:
@@ -198,7 +197,7 @@ class Fluid:
         self._layer.show_velocity(state, axis, place, speed, wanted.velocity)
 
     def legend(self, wanted: Settings) -> tuple[Legend, list[Scale]]:
-        """(name, colour) of what is seen in a colour of its own, and the scales of colours."""
+        """(name, colour) of what is shown in a colour of its own, and the colour scales."""
         if self._run.slab:
             field = self._slab_field(wanted.field)
             scales = [] if field is None or field.scale is None else [field.scale]
@@ -225,7 +224,7 @@ class Fluid:
         self._layer.show_image(image.swapaxes(0, 1), wanted.axis, wanted.place)
 
     def _show_vortices(self, state: State, wanted: bool) -> None:
-        """Those that turn one way and the other are a mesh each, of their colour."""
+        """Show one mesh for each sense of rotation."""
         points, faces, warm = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, bool)
         if wanted:
             surface = self._surfaces.of(state, self.toward)
@@ -247,7 +246,7 @@ class Fluid:
             )
 
     def _show_dye(self, state: State, wanted: bool) -> None:
-        """A Gaussian for each cell with dye in it, lit as smoke."""
+        """Show a Gaussian for each cell with dye, lit as smoke."""
         smoke = cloud(self.grid, self._dye, state, self.toward) if wanted else None
         if smoke is None or not len(smoke[0]):
             self._scene.remove_by_name("/run/dye")
@@ -256,7 +255,7 @@ class Fluid:
         self._scene.add_gaussian_splats(
             "/run/dye",
             centres.astype(np.float32),
-            np.broadcast_to((WIDE * size) ** 2 * np.eye(3), (len(centres), 3, 3)),
+            np.broadcast_to((SPLAT_DEVIATION * size) ** 2 * np.eye(3), (len(centres), 3, 3)),
             colours,
             opacities[:, None],
         )
@@ -272,10 +271,6 @@ class Fluid:
     @cached_property
     def _surfaces(self) -> VortexSurfaces:
         return VortexSurfaces(self.grid, self._vortices, FINE)
-
-    @cached_property
-    def _numbers(self) -> dict[str, FieldNumber]:
-        return {}
 
     def _number(self, name: str) -> FieldNumber:
         if name not in self._numbers:
@@ -293,24 +288,24 @@ def cloud(
 ) -> tuple[Array, NDArray[np.float32], NDArray[np.float32], float]:
     """Centres (n, 3) m, colours (n, 3) and opacities (n,) of the cells with dye, and their size, m.
 
-    toward  (3,) to the camera, for the light that dye scatters
+    toward  (3,) to the camera, for scattered light
     """
     colour, density = dye.smoke(state)
     size, solid = grid.spacing, (1.0 - state["open"]).astype(np.float32)
-    while np.count_nonzero(density > FAINT) > SPLATS:
+    while np.count_nonzero(density > FAINT) > MAX_SPLATS:
         colour, density, solid = _coarser(colour), _coarser(density), _coarser(solid)
         size *= 2.0
-    light = scattered(density / np.float32(DEPTH), solid, toward)
+    light = scattered(density / np.float32(DYE_DEPTH), solid, toward)
     chosen = np.argwhere(density > FAINT)
     at = tuple(chosen.T)
     centres = np.asarray(grid.origin) + size * (chosen + 0.5)
-    # Gaussians at every cell add up to 2 pi WIDE^2 times the height of one
-    opacity = (1.0 - np.exp(-density[at] / DEPTH)) / (2.0 * np.pi * WIDE**2)
+    # Gaussians at every cell add up to 2 pi SPLAT_DEVIATION^2 times the height of one
+    opacity = (1.0 - np.exp(-density[at] / DYE_DEPTH)) / (2.0 * np.pi * SPLAT_DEVIATION**2)
     return centres, np.clip(colour[at] * light[at], 0.0, 1.0), np.clip(opacity, 0.0, 1.0), size
 
 
 def _coarser(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means over blocks of two cells each way; what is left over at the upper ends is dropped."""
+    """Means over blocks of 2^3 cells; odd cells at the upper ends are dropped."""
     for axis in range(3):
         values = np.moveaxis(values, axis, 0)
         if len(values) > 1:

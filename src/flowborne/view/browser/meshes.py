@@ -20,20 +20,19 @@ Mesh = tuple[Array, Integers]
 
 
 def prism(outlines: Sequence[Array], low: float, high: float) -> Mesh:
-    """What outlines enclose, raised from one z to another, m.
+    """The area inside outlines, extruded from z = low to z = high, m.
 
-    There is no bottom, which nobody sees. Top and sides share no vertex, so that the edge between
-    them is lit as one.
+    The invisible bottom is left out. Top and sides share no vertex, so that the edge between them
+    is sharp.
 
-    outlines  (k, 2) m of each, counter-clockwise, and clockwise around holes
+    outlines  (k, 2) m of each, counter-clockwise; clockwise around holes
     """
     if not outlines:
         return nothing()
     flat = np.concatenate(outlines)
     sizes = [len(outline) for outline in outlines]
-    firsts = np.cumsum([0, *sizes[:-1]])
     here = np.arange(len(flat))
-    loops = [first + np.arange(size) for first, size in zip(firsts, sizes, strict=True)]
+    loops = np.split(here, np.cumsum(sizes)[:-1])
     there = np.concatenate([np.roll(loop, -1) for loop in loops])
     top = np.pad(flat, ((0, 0), (0, 1)), constant_values=high)
     bottom = np.pad(flat, ((0, 0), (0, 1)), constant_values=low)
@@ -61,14 +60,14 @@ def nothing() -> Mesh:
 
 
 def counter_clockwise(outline: Array) -> Array:
-    """An outline (k, 2) in that direction, whichever it had."""
+    """The outline (k, 2), reversed if it was clockwise."""
     x, y = outline.T
     area = float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
     return outline if area >= 0.0 else outline[::-1]
 
 
 def _inside(points: Array, loops: Sequence[Integers]) -> Integers:
-    """(m, 3) triangles of points (n, 3) in a plane that loops of them enclose."""
+    """(m, 3) triangles of points (n, 3) of a plane, inside loops of these points."""
     lines = [entry for loop in loops for entry in (len(loop) + 1, *loop.tolist(), int(loop[0]))]
     outline = pv.PolyData(points, lines=lines)
     cap = vtkContourTriangulator()
@@ -79,9 +78,9 @@ def _inside(points: Array, loops: Sequence[Integers]) -> Integers:
 
 
 def show_mesh(scene: SceneApi, name: str, mesh: Mesh, **drawn: Any) -> None:
-    """Show a mesh under a name, in place of what was there; nothing when it has no triangles.
+    """Show a mesh under a name and replace an earlier one; without triangles only remove it.
 
-    drawn  how, as viser's add_mesh_simple has it
+    drawn  options of viser's add_mesh_simple
     """
     vertices, faces = mesh
     if len(faces):

@@ -22,12 +22,12 @@ CSS = (
     ".mantine-Slider-markLabel, .mantine-Notification-description"
     f" {{ color: {style.MUTED} !important; }}"
 )
-"""viser writes the names of controls in a grey of 4.0:1 on the panel; WCAG 2.2, 1.4.3, asks for
-4.5:1."""
+"""Style of dimmed text: viser's grey has a contrast of 4.0:1 on the panel, and WCAG 2.2, 1.4.3,
+requires 4.5:1."""
 
 
 def dress(server: ViserServer, name: str) -> None:
-    """Give every page that is open, or will be, the name of a run as its title."""
+    """Set the title of all open and future pages to the name of a run, and their style."""
     from viser import _messages
 
     source = f"""
@@ -38,15 +38,19 @@ if (!document.getElementById("flowborne")) {{
   sheet.textContent = {json.dumps(CSS)};
   document.head.append(sheet);
 }}"""
-    # viser has no public way to either; this is how it loads its own scripts
+    # viser has no public function for either; it loads its own scripts like this
     server.gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))
 
 
 def is_own(host: str, origin: str | None, served: str) -> bool:
-    """Whether a request is one of the page that is served.
+    """Whether a request comes from the served page.
+
+    A browser lets any page open a websocket to any host, including this machine, and a page's own
+    name can be pointed at this machine's address later (DNS rebinding). Origin reveals the former,
+    Host the latter.
 
     host    the request's Host: name or address, and port
-    origin  the request's Origin, which programs that are no browsers leave out
+    origin  the request's Origin; programs other than browsers leave it out
     served  name or address at which the page is served
     """
     try:
@@ -65,9 +69,9 @@ def is_own(host: str, origin: str | None, served: str) -> bool:
 
 @contextmanager
 def only_own_requests(served: str) -> Iterator[None]:
-    """Context in which a server that viser starts answers no requests but its own page's.
+    """Context in which a server that viser starts answers only requests of its own page.
 
-    raises  RuntimeError when viser has started its server in some other way
+    raises  RuntimeError if viser has started its server in another way
     """
     import websockets.asyncio.server as server
 
@@ -92,7 +96,7 @@ def only_own_requests(served: str) -> Iterator[None]:
 
         return serve(*args, process_request=checked, **options)
 
-    vars(server)["serve"] = guarded  # viser hands none of its options on
+    vars(server)["serve"] = guarded  # viser does not pass options on
     try:
         yield
     finally:

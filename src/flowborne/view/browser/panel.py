@@ -20,21 +20,41 @@ from flowborne.view.run import Run
 if TYPE_CHECKING:
     from viser import GuiApi
 
-STOPS = 24
-"""Colours of which the bar of a scale is made."""
+COLOUR_STOPS = 24
+"""Number of colours in the bar of a scale."""
 
-ARROW = 60.0
+ARROW_LENGTH = 60.0
 """Length of the arrow of a large force in the legend, pixels."""
+
+MAX_SAMPLES = 400
+"""Maximum number of points of a curve that are sent: about one per pixel."""
+
+CHARACTER_WIDTH, AXIS_MARGIN = 6.6, 16
+"""Width of a character of an axis number, and the space between numbers and plot, pixels."""
+
+MIN_AXIS_WIDTH = 58
+"""Minimum width of the numbers at an axis, so that plots in a column are aligned, pixels."""
+
+PLOT_HEIGHT = 150
+"""Height of a plot, pixels."""
+
+PANEL_WIDTH = 360
+"""Width of the panel, pixels."""
+
+PACES = {"1/8": 0.125, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0}
+"""Name of a pace -> seconds of the run per second."""
+
+AXES = "xyz"
 
 
 def legend_html(
     names: Sequence[tuple[str, str]], scales: Sequence[Scale], forces: Forces | None
 ) -> str:
-    """The legend.
+    """The legend as HTML.
 
     names   (name, colour) of what has a colour of its own
     scales  of colours
-    forces  whose arrows are shown, if any
+    forces  that are shown as arrows, if any
     """
     rows = [_named(name, colour) for name, colour in names]
     rows += [_bar(scale) for scale in scales]
@@ -51,7 +71,7 @@ def _named(name: str, colour: str) -> str:
 
 def _bar(scale: Scale) -> str:
     colours, low, high, name = scale
-    picked = colours[np.linspace(0, len(colours) - 1, STOPS).round().astype(int)]
+    picked = colours[np.linspace(0, len(colours) - 1, COLOUR_STOPS).round().astype(int)]
     stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in np.rint(255.0 * picked).astype(int))
     bar = f"height:11px;border-radius:3px;background:linear-gradient(to right,{stops})"
     ends = f"<span>{_number(low)}</span><span>{_number(high)}</span>"
@@ -61,7 +81,7 @@ def _bar(scale: Scale) -> str:
 
 def _force(forces: Forces) -> str:
     force = round_number(forces.large)
-    length = ARROW * force / forces.large
+    length = ARROW_LENGTH * force / forces.large
     line = (
         f"display:inline-block;vertical-align:middle;height:3px;width:{length:.0f}px;"
         f"background:{style.FORCE}"
@@ -80,21 +100,9 @@ def _number(value: float) -> str:
 
 Array = NDArray[np.float64]
 
-SAMPLES = 400
-"""Times of a curve that are sent at most: about a pixel each."""
-
-CHARACTER_WIDTH, AXIS_MARGIN = 6.6, 16
-"""Pixels of a character of a number at an axis, and of all else between numbers and plot."""
-
-LEAST_AXIS_WIDTH = 58
-"""Pixels for numbers at an axis at least: plots one below the other begin at the same x."""
-
-HEIGHT = 150
-"""Of a plot, pixels."""
-
 
 class Curves:
-    """The plots of a run, of the titles and curves that its film has."""
+    """The plots of a run, as in its film: the whole run faint, the past bright."""
 
     def __init__(self, gui: GuiApi, run: Run) -> None:
         self._gui = gui
@@ -102,11 +110,11 @@ class Curves:
         self.extend(run)
 
     def extend(self, run: Run) -> None:
-        """Take the curves of a run that has come farther."""
+        """Update the curves to a run with new frames."""
         for shown in self._shown:
             shown.remove()
         times = run.history["time_s"]
-        chosen = np.unique(np.linspace(0, len(times) - 1, SAMPLES).round().astype(int))
+        chosen = np.unique(np.linspace(0, len(times) - 1, MAX_SAMPLES).round().astype(int))
         self._shown, self._values, self.plots = [], [], []
         if not len(times):
             return
@@ -121,25 +129,25 @@ class Curves:
                 axes=(_axis(34, "time (s)"), _axis(room_for(*robust_limits(values)))),
                 padding=(8, 16, 0, 0),
                 legend={"show": False},
-                height=HEIGHT,
+                height=PLOT_HEIGHT,
             )
             self._shown += [names, plot]
             self._values.append(values)
             self.plots.append(plot)
 
     def show(self, time: float) -> None:
-        """Show what is past at a time, s."""
+        """Highlight the curves up to a time, s."""
         for plot, values in zip(self.plots, self._values, strict=True):
             plot.data = self._data(values, time)
 
     def _data(self, values: Array, time: float) -> tuple[Array, ...]:
-        """Times, every curve of values (k, n), and each again as far as it is past."""
+        """Times, every curve of values (k, n), and every curve up to a time."""
         past = np.where(self._times <= time + 1e-9, values, np.nan)
         return (self._times, *values, *past)
 
 
 def _title(title: str, names: Sequence[str]) -> str:
-    """Title of a plot, and the names of its curves in their colours."""
+    """HTML of the title of a plot, and of the names of its curves in their colours."""
     named = [
         f'<span style="color:{_colour(n)};margin-left:10px">{escape(name)}</span>'
         for n, name in enumerate(names)
@@ -151,7 +159,7 @@ def _title(title: str, names: Sequence[str]) -> str:
 
 
 def _series(count: int) -> tuple[Any, ...]:
-    """How the times and so many curves are drawn, whole and past."""
+    """uPlot's series: times, and a number of curves, whole and past."""
     points = {"show": False}
     whole = [{"stroke": f"{_colour(n)}50", "width": 1.2, "points": points} for n in range(count)]
     past = [{"stroke": _colour(n), "width": 2.2, "points": points} for n in range(count)]
@@ -163,45 +171,36 @@ def _colour(curve: int) -> str:
 
 
 def room_for(low: float, high: float) -> int:
-    """Pixels for the numbers of an axis from `low` to `high`, of which there are at most eight."""
+    """Width of the numbers of an axis from `low` to `high`, at most eight of them, pixels."""
     step = (high - low) / 8.0
     digits = max(0, -int(np.floor(np.log10(step)))) if step > 0.0 else 3
     longest = max(len(f"{end:,.{digits}f}") for end in (low, high))
-    return max(LEAST_AXIS_WIDTH, round(CHARACTER_WIDTH * longest) + AXIS_MARGIN)
+    return max(MIN_AXIS_WIDTH, round(CHARACTER_WIDTH * longest) + AXIS_MARGIN)
 
 
 def _axis(size: int, label: str | None = None) -> Any:
-    """How an axis is drawn; `size` is of what stands beside it, pixels."""
+    """uPlot's options of an axis; `size` is the width of its numbers, pixels."""
     font = "11px sans-serif"
     axis: dict[str, Any] = {"stroke": style.MUTED, "font": font, "labelFont": font, "size": size}
     axis |= {"grid": {"stroke": style.LINE, "width": 1}, "ticks": {"show": False}}
     return axis if label is None else {**axis, "label": label, "labelSize": 18}
 
 
-WIDTH = 360
-"""Of the panel, pixels."""
-
-PACES = {"1/8": 0.125, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0}
-"""Seconds of the run in a second, by its name."""
-
-AXES = "xyz"
-
-
 class Panel:
-    """The controls of a run, which change a timeline; `settings` is what they say.
+    """The controls of a run, which change a timeline; `settings` has their values.
 
-    legend  HTML that says what colours and arrows stand for
+    legend  HTML that explains colours and arrows
     """
 
     def __init__(self, gui: GuiApi, run: Run, view: FilmView, timeline: Timeline) -> None:
         self._timeline = timeline
         self._controls: dict[str, Any] = {}
-        self._said = 0.0
+        self._slider_time = 0.0
         self._frames_per_second = run.frames_per_second
         gui.set_panel_label(run.name)
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(WIDTH)
+        gui.main_panel.set_width(PANEL_WIDTH)
         self._add_time(gui)
         self.legend = gui.add_html("")
         self._add_shown(gui, run, view)
@@ -209,25 +208,24 @@ class Panel:
 
     @property
     def settings(self) -> Settings:
-        """What the controls say now."""
-        said = {name: control.value for name, control in self._controls.items()}
-        if "axis" in said:
-            said["axis"] = AXES.index(said["axis"])
-        return Settings(**said)
+        """The current values of the controls."""
+        values = {name: control.value for name, control in self._controls.items()}
+        if "axis" in values:
+            values["axis"] = AXES.index(values["axis"])
+        return Settings(**values)
 
     def obey(self) -> None:
-        """Go at the pace that is chosen, and to the time to which somebody has moved the slider;
-        offer where a slice is when there is one."""
+        """Apply pace and slider to the timeline; hide the controls of a slice if there is none."""
         if "slice" in self._controls:
             sliced = self._controls["slice"].value != "none" or self._controls["velocity"].value
             self._controls["axis"].visible = self._controls["place"].visible = sliced
         self._timeline.pace = PACES[self._pace.value]
-        if self._slider.value != self._said:
+        if self._slider.value != self._slider_time:
             self._timeline.seek(self._slider.value)
-            self._said = self._slider.value
+            self._slider_time = self._slider.value
 
     def show(self, run: Run, number: int) -> None:
-        """Tell the time of a state of the run, and where the curves are then."""
+        """Show the time of a state of the run, and the curves up to it."""
         timeline = self._timeline
         state = ", playing" if timeline.playing else ", newest" if timeline.newest else ""
         self._clock.content = CLOCK.format(
@@ -236,11 +234,11 @@ class Panel:
             last=int(run.states[-1].stem),
             state=state,
         )
-        self._said = self._slider.value = round(float(timeline.time), 4)
+        self._slider_time = self._slider.value = round(float(timeline.time), 4)
         self.curves.show(timeline.times[number])
 
     def extend(self, run: Run) -> None:
-        """Take a run that has come farther."""
+        """Update to a run with new frames."""
         self._slider.max = max(float(self._timeline.times[-1]), self._slider.step)
         self.curves.extend(run)
 
@@ -250,7 +248,7 @@ class Panel:
         step = 1.0 / self._frames_per_second
         first, last = float(timeline.times[0]), float(timeline.times[-1])
         self._slider: Any = gui.add_slider("time (s)", first, max(last, first + step), 1e-4, first)
-        self._said = self._slider.value
+        self._slider_time = self._slider.value
         moves: dict[str, Callable[[], None]] = {
             "◀": lambda: timeline.step(-1),
             "play": timeline.play,
@@ -286,7 +284,7 @@ class Panel:
             controls["follow"] = gui.add_checkbox("follow", True)
 
     def _add_slice(self, gui: GuiApi, run: Run, view: FilmView) -> None:
-        """A slice, at first through what is looked at and across the view."""
+        """Add the controls of a slice, at first facing the camera through its target."""
         assert run.grid is not None
         controls, shot = self._controls, run.shot
         toward = view.first.position - view.first.target
@@ -317,4 +315,4 @@ CLOCK = (
     'font-variant-numeric:tabular-nums"><b style="font-size:17px">t = {time:.3f} s</b>'
     '<span style="align-self:end">frame {frame} of {last}{state}</span></div>'
 )
-"""The time of a state."""
+"""HTML of the time of a state."""

@@ -14,12 +14,12 @@ class Settings:
 
     field     "dye", "vorticity" or "none"; of a slab also "speed" and "pressure"
     slice     "speed", "pressure" or "none", in space
-    axis      number of the axis across which the slice is
-    place     m, where on it
-    velocity  whether the velocity in the slice is shown, in a slab that of all
-    bones     whether flesh is seen through, to the bones in it
+    axis      number of the axis normal to the slice
+    place     coordinate of the slice on that axis, m
+    velocity  whether the velocity is shown, in 3D in the slice
+    bones     whether flesh is transparent to show its bones
     forces    whether the forces on the bodies are shown
-    follow    whether the view goes along with the bodies
+    follow    whether the view follows the bodies
     """
 
     field: str = "none"
@@ -36,13 +36,13 @@ Array = NDArray[np.float64]
 
 
 class Timeline:
-    """A place in the time of a run, which goes on by itself while it plays.
+    """The current time of a run, which advances while it plays.
 
     times    (n,) s of the states, ascending
-    time     s, that is seen
-    playing  whether it goes on
-    pace     s of the run in a second
-    newest   whether the last state is seen, also when there are new ones
+    time     s, current time
+    playing  whether it advances
+    pace     seconds of the run per second
+    newest   whether the last state is shown, also after new ones arrive
     """
 
     def __init__(self, times: Array) -> None:
@@ -54,36 +54,36 @@ class Timeline:
 
     @property
     def number(self) -> int:
-        """Of the state that is nearest to the time; of two as near the earlier one."""
+        """Number of the state nearest to the time; the earlier one of two equally near."""
         return int(np.abs(self.times - self.time).argmin())
 
     def seek(self, time: float) -> None:
-        """See another time, and stay there."""
+        """Set the time and stop."""
         self.time = float(np.clip(time, self.times[0], self.times[-1]))
         self.playing = self.newest = False
 
     def step(self, states: int) -> None:
-        """See a state so many farther on."""
+        """Move by a number of states and stop."""
         self.seek(self.times[np.clip(self.number + states, 0, len(self.times) - 1)])
 
     def play(self) -> None:
-        """Go on from here, from the start when this is the end; or stop here."""
+        """Play from the current time, or from the start if it is the end; stop if playing."""
         self.playing, self.newest = not self.playing, False
         if self.playing and self.time >= self.times[-1]:
             self.time = float(self.times[0])
 
     def advance(self, seconds: float) -> None:
-        """Let so many seconds go by. At the end it begins again."""
+        """Advance the time if playing, by seconds of real time; start again at the end."""
         if self.playing:
             time = self.time + self.pace * seconds
             self.time = float(time if time <= self.times[-1] else self.times[0])
 
     def extend(self, times: Array) -> None:
-        """Take the times (n,) of a run that has come farther."""
+        """Update the times (n,) to those of a run with new frames."""
         self.times = times
         if self.newest:
             self.time = float(times[-1])
 
     def show_newest(self) -> None:
-        """See the last state, and stay with it when there are new ones."""
+        """Show the last state, also after new ones arrive."""
         self.time, self.playing, self.newest = float(self.times[-1]), False, True

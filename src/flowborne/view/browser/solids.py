@@ -21,21 +21,21 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-THICK = 0.02
-"""Thickness of what is drawn of a slab, in smaller sides of what is seen."""
+SLAB_THICKNESS = 0.02
+"""Thickness of drawn slabs, in smaller sides of the view."""
 
 PIXELS = 700.0
-"""About how many a browser shows across the smaller side of what is seen."""
+"""Approximate number of pixels along the smaller side of the view in a browser."""
 
 
 class Bodies:
-    """The geometries, each a mesh in its own frame that is placed anew for every state.
+    """The geometries, each a mesh in its own frame that is moved for every state.
 
     meshes  of each geometry
     """
 
     def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
-        """`side`: m, smaller side of what is seen."""
+        """`side`: smaller side of the view, m."""
         self._covered = [geom.covered for geom in run.geoms]
         self.meshes: list[MeshHandle] = []
         for n, (vertices, faces) in enumerate(_surfaces(run, side)):
@@ -51,52 +51,54 @@ class Bodies:
             )
 
     def show(self, state: State, bones: bool) -> None:
-        """Place them; those in flesh are seen with `bones`, one whose numbers are lost is not."""
-        centres, turns = state["geom_position"].astype(float), state["geom_rotation"].astype(float)
-        for n, mesh in enumerate(self.meshes):
-            known = np.isfinite(centres[n]).all() and np.isfinite(turns[n]).all()
-            mesh.visible = bool(known) and (bones or not self._covered[n])
+        """Place them; hide those with non-finite poses and, unless `bones`, those in flesh."""
+        positions = state["geom_position"].astype(float)
+        rotations = state["geom_rotation"].astype(float)
+        poses = zip(self.meshes, self._covered, positions, rotations, strict=True)
+        for mesh, covered, position, rotation in poses:
+            known = np.isfinite(position).all() and np.isfinite(rotation).all()
+            mesh.visible = bool(known) and (bones or not covered)
             if mesh.visible:
-                mesh.position = centres[n]
-                mesh.wxyz = Rotation.from_matrix(turns[n]).as_quat(scalar_first=True)
+                mesh.position = position
+                mesh.wxyz = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
 
 
 class SkinMesh:
-    """A skin; of the flesh of a slab its cross-section.
+    """A skin, or the cross-section of the flesh of a slab.
 
     mesh  in the scene
     """
 
     def __init__(self, scene: SceneApi, run: Run, skin: Skin, name: str, side: float) -> None:
-        """`side`: m, smaller side of what is seen."""
-        self._run, self._skin, self._high = run, skin, THICK * side
+        """`side`: smaller side of the view, m."""
+        self._run, self._skin, self._high = run, skin, SLAB_THICKNESS * side
         state = run.state(0)
-        places = skin.vertices(state)
-        self._vertex, self._faces = creased(places, skin.triangles)
-        vertices, faces = self._surface(state, places)
+        vertices = skin.vertices(state)
+        self._vertex, self._faces = creased(vertices, skin.triangles)
+        points, faces = self._surface(state, vertices)
         self.mesh: MeshHandle = scene.add_mesh_simple(
             f"/run/skins/{name}",
-            vertices.astype(np.float32),
+            points.astype(np.float32),
             faces.astype(np.uint32),
             color=skin.rgb,
         )
 
     def show(self, state: State, bones: bool) -> None:
-        """Show the skin in a state, seen through with `bones`; not when its numbers are lost."""
-        places = self._skin.vertices(state)
-        self.mesh.visible = bool(np.isfinite(places).all())
+        """Show the skin, transparent if `bones`; hide it if its vertices are not finite."""
+        vertices = self._skin.vertices(state)
+        self.mesh.visible = bool(np.isfinite(vertices).all())
         self.mesh.opacity = style.SEEN_THROUGH if bones else None
         if self.mesh.visible:
-            vertices, faces = self._surface(state, places)
-            self.mesh.vertices = vertices.astype(np.float32)
+            points, faces = self._surface(state, vertices)
+            self.mesh.vertices = points.astype(np.float32)
             if self._run.slab:
                 self.mesh.faces = faces.astype(np.uint32)
 
-    def _surface(self, state: State, places: Array) -> Mesh:
-        """Of the skin with vertices (k, 3) m in a state."""
+    def _surface(self, state: State, vertices: Array) -> Mesh:
+        """Mesh of the skin with vertices (k, 3) m in a state."""
         if self._run.slab:
             return prism(flesh_loops(self._run, state), 0.0, self._high)
-        return places[self._vertex], self._faces
+        return vertices[self._vertex], self._faces
 
 
 class Pushes:
@@ -108,7 +110,7 @@ class Pushes:
     def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
         self.scale = Forces(run, side)
         self._scene, self._slab = scene, run.slab
-        self._pixel, self._high = side / PIXELS, THICK * side
+        self._pixel, self._high = side / PIXELS, SLAB_THICKNESS * side
         self._outside = None
         if not run.slab:
             self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
@@ -135,9 +137,9 @@ def _surfaces(run: Run, side: float) -> list[Mesh]:
         meshes = [mesh_of(geom) for geom in run.geoms]
         return [(np.asarray(m.points, float), m.regular_faces) for m in meshes]
     state, found = run.state(0), []
-    placed = Outlines(run).placed(state)
-    poses = zip(state["geom_position"], state["geom_rotation"], placed, strict=True)
-    for centre, turn, outline in poses:
-        vertices, faces = prism([counter_clockwise(outline)], 0.0, THICK * side)
-        found.append(((vertices - centre) @ turn, faces))
+    outlines = Outlines(run).placed(state)
+    poses = zip(state["geom_position"], state["geom_rotation"], outlines, strict=True)
+    for position, rotation, outline in poses:
+        vertices, faces = prism([counter_clockwise(outline)], 0.0, SLAB_THICKNESS * side)
+        found.append(((vertices - position) @ rotation, faces))
     return found

@@ -1,4 +1,4 @@
-"""What stands around the bodies: light, background, ground, the edges of a domain, and wind."""
+"""The surroundings of the bodies: light, background, ground, edges of the domain, and wind."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ if TYPE_CHECKING:
     from viser import SceneApi
 
 MOTES = 20_000
-"""Points in a cube around the domain."""
+"""Number of motes in a cube around the domain."""
 
-BRIGHT = 3.0
-"""Strength of a light in a browser over that in a film: there it is divided by pi."""
+LIGHT_RATIO = 3.0
+"""Strength of a light in a browser over that in a film: browsers divide it by pi."""
 
 AMBIENT = 0.75
-"""Light that comes from everywhere."""
+"""Strength of the ambient light."""
 
 ABOVE = ((0.25, 0.45, -1.0), 0.75, "#ffffff")
 """Direction, strength and colour of the light on a slab, which is seen from above."""
 
 
 def surround(scene: SceneApi, run: Run, view: FilmView) -> None:
-    """Put everything into the scene that does not change with time."""
+    """Add everything to the scene that does not change with time."""
     scene.set_up_direction(view.up)
     scene.set_background_image(
-        np.broadcast_to(np.rint(255.0 * style.rgb(run.shot.colour)).astype(np.uint8), (4, 4, 3)),
+        np.broadcast_to(style.to_bytes(style.rgb(run.shot.colour)), (4, 4, 3)),
         format="png",
     )
     scene.add_frame("/run", show_axes=False)
@@ -57,19 +57,19 @@ def _light(scene: SceneApi, slab: bool, shadows: bool) -> None:
     scene.configure_environment_map(None)
     scene.add_light_ambient("/lights/ambient", intensity=AMBIENT)
     for n, (direction, strength, colour) in enumerate([ABOVE] if slab else LIGHTS):
-        red, green, blue = np.rint(255.0 * style.rgb(colour)).astype(int).tolist()
+        red, green, blue = style.to_bytes(style.rgb(colour)).tolist()
         x, y, z = (-10.0 * np.array(direction)).tolist()
         scene.add_light_directional(
             f"/lights/{n}",
             color=(red, green, blue),
-            intensity=BRIGHT * strength,
+            intensity=LIGHT_RATIO * strength,
             cast_shadow=shadows and n == 0,
             position=(x, y, z),
         )
 
 
 def _lay_ground(scene: SceneApi, view: FilmView) -> None:
-    """A floor with squares of a round number of metres, fading away."""
+    """Add a floor with squares of a round number of metres that fades out."""
     square = round_number(SQUARE * view.side)
     scene.add_grid(
         "/run/ground",
@@ -88,7 +88,7 @@ def _lay_ground(scene: SceneApi, view: FilmView) -> None:
 
 
 def _mark(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
-    """What stands still in the water, where the view goes along with the bodies."""
+    """Add marks that are fixed in the water, to show that the view moves."""
     low, high = np.array(grid.origin), np.array(grid.upper)
     if slab:
         strokes = crosses(low[:2], high[:2], view.side)
@@ -114,7 +114,7 @@ def _mark(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
 
 
 def _draw_edges(scene: SceneApi, grid: Grid) -> None:
-    """The edges of the fluid's domain."""
+    """Add the edges of the fluid's domain."""
     corners = np.array(list(product(*zip(grid.origin, grid.upper, strict=True))))
     ends = [(a, b) for a, b in combinations(corners, 2) if np.count_nonzero(a != b) == 1]
     scene.add_line_segments(
@@ -127,7 +127,7 @@ def _draw_edges(scene: SceneApi, grid: Grid) -> None:
 
 
 def _blow(scene: SceneApi, run: Run, view: FilmView) -> None:
-    """An arrow along the wind, upwind of what is looked at and staying there, with its speed."""
+    """Add a fixed arrow along the wind, upwind of the camera's first target, with its speed."""
     wind = run.wind.sum(axis=0)
     speed = float(np.linalg.norm(wind))
     vector = 0.17 * view.side * wind / speed

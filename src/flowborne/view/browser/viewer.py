@@ -33,10 +33,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GrowingRun(Run):
-    """A run as far as it has come; `grown` is the same with the frames that have come since.
+    """A run that may continue; `grown` reads it again with its new frames.
 
-    started  ns, when its folder was written first
-    kept     name -> what `every` has read of the states, so that it is read once
+    started  ns, time at which its folder was written first
+    kept     name -> arrays of the states that `every` has read, so that each is read once
     """
 
     started: int = 0
@@ -46,7 +46,7 @@ class GrowingRun(Run):
     def opened(cls, path: Path) -> Self:
         """The run in folder `path`.
 
-        raises  RunFolderError when it is none, has no frame yet, or cannot be read
+        raises  RunFolderError if it is not a run, has no frame yet, or cannot be read
         """
         files = RunFolder.existing(path)
         if not state_files(files):
@@ -60,10 +60,10 @@ class GrowingRun(Run):
             ) from error
 
     def grown(self) -> Self | None:
-        """The run with its new frames; None while there are none.
+        """The run with its new frames; None if there are none.
 
-        A run that was started again is another one: `started` tells.
-        raises  RunFolderError when it cannot be read, as while it is being replaced
+        A run that was started again is another one, with another `started`.
+        raises  RunFolderError if it cannot be read, for example while it is being replaced
         """
         files = RunFolder(self.states[0].parent.parent)
         if len(state_files(files)) == len(self):
@@ -74,11 +74,11 @@ class GrowingRun(Run):
         return new
 
     def continues(self, other: GrowingRun) -> bool:
-        """Whether it is the same run as `other`, farther on."""
+        """Whether it is the same run as `other` with as many or more frames."""
         return self.started == other.started and len(self) >= len(other)
 
     def every(self, name: str) -> Array:
-        """(n, ...) a small array of all states, such as "fluid_force"."""
+        """(n, ...) values of a small array in all states, such as "fluid_force"."""
         values = self.kept.setdefault(name, [])
         for path in self.states[len(values) :]:
             values.append(read_state(path, (name,))[name])
@@ -86,28 +86,28 @@ class GrowingRun(Run):
 
 
 TICK = 1.0 / 60.0
-"""s between two looks at the controls."""
+"""Interval at which controls are read, s."""
 
 LOOK = 0.5
-"""s between two looks into the folder, and two at the cameras."""
+"""Interval at which folder and cameras are read, s."""
 
 
 class Viewer:
     """A run in the scene and panel of a server; `tick` keeps them up to date.
 
-    run       as far as it has come
-    timeline  the time that is seen
+    run       with the frames read so far
+    timeline  the current time
     panel     the controls
     """
 
     def __init__(self, server: ViserServer, run: GrowingRun, folder: str) -> None:
-        """raises  ValueError when the shot of the run's scene does not suit it"""
+        """raises  ValueError if the shot of the run's scene does not fit it"""
         self.server, self.folder = server, folder
         self._shown: tuple[int, bool, bool, Settings] | None = None
         self._open(run)
 
     def tick(self, seconds: float) -> None:
-        """Let so many seconds go by, and show what is then to be seen."""
+        """Advance by seconds of real time, and update the scene if anything changed."""
         self.timeline.advance(seconds)
         self.panel.obey()
         timeline, settings = self.timeline, self.panel.settings
@@ -117,8 +117,8 @@ class Viewer:
             self._shown = wanted
 
     def look(self) -> None:
-        """Take new frames of the run, and the cameras of those who look."""
-        # while a run is being replaced its folder cannot be read, and what was there is seen
+        """Read new frames of the run, and the cameras of all clients."""
+        # a run that is being replaced cannot be read; the old one stays until then
         with suppress(RunFolderError):
             new = self.run.grown()
             if new is not None and new.continues(self.run):
@@ -128,7 +128,7 @@ class Viewer:
         self._keys.show(self.server.get_clients(), self._along)
 
     def _open(self, run: GrowingRun) -> None:
-        """Show a run from its beginning."""
+        """Show another run from its beginning."""
         server = self.server
         server.scene.reset()
         server.gui.reset()
@@ -153,7 +153,7 @@ class Viewer:
             self.timeline.show_newest()
 
     def _extend(self, run: GrowingRun) -> None:
-        """Show a run that has come farther."""
+        """Update to the run with new frames."""
         self.run, self._view = run, FilmView.of(run)
         self.timeline.extend(run.times)
         if len(run) >= 2 * self._measured:
@@ -162,7 +162,7 @@ class Viewer:
         self._shown = None
 
     def _measure(self) -> None:
-        """Take scales from the frames there are: anew whenever there are twice as many."""
+        """Take scales from the frames so far; repeated whenever their number doubles."""
         run, view = self.run, self._view
         self._measured = len(run)
         self._pushes = Pushes(self.server.scene, run, view.side)
@@ -172,7 +172,7 @@ class Viewer:
             self._fluid = Fluid(self.server.scene, run, toward / np.linalg.norm(toward))
 
     def _show(self, wanted: Settings) -> None:
-        """Show the state of the time as it is wanted."""
+        """Show the current state by the settings."""
         number = self.timeline.number
         state = self.run.state(number)
         self._along = self._view.path[number] if wanted.follow else np.zeros(3)
@@ -191,11 +191,10 @@ class Viewer:
 
 
 def open_viewer(folder: Path, host: str, port: int) -> Viewer:
-    """A viewer of the run in `folder`, which is served from now on.
+    """Start to serve a viewer of the run in `folder`.
 
-    raises  RunFolderError when there is nothing to view there; SceneError when viser is missing,
-            or nothing can be served there; ValueError when the shot of the run's scene does not
-            suit it
+    raises  RunFolderError if the folder has nothing to view; SceneError if viser is missing, or
+            host and port cannot be used; ValueError if the shot of the run's scene does not fit it
     """
     viser = optional("viser", "viser", "view", "views in a browser")
     run = GrowingRun.opened(folder)
@@ -219,11 +218,11 @@ def serve(viewer: Viewer) -> None:
 
 
 def _check_free(host: str, port: int) -> None:
-    """Raise SceneError unless a server can listen there: viser would take the next port."""
-    with socket.socket() as taken:
-        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    """Raise SceneError unless a server can listen there; viser would silently use another port."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            taken.bind((host, port))
+            probe.bind((host, port))
         except OSError as error:
             raise SceneError(
                 f"{host}, port {port} cannot be used ({error.strerror}); name another one with "

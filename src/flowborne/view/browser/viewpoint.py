@@ -19,15 +19,18 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 ASPECT = 0.75
-"""Height over width of the part of a browser's window that shows the run, about."""
+"""Approximate height over width of the part of a browser's window that shows the run."""
+
+LAST = 1e9
+"""Order of the last item in the panel; viser counts others up from the clock."""
 
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """Place of a camera.
+    """Position, target and lens of a camera.
 
     position  (3,) m
-    target    (3,) m, looked at
+    target    (3,) m
     lens      degrees between the lower and the upper edge
     """
 
@@ -36,7 +39,7 @@ class Viewpoint:
     lens: float
 
     def film_keys(self, slab: bool) -> dict[str, list[float] | float]:
-        """Keys of [film.camera] with which a film sees the same, to a thousandth of the distance.
+        """Keys of [film.camera] for the same view in a film, to a thousandth of the distance.
 
         A slab is filmed from straight above, at the same distance.
         """
@@ -52,12 +55,12 @@ class Viewpoint:
 
 @dataclass(frozen=True, eq=False)
 class FilmView:
-    """What the film of a run sees, as the viewer begins with it.
+    """The view of a run's film, with which the viewer starts.
 
-    first   where the first state is seen from
-    path    (n, 3) m, by which the film's camera has gone along since
-    side    m, smaller side of what is seen
-    up      axis that is upwards on it, "+y" or "+z"
+    first   viewpoint of the first state
+    path    (n, 3) m, displacement of the film's camera since then
+    side    m, smaller side of the view
+    up      axis that is up in the view, "+y" or "+z"
     """
 
     first: Viewpoint
@@ -67,7 +70,7 @@ class FilmView:
 
     @classmethod
     def of(cls, run: Run) -> FilmView:
-        """raises  ValueError when its camera follows a body that is not there"""
+        """raises  ValueError if its camera follows a body that does not exist"""
         lens = run.shot.camera.lens
         if run.slab:
             views = windows(run, Outlines(run), run.shot, ASPECT)
@@ -85,9 +88,9 @@ class FilmView:
 
 
 class CameraKeys:
-    """The text in the panel of each who looks.
+    """The camera of each client as text in its panel, to copy into a scene or a command.
 
-    folder  of the run, as a command would name it
+    folder  of the run, for the command
     """
 
     def __init__(self, folder: str, slab: bool) -> None:
@@ -95,9 +98,9 @@ class CameraKeys:
         self._texts: dict[int, GuiMarkdownHandle] = {}
 
     def show(self, clients: dict[int, ClientHandle], along: Array) -> None:
-        """Bring the texts up to date.
+        """Update the texts.
 
-        along  (3,) m, by which the world has been moved back so that the view follows the bodies
+        along  (3,) m, by which the world is moved back so that the view follows the bodies
         """
         self._texts = {key: text for key, text in self._texts.items() if key in clients}
         for key, client in clients.items():
@@ -116,12 +119,8 @@ class CameraKeys:
 
 
 def camera_text(folder: str, seen_from: Viewpoint, slab: bool) -> str:
-    """Markdown: the table of a scene, and the command, with which a film sees the same."""
+    """Markdown with the table of a scene and the command for the same view in a film."""
     keys = seen_from.film_keys(slab)
     table = "\n".join(f"{key} = {value}" for key, value in keys.items())
     settings = " ".join(f'--set "camera.{key}={value}"' for key, value in keys.items())
     return f"```toml\n[film.camera]\n{table}\n```\n\n```sh\nflowborne film {folder} {settings}\n```"
-
-
-LAST = 1e9
-"""Order of what comes last in the panel: others count up from the clock."""
