@@ -22,15 +22,15 @@ MENDED = "(mended)"
 LEFT_OUT = "overlap at rest: "
 """Prefix of the names of <exclude> elements made here; the names of both bodies follow."""
 
-TURNING = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
+ROTATIONAL = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
 
 
 def mend_meshes(spec: mujoco.MjSpec, mj: mujoco.MjModel, geoms: Iterable[int], hulls: bool) -> bool:
     """Close the open meshes of some geometries in a spec; return whether there was one.
 
     mj      of the spec
-    hulls   whether meshes with holes that are not small are replaced by their convex hulls
-    raises  ValueError that names every body with a mesh that stays open
+    hulls   whether meshes with large holes are replaced by their convex hulls
+    raises  ValueError with the name of every body with a mesh that stays open
     """
     wide, flat, mended = list[str](), list[str](), list[str]()
     for number, (mesh, body) in _open(mj, geoms).items():
@@ -69,7 +69,7 @@ def mended_meshes(mj: mujoco.MjModel) -> str:
 
 
 def _open(mj: mujoco.MjModel, geoms: Iterable[int]) -> dict[int, tuple[Mesh, str]]:
-    """Number of each mesh of the geometries that is open -> the mesh, and a body that has it."""
+    """Number of each open mesh of the geometries -> the mesh, and a body that has it."""
     found: dict[int, tuple[Mesh, str]] = {}
     closed_ones = set[int]()
     for geom in geoms:
@@ -86,7 +86,7 @@ def _open(mj: mujoco.MjModel, geoms: Iterable[int]) -> dict[int, tuple[Mesh, str
 
 
 def _replace(spec: mujoco.MjSpec, mj: mujoco.MjModel, number: int, mesh: Mesh) -> None:
-    """Give geometries another mesh, in the frame that MuJoCo has moved theirs to."""
+    """Give the geometries of a mesh another one, in the frame to which MuJoCo has moved it."""
     vertices, faces = mesh
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, mj.mesh_quat[number])
@@ -101,8 +101,11 @@ def _replace(spec: mujoco.MjSpec, mj: mujoco.MjModel, number: int, mesh: Mesh) -
 
 
 def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
-    """Leave out contact between fixed bodies and those that hinges and ball joints hold on them,
-    where they overlap at rest; whether any was left out. Bodies with a floor are as they are."""
+    """Exclude contact between fixed bodies and their children that overlap at rest.
+
+    Only children on hinges and ball joints count, and no body with a floor.
+    returns  whether any contact was excluded
+    """
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
     mujoco.mj_comPos(mj, data)
@@ -113,11 +116,11 @@ def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
     bodies = {body.id: body for body in spec.bodies}
     excluded = False
     for base, other in sorted(pairs):
-        if mj.body_weldid[base] or base in with_floor or not _hangs_on_the_world(mj, other):
+        if mj.body_weldid[base] or base in with_floor or not _hangs_on_fixed(mj, other):
             continue
         names = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, body) for body in (base, other)]
         for body, name in zip((base, other), names, strict=True):
-            bodies[body].name = name  # <exclude> knows bodies by their names alone
+            bodies[body].name = name  # <exclude> refers to bodies by name
         spec.add_exclude(
             name=LEFT_OUT + " and ".join(names), bodyname1=names[0], bodyname2=names[1]
         )
@@ -125,16 +128,16 @@ def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
     return excluded
 
 
-def _hangs_on_the_world(mj: mujoco.MjModel, body: int) -> bool:
-    """Whether joints that turn, and no others, hold a body on what does not move."""
+def _hangs_on_fixed(mj: mujoco.MjModel, body: int) -> bool:
+    """Whether a body hangs on a fixed one by rotational joints only."""
     top = mj.body_weldid[body]
     first, count = mj.body_jntadr[top], mj.body_jntnum[top]
     held = top > 0 and mj.body_weldid[mj.body_parentid[top]] == 0
-    return bool(held and count and np.isin(mj.jnt_type[first : first + count], TURNING).all())
+    return bool(held and count and np.isin(mj.jnt_type[first : first + count], ROTATIONAL).all())
 
 
 def joined_pairs(mj: mujoco.MjModel) -> list[str]:
-    """Both names of the pairs whose contact was left out, joined by "and"."""
+    """The pairs of bodies with excluded contact, both names joined by "and"."""
     names = [
         mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_EXCLUDE, number) for number in range(mj.nexclude)
     ]

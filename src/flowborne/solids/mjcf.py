@@ -1,8 +1,9 @@
-"""Reading an MJCF model and compiling it for the coupled solve, as a slab if wanted."""
+"""Reading an MJCF model and compiling it for the coupled solve, also as a slab."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -32,21 +33,21 @@ from flowborne.solids.model_files import ModelFiles, gathered, parsed
 Array = NDArray[np.float64]
 
 ARENA = 1 << 26
-"""Bytes of MuJoCo's working memory beside that for pairs of bodies: it would take memory quadratic
-in the number of dofs."""
+"""Bytes of MuJoCo's working memory without the pairs of bodies; by default it grows with the square
+of the number of dofs."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """What is given of a model besides its file.
+    """Settings of a model in addition to its file.
 
-    density    kg/m^3, in place of the density or mass of every geom that displaces fluid
-    densities  body -> kg/m^3 of its geoms, in place of `density`
-    shapes     geometries of one's own, besides those of the file
-    floating   bodies on the world without a joint, which get a free one of their name
-    displace   which geoms the fluid meets
-    packages   folders in which packages of ROS are looked for besides those above the model
-    hulls      whether meshes with holes that are not small are replaced by their convex hulls
+    density    kg/m^3, replaces the density or mass of every geom that displaces fluid
+    densities  body -> kg/m^3 of its geoms, replaces `density`
+    shapes     the user's geometries, added to those of the file
+    floating   bodies on the world without a joint; they get a free joint of the same name
+    displace   geoms that displace fluid
+    packages   folders that may contain ROS packages, in addition to those above the model
+    hulls      whether meshes with large holes are replaced by their convex hulls
     """
 
     density: float | None = None
@@ -58,7 +59,7 @@ class Given:
     hulls: bool = False
 
     def density_of(self, body: str) -> float | None:
-        """kg/m^3 of a body's geoms; None as the model has it."""
+        """kg/m^3 of the geoms of a body; None for the values of the model."""
         return self.densities.get(body, self.density)
 
 
@@ -74,7 +75,8 @@ def compiled(
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
-    motions and the controller take their places. raises ValueError for a bad model.
+    motions and the controller replace them.
+    raises  ValueError for a bad model
     """
     return bones_of(source, slab, gravity, given)[1]
 
@@ -85,7 +87,7 @@ def bones_of(
     gravity: tuple[float, float, float],
     given: Given = NOTHING,
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    """An MJCF file or text, as `compiled`, before flesh grows on it."""
+    """The spec and the model of an MJCF file or text, as `compiled`, without flesh."""
     where = _named(source)
     spec = read_spec(source, given.packages)
     wrong = next(misgiven(spec), None)
@@ -100,20 +102,16 @@ def bones_of(
         if density is not None:
             geom.density, geom.mass = density, np.nan
     mj = _compiled(spec, where)
-    try:
+    with _errors_at(where):
         chosen = chosen_geoms(spec, mj, given.displace)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from error
     weightless = _weightless(spec, chosen, given)
     for geom in weightless:
         geom.mass = 0.0
     if write_groups(spec, chosen) or weightless:
         mj = _compiled(spec, where)
     _refuse_unsupported(mj, where)
-    try:
+    with _errors_at(where):
         mended = mend_meshes(spec, mj, displacing_geoms(mj), given.hulls)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from error
     if exclude_joined(spec, mj) or mended:
         mj = _compiled(spec, where)
     if slab:
@@ -125,6 +123,15 @@ def bones_of(
     return spec, mj
 
 
+@contextmanager
+def _errors_at(where: str) -> Iterator[None]:
+    """Context in which the messages of ValueErrors get the name of the model."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
+
+
 def _compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
     try:
         return compiled_quietly(spec)
@@ -133,7 +140,7 @@ def _compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
 
 
 def _weightless(spec: mujoco.MjSpec, chosen: set[int], given: Given) -> list[mujoco.MjsGeom]:
-    """Geoms that a density of the scene does not mean: others of their body displace the fluid."""
+    """Geoms without mass: the scene gives a density, which applies to other geoms of the body."""
     displacing = {geom.parent.id for geom in spec.geoms if geom.id in chosen}
     return [
         geom
@@ -156,11 +163,11 @@ def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
 
 
 def read_spec(source: str | Path, packages: Sequence[Path] = ()) -> mujoco.MjSpec:
-    """What MuJoCo reads of a model file (a Path) or text.
+    """The spec of a model file (a Path) or text.
 
-    MuJoCo reads over what follows the end of a model, and makes all that a model asks for. Of a
-    file it gets what a run folder has.
-    packages  folders in which packages of ROS are looked for
+    The text is checked first: MuJoCo ignores text after the end of a model, and allocates any size
+    that a model requests. MuJoCo gets the same files as a run folder.
+    packages  folders that may contain ROS packages
     raises    ValueError for a bad model
     """
     where = _named(source)
@@ -194,14 +201,14 @@ def _named(source: str | Path) -> str:
 
 
 def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> mujoco.MjModel:
-    """MuJoCo's model of bones and flesh; switched off is what `compiled` switches off.
+    """MuJoCo's model of bones and flesh, with the options of `compiled`.
 
-    raises ValueError for a bad model, and for one with a flex
+    raises  ValueError for a bad model, and for one with a flex
     """
     spec = spec.copy()
     _set_options(spec, gravity)
-    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # dense takes room for (nv, nv) arrays
-    spec.memory = ARENA + 2 * len(spec.bodies) ** 2  # 4 bytes for each pair that might collide
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # dense allocates (nv, nv) arrays
+    spec.memory = ARENA + 2 * len(spec.bodies) ** 2  # 4 bytes for each pair that may collide
     try:
         mj = compiled_quietly(spec)
     except ValueError as error:
@@ -249,7 +256,10 @@ def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
 
 
 def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> Section:
-    """Cross-section of a geometry at its rest pose; ValueError that names it when there is none."""
+    """Cross-section of a geometry at its rest pose.
+
+    raises  ValueError with the name of a geometry that has none
+    """
     shape = geom_shape(mj, geom)
     try:
         return shape.section(rotation, float(position[2]))
@@ -262,7 +272,7 @@ def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array
 
 
 def _lower(spec: mujoco.MjSpec, height: float) -> None:
-    """Move all that is in the world down by `height` m."""
+    """Move everything in the world down by `height` m."""
     for part in (*spec.worldbody.bodies, *spec.worldbody.geoms, *spec.worldbody.sites):
         part.pos[2] -= height
 
@@ -270,8 +280,8 @@ def _lower(spec: mujoco.MjSpec, height: float) -> None:
 def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
     """Give each body of `spec` the mass, centre and inertia per unit depth of its sections.
 
-    A body's own <inertial> stays as it is, and is per unit depth. A height that all bodies have is
-    taken off.
+    An explicit <inertial> is kept and is per unit depth. A height that all bodies have in common is
+    subtracted.
     """
     body_position, body_rotation, geom_position, geom_rotation = rest_poses(mj)
     heights = np.unique(body_position[1:, 2].round(9))

@@ -1,4 +1,4 @@
-"""The articulated body as it is built: immutable, shared by all copies of a world."""
+"""The articulated body: immutable, shared by all copies of a world."""
 
 from __future__ import annotations
 
@@ -42,31 +42,30 @@ class SolidModel:
     """Bodies, joints and geometries. Build with `from_file` or `from_string`; never changed after.
 
     Geometries here are those that displace fluid, see `displacing`; others take part in contact
-    alone. In a slab everything is per unit depth.
+    only. In a slab all quantities are per unit depth.
 
     mj             MuJoCo's model
     slab           whether the solids are cross-sections at z = 0
     gravity        (3,) m/s^2
     nq, nv         numbers of positions and velocities
     nbody, ngeom   numbers of bodies (0 is the world), without nodes of flesh, and of geometries
-    flesh          what of the model is flesh, or None
+    flesh          the flesh of the model, or None
     body_names, joint_names, dof_names, geom_names
-                   nameless elements are called by kind and number; the dofs of a free joint have
-                   the joint's name with :x :y :z (world axes) :rx :ry :rz (body axes)
+                   nameless elements get their kind and number; the dofs of a free joint have the
+                   name of the joint with :x :y :z (world axes) :rx :ry :rz (body axes)
     locked         (nv,) dofs of a slab that would leave the plane
-    dof_position   (nv,) place in q of a hinge's or slide's position, -1 for other dofs
-    dof_range      (nv, 2) limits of hinges and slides, rad or m; infinite where there are none
+    dof_position   (nv,) index in q of the position of a hinge or slide, -1 for other dofs
+    dof_range      (nv, 2) limits of hinges and slides, rad or m; infinite without limits
     dof_body       (nv,) body that the dof moves
-    dof_root       (nv,) ancestor of that body that hangs on the world
+    dof_root       (nv,) ancestor of that body that is a child of the world
     moves          (nbody, nv) whether a dof moves a body
-    conserved      (nv,) dofs along which the bodies' momentum changes by outer forces alone
-    armature       (nv,) inertia of the joints themselves, kg m^2 or kg
+    conserved      (nv,) dofs along which only external forces change the momentum of the bodies
+    armature       (nv,) inertia of the joints, kg m^2 or kg
     body_mass      (nbody + nodes,) kg; nodes of flesh come after the bodies
     subtree_mass   (nbody + nodes,) kg, of the body and all below
-    volume         (nbody,) displaced volume, m^3 (area in a slab), each region counted once where
-                   geometries of a body overlap; see displaced.united and
-                   geoms.said_to_displace. 0 for the world body, and
-                   for bones in flesh
+    volume         (nbody,) displaced volume, m^3 (area in a slab); overlaps of geometries of a
+                   body count once, see displaced.united and geoms.said_to_displace. 0 for the
+                   world and for bones in flesh
     centroid       (nbody, 3) centroid of that volume in the body's frame, m
     geom_id        (ngeom,) MuJoCo's number
     geom_shape     (ngeom,) each in its own frame
@@ -75,8 +74,8 @@ class SolidModel:
     geom_offset    (ngeom, 3) centre in the body's frame, m
     geom_rotation  (ngeom, 3, 3) geometry's frame to the body's
     geom_rgba      (ngeom, 4) colour
-    orderings      of its sparse factors, by the dofs that are free; see `flesh_order`
-    geom_covered   (ngeom,) whether flesh is all around it at rest, so that no fluid touches it
+    geom_covered   (ngeom,) whether flesh encloses it at rest, so that no fluid touches it
+    orderings      elimination orders by free dofs; see `flesh_solve.ordered`
     """
 
     def __init__(
@@ -112,9 +111,9 @@ class SolidModel:
     ) -> SolidModel:
         """Model of an MJCF or URDF file.
 
-        slab     take the cross-sections at z = 0, per unit depth
-        gravity  (3,) m/s^2, in place of the file's own
-        given    densities, shapes and choices besides the file
+        slab     use the cross-sections at z = 0, per unit depth
+        gravity  (3,) m/s^2, replaces that of the file
+        given    densities, shapes and choices in addition to the file
         raises   ValueError when the model is bad
         """
         return cls(mjcf.compiled(Path(path), slab, gravity, given), slab, shapes=given.shapes)
@@ -145,9 +144,9 @@ class SolidModel:
     ) -> SolidModel:
         """Model of bones and flesh, for `assemble_flesh`.
 
-        grown   what `add_flesh` gave for each flesh of `spec`
+        grown   the results of `add_flesh` for each flesh of `spec`
         slab    flesh is made of triangles in the plane z = 0, per unit depth
-        shapes  geometries of one's own that `add_shapes` gave to it
+        shapes  the user's geometries that `add_shapes` has added
         raises  ValueError when it is bad
         """
         corners = {g.elements.shape[1] for g in grown}
@@ -165,18 +164,20 @@ class SolidModel:
         return cls.from_string("<mujoco/>", slab=True, gravity=gravity)
 
     def rest(self) -> SolidState:
-        """The model's own pose, at rest."""
+        """The rest pose of the model, without velocity."""
         return SolidState(np.array(self.mj.qpos0), np.zeros(self.nv))
 
     def integrate(self, q: Array, velocity: Array, dt: float) -> Array:
-        """(nq,) positions after moving with constant velocity (nv,) for dt s; quaternions turn."""
+        """(nq,) positions after moving with constant velocity (nv,) for dt s."""
         moved = np.array(q, dtype=np.float64)
         mujoco.mj_integratePos(self.mj, moved, velocity, dt)
         return moved
 
     def difference(self, start: Array, end: Array) -> Array:
-        """(nv,) displacement that leads from positions `start` to `end`, both (nq,); the inverse of
-        `integrate`, so a ball's is a rotation vector in its own frame."""
+        """(nv,) displacement from positions `start` to `end`, both (nq,).
+
+        It is the inverse of `integrate`: that of a ball is a rotation vector in its own frame.
+        """
         displacement = np.zeros(self.nv)
         mujoco.mj_differentiatePos(self.mj, displacement, 1.0, start, end)
         return displacement
@@ -188,13 +189,13 @@ class SolidModel:
 
     @cached_property
     def met(self) -> NDArray[np.bool_]:
-        """(nbody,) whether a body has a geometry, which the fluid meets."""
+        """(nbody,) whether a body has a geometry that displaces fluid."""
         return np.isin(np.arange(self.nbody), self.geom_body)
 
     @cached_property
     def outboard(self) -> NDArray[np.bool_]:
-        """(m, m) whether a dof (column) is of a body below the one that another (row) moves, for
-        the dofs of bones, which are the first m."""
+        """(m, m) whether a dof (column) belongs to a descendant of the body that another dof (row)
+        moves, for the dofs of bones, which are the first m."""
         on = self.dof_body[self.dof_body < self.nbody]
         return np.ascontiguousarray(self.moves[on, : len(on)].T & (on[:, None] != on))
 
@@ -205,7 +206,7 @@ class SolidModel:
 
     @cached_property
     def limited_balls(self) -> tuple[tuple[int, int, float], ...]:
-        """First place in q, first dof and largest angle (rad) of each ball joint with a limit."""
+        """First index in q, first dof and largest angle (rad) of each ball joint with a limit."""
         mj = self.mj
         return tuple(
             (int(mj.jnt_qposadr[j]), int(mj.jnt_dofadr[j]), float(mj.jnt_range[j, 1]))
@@ -213,10 +214,10 @@ class SolidModel:
         )
 
     def indices_of(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(m,) places in q of the joints that `dofs` belong to, ascending."""
+        """(m,) indices in q of the joints of `dofs`, ascending."""
         named = np.zeros(self.mj.njnt, bool)
         named[self._joint_of_dof[dofs]] = True
-        return named[self._joint_of_place].nonzero()[0]
+        return named[self._joint_of_index].nonzero()[0]
 
     def dofs_of(self, joint: str) -> NDArray[np.int64]:
         """Dofs of a joint. Raises ValueError for an unknown name."""
@@ -225,7 +226,7 @@ class SolidModel:
         return np.arange(first, first + len(SUFFIXES[int(self.mj.jnt_type[j])]))
 
     def positions_of(self, joint: str) -> NDArray[np.int64]:
-        """Places in q of a joint: 7 for a free joint, 4 for a ball, else 1."""
+        """Indices in q of a joint: 7 for a free joint, 4 for a ball, else 1."""
         j = self.joint(joint)
         first = int(self.mj.jnt_qposadr[j])
         return np.arange(first, first + WIDTHS[int(self.mj.jnt_type[j])])
@@ -245,7 +246,7 @@ class SolidModel:
         return rotation[g], float(position[g, 2])
 
     def section_of(self, geom: int) -> Section:
-        """Cross-section of a slab's geometry, in the geometry's frame."""
+        """Cross-section of a geometry of a slab, in the frame of the geometry."""
         g = int(self.geom_id[geom])
         _, _, position, rotation = geoms.rest_poses(self.mj)
         return mjcf.slab_section(self.mj, g, position[g], rotation[g])
@@ -255,7 +256,7 @@ class SolidModel:
         self.joint_names = _names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)
         self._joints = {name: j for j, name in enumerate(self.joint_names)}
         widths = [WIDTHS[int(kind)] for kind in mj.jnt_type]
-        self._joint_of_place = np.repeat(np.arange(mj.njnt), widths)
+        self._joint_of_index = np.repeat(np.arange(mj.njnt), widths)
         self._joint_of_dof = np.array(mj.dof_jntid, dtype=np.int64)
         names: list[str] = []
         self.dof_position: NDArray[np.int64] = np.full(self.nv, -1)
@@ -319,7 +320,7 @@ class SolidModel:
                 self.centroid[body] = body_rotation[body].T @ (centre - body_position[body])
 
     def _solid(self, geom: int, position: Array, rotation: Array) -> displaced.Solid:
-        """The geometry at rest, in the world's frame; a slab's geometry is checked on the way."""
+        """The geometry at rest, in world axes. Raises ValueError for a bad one in a slab."""
         g, shape = int(self.geom_id[geom]), self.geom_shape[geom]
         if self.slab:
             cut = mjcf.slab_section(self.mj, g, position, rotation)
@@ -365,9 +366,9 @@ def _rotations(quaternions: Array) -> Array:
 def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
     """Dofs whose motion carries a whole tree rigidly along a symmetry of its kinetic energy.
 
-    They are, on bodies hung on the world: free joints, a first ball or hinge, slides that follow
-    slides alone, and a ball or hinge after slides that span every direction it turns. Along them
-    the equation of motion says that momentum changes by the outer impulse.
+    They are, on children of the world: free joints, a first ball or hinge, slides that follow only
+    slides, and a ball or hinge after slides that span all directions that it rotates. Along them
+    the equation of motion states that only external impulses change the momentum.
     """
     conserved = np.zeros(mj.nv, bool)
     for body in range(1, mj.nbody):
@@ -394,10 +395,10 @@ def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
 
 
 def _locked(mj: mujoco.MjModel, names: tuple[str, ...]) -> NDArray[np.bool_]:
-    """Dofs whose motion leaves the plane z = 0. Raises ValueError when one leaves it partly.
+    """Dofs that leave the plane z = 0. Raises ValueError when one leaves it partly.
 
-    A hinge must be along z and a slide across z to be free. A ball or free joint turns about its
-    body's axes, one of which has to be along z.
+    A hinge must be along z and a slide across z to be free. A ball or free joint rotates about the
+    axes of its body, one of which must be along z.
     """
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)

@@ -26,13 +26,13 @@ from flowborne.solids.model_checks import check_kind, check_mesh
 ATTRIBUTE = re.compile(rb"\s+([^\s=/>]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 
 Changes = Mapping[int, Mapping[str, str | None]]
-"""Number of an element in the order of the text -> attribute -> new value, None to drop it."""
+"""Number of an element in text order -> attribute -> new value, None to remove it."""
 
 ADDRESS = re.compile(r"(?:package|model):/+([^/]+)/(.+)")
 """Name of a package, and a path in it."""
 
 ASSETS = "assets"
-"""Folder beside the model of all that it names."""
+"""Folder next to the model for all files that it names."""
 
 FOLDER_KEYS = {
     "mesh": ("meshdir", "assetdir"),
@@ -42,16 +42,16 @@ FOLDER_KEYS = {
     "texture": ("texturedir", "assetdir"),
     "model": (),
 }
-"""Element that names a file -> compiler attributes that say where its folder is."""
+"""Element that names a file -> compiler attributes that give its folder."""
 
 FOLDERS = ("assetdir", "meshdir", "texturedir")
 
 MOST_NESTED = 500
-"""Elements of a model in each other; readers and writers of it call themselves for each."""
+"""Deepest nesting of elements; readers and writers recurse once per level."""
 
 
 def with_attributes(text: bytes, changes: Changes) -> bytes:
-    """XML with other values of attributes that it has."""
+    """XML with other values of existing attributes; the rest of the text, with its lines, stays."""
     starts: list[int] = []
     parser = expat.ParserCreate()
     parser.StartElementHandler = lambda *_: starts.append(parser.CurrentByteIndex)
@@ -71,23 +71,23 @@ def with_attributes(text: bytes, changes: Changes) -> bytes:
 
 
 def _quoted(value: str | None) -> bytes:
-    """A value as it stands behind an equals sign; nothing for None."""
+    """A value as it is written after an equals sign; empty for None."""
     if value is None:
         return b""
     return b'"%s"' % escape(value, {'"': "&quot;"}).encode("ascii", "xmlcharrefreplace")
 
 
 def is_address(given: str) -> bool:
-    """Whether a file is named by its package or as a URL, not by a path."""
+    """Whether a file is given by a package or a URL, not by a path."""
     return given.startswith(("package:", "model:", "file:"))
 
 
 def located(given: str, model: Path, packages: Sequence[Path]) -> Path:
-    """The file that an address means.
+    """The file at an address.
 
-    A package is looked for in the folders above the model, then in `packages`; each of them may
-    hold its folder, or be the folder.
-    raises  ValueError where it is not found
+    Packages are searched for in the folders above the model, then in `packages`; each of these may
+    contain the folder of the package, or be that folder.
+    raises  ValueError if the file is not found
     """
     if given.startswith("file:"):
         return Path(unquote(re.sub("^file:/*", "/", given)))
@@ -106,14 +106,14 @@ def located(given: str, model: Path, packages: Sequence[Path]) -> Path:
 
 
 def _roots(folder: Path, name: str) -> Iterator[Path]:
-    """What may be the folder of a package in a folder that may hold it or be it."""
+    """Possible folders of a package: inside a folder, or the folder itself."""
     yield folder / name
     if folder.name == name or _name(folder / "package.xml") == name:
         yield folder
 
 
 def _name(manifest: Path) -> str:
-    """The name in a package.xml; "" where there is none."""
+    """The name in a package.xml; "" without one."""
     try:
         return (ElementTree.parse(manifest).findtext("name") or "").strip()
     except (OSError, ElementTree.ParseError):
@@ -123,7 +123,7 @@ def _name(manifest: Path) -> str:
 def parsed(text: bytes | str) -> Element:
     """A model's text as a tree.
 
-    raises  ElementTree.ParseError for what is no XML, ValueError for one nested too deep
+    raises  ElementTree.ParseError for a text that is not XML, ValueError for too deep nesting
     """
     root = ElementTree.fromstring(text)
     level, depth = [root], 0
@@ -139,12 +139,12 @@ def parsed(text: bytes | str) -> Element:
 
 @dataclass(frozen=True)
 class ModelFiles:
-    """A model and what it names: name in one folder -> content.
+    """A model and the files that it names: name in one folder -> content.
 
-    name     of the model itself
+    name     name of the model itself
     texts    the model, parts that it includes, and models that it attaches
-    assets   all else
-    sources  name -> the file that it is a copy of
+    assets   all other files
+    sources  name -> the original file
     """
 
     name: str
@@ -153,7 +153,7 @@ class ModelFiles:
     sources: dict[str, Path] = field(default_factory=dict)
 
     def in_memory(self) -> mujoco.MjVfs:
-        """The files as MuJoCo takes them in place of a disc."""
+        """The files as a virtual file system for MuJoCo."""
         memory = mujoco.MjVfs()
         for name, content in (self.texts | self.assets).items():
             memory[name] = content
@@ -161,14 +161,14 @@ class ModelFiles:
 
 
 def gathered(path: Path, packages: Sequence[Path] = ()) -> ModelFiles:
-    """An MJCF or URDF file and what MuJoCo reads for it.
+    """An MJCF or URDF file and all files that MuJoCo reads for it.
 
-    Files keep their names, as nameless meshes are called by them, and line numbers stay. What has
-    been gathered once is gathered the same again.
+    Files keep their names, because nameless meshes are called after their files, and line numbers
+    do not change. Gathering a gathered model again gives the same files.
 
-    packages  folders in which packages of ROS are looked for besides those above the model
-    raises    OSError for a file that cannot be read, ElementTree.ParseError for what is no XML,
-              ValueError for what MuJoCo does not read
+    packages  folders that may contain ROS packages, in addition to those above the model
+    raises    OSError for a file that cannot be read, ElementTree.ParseError for a text that is not
+              XML, ValueError for a file that MuJoCo does not read
     """
     files = ModelFiles(path.name)
     _Gathering(files, packages).add_model(path, path.name)
@@ -177,7 +177,7 @@ def gathered(path: Path, packages: Sequence[Path] = ()) -> ModelFiles:
 
 @dataclass
 class _Part:
-    """A file of a model: the model itself, or what it includes.
+    """A text of a model: the model itself, or a part that it includes.
 
     included  number of an include -> its part
     """
@@ -188,7 +188,7 @@ class _Part:
     included: dict[int, _Part]
 
     def compiler(self) -> dict[str, str]:
-        """Attributes of all compiler elements; the last one of the text counts."""
+        """Attributes of all compiler elements; the last value in the text counts."""
         given: dict[str, str] = {}
         for number, element in enumerate(self.elements):
             if element.tag == "compiler":
@@ -207,7 +207,7 @@ class _Gathering:
         self._names: dict[tuple[Path, str, str], str] = {}
 
     def add_model(self, path: Path, name: str) -> None:
-        """Add a model and what it names; names in it are relative to the folder of its own."""
+        """Add a model and its files; names in it are relative to its own folder."""
         whole = _read(path, path.parent, set())
         check_kind(whole.elements[0], path.suffix)
         given = whole.compiler()
@@ -239,7 +239,7 @@ class _Gathering:
         self._files.sources[name] = part.path
 
     def _source(self, element: Element, key: str, model: Path, given: Mapping[str, str]) -> Path:
-        """The file that an attribute of an element means."""
+        """The file that an attribute of an element names."""
         file = element.attrib[key].replace("\\", "/")
         if element.tag == "mesh":
             check_mesh(file)
@@ -251,9 +251,9 @@ class _Gathering:
         return model.parent / next((given[key] for key in keys if key in given), "") / file
 
     def _named(self, source: Path, folder: str) -> tuple[str, bool]:
-        """The name that a file gets, and whether it is new.
+        """The name of a file in the gathered model, and whether the file is new.
 
-        folder  that names in it are relative to
+        folder  folder to which names in the file are relative
         """
         known = source.resolve(), source.name, folder
         if known in self._names:
@@ -269,7 +269,7 @@ class _Gathering:
 
 
 def _read(path: Path, folder: Path, read: set[Path]) -> _Part:
-    """A file of a model in `folder`, of which those in `read` have been read."""
+    """A text of a model in `folder`; the files in `read` have been read before."""
     read.add(path.resolve())
     text = read_file(path)
     part = _Part(path, text, [*parsed(text).iter()], {})
@@ -277,8 +277,8 @@ def _read(path: Path, folder: Path, read: set[Path]) -> _Part:
         file = element.get("file") if element.tag == "include" else None
         if not file:
             continue
-        places = [one / file.replace("\\", "/") for one in (folder, path.parent)]
-        found = next((place for place in places if place.is_file()), places[0])
+        paths = [base / file.replace("\\", "/") for base in (folder, path.parent)]
+        found = next((p for p in paths if p.is_file()), paths[0])
         if found.resolve() in read:
             raise ValueError(f"{path.name} includes {file} once more. Include it once.")
         part.included[number] = _read(found, folder, read)
@@ -288,7 +288,7 @@ def _read(path: Path, folder: Path, read: set[Path]) -> _Part:
 def _references(elements: list[Element], given: Mapping[str, str]) -> Iterator[tuple[int, str]]:
     """Number and attribute of each element that names a file which MuJoCo reads.
 
-    Of a URDF these are meshes: those that are drawn are discarded, unless it says otherwise.
+    In a URDF these are meshes; by default MuJoCo discards the visual ones.
     """
     numbers = {element: number for number, element in enumerate(elements)}
     if elements[0].tag == "robot":

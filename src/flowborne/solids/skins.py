@@ -1,4 +1,4 @@
-"""The skins of a model: surfaces that several bodies carry, and that have no part in the flow."""
+"""The skins of a model: drawn surfaces that follow several bodies and do not displace fluid."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ModelSkin:
     name      of the skin
     vertices  (k, 3) m in the model's own pose
     faces     (m, 3) of them, outward
-    weights   (k, bodies) share of each body in carrying a vertex, together 1
+    weights   (k, bodies) share of each body in the motion of a vertex, sum 1
     rgba      (4,) colour
     """
 
@@ -34,18 +34,18 @@ class ModelSkin:
 
 
 def skinned(vertices: Array, weights: Array, turn: Array, shift: Array) -> Array:
-    """(k, 3) places of a surface that bodies carry, m: linear blend skinning.
+    """(k, 3) vertices of a surface that follows bodies, m: linear blend skinning.
 
-    vertices  (k, 3) m where the bodies do not move it
-    weights   (k, n) share of each body in carrying a vertex, together 1
-    turn, shift  (n, 3, 3) R and (n, 3) t of each body's motion x -> R x + t, m
+    vertices     (k, 3) m before the bodies move
+    weights      (k, n) share of each body in the motion of a vertex, sum 1
+    turn, shift  (n, 3, 3) R and (n, 3) t of the motion x -> R x + t of each body, m
     """
     blended = np.einsum("kn,nij->kij", weights, turn)
     return np.asarray(np.einsum("kij,kj->ki", blended, vertices) + weights @ shift)
 
 
 def clad_bodies(mj: mujoco.MjModel) -> NDArray[np.bool_]:
-    """(nbody,) which bodies a skin stands for: it follows them, or what is rigid with them."""
+    """(nbody,) bodies that a skin covers: it follows them, or bodies that are rigid with them."""
     carrying = np.zeros(mj.nbody, bool)
     for skin in skins_of(mj):
         carrying |= skin.weights.any(axis=0)
@@ -56,7 +56,7 @@ def clad_bodies(mj: mujoco.MjModel) -> NDArray[np.bool_]:
 
 
 def skins_of(mj: mujoco.MjModel) -> tuple[ModelSkin, ...]:
-    """The skins, moved by their bodies from the pose in which they were bound."""
+    """The skins at the model's rest pose, moved from the pose in which they were bound."""
     position, rotation, _, _ = rest_poses(mj)
     return tuple(_skin(mj, skin, position, rotation) for skin in range(mj.nskin))
 
@@ -84,5 +84,5 @@ def _skin(mj: mujoco.MjModel, skin: int, position: Array, rotation: Array) -> Mo
 
 
 def _entries(starts: Integers, counts: Integers, number: int) -> slice:
-    """Of one element in an array of MuJoCo's."""
+    """Entries of one element in an array of MuJoCo."""
     return slice(int(starts[number]), int(starts[number] + counts[number]))

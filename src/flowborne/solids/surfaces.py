@@ -44,9 +44,9 @@ _known: weakref.WeakKeyDictionary[SolidModel, Patches] = weakref.WeakKeyDictiona
 def surfaces(model: SolidModel) -> Patches:
     """Patches of every geometry, none longer than an eighth of it; in a slab, of every outline.
 
-    Boxes and meshes keep their area exactly. Round shapes are inscribed polyhedra: less area by
-    0.04 % in a slab, by 0.2 % (cylinder) to 0.8 % (sphere) in three dimensions. Patches of one
-    geometry that lie within another of the same body are not left out.
+    Boxes and meshes keep their exact area. Round shapes are inscribed polyhedra: their area is too
+    small by 0.04 % in a slab, by 0.2 % (cylinder) to 0.8 % (sphere) in three dimensions. Patches
+    inside another geometry of the same body are kept.
     """
     patches = _known.get(model)
     if patches is None:
@@ -87,9 +87,9 @@ def _outline(section: Section) -> tuple[Array, Array]:
 
 
 class Outline:
-    """Places on the bodies that lie farthest out, without those of flesh.
+    """The outermost points of the bodies, without flesh, for any pose at little cost.
 
-    body  (n,) body of each place
+    body  (n,) body of each point
     mass  (n,) share of its body's mass, kg
     """
 
@@ -97,13 +97,13 @@ class Outline:
         self._mj, self._data = model.mj, mujoco.MjData(model.mj)
         self._local = [shape.outermost() for shape in model.geom_shape]
         self._geom = model.geom_id
-        counts = [len(places) for places in self._local]
+        counts = [len(points) for points in self._local]
         self.body: NDArray[np.int64] = np.repeat(model.geom_body, counts)
         shared = np.bincount(self.body, minlength=model.nbody)[self.body]
         self.mass: Array = model.body_mass[self.body] / shared
 
     def at(self, q: Array) -> Array:
-        """(n, 3) the places in the world, m, with the joints at `q` (nq,)."""
+        """(n, 3) the points in the world, m, with the joints at `q` (nq,)."""
         self._data.qpos[:] = q
         mujoco.mj_kinematics(self._mj, self._data)
         position, rotation = self._data.geom_xpos, self._data.geom_xmat.reshape(-1, 3, 3)

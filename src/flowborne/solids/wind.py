@@ -19,7 +19,7 @@ Bodies = NDArray[np.int64]
 
 
 class Wind(Protocol):
-    """What pushes the bodies from outside."""
+    """An external force on the bodies."""
 
     def wrench(self, model: SolidModel, kinematics: Kinematics, v: Array, time: float) -> Array:
         """(nbody, 6) force (N) and torque about the world origin (N m) on each body.
@@ -31,10 +31,10 @@ class Wind(Protocol):
 
 
 class WindField(Protocol):
-    """A wind that differs from place to place; picklable."""
+    """A wind that varies in space and time; picklable."""
 
     def __call__(self, x: Array, time: float) -> Array:
-        """(n, 3) velocity in m/s at the places x (n, 3)."""
+        """(n, 3) velocity in m/s at the points x (n, 3)."""
         ...
 
 
@@ -43,12 +43,12 @@ class WindFaces:
     """The simple wind force on every face, eq. (2): F = sign(u.n) A rho (u.n)^2 n.
 
     u is the wind relative to the face, n its outward normal. Every face counts, windward and
-    leeward, as in the paper: a thin plate across the wind feels 2 rho U^2 per area. Nothing
-    shelters anything.
+    leeward, as in the paper: the force on a thin plate across the wind is 2 rho U^2 per area.
+    Bodies do not shelter each other.
 
-    velocity  (3,) m/s, or a field of place and time
+    velocity  (3,) m/s, or a field in space and time
     density   rho, kg/m^3 (per unit depth in a slab)
-    bodies    names of the bodies that it blows on; all when None
+    bodies    names of the bodies with this force; all when None
     source    Lentine et al. 2011, eq. (2)
     """
 
@@ -66,7 +66,7 @@ class WindFaces:
             wind = np.array([self.velocity])
         twist = kinematics.twist_jacobian @ v
         wrench = pushed(patches.body, patches.screw, patches.area, *pose, twist, wind)
-        return _only(model, self.density * wrench, self.bodies)
+        return _on_bodies(model, self.density * wrench, self.bodies)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class WindForce:
     """The same force on each body, at its centre of mass: the wind of Fig. 4.
 
     force   (3,) N (N/m in a slab)
-    bodies  names of the bodies that it pushes; all when None
+    bodies  names of the bodies with this force; all when None
     """
 
     force: tuple[float, float, float]
@@ -85,11 +85,11 @@ class WindForce:
         force = np.tile(np.asarray(self.force, dtype=np.float64), (model.nbody, 1))
         wrench = np.concatenate([force, cross(kinematics.mass_centre, force)], axis=1)
         wrench[0] = 0.0
-        return _only(model, wrench, self.bodies)
+        return _on_bodies(model, wrench, self.bodies)
 
 
-def _only(model: SolidModel, wrench: Array, bodies: tuple[str, ...] | None) -> Array:
-    """The wrenches of the named bodies. Raises ValueError for a name that is not in the model."""
+def _on_bodies(model: SolidModel, wrench: Array, bodies: tuple[str, ...] | None) -> Array:
+    """The wrenches of the named bodies. Raises ValueError for an unknown name."""
     if bodies is None:
         return wrench
     chosen = np.zeros(model.nbody, bool)

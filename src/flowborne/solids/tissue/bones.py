@@ -24,7 +24,7 @@ from flowborne.solids.geoms import (
 Array = NDArray[np.float64]
 
 MOST_SAMPLES = 2_000_000
-"""Where a lattice would have more samples than this, it is coarser than asked for."""
+"""Most samples of a lattice; a finer lattice is made coarser."""
 
 
 def signed_distance(points: Array, surface: Mesh) -> Array:
@@ -45,7 +45,7 @@ class Part:
     rotation  (3, 3) geometry's frame to the world's
     low, high (3,) corners of a box around it in world axes, m
     half      (3,) half sizes, m
-    surface   the surface of a mesh, to search by its cells; None for other kinds
+    surface   the surface of a mesh, for a search by its cells; None for other kinds
     """
 
     bone: int
@@ -83,7 +83,7 @@ class Bones:
 
     @property
     def box(self) -> tuple[Array, Array]:
-        """(3,) lowest and highest corner around all of them, m."""
+        """(3,) lowest and highest corner of a box around all of them, m."""
         return (
             np.min([part.low for part in self.parts], axis=0),
             np.max([part.high for part in self.parts], axis=0),
@@ -110,9 +110,9 @@ class Bones:
 
 
 def bones_of(spec: mujoco.MjSpec, names: Sequence[str]) -> Bones:
-    """The bodies `names` of a model, as far as they displace fluid.
+    """The geometries of the bodies `names` that displace fluid.
 
-    raises  ValueError for an unknown body and for one without such a geom
+    raises  ValueError for an unknown body and for a body without such a geom
     """
     mj = compiled_quietly(spec.copy())
     known = [element_name(mj, mujoco.mjtObj.mjOBJ_BODY, b) for b in range(mj.nbody)]
@@ -149,7 +149,7 @@ def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: A
 
 
 def finest(bones: Bones, level: float) -> float:
-    """Least distance of the samples from which a contour is made, m."""
+    """Smallest distance between the samples of a contour, m."""
     low, high = bones.box
     return float(np.cbrt((high - low + 2.0 * level).prod() / MOST_SAMPLES))
 
@@ -157,7 +157,7 @@ def finest(bones: Bones, level: float) -> float:
 def contour(bones: Bones, level: float, pitch: float) -> Mesh:
     """Closed outward surface `level` m outside the union of the bones, in world axes.
 
-    Sampled `pitch` m apart: edges that are sharper than that are cut off.
+    The samples are `pitch` m apart: sharper edges are cut off.
     """
     pv = flesh_library()
     low, high = bones.box

@@ -1,9 +1,9 @@
 """Growing flesh onto the bones of an MJCF model: quadratic elements, held by bones at nodes.
 
-Linear tetrahedra lock: one layer of them across a bending skin is several times too stiff, and more
-so the nearer Poisson's ratio is to 1/2. A node that no bone holds becomes a body of its own that
-hangs on the world by slides. Under a bone it would ride in that bone's frame, and the bone's row
-and column would be full in both the mass and the stiffness matrix.
+Linear tetrahedra lock: one layer of them across a bending skin is several times too stiff, the more
+so the closer Poisson's ratio is to 1/2. A node that no bone holds becomes a separate body that
+slides freely in the world. As a child of a bone it would move in the frame of the bone, and the row
+and column of the bone would be full in both the mass and the stiffness matrix.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ Indices = NDArray[np.int64]
 
 WORLD = "world"
 
-TOGETHER = 250
-"""Nodes that are added to a model at once: MuJoCo looks through all of it at each addition."""
+NODES_PER_ATTACH = 250
+"""Nodes that are added to a model at once: MuJoCo searches the whole model at each addition."""
 
 LEAST_INERTIA = 1e-12
 """MuJoCo refuses moving bodies of less than 1e-15 kg m^2, even those that only slide."""
 
 
 class Law(IntEnum):
-    """How stress follows strain; small strains see no difference. See kernels.elastic.
+    """The law of stress and strain; all agree for small strains. See kernels.elastic.
 
-    SAINT_VENANT_KIRCHHOFF  gives way when crushed, and may stay inside out
-    STABLE_NEO_HOOKEAN      turns right side out again
+    SAINT_VENANT_KIRCHHOFF  collapses under strong compression, and may stay inverted
+    STABLE_NEO_HOOKEAN      recovers from inversion
     """
 
     SAINT_VENANT_KIRCHHOFF = elastic.SAINT_VENANT_KIRCHHOFF
@@ -69,14 +69,14 @@ class Tissue:
 
 @dataclass(frozen=True)
 class Grown:
-    """Flesh whose nodes are bodies of a model, or ride on them.
+    """Flesh with nodes that are bodies of a model, or are fixed to them.
 
-    name      its own
-    nodes     (n, 3) at rest in world axes, m: the points it was made of, then middles of edges
+    name      of the flesh
+    nodes     (n, 3) at rest in world axes, m: the points of the mesh, then middles of edges
     elements  (m, 10) nodes of tetrahedra, or (m, 6) of triangles in a slab
-    bodies    n names of the bodies that the nodes are or ride on
-    free      (n,) nodes that are bodies of their own
-    tissue    what it is made of
+    bodies    n names of the bodies that the nodes are, or are fixed to
+    free      (n,) nodes that are separate bodies
+    tissue    its material
     """
 
     name: str
@@ -101,8 +101,8 @@ def add_flesh(
     simplices  (m, 4) points of each tetrahedron, or (m, 3) of each triangle in a slab, of positive
                volume or area; the middles of their edges become nodes
     holders    n names: the body that holds the point, "" for none. A body that holds both ends of
-               an edge holds its middle. The mass of held nodes is given to the body that holds them
-    raises     ValueError for an element without volume, and for a holder that is no body
+               an edge holds its middle. A body gets the mass of the nodes that it holds
+    raises     ValueError for an element without volume, and for an unknown holder
     """
     volume = measures(points, simplices)
     if not volume.min() > 0.0:
@@ -128,9 +128,9 @@ def add_flesh(
         _load(spec, holder, (nodes[held] - position) @ rotation, mass[held], inertia[held])
     free = np.array([not holder for holder in held_by])
     loose = np.flatnonzero(free)
-    for some in np.split(loose, range(TOGETHER, len(loose), TOGETHER)):
+    for some in np.split(loose, range(NODES_PER_ATTACH, len(loose), NODES_PER_ATTACH)):
         spec.attach(
-            _hung(some, nodes, mass, inertia, "xyz"[: simplices.shape[1] - 1]),
+            _free_nodes(some, nodes, mass, inertia, "xyz"[: simplices.shape[1] - 1]),
             prefix=f"{name}:",
             frame=spec.worldbody.add_frame(),
         )
@@ -157,14 +157,16 @@ def _frames(
     return frames
 
 
-def _hung(some: Indices, nodes: Array, mass: Array, inertia: Array, axes: str) -> mujoco.MjSpec:
-    """A model of some nodes of flesh that move freely along some axes, named by their numbers."""
+def _free_nodes(
+    some: Indices, nodes: Array, mass: Array, inertia: Array, axes: str
+) -> mujoco.MjSpec:
+    """A model of some nodes of flesh that slide along some axes, named by their numbers."""
     spec = mujoco.MjSpec()
     for i in some.tolist():
         body = spec.worldbody.add_body(name=f"{i}", pos=nodes[i])
         body.mass, body.explicitinertial = mass[i], True
         body.inertia = np.full(3, max(inertia[i], LEAST_INERTIA))
-        body.ipos = np.zeros(3)  # left out, it becomes the body's own place, once more
+        body.ipos = np.zeros(3)  # by default it would be `pos`
         for axis, direction in zip(axes, np.eye(3), strict=False):
             joint = body.add_joint(name=f"{i}:{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE)
             joint.axis, joint.limited = direction, mujoco.mjtLimited.mjLIMITED_FALSE
@@ -172,7 +174,7 @@ def _hung(some: Indices, nodes: Array, mass: Array, inertia: Array, axes: str) -
 
 
 def _load(spec: mujoco.MjSpec, holder: str, offsets: Array, mass: Array, inertia: Array) -> None:
-    """Give a bone the mass of the nodes that it holds, at `offsets` (n, 3) in its frame."""
+    """Add the mass of held nodes, at `offsets` (n, 3) in the frame of a bone, to the bone."""
     mj = compiled_quietly(spec.copy())
     b = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, holder)
     turn = np.empty(9)

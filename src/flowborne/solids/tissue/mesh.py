@@ -1,4 +1,4 @@
-"""Flesh: what of the tetrahedra is elastic, and which points a bone holds."""
+"""Flesh as a mesh: which tetrahedra are elastic, and which points a bone holds."""
 
 from __future__ import annotations
 
@@ -32,41 +32,40 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FIDELITY = 0.1
-"""How far a face may be off the surface that it follows, in edges."""
+"""Largest distance of a face from the surface that it follows, in edges."""
 
 THICKNESSES = 0.6
-"""As FIDELITY, in thicknesses of the skin or of the thinnest bone's half."""
+"""The same, in thicknesses of the skin, or in half thicknesses of the thinnest bone."""
 
 HELD = 0.5
-"""How far outside a bone it still holds points, as a part of the distance that faces may be off."""
+"""Largest distance from a bone to the points that it holds, in tolerances of the faces."""
 
 JOINT = 1.25
-"""How close to a second bone points are let go, in half sizes of the thinnest bone."""
+"""Bones hold no points closer than this to a second bone, in half sizes of the thinnest bone."""
 
 JOINT_EDGES = 0.75
-"""The same in edges as long as most are, where those are too long for it."""
+"""The same in median edges; the larger distance counts."""
 
 ASTRAY = 1.5
-"""How far the outside of a mesh may be off its surface, in tolerances, and not be meshed again."""
+"""Largest distance of the outside of a mesh from its surface, in tolerances, without a new try."""
 
-TIGHTER = 0.8
+TOLERANCE_RATIO = 0.8
 """Tolerance of the next try over that of the last one."""
 
-TRIES = 8
-"""How often flesh is meshed at most."""
+MOST_TRIES = 8
+"""Most meshings of one flesh."""
 
-FILLING = 6.0 * np.sqrt(2.0)
-"""Regular tetrahedra that a cube of their edges has room for."""
+TETRAHEDRA_PER_CUBE = 6.0 * np.sqrt(2.0)
+"""Volume of a cube over that of a regular tetrahedron with the same edges."""
 
 MOST_ELEMENTS = 100_000
-"""Most elements that the mesher's box may have room for: two balls of 0.6 m, 160 m apart, with
-edges of 0.25 m take 13 s and 0.5 GB, and the built-in creatures with flesh ask for 7,000."""
+"""Most elements that fit into the box of the mesher. Two balls of 0.6 m, 160 m apart, with edges of
+0.25 m take 13 s and 0.5 GB; the built-in creatures with flesh need 7,000."""
 
+SAMPLE_SPACING = 0.6
+"""Largest distance of samples that resolves the thinnest bone, in its half sizes."""
 
-SEEN = 0.6
-"""Distance of samples at which the thinnest bone is not missed, in its half sizes."""
-
-PER_SQUARE = 24.0
+ELEMENTS_PER_SQUARE = 24.0
 """Elements around a plate, per square of its thickness: 24,000 for one of 0.5 m x 0.2 m x 1 cm."""
 
 
@@ -88,15 +87,15 @@ class FleshMesh:
 def skin_mesh(
     spec: mujoco.MjSpec, bones: Sequence[str], thickness: float, size: float
 ) -> FleshMesh:
-    """Flesh as far as `thickness` m outside the union of some bodies.
+    """Flesh up to `thickness` m outside the union of some bodies.
 
-    It has the mirror planes that exchange some of them.
+    It has the mirror planes that exchange some of these bodies.
 
     bones   names of the bodies
-    size    length of edges, m; shorter where the surface bends too much for it
-    raises  ValueError for an unknown body, for one without a geom, for a bone that is too thin, for
-            a skin that is too thin for its bones or too large for its edges, when the mesher fails
-            and for a bone that holds no point
+    size    length of edges, m; shorter where the curvature of the surface requires it
+    raises  ValueError for an unknown body, a body without a geom, a bone that is too thin, a skin
+            that is too thin for its bones or too large for its edges, when the mesher fails, and
+            for a bone that holds no point
     """
     chosen = bones_of(spec, bones)
     _check_bones(chosen)
@@ -114,9 +113,9 @@ def skin_mesh(
 
 
 def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: float) -> FleshMesh:
-    """Flesh as far as the closed surface in a file, which is in world axes at rest; as `skin_mesh`.
+    """Flesh up to the closed surface in a file, in world axes at rest; as `skin_mesh`.
 
-    raises  ValueError as `skin_mesh`, for a file that is no closed surface, and for a bone outside
+    raises  ValueError as `skin_mesh`, for a file without a closed surface, and for a bone outside
             the surface
     """
     chosen = bones_of(spec, bones)
@@ -131,15 +130,16 @@ def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: fl
 def _check_bones(bones: Bones) -> None:
     """Raise ValueError for a bone that is too thin for flesh around it.
 
-    The samples miss it, or it is a plate that needs too many elements.
+    Too thin means that the samples miss it, or that it is a plate with too many elements around it.
     """
     low, high = bones.box
     for part in bones.parts:
-        # 8 prod((high - low) / 2 + t - thinnest) = MOST_SAMPLES (SEEN t)^3 at the least half size t
+        # at the smallest half size t
+        # 8 prod((high - low) / 2 + t - thinnest) = MOST_SAMPLES (SAMPLE_SPACING t)^3
         sampled = 8.0 * Polynomial.fromroots(part.thinnest - 0.5 * (high - low))
-        sampled -= Polynomial([0.0, 0.0, 0.0, MOST_SAMPLES * SEEN**3])
+        sampled -= Polynomial([0.0, 0.0, 0.0, MOST_SAMPLES * SAMPLE_SPACING**3])
         flat = 4.0 * np.prod(np.sort(part.half)[1:])
-        squares = MOST_ELEMENTS / PER_SQUARE
+        squares = MOST_ELEMENTS / ELEMENTS_PER_SQUARE
         least = max(sampled.roots().real.max(), 0.5 * np.sqrt(flat / squares))
         if part.thinnest < least:
             raise ValueError(
@@ -150,13 +150,13 @@ def _check_bones(bones: Bones) -> None:
 
 
 def _check_elements(extent: Array, size: float) -> None:
-    """Raise ValueError where the mesher's box has room for too many elements.
+    """Raise ValueError when too many elements fit into the box of the mesher.
 
-    That box is one edge farther out on every side than flesh that reaches over `extent` m.
+    That box exceeds the flesh, which extends over `extent` m, by one edge on every side.
     """
-    # FILLING * prod(extent + 2 s) elements of volume s^3: as many as allowed at the largest root
-    beside = 8.0 * FILLING * Polynomial.fromroots(-0.5 * extent)
-    most = (beside - Polynomial([0.0, 0.0, 0.0, MOST_ELEMENTS])).roots().real.max()
+    # TETRAHEDRA_PER_CUBE * prod(extent + 2 s) elements of volume s^3: the most at the largest root
+    box = 8.0 * TETRAHEDRA_PER_CUBE * Polynomial.fromroots(-0.5 * extent)
+    most = (box - Polynomial([0.0, 0.0, 0.0, MOST_ELEMENTS])).roots().real.max()
     if size < most:
         raise ValueError(
             f"flesh that reaches over {extent.max():.3g} m would have more than "
@@ -166,14 +166,14 @@ def _check_elements(extent: Array, size: float) -> None:
 
 
 def _pitch(bones: Bones, size: float) -> float:
-    """Distance of samples at which neither edges nor the thinnest bone are missed, m."""
-    return min(0.3 * size, SEEN * bones.thinnest)
+    """Distance of samples that resolves edges and the thinnest bone, m."""
+    return min(0.3 * size, SAMPLE_SPACING * bones.thinnest)
 
 
 def _fleshed(
     outside: Mesh, own: Mesh | None, bones: Bones, size: float, tolerance: float
 ) -> FleshMesh:
-    """Flesh between an outer surface and bones; `own` is the surface where it is the user's."""
+    """Flesh between an outer surface and bones; `own` is the surface if it is the user's."""
     inside = contour(bones, 0.0, _pitch(bones, size))
     chamber = chamber_of(bones, inside[0], tolerance, own)
     hollow = _hollow(outside, inside)
@@ -189,14 +189,15 @@ def _fleshed(
 def _meshed(
     hollow: Mesh, outside: Mesh, bones: Bones, chamber: Chamber, size: float, tolerance: float
 ) -> tuple[Array, Indices, float]:
-    """Points and right-handed tetrahedra between the surfaces, and the tolerance that it took.
+    """Points and right-handed tetrahedra between the surfaces, and the tolerance used.
 
-    Where walls meet, the chamber is a wedge, and the mesher may leave out of its tip all that is
-    within the tolerance of both: a pit as deep as the flesh. It meshes again until there is none.
-    raises  ValueError when it always is
+    Where walls meet, the chamber is a wedge. The mesher may drop the part of its tip that is within
+    the tolerance of both walls, which leaves a pit as deep as the flesh. Then it is meshed again
+    with a smaller tolerance.
+    raises  ValueError when every try has a pit
     """
     part = chamber.cut(hollow)
-    for _ in range(TRIES):
+    for _ in range(MOST_TRIES):
         points, elements = tetrahedra_within(part, size, tolerance)
         flesh = bones.distance(points[elements].mean(axis=1)) > 0.0
         points, elements = chamber.unfold(points, elements, flesh, hollow, tolerance)
@@ -205,24 +206,24 @@ def _meshed(
         corners = points[np.unique(outer_surface(points, elements))]
         if np.abs(signed_distance(corners, outside)).max() <= ASTRAY * tolerance:
             return points, elements, tolerance
-        tolerance *= TIGHTER
+        tolerance *= TOLERANCE_RATIO
     raise ValueError(
         f"flesh that has edges of {size:g} m does not follow its surface. Make the size smaller."
     )
 
 
 def _hollow(outside: Mesh, inside: Mesh) -> Mesh:
-    """The surface of what lies between two surfaces.
+    """The surface of the space between two surfaces.
 
-    One surface has one face where a wall cuts it, a ring. Of two discs upon each other, one for
-    each surface, the mesher cut off a corner in a third of its runs.
+    As one surface, it has one face where a wall cuts it, a ring. With two discs on top of each
+    other, one for each surface, the mesher cut off a corner in a third of its runs.
     """
     inward = inside[1][:, ::-1] + len(outside[0])
     return np.concatenate([outside[0], inside[0]]), np.concatenate([outside[1], inward])
 
 
 def _connected(cells: Indices, count: int) -> Indices:
-    """(count,) number of the part of a mesh that each of its points is in."""
+    """(count,) number of the connected part of a mesh for each point."""
     pairs = np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel()
     links = coo_array((np.ones(pairs[0].size), pairs), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1])
@@ -231,9 +232,9 @@ def _connected(cells: Indices, count: int) -> Indices:
 def _holders(bones: Bones, points: Array, tolerance: float, joint: float) -> tuple[str, ...]:
     """The bone that each point is deepest in, "" for points more than `tolerance` m outside all.
 
-    Points less than `joint` m from a second bone are let go: where a joint bends, flesh that both
-    bones held would be torn. How stiff the flesh about it is goes with that distance, which is
-    therefore the bones' own and no mesh's.
+    Points less than `joint` m from a second bone are not held: flesh held by both bones would tear
+    when the joint bends. This distance determines the stiffness of the flesh around the joint, so
+    it depends on the bones and not on the mesh.
     """
     distances = bones.distances(points)
     nearest = distances.argmin(axis=1)

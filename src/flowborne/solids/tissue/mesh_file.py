@@ -1,6 +1,6 @@
-"""The file in which a run keeps its flesh: another meshing would give another mesh.
+"""The file in which a run keeps its flesh, since meshing again would give another mesh.
 
-flowborne writes .npz. A mesh of the user's own may be a .vtu, which VTK reads.
+flowborne writes .npz. A mesh of the user may also be a .vtu, which VTK reads.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from flowborne.solids.tissue.mesher import run_apart
 HOLDER, BONES, RECIPE = "holder", "bones", "recipe"
 
 ENDING = ".npz"
-"""Of the files that flowborne writes."""
+"""Ending of the files that flowborne writes."""
 
 
 def mesh_bytes(mesh: FleshMesh, recipe: str) -> bytes:
     """Content of the file: arrays in an .npz, exactly.
 
-    `points` (n, 3) m; `elements_4` (m, 4) or `elements_3` (m, 3); `holder` (n,) the number of a
-    point's holder among the names in `bones`, a JSON list, or -1; `recipe` says what the mesh was
-    made of.
+    `points` (n, 3) m; `elements_4` (m, 4) or `elements_3` (m, 3); `holder` (n,) the index of the
+    bone that holds a point in `bones`, a JSON list of names, or -1; `recipe` describes how the mesh
+    was made.
     """
     bones = sorted(set(mesh.holders) - {""})
     number = {"": -1} | {name: n for n, name in enumerate(bones)}
@@ -51,7 +51,7 @@ def mesh_bytes(mesh: FleshMesh, recipe: str) -> bytes:
 
 
 def recipe_of(path: Path) -> str:
-    """What the mesh of a file was made of; empty for one that does not say.
+    """The recipe of the mesh in a file; empty without one.
 
     raises  ValueError for a file that cannot be read
     """
@@ -60,7 +60,7 @@ def recipe_of(path: Path) -> str:
 
 
 def read_mesh(path: Path) -> FleshMesh:
-    """The flesh of such a file. Raises ValueError for another file, or one that is damaged."""
+    """The flesh in a file. Raises ValueError for another kind of file, or a damaged one."""
     found = _contents(path)
     try:
         bones = [*map(str, json.loads(str(found[BONES]))), ""]
@@ -82,7 +82,7 @@ def read_mesh(path: Path) -> FleshMesh:
 
 
 def _contents(path: Path) -> Mapping[str, NDArray[Any]]:
-    """The arrays of a file. Raises ValueError with what its reader stumbles over first."""
+    """The arrays of a file. Raises ValueError with the first error of its reader."""
     try:
         if path.suffix.lower() == ENDING:
             return read_arrays(path)
@@ -111,7 +111,7 @@ def _no_mesh(path: Path, why: object) -> ValueError:
 
 
 def _elements(found: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-    """(m, 4) the tetrahedra of a file, (m, 3) its triangles when it has none."""
+    """(m, 4) the tetrahedra of a file, or (m, 3) its triangles if it has no tetrahedra."""
     for corners in (4, 3):
         elements = found.get(f"elements_{corners}", np.zeros((0, corners)))
         if len(elements):

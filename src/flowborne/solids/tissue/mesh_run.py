@@ -1,8 +1,8 @@
-"""The process that makes or reads a mesh, and may die of it: files in, files out.
+"""A process that makes or reads a mesh and may crash: files in, files out.
 
-fTetWild leaves a file in the folder where it runs and writes to the terminal. VTK trusts what a
-file says of its own arrays, and dies where that is wrong. This is run as a script, in a folder that
-is thrown away, and ends with the process that began it.
+fTetWild leaves a file in its working folder and writes to the terminal. VTK trusts the array sizes
+in a file, and crashes if they are wrong. This module runs as a script in a temporary folder, and
+ends with its parent process.
 """
 
 from __future__ import annotations
@@ -18,28 +18,30 @@ import numpy as np
 SURFACES, TETRAHEDRA, READ = "surfaces.npz", "tetrahedra.npz", "read.npz"
 
 FIELDS = ("bones", "recipe")
-"""Texts that a mesh of flesh has."""
+"""Names of the texts in a mesh of flesh."""
 
 CORNERS = {5: 3, 10: 4}
-"""VTK's cells that flesh is made of, triangles and tetrahedra -> their corners."""
+"""VTK's cell types of flesh, triangles and tetrahedra -> number of corners."""
 
 PR_SET_PDEATHSIG = 1
 """Linux's name for the signal that a process gets when its parent ends."""
 
 MEMORY = 8 << 30
-"""Bytes that a file may make VTK ask for."""
+"""Most bytes that VTK may allocate for a file."""
 
 
 def end_with_parent() -> None:
-    """Let the system end this process with the one that began it, which may be killed: nothing
-    else would stop a mesher that has work for hours. Of systems that can, only Linux is asked."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's, which ends this
+    """Let the system end this process with its parent, on Linux.
+
+    The parent may be killed, and nothing else would stop a mesher that runs for hours.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and ends this process
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def mesh() -> None:
-    """Mesh what is in SURFACES into TETRAHEDRA, both in this folder."""
+    """Mesh the surface in SURFACES into TETRAHEDRA, both in this folder."""
     import pytetwild
 
     with np.load(SURFACES) as given:
@@ -54,7 +56,7 @@ def mesh() -> None:
 
 
 def read(file: str) -> None:
-    """Put what a .vtu file holds into READ: points, elements of each kind, holders and FIELDS."""
+    """Copy the contents of a .vtu file to READ: points, elements, holders and FIELDS."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader

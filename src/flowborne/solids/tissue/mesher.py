@@ -22,11 +22,11 @@ Indices = NDArray[np.int64]
 
 
 def run_apart(folder: str, made: str, job: str, *arguments: str) -> str | None:
-    """Do a job of `mesh_run` in a folder; why it failed to make the file `made`, or None.
+    """Run a job of `mesh_run` in a folder; return why it did not make the file `made`, or None.
 
-    fTetWild may end its process with 0 before there is a mesh.
+    The process may crash; fTetWild may also exit with 0 before there is a mesh.
     """
-    # -P: no module of this folder stands in for one of Python's own
+    # -P: no module of this folder hides one of Python's
     command = [sys.executable, "-P", str(Path(mesh_run.__file__).resolve()), job, *arguments]
     run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if run.returncode == 0 and (Path(folder) / made).is_file():
@@ -37,11 +37,11 @@ def run_apart(folder: str, made: str, job: str, *arguments: str) -> str | None:
 
 
 def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Array, Indices]:
-    """Points (n, 3) and right-handed tetrahedra (m, 4) of all that a surface encloses.
+    """Points (n, 3) and right-handed tetrahedra (m, 4) of the inside of a surface.
 
-    surface    closed, and turned outward: that of a hollow body has parts turned into the hollow
-    size       length of edges, m; shorter where the surface bends too much for it, or is smaller
-    tolerance  how far from the surface faces of the tetrahedra may be, m
+    surface    closed and outward; for a hollow body it has parts that point into the hollow
+    size       length of edges, m; shorter where the curvature or size of the surface requires it
+    tolerance  largest distance of faces of the tetrahedra from the surface, m
     raises     ValueError when the mesher fails
 
     Two runs give different meshes of the same quality, even on one thread.
@@ -54,7 +54,7 @@ def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Arr
             Path(folder) / mesh_run.SURFACES,
             points=points,
             triangles=triangles.astype(np.int32),
-            size=min(size, across),  # by which the mesher's box is larger than the surface
+            size=min(size, across),  # the mesher's box exceeds the surface by it
             tolerance=tolerance / across,
             threads=numba_thread_count(),
         )

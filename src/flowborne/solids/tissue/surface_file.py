@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SAME = 1e-7
-"""Points this close, relative to the size of the surface, are one: STL repeats its corners."""
+"""Closer points, relative to the size of the surface, are merged: STL repeats its corners."""
 
 
 def read_surface(path: Path) -> Mesh:
-    """The surface in a file, its triangles turned outward.
+    """The surface in a file, its triangles oriented outward.
 
-    raises  ValueError when there is no such file, when it has no triangles, and when its
-            triangles do not close a surface
+    raises  ValueError for a missing file, a file without triangles, and triangles that do not close
+            a surface
     """
     content = surface_bytes(path)
     if path.suffix.lower() not in formats():
@@ -68,14 +68,14 @@ def surface_bytes(path: Path) -> bytes:
 
 
 def formats() -> tuple[str, ...]:
-    """Endings of the files whose triangles trimesh reads here: more with its own extras."""
+    """Endings of the mesh files that trimesh reads here; its extras add more."""
     return tuple(sorted(f".{kind}" for kind in mesh_formats() if "_" not in kind))
 
 
 def check_covers(path: Path, surface: Mesh, bones: Bones, pitch: float, tolerance: float) -> None:
     """Raise ValueError when a bone is more than `tolerance` m outside its flesh.
 
-    pitch  of the lattice on which the bones' surfaces are looked for, m
+    pitch  spacing of the lattice for the surfaces of the bones, m
     """
     points = contour(bones, 0.0, pitch)[0]
     outside = signed_distance(points, surface)
@@ -90,7 +90,7 @@ def check_covers(path: Path, surface: Mesh, bones: Bones, pitch: float, toleranc
 
 
 def place(point: Array) -> str:
-    """A point (3,) for people: "(0.1, 2, -3) m"."""
+    """A point (3,) for messages: "(0.1, 2, -3) m"."""
     return f"({', '.join(f'{x:.4g}' for x in point)}) m"
 
 
@@ -99,7 +99,7 @@ def _triangles(path: Path, content: bytes) -> pv.PolyData:
     try:
         kind = path.suffix.lower().removeprefix(".")
         read = trimesh.load_mesh(BytesIO(content), file_type=kind, process=False)
-    except Exception as error:  # its readers raise whatever goes wrong in them
+    except Exception as error:  # its readers raise errors of any kind
         why = str(error).rstrip(".!")
         raise ValueError(
             f"flesh file {path} cannot be read: {why}. Save the surface once more."
@@ -127,5 +127,5 @@ def _edges(surface: pv.PolyData, **kind: bool) -> pv.PolyData:
 
 
 def _middle(edges: pv.PolyData) -> str:
-    """Where the first of some edges is."""
+    """The middle of the first edge, for messages."""
     return place(np.asarray(edges.points)[edges.lines[1:3]].mean(axis=0))

@@ -1,7 +1,7 @@
-"""Mirror planes that exchange bones: flesh is meshed between them and reflected into the rest.
+"""Mirror planes that exchange bones: flesh is meshed between them and reflected to the other side.
 
-The mesher lays its points where it likes. How stiff flesh is about a joint depends on which of them
-a bone holds, so that two legs meshed on their own may differ by a quarter.
+The mesher is not symmetric. The stiffness of flesh around a joint depends on the points that a bone
+holds, so two legs that are meshed separately may differ by a quarter.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 SAME = 0.01
-"""How far the mirror image of a shape may be off it, as a part of the distance that faces may."""
+"""Largest distance between a shape and its mirror image, in tolerances of the faces."""
 
 PARALLEL = 1e-3
-"""Unit vectors that differ by less than this are one: files give coordinates with few digits."""
+"""Unit vectors that differ by less are equal: files give coordinates with few digits."""
 
 MIRRORED = [2, 1, 0, 3]
-"""Corners of an element's image, right-handed again and with `elements.PARTS` mirrored too."""
+"""Corners of the image of an element: right-handed, and with `elements.PARTS` mirrored."""
 
 APART = np.array([0.55, 0.72, 0.42])
-"""A direction in no mirror plane that a person would choose: the chamber around it is meshed."""
+"""A direction in no likely mirror plane; the chamber that contains it is meshed."""
 
 
 @dataclass(frozen=True)
 class Chamber:
-    """A part of space between mirror planes, whose images under reflection fill all of it.
+    """A part of space between mirror planes; its images under reflection fill all space.
 
     centre  (3,) m, in all of the planes
-    walls   (k, 3) unit normals of the planes around it, inward; none where nothing is mirrored
-    images  (g, 3, 3) what carries it to each of its images, the identity first
+    walls   (k, 3) inward unit normals of the planes around it; none without a mirror plane
+    images  (g, 3, 3) the maps to its images, the identity first
     """
 
     centre: Array
@@ -49,7 +49,7 @@ class Chamber:
     images: Array
 
     def cut(self, surface: Mesh) -> Mesh:
-        """What of a closed surface's inside lies in the chamber, as a closed surface."""
+        """The part of the inside of a closed surface in the chamber, as a closed surface."""
         pv = flesh_library()
         left = pv.PolyData.from_regular_faces(*surface)
         for wall in self.walls:
@@ -65,14 +65,14 @@ class Chamber:
         surface: Mesh,
         tolerance: float,
     ) -> tuple[Array, Indices]:
-        """Points and right-handed tetrahedra of all images in turn, joined at the walls.
+        """Points and right-handed tetrahedra of all images, joined at the walls.
 
         points     (n, 3) m
-        elements   (m, 4) right-handed, of all that is in the chamber
-        wanted     (m,) those of them that are set down in the images
-        surface    that of all the flesh, in all images
-        tolerance  how far from a wall the faces on it may be, m; their points are put onto it, and
-                   elements that this makes flat are left out
+        elements   (m, 4) right-handed tetrahedra in the chamber
+        wanted     (m,) those that are copied to the images
+        surface    surface of all the flesh, in all images
+        tolerance  largest distance of the faces on a wall from it, m; their points are projected
+                   onto it, and elements that become flat are dropped
         """
         on_wall = self._on_walls(points, elements, surface, tolerance)
         settled = points - self.centre
@@ -90,8 +90,8 @@ class Chamber:
         return images.reshape(-1, 3)[first], unfolded.reshape(-1, 4)
 
     def _joined(self, on_wall: NDArray[np.bool_], count: int) -> Indices:
-        """(g, count) numbers of the images of points: an image has those on a wall in common with
-        the one on its other side."""
+        """(g, count) numbers of the images of points; two images share the points on the wall
+        between them."""
         numbers = np.arange(len(self.images) * count).reshape(-1, count)
         graph = coo_array((numbers.size,) * 2, dtype=np.float64)
         for wall, on in zip(self.walls, on_wall, strict=True):
@@ -104,10 +104,10 @@ class Chamber:
     def _on_walls(
         self, points: Array, elements: Indices, surface: Mesh, tolerance: float
     ) -> NDArray[np.bool_]:
-        """(k, n) of each wall, the points of faces that lie in it.
+        """(k, n) for each wall, the points of faces that lie in it.
 
-        Those are the faces beside it whose middle is no closer to the surface: which way a small
-        one faces says nothing, as the mesher may tilt it.
+        These are the faces near the wall with a middle no closer to the surface. The normals of
+        small faces are no criterion, as the mesher may tilt them.
         """
         faces = surface_of(elements)
         to_surface = np.abs(signed_distance(points[faces].mean(axis=1), surface))
@@ -124,11 +124,11 @@ def reflection(normal: Array) -> Array:
 
 
 def chamber_of(bones: Bones, skin: Array, tolerance: float, surface: Mesh | None) -> Chamber:
-    """The chamber between the mirror planes that exchange bones; all of space where there is none.
+    """The chamber between the mirror planes that exchange bones; all space without such planes.
 
-    skin       (n, 3) points on the bones' skin, m
-    tolerance  how far from the surfaces the faces of the mesh may be, m
-    surface    the flesh's own, which must be its own mirror image too
+    skin       (n, 3) points on the surface of the bones, m
+    tolerance  largest distance of the faces of the mesh from the surfaces, m
+    surface    the user's surface of the flesh, which must be symmetric too, or None
     """
     centres = np.array([0.5 * (part.low + part.high) for part in bones.parts])
     middle = centres.mean(axis=0)
@@ -144,7 +144,7 @@ def chamber_of(bones: Bones, skin: Array, tolerance: float, surface: Mesh | None
         ):
             normals.append(normal)
     whole = [n for n in normals if all(_among(reflection(n) @ m, normals) for m in normals)]
-    if len(whole) < len(normals):  # a tolerance let some of the planes through, and not others
+    if len(whole) < len(normals):  # the tolerance accepted some of the planes only
         whole = normals[:1]
     inward = np.array([n if n @ APART > 0.0 else -n for n in whole]).reshape(-1, 3)
     walls = np.array([n for n in inward if _next_to(n, inward)]).reshape(-1, 3)
@@ -152,14 +152,14 @@ def chamber_of(bones: Bones, skin: Array, tolerance: float, surface: Mesh | None
 
 
 def _among(normal: Array, normals: list[Array]) -> bool:
-    """Whether a plane is one of some, by their unit normals."""
+    """Whether a plane is in a list, by unit normals."""
     return any(np.abs(np.abs(normal @ n) - 1.0) < PARALLEL**2 for n in normals)
 
 
 def _is_mirror(
     normal: Array, centre: Array, bones: Bones, skin: Array, same: float, surface: Mesh | None
 ) -> bool:
-    """Whether the bones, and the flesh's own surface, are their own images in a plane."""
+    """Whether the bones, and the user's surface of the flesh, are symmetric about a plane."""
     mirror = reflection(normal)
 
     def image(points: Array) -> Array:
@@ -173,13 +173,15 @@ def _is_mirror(
 
 
 def _next_to(normal: Array, inward: Array) -> bool:
-    """Whether no plane but its own lies between APART and its image: it is a wall."""
+    """Whether a plane is a wall: no other plane lies between APART and its image."""
     return int((inward @ (reflection(normal) @ APART) < 0.0).sum()) == 1
 
 
 def _generated(normals: Array) -> Array:
-    """(g, 3, 3) all products of reflections in some planes, the shortest first: files give
-    coordinates with few digits, and each factor adds their error."""
+    """(g, 3, 3) all products of reflections in some planes, the shortest first.
+
+    Files give coordinates with few digits, and each factor adds their error.
+    """
     images = [np.eye(3)]
     for image in images:
         for normal in normals:
