@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing paper exporters fuzz messages size strangers validation-page clean
+.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing gallery paper exporters fuzz messages size strangers validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -36,6 +36,9 @@ imports: $(VENV)/installed-test
 
 failing: $(VENV)/installed-test
 	$(BIN)/python tools/failing.py
+
+gallery: $(VENV)/installed-test
+	$(BIN)/python tools/gallery.py $(NAMES)
 
 paper: $(VENV)/installed-test
 	$(BIN)/python tools/paper.py

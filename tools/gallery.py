@@ -78,19 +78,7 @@ def has_gas(scene: Scene) -> bool:
     return scene.fluid is not None and scene.fluid.density <= MAX_GAS_DENSITY
 
 
-def has_line_search(scene: Scene) -> bool:
-    """Whether a decision takes many trials, and the creature has flesh: each trial takes long."""
-    return bool(scene.flesh) and scene.controller.rule.kind == "golden-section"
-
-
-FLYERS, ROBOTS, FLESH = "Flyers", "Swimming robots", "Swimmers of flesh and bone"
-
-SMALL_TANK = {
-    "domain.lower": "[-6.0, -6.0, -10.0]",
-    "domain.upper": "[6.0, 6.0, 6.0]",
-    "domain.resolution": "32",
-}
-"""Settings for a swimmer that does not get far."""
+FLYERS, ROBOTS = "Flyers", "Swimming robots"
 
 GROUPS = (
     Group("Walkers", lambda scene: scene.human is not None, 60),
@@ -98,12 +86,23 @@ GROUPS = (
     Group("Blocks in a stream", has_inflow, 100, {"domain.resolution": "64"}),
     Group(FLYERS, lambda scene: has_gas(scene) and not scene.flesh, 320),
     Group(FLYERS, has_gas, 20, {"time.frames_per_second": "15.0"}),
-    Group(FLESH, has_line_search, 18, SMALL_TANK),
-    Group(FLESH, lambda scene: bool(scene.flesh), 40, SMALL_TANK),
+    Group(
+        "Swimmers of flesh and bone",
+        lambda scene: bool(scene.flesh),
+        40,
+        {
+            "domain.lower": "[-6.0, -6.0, -10.0]",
+            "domain.upper": "[6.0, 6.0, 6.0]",
+            "domain.resolution": "32",
+        },
+    ),
     Group(ROBOTS, lambda scene: scene.dimensions == 2, 180),
     Group(ROBOTS, lambda scene: True, 180, {"domain.resolution": "61"}),
 )
 """In the order of the page."""
+
+EARLIER = {"swimmer-held": 12, "swimmer-stroke": 6}
+"""Frames that are shown of scenes that take too long to get to their group's."""
 
 
 def group_of(scene: Scene) -> Group:
@@ -113,7 +112,7 @@ def group_of(scene: Scene) -> Group:
 
 def frame_of(scene: Scene) -> int:
     """Number of the frame that is shown of a scene."""
-    return min(group_of(scene).frame, scene.time.frames)
+    return min(EARLIER.get(scene.name, group_of(scene).frame), scene.time.frames)
 
 
 def picture_of(name: str) -> Path:
