@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from flowborne import Grid, SceneError, Simulation, load_scene, step
+from flowborne.bodies import TrajectorySinusoid, WindForce
 from flowborne.body_measures import BodyMeasures
-from flowborne.motions import TrajectorySinusoid
 from flowborne.validation.worlds import mjcf
-from flowborne.winds import WindForce
 from flowborne.worlds import make_world
 
 BALL = (

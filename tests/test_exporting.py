@@ -101,13 +101,13 @@ def test_ones_own_takes_the_place_of_ours(water: Path, tmp_path: Path) -> None:
     assert can_write(".csv")
     ours = EXPORTERS._kinds[".csv"]
 
-    @fb.exporters.register(".csv")
+    @fb.parts.exporter(".csv")
     @dataclass(frozen=True)
     class Own:
         def write(self, run: fb.OpenRun, path: Path) -> None:
             path.write_text(run.name)
 
-    @fb.exporters.register(".odd")
+    @fb.parts.exporter(".odd")
     @dataclass(frozen=True)
     class Odd:
         def write(self, run: fb.OpenRun, path: Path) -> float:

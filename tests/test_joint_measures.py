@@ -10,10 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import flowborne as fb
-from flowborne.bodies import SolidState, kinetic_energy, potential_energy
+from flowborne.bodies import SolidState, TrajectorySinusoid, kinetic_energy, potential_energy
 from flowborne.joint_measures import JointMeasures
 from flowborne.measures import Measures
-from flowborne.motions import TrajectorySinusoid
 from flowborne.scenes.build import build
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world

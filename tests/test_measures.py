@@ -2,11 +2,9 @@ import numpy as np
 import pytest
 
 from flowborne import FrameReport, Grid, Setup, SolidModel, World, step
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.measures import Measures, quaternion
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world
+from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, cut_by_bodies, make_world
 
 MODEL = """
 <mujoco>

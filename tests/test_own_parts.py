@@ -120,11 +120,11 @@ def test_parts_work_in_python(scene: Path) -> None:
     world = fb.Simulation(scene).world
     controller = fb.Controller(
         np.array([0]),
-        fb.objectives.ObjectiveSum.of(level("block", -9.0)),
+        fb.parts.ObjectiveSum.of(level("block", -9.0)),
         fb.Hypothesis(0.04),
         strength=1.0,
         rule=share(0.5),
-        executor=fb.executors.Serial(),
+        executor=fb.machine.Serial(),
     )
     decision = controller.decide(world, 0.1, fb.step)
     assert abs(decision.displacement[0]) == pytest.approx(0.05)
@@ -241,10 +241,10 @@ def test_what_a_rule_or_gradient_gives_is_looked_at(scene: Path, kind: str, give
     world = fb.Simulation(scene.with_name("sound.toml")).world
     controller = fb.Controller(
         np.array([0]),
-        fb.objectives.ObjectiveSum.of(fb.objectives.ObjectiveCallable(lambda m: 0.0, name="none")),
+        fb.parts.ObjectiveSum.of(fb.parts.ObjectiveCallable(lambda m: 0.0, name="none")),
         fb.Hypothesis(0.04),
         strength=1.0,
-        executor=fb.executors.Serial(),
+        executor=fb.machine.Serial(),
         **{kind: Odd(given)},
     )
     with pytest.raises(fb.PartError, match=rf"{kind} Odd gave .*: return .* for each of 1 dofs"):
@@ -286,9 +286,9 @@ def test_a_name_of_ours_a_class_without_its_method_and_a_taken_key_are_refused()
     from dataclasses import dataclass
 
     with pytest.raises(ValueError, match="'effort' is flowborne's own"):
-        fb.objectives.register("effort")(object)
+        fb.parts.objective("effort")(object)
     with pytest.raises(ValueError, match="'thing' is no dataclass"):
-        fb.objectives.register("thing")(object)
+        fb.parts.objective("thing")(object)
 
     @dataclass
     class Weighty:
@@ -298,9 +298,9 @@ def test_a_name_of_ours_a_class_without_its_method_and_a_taken_key_are_refused()
             return self.weight
 
     with pytest.raises(ValueError, match="has a field 'weight', which is a key of every objective"):
-        fb.objectives.register("weighty")(Weighty)
+        fb.parts.objective("weighty")(Weighty)
     with pytest.raises(ValueError, match=r"has no method step_scale\(\): add it"):
-        fb.rules.register("weighty")(Weighty)
+        fb.parts.rule("weighty")(Weighty)
 
 
 WIND = """
@@ -368,9 +368,9 @@ def test_a_wind_that_fails_is_told_before_the_run_or_keeps_what_was_done(
 def test_a_gradient_of_ones_own_gets_the_probes_of_the_scene(scene: Path) -> None:
     from dataclasses import dataclass
 
-    @fb.gradients.register("doubled")
+    @fb.parts.gradient("doubled")
     @dataclass(frozen=True)
-    class Doubled(fb.gradients.GradientCentral):
+    class Doubled(fb.parts.GradientCentral):
         factor: float = 2.0
 
     scene.write_text(

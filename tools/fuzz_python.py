@@ -66,21 +66,21 @@ MODULE = """
 import os
 import numpy as np
 from dataclasses import dataclass
-from flowborne import exporters, gradients, objectives, rules
+from flowborne import parts
 
 class Odd(BaseException): pass
 class Mute(Exception):
     def __str__(self): raise ValueError
 def deep(): return deep()
 
-@objectives.register("wish_{name}")
+@parts.objective("wish_{name}")
 @dataclass(frozen=True)
 class Wish:
     height: float = 0.0
     def value(self, measured):
         return abs(measured.body("arm").centre[2] - self.height)  # value
 
-@rules.register("rule_{name}")
+@parts.rule("rule_{name}")
 @dataclass(frozen=True)
 class Rule:
     part: float = 0.5
@@ -89,13 +89,13 @@ class Rule:
     def step(self, poses, gradient, limit):
         return self.part * rules.descent(gradient, limit)  # step
 
-@gradients.register("gradient_{name}")
+@parts.gradient("gradient_{name}")
 @dataclass(frozen=True)
-class Slope(gradients.FiniteDifference):
+class Slope(parts.FiniteDifference):
     def estimate(self, poses):
-        return gradients.Estimate(0.0, np.ones(poses.count))  # estimate
+        return parts.Estimate(0.0, np.ones(poses.count))  # estimate
 
-@exporters.register(".{name}")
+@parts.exporter(".{name}")
 @dataclass(frozen=True)
 class Track:
     body: str = "arm"
@@ -130,14 +130,14 @@ SHAPE = """
 import os
 import numpy as np
 from dataclasses import dataclass
-from flowborne import shapes
+from flowborne import parts
 
 class Odd(BaseException): pass
 class Mute(Exception):
     def __str__(self): raise ValueError
 def deep(): return deep()
 
-@shapes.register("shape_{name}")
+@parts.shape("shape_{name}")
 @dataclass(frozen=True)
 class Ball:
     radius: float

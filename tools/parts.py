@@ -41,7 +41,7 @@ OWN: dict[str, Registry[Any]] = {
     "shape": SHAPES,
     "exporter": EXPORTERS,
 }
-"""Parts that a user can add, by the page of the public face on which `register` is."""
+"""Parts that a user can add, by their decorator in `flowborne.parts`."""
 
 
 def chosen() -> str:
@@ -71,7 +71,7 @@ def own() -> str:
     rows = []
     for what, registry in OWN.items():
         methods = ", ".join(f"`{name}()`" for name in registry.methods)
-        rows.append([what, f"`flowborne.{what}s.register`", methods])
+        rows.append([what, f"`flowborne.parts.{what}`", methods])
     return table(["part", "decorator", "methods"], rows)
 
 

@@ -2,21 +2,11 @@
 
 The public names are here and in these modules:
 
-    bodies        models, poses, momentum and energy of bodies
-    boundaries    what the sides of a domain do
-    executors     where the trials of a decision run
-    exporters     runs as files for other programs
-    flesh         flesh as a [[flesh]] table grows it
-    gradients     how a gradient is estimated
-    machine       threads, memory, seconds by part
-    motions       prescribed motions of joints
-    objectives    objectives of the controller
-    operators     the operators of a step, one by one
-    pictures      pictures and plots
-    rules         step rules of the gradient descent
-    shapes        geometries that a user defines
-    winds         simple winds
-    worlds        worlds made and stepped in code
+    bodies     models, poses, momentum and energy, flesh, prescribed motions, simple winds
+    machine    threads, memory, seconds by part, executors
+    parts      objectives, rules, gradients, shapes and exporters, and how to add your own
+    pictures   pictures and plots
+    worlds     worlds made and stepped in code, boundaries, operators of a step
 
 All other modules are internal and may change.
 """
@@ -91,45 +81,25 @@ __all__ = [
     "__version__",
     "advance",
     "bodies",
-    "boundaries",
     "error_bar",
-    "executors",
     "export",
-    "exporters",
-    "flesh",
-    "gradients",
     "import_character",
     "load_scene",
     "machine",
     "make_world",
-    "motions",
-    "objectives",
     "open_run",
-    "operators",
+    "parts",
     "pictures",
-    "rules",
     "run",
-    "shapes",
     "step",
-    "winds",
     "worlds",
 ]
 
 PAGES = (
+    "parts",
     "bodies",
-    "boundaries",
-    "executors",
-    "exporters",
-    "flesh",
-    "gradients",
     "machine",
-    "motions",
-    "objectives",
-    "operators",
     "pictures",
-    "rules",
-    "shapes",
-    "winds",
     "worlds",
 )
 """Public modules of the package, besides itself."""

@@ -1,9 +1,19 @@
-"""Articulated bodies and flesh by themselves: models, poses, momentum, energy."""
+"""Bodies: models, poses, momentum and energy, flesh, prescribed motions and simple winds."""
 
 from __future__ import annotations
 
+from flowborne.coupling.motion import JointCommand, Trajectory
+from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
+from flowborne.motion.tracks import (
+    Curve,
+    TrajectoryConstant,
+    TrajectoryFormula,
+    TrajectoryKeyframes,
+    TrajectorySinusoid,
+)
+from flowborne.scenes.flesh import FleshTable, grow
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
@@ -19,26 +29,49 @@ from flowborne.solids.momentum import (
 from flowborne.solids.prescribed import holding
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Tissue, add_flesh
+from flowborne.solids.tissue.mesh import FleshMesh
+from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh
+from flowborne.solids.wind import Wind, WindFaces, WindField, WindForce
 from flowborne.solvers.cholesky import symmetric_factor
 
 __all__ = [
     "SIDES",
+    "Curve",
     "Flesh",
+    "FleshMesh",
+    "FleshTable",
+    "JointCommand",
     "Kinematics",
+    "Servo",
+    "ServoExact",
+    "ServoPD",
     "SolidModel",
     "SolidState",
     "Tissue",
+    "Trajectory",
+    "TrajectoryConstant",
+    "TrajectoryFormula",
+    "TrajectoryKeyframes",
+    "TrajectoryServo",
+    "TrajectorySinusoid",
+    "Wind",
+    "WindFaces",
+    "WindField",
+    "WindForce",
     "add_flesh",
     "assemble_flesh",
+    "grow",
     "halfway_momentum",
     "holding",
     "human_mjcf",
     "kinematics",
     "kinetic_energy",
     "mass_matrix",
+    "mesh_bytes",
     "momentum",
     "potential_energy",
     "prescribe_flesh",
+    "read_mesh",
     "standard_skeleton",
     "static_forces",
     "symmetric_factor",

@@ -1,4 +1,4 @@
-"""What a run takes of the machine: threads, memory, seconds by part; processes that end with it."""
+"""Resources of a run: threads, memory, seconds by part, and where trials run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,16 @@ from time import perf_counter
 
 import numpy as np
 
-from flowborne.control.executors import GRACE, end_with_parent
+from flowborne.control.executors import (
+    GRACE,
+    Foreign,
+    Mapper,
+    Processes,
+    Serial,
+    Threads,
+    end_with_parent,
+    mapper,
+)
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.kernels.vectors import turn
 from flowborne.runs.checkpoint import state_bytes
@@ -16,9 +25,15 @@ from flowborne.runs.summary import peak_memory
 __all__ = [
     "GRACE",
     "PARTS",
+    "Foreign",
+    "Mapper",
+    "Processes",
+    "Serial",
+    "Threads",
     "cores",
     "end_with_parent",
     "kernel_threads",
+    "mapper",
     "memory_bandwidth",
     "peak_memory",
     "state_bytes",

@@ -2,6 +2,9 @@
 
 world = make_world("<mujoco>...</mujoco>", Grid.slab(64, 64, 1 / 64, (0, 0)), density=1000.0)
 report = advance(world, 0.01, 20)
+
+Also here: what the sides of a domain do, and the operators of a step on plain arrays, for research
+on the numerics; the operators change with the numerics.
 """
 
 from __future__ import annotations
@@ -19,18 +22,55 @@ from flowborne.coupling.start import set_going, start
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.stream import Sampled
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import Boundaries, Source
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.advection import CENTRE, carry, cells_per_step
+from flowborne.fluid.boundary import (
+    Boundaries,
+    Boundary,
+    BoundaryClosed,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    BoundaryPeriodic,
+    Profile,
+    Source,
+)
+from flowborne.fluid.control_volumes import control_volumes
+from flowborne.fluid.dye import Passage, nothing_brought
+from flowborne.fluid.ghosts import pad_cells
+from flowborne.fluid.grid import Array, Grid, faces_of
+from flowborne.fluid.transport import Transport
 from flowborne.solids import momentum
 from flowborne.solids.model import SolidModel
 from flowborne.solids.wind import Wind
+from flowborne.solvers.pressure import PressureSolution, PressureSystem
 
 __all__ = [
+    "CENTRE",
+    "Boundaries",
+    "Boundary",
+    "BoundaryClosed",
+    "BoundaryInflow",
+    "BoundaryNoSlip",
+    "BoundaryOpen",
+    "BoundaryPeriodic",
     "Field",
     "FluidProperties",
+    "Passage",
+    "PressureSolution",
+    "PressureSystem",
+    "Profile",
+    "Source",
+    "Transport",
     "advance",
+    "carry",
+    "cells_per_step",
+    "control_volumes",
+    "cut_by_bodies",
+    "faces_of",
     "kinetic_energy",
     "make_world",
+    "nothing_brought",
+    "pad_cells",
     "set_going",
     "set_velocity",
     "start",

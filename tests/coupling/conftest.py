@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from flowborne import Grid
-from flowborne.boundaries import Boundaries
 from flowborne.coupling.fractions import Geometry
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world
+from flowborne.worlds import Boundaries, cut_by_bodies, make_world
 
 from .meshes import meshed_mjcf
 

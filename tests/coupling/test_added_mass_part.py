@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from flowborne import FrameReport, Grid
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.step import step
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world
+from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, make_world
 
 BALL = (
     '<body name="ball"><joint name="along" type="slide" axis="1 0 0"/>'

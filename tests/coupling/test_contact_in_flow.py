@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from flowborne import Grid, Outcome, World, step
+from flowborne.bodies import JointCommand
 from flowborne.coupling import solve
-from flowborne.motions import JointCommand
-from flowborne.operators import PressureSolution, PressureSystem
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import PressureSolution, PressureSystem, advance, make_world
 
 BOX = """<mujoco><worldbody>
   <geom type="plane" size="4 4 1" pos="0 -0.4 0" zaxis="0 1 0" condim="{condim}" friction="0 0 0"/>

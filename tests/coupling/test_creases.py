@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from flowborne import Grid, World
-from flowborne.bodies import kinematics
+from flowborne.bodies import TrajectorySinusoid, kinematics
 from flowborne.coupling.flow import face_masses, volumes_of
 from flowborne.coupling.operators import twists
 from flowborne.fluid.projection import accelerated, face_weights
 from flowborne.kernels.closed_fractions import CREASE
-from flowborne.motions import TrajectorySinusoid
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.swimmers import BOX, LINK, PERIOD, swimmer
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import advance, cut_by_bodies, make_world
 
 
 def fastest_end(world: World) -> float:

@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Faces, Grid, World, step
-from flowborne.boundaries import Boundaries, BoundaryOpen
+from flowborne.bodies import TrajectorySinusoid
 from flowborne.coupling import flow
 from flowborne.coupling.leak_proof import leak_proof_flux
 from flowborne.coupling.mouths import Mouth
 from flowborne.motion.inflow import FactorSteady
-from flowborne.motions import TrajectorySinusoid
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world
+from flowborne.worlds import Boundaries, BoundaryOpen, cut_by_bodies, make_world
 
 from .meshes import Model, meshed_mjcf
 

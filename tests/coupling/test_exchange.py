@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid, Simulation, World, load_scene, step
-from flowborne.bodies import momentum
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.bodies import TrajectorySinusoid, momentum
 from flowborne.coupling.flow import face_masses, fluid_momentum, volumes_of
-from flowborne.motions import TrajectorySinusoid
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import RING, mjcf
-from flowborne.worlds import advance, make_world, set_velocity
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    advance,
+    cut_by_bodies,
+    make_world,
+    set_velocity,
+)
 
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))

@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid, Outcome, StepReport, World, step
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen, BoundaryPeriodic
-from flowborne.motions import JointCommand
+from flowborne.bodies import JointCommand
 from flowborne.validation.worlds import RING, mjcf
-from flowborne.worlds import advance, make_world, set_velocity
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    BoundaryPeriodic,
+    advance,
+    make_world,
+    set_velocity,
+)
 
 LONG = 0.2
 """m, half the length of the plate across its way, or all of it from its hinge."""

@@ -21,19 +21,24 @@ from flowborne import (
     World,
     step,
 )
-from flowborne.bodies import kinetic_energy
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.bodies import JointCommand, TrajectorySinusoid, kinetic_energy
 from flowborne.coupling import flow
 from flowborne.coupling.flow import carry_fluid, face_masses, volumes_of
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import move_bodies
 from flowborne.motion.inflow import FactorSteady
-from flowborne.motions import JointCommand, TrajectorySinusoid
-from flowborne.operators import Passage, cut_by_bodies
 from flowborne.solids.tissue.growth import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.validation.worlds import PERIODIC, RING, mjcf
-from flowborne.worlds import make_world, set_velocity
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    Passage,
+    cut_by_bodies,
+    make_world,
+    set_velocity,
+)
 
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid, World, step
-from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.flow import volumes_of
 from flowborne.coupling.half_kick import half_kick, likely
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world, set_velocity
+from flowborne.worlds import Boundaries, BoundaryOpen, cut_by_bodies, make_world, set_velocity
 
 DT = 1.0 / 64
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))

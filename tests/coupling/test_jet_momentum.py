@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid, World, step
-from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.mouths import Mouth
 from flowborne.motion.inflow import FactorPulse
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world
+from flowborne.worlds import Boundaries, BoundaryOpen, make_world
 
 RADIUS, HALF, RATE, DURATION = 0.2, 0.1, 0.1, 1.0
 SQUARE = Grid.slab(48, 48, 2.0 / 48.0, (-1.0, -1.0))

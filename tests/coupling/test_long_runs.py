@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid, Simulation, World, load_scene, step
-from flowborne.bodies import kinetic_energy
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.bodies import TrajectoryConstant, TrajectorySinusoid, kinetic_energy
 from flowborne.coupling import flow
 from flowborne.coupling.flow import face_masses, volumes_of
 from flowborne.coupling.fractions import Geometry
-from flowborne.motions import TrajectoryConstant, TrajectorySinusoid
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world, set_velocity
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    cut_by_bodies,
+    make_world,
+    set_velocity,
+)
 
 from .meshes import Model, meshed_mjcf
 

@@ -8,10 +8,16 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from flowborne import Grid, World
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import advance, make_world, set_velocity
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    advance,
+    cut_by_bodies,
+    make_world,
+    set_velocity,
+)
 
 from .meshes import mesh_asset
 

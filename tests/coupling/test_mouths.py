@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, Tissue, World, step
-from flowborne.boundaries import Boundaries, BoundaryOpen
 from flowborne.coupling.flow import face_masses, fluid_momentum, volumes_of
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import jets_at
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorSteady
-from flowborne.operators import cut_by_bodies
 from flowborne.solids.tissue.growth import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import Boundaries, BoundaryOpen, advance, cut_by_bodies, make_world
 
 OPEN = BoundaryOpen()
 RADIUS, HALF, RATE = 0.2, 0.1, 0.1

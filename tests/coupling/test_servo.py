@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flowborne import World
-from flowborne.motions import (
+from flowborne.bodies import (
     Servo,
     ServoExact,
     ServoPD,

@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne import Grid
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.validation.shedding import cylinder
 from flowborne.validation.worlds import Uniform
-from flowborne.worlds import advance, make_world, set_velocity
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    advance,
+    make_world,
+    set_velocity,
+)
 
 
 def drag(steps: int) -> float:

@@ -9,9 +9,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import flowborne as fb
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.validation.worlds import RING, Uniform, mjcf
 from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
     advance,
     kinetic_energy,
     make_world,

@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Faces, Grid
-from flowborne.boundaries import Boundaries, BoundaryNoSlip
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.friction import TOLERANCE
 from flowborne.coupling.viscous_solve import ViscousSystem, walls_of
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
-from flowborne.operators import cut_by_bodies, faces_of
 from flowborne.solvers.answers import DenseAnswer
 from flowborne.solvers.conjugate_gradients import spread
 from flowborne.validation.worlds import PERIODIC, RING, mjcf
-from flowborne.worlds import make_world
+from flowborne.worlds import Boundaries, BoundaryNoSlip, cut_by_bodies, faces_of, make_world
 
 DENSITY, VISCOSITY = 1.3, 0.7
 """kg/m^3 and Pa s."""

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from flowborne.objectives import Measurement, register
+from flowborne.parts import Measurement, objective
 
 
-@register("level")
+@objective("level")
 @dataclass(frozen=True)
 class Level:
     body: str

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from flowborne.rules import FullStep, Poses, descent, register
+from flowborne.parts import FullStep, Poses, descent, rule
 
 
-@register("share")
+@rule("share")
 @dataclass(frozen=True)
 class Share(FullStep):
     part: float = 0.5

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.shapes import register
+from flowborne.parts import shape
 
 
-@register("torus")
+@shape("torus")
 @dataclass(frozen=True)
 class Torus:
     radius: float

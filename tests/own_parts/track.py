@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.exporters import OpenRun, register
+from flowborne.parts import OpenRun, exporter
 
 
-@register(".track")
+@exporter(".track")
 @dataclass(frozen=True)
 class Track:
     body: str

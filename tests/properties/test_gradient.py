@@ -9,11 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flowborne import Array, Controller, Hypothesis, Measurement, World, step
-from flowborne.executors import Serial
-from flowborne.gradients import GradientCentral
-from flowborne.objectives import ObjectiveCallable, ObjectiveSum
+from flowborne.bodies import WindForce
+from flowborne.machine import Serial
+from flowborne.parts import GradientCentral, ObjectiveCallable, ObjectiveSum
 from flowborne.validation.worlds import mjcf
-from flowborne.winds import WindForce
 from flowborne.worlds import make_world
 
 from .worlds import UNSHRUNK

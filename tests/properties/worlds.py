@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from flowborne import Array, Grid, World
-from flowborne.boundaries import (
+from flowborne.validation.worlds import mjcf
+from flowborne.worlds import (
     Boundaries,
     Boundary,
     BoundaryClosed,
@@ -19,9 +20,8 @@ from flowborne.boundaries import (
     BoundaryNoSlip,
     BoundaryOpen,
     BoundaryPeriodic,
+    make_world,
 )
-from flowborne.validation.worlds import mjcf
-from flowborne.worlds import make_world
 
 H = 0.125
 """m, edge of a cell; a domain's middle is the origin."""

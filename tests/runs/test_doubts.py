@@ -3,12 +3,12 @@
 import pytest
 
 from flowborne import Grid
-from flowborne.boundaries import Boundaries, BoundaryPeriodic
 from flowborne.cli import BLAS_THREADS, main
 from flowborne.coupling.world import Fluid
 from flowborne.running import RunOutcome
 from flowborne.runs.history import History
 from flowborne.runs.summary import doubts_of
+from flowborne.worlds import Boundaries, BoundaryPeriodic
 
 from ..made_runs import run, summary_of
 

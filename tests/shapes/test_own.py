@@ -11,11 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flowborne as fb
-from flowborne.operators import cut_by_bodies
+from flowborne.parts import PlacedShape
 from flowborne.scenes.load import check_scene
-from flowborne.shapes import PlacedShape
 from flowborne.shapes.own import ShapeOwn, triangulated
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import advance, cut_by_bodies, make_world
 
 from ..own_parts.torus import Torus
 

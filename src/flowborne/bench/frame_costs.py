@@ -27,7 +27,7 @@ from flowborne.machine import (
     peak_memory,
     state_bytes,
 )
-from flowborne.operators import PressureSystem, faces_of
+from flowborne.worlds import PressureSystem, faces_of
 
 BLOCK = "ns-block-drag-max"
 

@@ -12,7 +12,7 @@ from scipy import sparse
 from flowborne import Array, Faces
 from flowborne.bench.timing import Result, timed, verdict
 from flowborne.machine import cores, kernel_threads
-from flowborne.operators import PressureSolution, PressureSystem
+from flowborne.worlds import PressureSolution, PressureSystem
 
 TOLERANCE = 1e-5
 """True residual of both solvers, over that of zero pressure."""

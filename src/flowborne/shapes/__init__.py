@@ -1,33 +1,6 @@
-"""Geometries: one contract, `shape.Shape`, its kinds, and how to add to them.
+"""Geometries: one contract, `shape.Shape`, and its kinds.
 
 A shape knows its volume, its distance, what a slab or a line cuts out of it, its surface and how
 thick it is, all in its own frame; no other room asks what kind it is. The distance at the nodes of
 the grid is a kernel, `kernels.distance`, which tells the kinds apart by `Shape.code`.
-
-    @shapes.register("torus")
-    @dataclass(frozen=True)
-    class Torus:
-        radius: float
-        tube: float
-
-        def distance(self, points):
-            ring = np.hypot(points[:, 0], points[:, 1]) - self.radius
-            return np.hypot(ring, points[:, 2]) - self.tube
-
-        def half_extents(self):
-            return [self.radius + self.tube, self.radius + self.tube, self.tube]
-
-A scene that names the file in `plugins` then has `[[shapes]]` of `kind = "torus"` on a `body` of
-its model, with `radius` and `tube` as keys. In Python `PlacedShape(Torus(0.3, 0.1), "ring")` is one
-of the `shapes` of `SolidModel.from_string` or `from_file`. The distance has to be right to first
-order at the surface. Mass, inertia, contact and pictures come from triangles that are made of it
-once; the fluid takes the distance itself, looked up twice a cell.
 """
-
-from __future__ import annotations
-
-from flowborne.shapes.own import SHAPES, OwnGeometry, PlacedShape
-
-__all__ = ["OwnGeometry", "PlacedShape", "register"]
-
-register = SHAPES.register

@@ -12,7 +12,7 @@ import trimesh
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from flowborne import Array, Grid
-from flowborne.motions import JointCommand
+from flowborne.bodies import JointCommand
 from flowborne.validation.case import Case, reference, table
 from flowborne.validation.findings import Finding, GridSeries, at_most, near
 from flowborne.validation.worlds import Vector, mjcf

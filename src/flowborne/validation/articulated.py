@@ -7,8 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from flowborne import Array, Grid, SolidModel, SolidState, World
-from flowborne.bodies import halfway_momentum, holding, kinematics, mass_matrix
-from flowborne.motions import JointCommand, TrajectorySinusoid
+from flowborne.bodies import (
+    JointCommand,
+    TrajectorySinusoid,
+    halfway_momentum,
+    holding,
+    kinematics,
+    mass_matrix,
+)
 from flowborne.validation.case import Case
 from flowborne.validation.findings import Finding, GridSeries, at_most, near
 from flowborne.validation.pendulums import DOWN, G

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from flowborne import Array, Grid, World
-from flowborne.boundaries import Boundaries, BoundaryNoSlip
 from flowborne.validation.case import Case, reference
 from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near
-from flowborne.worlds import advance, make_world, start_from
+from flowborne.worlds import Boundaries, BoundaryNoSlip, advance, make_world, start_from
 
 REYNOLDS = {True: (100,), False: (100, 400, 1000)}
 GRIDS = {True: (16, 32), False: (64, 128, 160)}

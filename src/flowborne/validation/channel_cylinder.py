@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne import Array, Grid, World
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen, Profile
 from flowborne.validation.case import Case, Tier, reference
 from flowborne.validation.findings import Curve, Finding, Plot
 from flowborne.validation.shedding import (
@@ -23,7 +22,15 @@ from flowborne.validation.shedding import (
     watch,
 )
 from flowborne.validation.worlds import refined
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    Profile,
+    advance,
+    make_world,
+)
 
 DIAMETER, CENTRE = 0.1, 0.2
 """m: of the cylinder, and both coordinates of its centre."""

@@ -10,14 +10,18 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from flowborne import Array, Controller, Hypothesis, Simulation, Velocities, World, load_scene, step
-from flowborne.bodies import kinematics
-from flowborne.executors import Serial
-from flowborne.gradients import GradientCentral
-from flowborne.objectives import Objective, ObjectiveEffort, ObjectiveSum, ObjectiveWindDrag
+from flowborne.bodies import Wind, WindFaces, WindForce, kinematics
+from flowborne.machine import Serial
+from flowborne.parts import (
+    GradientCentral,
+    Objective,
+    ObjectiveEffort,
+    ObjectiveSum,
+    ObjectiveWindDrag,
+)
 from flowborne.validation.case import Case
 from flowborne.validation.findings import Finding, at_most, near
 from flowborne.validation.worlds import Vector, mjcf
-from flowborne.winds import Wind, WindFaces, WindForce
 from flowborne.worlds import make_world
 
 G = 9.81

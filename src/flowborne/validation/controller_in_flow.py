@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from flowborne import Array, BlowUpError, Simulation, load_scene
-from flowborne.motions import JointCommand
+from flowborne.bodies import JointCommand
 from flowborne.validation.case import Case, Tier, reference
 from flowborne.validation.findings import Finding, GridSeries, near
 from flowborne.worlds import advance

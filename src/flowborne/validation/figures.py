@@ -16,8 +16,8 @@ from rich.table import Table
 from flowborne import Array, Simulation, SolidModel, load_scene, run
 from flowborne.bench.timing import frame_times
 from flowborne.bodies import SIDES, kinematics
-from flowborne.exporters import write_atomically
 from flowborne.machine import cores
+from flowborne.parts import write_atomically
 from flowborne.pictures import ChainCost, plot_chain_cost, plot_courses, plot_forces
 from flowborne.validation.case import reference
 from flowborne.validation.controller_in_flow import SCENES, course

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, StepReport, World
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
-from flowborne.flesh import FleshMesh, FleshTable
+from flowborne.bodies import FleshMesh, FleshTable
 from flowborne.validation.case import Case, Tier, reference
 from flowborne.validation.channel_cylinder import Parabola
 from flowborne.validation.findings import Finding, GridSeries, near
@@ -17,7 +16,7 @@ from flowborne.validation.flesh import round_root
 from flowborne.validation.flesh_bars import flat_mesh, grown_from, tissue_table
 from flowborne.validation.shedding import Oscillation, amplitude, crest
 from flowborne.validation.worlds import NOWHERE, begin, mjcf
-from flowborne.worlds import advance
+from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen, advance
 
 LENGTH, HEIGHT = 2.5, 0.41
 """m, of the channel."""

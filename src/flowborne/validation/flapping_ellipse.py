@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne import Array, Grid, World
-from flowborne.motions import TrajectorySinusoid
+from flowborne.bodies import TrajectorySinusoid
 from flowborne.validation.case import Case, Tier, reference
 from flowborne.validation.findings import Curve, Finding, GridSeries, Plot
 from flowborne.validation.worlds import mjcf, whole_steps

@@ -10,8 +10,13 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from flowborne import Array, SolidState
-from flowborne.bodies import assemble_flesh, prescribe_flesh, static_forces, symmetric_factor
-from flowborne.flesh import FleshTable
+from flowborne.bodies import (
+    FleshTable,
+    assemble_flesh,
+    prescribe_flesh,
+    static_forces,
+    symmetric_factor,
+)
 from flowborne.validation.case import Case, reference, table
 from flowborne.validation.findings import Finding, GridSeries, at_most, near, order_of
 from flowborne.validation.flesh_bars import Bar, bar_of, equilibrium, tissue_table

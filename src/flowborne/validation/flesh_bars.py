@@ -13,8 +13,15 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, dia_array
 
 from flowborne import Array, SolidModel
-from flowborne.bodies import Flesh, static_forces, symmetric_factor
-from flowborne.flesh import FleshMesh, FleshTable, grow, mesh_bytes
+from flowborne.bodies import (
+    Flesh,
+    FleshMesh,
+    FleshTable,
+    grow,
+    mesh_bytes,
+    static_forces,
+    symmetric_factor,
+)
 from flowborne.validation.worlds import Vector
 
 Root = Callable[[Array], Array]

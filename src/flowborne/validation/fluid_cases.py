@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne import Array, Grid, World
-from flowborne.boundaries import Boundaries
-from flowborne.motions import Trajectory, TrajectoryConstant
+from flowborne.bodies import Trajectory, TrajectoryConstant
 from flowborne.validation.case import Case, Tier, reference
 from flowborne.validation.findings import (
     FALLING,
@@ -22,7 +21,7 @@ from flowborne.validation.findings import (
     within,
 )
 from flowborne.validation.worlds import PERIODIC, RING, Uniform, all_inflow, mjcf, whole_steps
-from flowborne.worlds import advance, kinetic_energy, make_world, set_velocity
+from flowborne.worlds import Boundaries, advance, kinetic_energy, make_world, set_velocity
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,19 @@ from time import perf_counter, process_time
 import numpy as np
 
 from flowborne import Controller, Grid, Hypothesis, Measurement, Simulation, World, load_scene, step
-from flowborne.executors import Serial
-from flowborne.gradients import GradientCentral, GradientOneSided
-from flowborne.machine import cores, kernel_threads
-from flowborne.objectives import ObjectiveCallable, ObjectiveSum, ObjectiveWindDrag
+from flowborne.bodies import WindFaces, WindForce
+from flowborne.machine import Serial, cores, kernel_threads
+from flowborne.parts import (
+    GradientCentral,
+    GradientOneSided,
+    ObjectiveCallable,
+    ObjectiveSum,
+    ObjectiveWindDrag,
+)
 from flowborne.validation.case import Case, Tier
 from flowborne.validation.controller import AIR, HINGE, LENGTH, SPEED, WIDTH, block
 from flowborne.validation.findings import Finding, GridSeries, at_most, near, order_of
 from flowborne.validation.worlds import Vector, mjcf
-from flowborne.winds import WindFaces, WindForce
 from flowborne.worlds import make_world
 
 FRAME = 1.0 / 24.0

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne import Array, Grid, World
-from flowborne.operators import cut_by_bodies
 from flowborne.validation.case import Case
 from flowborne.validation.findings import Finding, at_most
 from flowborne.validation.worlds import Vector, mjcf
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import advance, cut_by_bodies, make_world
 
 GRAVITY: Vector = (751.0, 83.6, 0.0)
 TILTED: Vector = (751.0, 83.6, -212.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne import Array, Grid
-from flowborne.boundaries import Boundaries, BoundaryOpen
+from flowborne.bodies import WindForce
 from flowborne.validation.case import Case, Tier, reference, table
 from flowborne.validation.findings import Finding, GridSeries, at_most, near
 from flowborne.validation.pendulums import passages
@@ -21,8 +21,15 @@ from flowborne.validation.worlds import (
     mjcf,
     start_at_once,
 )
-from flowborne.winds import WindForce
-from flowborne.worlds import advance, kinetic_energy, make_world, set_velocity, start
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryOpen,
+    advance,
+    kinetic_energy,
+    make_world,
+    set_velocity,
+    start,
+)
 
 G = 9.81
 

@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 
 from flowborne import Grid, World
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
 from flowborne.validation.case import Case, Tier, confirmed, reference, table
 from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, near, within
 from flowborne.validation.shedding import (
@@ -30,7 +29,14 @@ from flowborne.validation.shedding import (
     watch,
 )
 from flowborne.validation.worlds import Vector, mjcf, refined, whole_steps
-from flowborne.worlds import advance, make_world, velocity_at
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    advance,
+    make_world,
+    velocity_at,
+)
 
 STEADY_GRIDS = {True: (4, 8), False: (8, 16, 24, 32)}
 OPEN_GRIDS = {True: (4,), False: (8, 16, 24, 32)}

@@ -7,13 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flowborne import Array, Grid, World
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryOpen
-from flowborne.motions import TrajectorySinusoid
+from flowborne.bodies import TrajectorySinusoid
 from flowborne.validation.case import Case, Tier, confirmed, reference
 from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near
 from flowborne.validation.shedding import CFL, STREAM, UNBOUNDED, Kicked, Oscillation, amplitude
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import advance, make_world, set_velocity
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryOpen,
+    advance,
+    make_world,
+    set_velocity,
+)
 
 PERIOD, KC, REYNOLDS = 5.0, 5.0, 100.0
 """V3: s; Keulegan and Carpenter's number Umax T / D and Reynolds number; D = 1 m, Umax = 1 m/s."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from flowborne.exporters import write_atomically
+from flowborne.parts import write_atomically
 from flowborne.validation.case import entry
 from flowborne.validation.findings import Curve, Plot
 from flowborne.validation.report import (

@@ -17,7 +17,7 @@ from typing import Any
 
 import flowborne
 from flowborne import __version__
-from flowborne.exporters import write_atomically
+from flowborne.parts import write_atomically
 from flowborne.validation import case as case_of
 from flowborne.validation.case import THE_RUN, Result, Tier
 from flowborne.validation.findings import Verdict

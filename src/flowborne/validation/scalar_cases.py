@@ -9,9 +9,13 @@ from typing import Protocol
 import numpy as np
 
 from flowborne import Array, Faces, Grid
-from flowborne.boundaries import Boundaries, BoundaryOpen
-from flowborne.operators import (
+from flowborne.validation.case import Case
+from flowborne.validation.findings import Finding, GridSeries, order_of
+from flowborne.validation.worlds import whole_steps
+from flowborne.worlds import (
     CENTRE,
+    Boundaries,
+    BoundaryOpen,
     Passage,
     Transport,
     carry,
@@ -20,9 +24,6 @@ from flowborne.operators import (
     nothing_brought,
     pad_cells,
 )
-from flowborne.validation.case import Case
-from flowborne.validation.findings import Finding, GridSeries, order_of
-from flowborne.validation.worlds import whole_steps
 
 Shape = Callable[[Array, Array], Array]
 """Value of a scalar at (x, y)."""

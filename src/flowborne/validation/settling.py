@@ -10,12 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flowborne import Array, Grid, World
-from flowborne.boundaries import Boundaries, BoundaryClosed, BoundaryNoSlip
+from flowborne.bodies import WindForce
 from flowborne.validation.case import Case, confirmed, reference
 from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near, within
 from flowborne.validation.worlds import mjcf, whole_steps
-from flowborne.winds import WindForce
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import Boundaries, BoundaryClosed, BoundaryNoSlip, advance, make_world
 
 CFL = 1.0
 """Cells that a body falls in a step at most. A step eight times shorter changes the largest

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne import Array, Grid, World
-from flowborne.bodies import halfway_momentum, kinematics
-from flowborne.boundaries import Boundaries
-from flowborne.motions import Trajectory, TrajectorySinusoid
+from flowborne.bodies import Trajectory, TrajectorySinusoid, halfway_momentum, kinematics
 from flowborne.validation.case import Case, Tier, confirmed, reference
 from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most
 from flowborne.validation.worlds import RING, mjcf, whole_steps
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import Boundaries, advance, make_world
 
 VISCOSITY = 1.4e-4
 """Pa s, of S1; the eel is 1 m long, its period is 1 s, fluid and eel have 1 kg/m^3."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne import Grid, World
-from flowborne.motions import Trajectory, TrajectoryConstant
+from flowborne.bodies import Trajectory, TrajectoryConstant
 from flowborne.validation.case import Case
 from flowborne.validation.findings import Finding, GridSeries, near
 from flowborne.validation.worlds import mjcf

@@ -8,8 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne import Array, StepReport, World
-from flowborne.boundaries import Boundaries, BoundaryInflow, BoundaryPeriodic, Profile
-from flowborne.worlds import Field, advance, set_velocity, start_from
+from flowborne.worlds import (
+    Boundaries,
+    BoundaryInflow,
+    BoundaryPeriodic,
+    Field,
+    Profile,
+    advance,
+    set_velocity,
+    start_from,
+)
 
 Vector = tuple[float, float, float]
 
