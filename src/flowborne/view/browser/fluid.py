@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,16 @@ from flowborne.runs.states import cell_velocity
 from flowborne.view import style
 from flowborne.view.browser.meshes import Mesh, joined, nothing, show_mesh
 from flowborne.view.browser.settings import Settings
-from flowborne.view.fields import NUMBERS, Field, FieldNumber, Scale, dyes_of, field_of, over
+from flowborne.view.fields import (
+    NUMBERS,
+    Field,
+    FieldNumber,
+    Legend,
+    Scale,
+    dyes_of,
+    field_of,
+    over,
+)
 from flowborne.view.glyphs import arrow
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
@@ -160,9 +170,6 @@ def enlarged(image: Pixels) -> Pixels:
     return np.maximum(large, image.min(axis=(0, 1)))
 
 
-Legend = list[tuple[str, str]]
-
-
 class Fluid:
     """The visible fluid of a run, on scales that are taken from its frames on first use.
 
@@ -179,11 +186,6 @@ class Fluid:
         self._fields: dict[str, Field | None] = {}
         self._numbers: dict[str, FieldNumber] = {}
 
-    @property
-    def frames(self) -> int:
-        """Number of frames from which the scales are taken."""
-        return len(self._run)
-
     def show(self, state: State, wanted: Settings) -> None:
         """Show a state by the settings."""
         if self._run.slab:
@@ -196,19 +198,20 @@ class Fluid:
         speed = self._number("speed").limit if wanted.velocity else 1.0
         self._layer.show_velocity(state, axis, place, speed, wanted.velocity)
 
-    def legend(self, wanted: Settings) -> tuple[Legend, list[Scale]]:
+    def legend(self, wanted: Settings) -> tuple[Legend, Sequence[Scale]]:
         """(name, colour) of what is shown in a colour of its own, and the colour scales."""
         if self._run.slab:
             field = self._slab_field(wanted.field)
-            scales = [] if field is None or field.scale is None else [field.scale]
-            return ([] if field is None else list(field.legend)), scales
-        names: Legend = []
+            if field is None:
+                return (), ()
+            return field.legend, () if field.scale is None else (field.scale,)
+        names: Legend = ()
         if wanted.field == "dye":
-            names += self._dye.legend
+            names = self._dye.legend
         if wanted.field == "vorticity":
-            names += self._vortices.legend
-        slices = () if wanted.slice == "none" else (self._number(wanted.slice).scale,)
-        return names, [scale for scale in slices if scale is not None]
+            names = self._vortices.legend
+        scale = None if wanted.slice == "none" else self._number(wanted.slice).scale
+        return names, () if scale is None else (scale,)
 
     def _show_slab(self, state: State, wanted: Settings) -> None:
         field = self._slab_field(wanted.field)

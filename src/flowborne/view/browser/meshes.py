@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
 
 if TYPE_CHECKING:
-    from viser import SceneApi
+    from viser import MeshHandle, SceneApi
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -77,13 +77,20 @@ def _inside(points: Array, loops: Sequence[Integers]) -> Integers:
     return np.asarray(faces, np.int64)
 
 
+def add_mesh(scene: SceneApi, name: str, mesh: Mesh, **drawn: Any) -> MeshHandle:
+    """Add a mesh with options of viser's add_mesh_simple."""
+    vertices, faces = mesh
+    return scene.add_mesh_simple(
+        name, vertices.astype(np.float32), faces.astype(np.uint32), **drawn
+    )
+
+
 def show_mesh(scene: SceneApi, name: str, mesh: Mesh, **drawn: Any) -> None:
     """Show a mesh under a name and replace an earlier one; without triangles only remove it.
 
     drawn  options of viser's add_mesh_simple
     """
-    vertices, faces = mesh
-    if len(faces):
-        scene.add_mesh_simple(name, vertices.astype(np.float32), faces.astype(np.uint32), **drawn)
+    if len(mesh[1]):
+        add_mesh(scene, name, mesh, **drawn)
     else:
         scene.remove_by_name(name)

@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.view import style
-from flowborne.view.browser.meshes import Mesh, counter_clockwise, joined, nothing, prism, show_mesh
+from flowborne.view.browser.meshes import (
+    Mesh,
+    add_mesh,
+    counter_clockwise,
+    joined,
+    nothing,
+    prism,
+    show_mesh,
+)
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, Skin, State
@@ -38,17 +46,10 @@ class Bodies:
         """`side`: smaller side of the view, m."""
         self._covered = [geom.covered for geom in run.geoms]
         self.meshes: list[MeshHandle] = []
-        for n, (vertices, faces) in enumerate(_surfaces(run, side)):
+        for n, mesh in enumerate(_surfaces(run, side)):
             colour, opacity = colour_of(run.geoms[n], run.accented)
-            self.meshes.append(
-                scene.add_mesh_simple(
-                    f"/run/bodies/{n}",
-                    vertices.astype(np.float32),
-                    faces.astype(np.uint32),
-                    color=colour,
-                    opacity=None if opacity == 1.0 else opacity,
-                )
-            )
+            drawn = {"color": colour, "opacity": None if opacity == 1.0 else opacity}
+            self.meshes.append(add_mesh(scene, f"/run/bodies/{n}", mesh, **drawn))
 
     def show(self, state: State, bones: bool) -> None:
         """Place them; hide those with non-finite poses and, unless `bones`, those in flesh."""
@@ -75,13 +76,8 @@ class SkinMesh:
         state = run.state(0)
         vertices = skin.vertices(state)
         self._vertex, self._faces = creased(vertices, skin.triangles)
-        points, faces = self._surface(state, vertices)
-        self.mesh: MeshHandle = scene.add_mesh_simple(
-            f"/run/skins/{name}",
-            points.astype(np.float32),
-            faces.astype(np.uint32),
-            color=skin.rgb,
-        )
+        mesh = self._surface(state, vertices)
+        self.mesh = add_mesh(scene, f"/run/skins/{name}", mesh, color=skin.rgb)
 
     def show(self, state: State, bones: bool) -> None:
         """Show the skin, transparent if `bones`; hide it if its vertices are not finite."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
+from flowborne.view.browser.meshes import add_mesh
 from flowborne.view.browser.viewpoint import FilmView
 from flowborne.view.glyphs import crosses, goes_along, motes, round_number
 from flowborne.view.run import Run
@@ -132,14 +133,8 @@ def _blow(scene: SceneApi, run: Run, view: FilmView) -> None:
     speed = float(np.linalg.norm(wind))
     vector = 0.17 * view.side * wind / speed
     tail = view.first.target - 0.54 * view.side * wind / speed
-    vertices, faces = arrow_mesh(tail[None], vector[None], 0.012 * view.side)
-    scene.add_mesh_simple(
-        "/wind",
-        vertices.astype(np.float32),
-        faces.astype(np.uint32),
-        color=style.rgb(style.CURVES[1]),
-        cast_shadow=False,
-        receive_shadow=False,
-    )
+    mesh = arrow_mesh(tail[None], vector[None], 0.012 * view.side)
+    colour = style.rgb(style.CURVES[1])
+    add_mesh(scene, "/wind", mesh, color=colour, cast_shadow=False, receive_shadow=False)
     place = tail + 0.5 * vector + 0.04 * view.side * np.eye(3)["xyz".index(view.up[1])]
     scene.add_label("/wind/speed", f"wind {speed:.3g} m/s", position=place)

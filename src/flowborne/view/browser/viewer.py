@@ -176,7 +176,7 @@ class Viewer:
         number = self.timeline.number
         state = self.run.state(number)
         self._along = self._view.path[number] if wanted.follow else np.zeros(3)
-        names, scales = ([], []) if self._fluid is None else self._fluid.legend(wanted)
+        names, scales = ((), ()) if self._fluid is None else self._fluid.legend(wanted)
         with self.server.atomic():
             self.server.scene.add_frame("/run", show_axes=False, position=-self._along)
             self._bodies.show(state, wanted.bones)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.run import State
+from flowborne.view.space.camera import Camera
 from flowborne.view.space.lighting import scattered
 from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
 from flowborne.view.space.surfaces import LIT
@@ -41,8 +44,27 @@ SLICE_PIXELS = 1024
 """Longer side of the image of a slice."""
 
 
+class VisibleFluid(Protocol):
+    """The fluid in a plotter."""
+
+    def show(self, state: State, focus: Array, toward: Array) -> None:
+        """Show a state to a camera with target `focus` (3,) m in the direction `toward` (3,)."""
+        ...
+
+
+def fluid_in(
+    plotter: pv.Plotter, grid: Grid, seen: SeenDye | SeenVortices | SeenSlice, camera: Camera
+) -> VisibleFluid:
+    """Add the visible quantity of a fluid to a plotter."""
+    if isinstance(seen, SeenDye):
+        return Smoke(plotter, grid, seen, camera.height)
+    if isinstance(seen, SeenVortices):
+        return Vortices(plotter, grid, seen)
+    return Slice(plotter, grid, seen, camera.axes(0)[2])
+
+
 class Smoke:
-    """A cloud in a plotter."""
+    """A cloud of dye in a plotter."""
 
     def __init__(self, plotter: pv.Plotter, grid: Grid, dye: SeenDye, height: float) -> None:
         """`height`: of the view, m."""
@@ -59,8 +81,7 @@ class Smoke:
         self._added = False
         self._plotter = plotter
 
-    def show(self, state: State, toward: Array) -> None:
-        """Show the smoke of a state to a camera in the direction `toward` (3,)."""
+    def show(self, state: State, focus: Array, toward: Array) -> None:
         colour, strength = self._dye.smoke(state)
         share = np.clip((strength - FAINT) / (FULL - FAINT), 0.0, 1.0)
         density = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
@@ -156,8 +177,7 @@ class Vortices:
         self._plotter = plotter
         self._actor: pv.Actor | None = None
 
-    def show(self, state: State, toward: Array) -> None:
-        """Show the vortices of a state to a camera in the direction `toward` (3,)."""
+    def show(self, state: State, focus: Array, toward: Array) -> None:
         surface = self._surfaces.of(state, toward)
         if self._actor is not None:
             self._plotter.remove_actor(self._actor, render=False)
@@ -201,7 +221,7 @@ class Slice:
             self._quad, lighting=False, texture=pv.Texture(np.zeros((2, 2, 3), np.uint8))
         )
 
-    def show(self, state: State, focus: Array) -> None:
+    def show(self, state: State, focus: Array, toward: Array) -> None:
         """Show the slice of a state through `focus` (3,) m."""
         cell = (focus[self._axis] - self._grid.origin[self._axis]) / self._grid.spacing
         image = self._seen.image(state, self._axis, cell)

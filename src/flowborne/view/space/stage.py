@@ -13,7 +13,7 @@ from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows, WindArrows
 from flowborne.view.space.camera import Camera
-from flowborne.view.space.fluid import Slice, Smoke, Vortices
+from flowborne.view.space.fluid import fluid_in
 from flowborne.view.space.lighting import KEY, LIGHTS
 from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
 from flowborne.view.space.surfaces import LIT, Outside, SkinSurface, colour_of, mesh_of, pushes
@@ -71,13 +71,9 @@ class Stage:
             self._edges = _edges(plotter, run.grid)
         elif run.wind.any():
             self._wind = WindArrows(plotter, run, camera, 0.0 if self._ground else -np.inf)
-        self._fluid: Smoke | Vortices | Slice | None = None
-        if run.grid is not None and isinstance(seen, SeenDye):
-            self._fluid = Smoke(plotter, run.grid, seen, camera.height)
-        elif run.grid is not None and isinstance(seen, SeenVortices):
-            self._fluid = Vortices(plotter, run.grid, seen)
-        elif run.grid is not None and isinstance(seen, SeenSlice):
-            self._fluid = Slice(plotter, run.grid, seen, camera.axes(0)[2])
+        self._fluid = None
+        if run.grid is not None and seen is not None:
+            self._fluid = fluid_in(plotter, run.grid, seen, camera)
 
     def image(self, number: int, state: State) -> Pixels:
         """(height, width, 3 or 4) picture of the `number`-th state, lowest row first."""
@@ -96,10 +92,8 @@ class Stage:
             self._motes.show(focus, toward)
         if self._wind is not None:
             self._wind.show(number, float(state["time"]))
-        if isinstance(self._fluid, Slice):
-            self._fluid.show(state, focus)
-        elif self._fluid is not None:
-            self._fluid.show(state, toward)
+        if self._fluid is not None:
+            self._fluid.show(state, focus, toward)
         for facing, edge in self._edges:
             edge.visibility = bool((facing @ toward < 0.0).any())
         shown = pushes(self._forces, self._outside, state, self._pixel)
