@@ -1,8 +1,8 @@
 """Geometries: one contract, `shape.Shape`, its kinds, and how to add to them.
 
-A shape knows its volume, its distance, what a slab or a line cuts out of it, its surface and how
-thick it is, all in its own frame; no other room asks what kind it is. The distance at the nodes of
-the grid is a kernel, `kernels.distance`, which tells the kinds apart by `Shape.code`.
+A shape has a volume, a distance, a cross-section, crossings with lines, a surface and a thickness,
+all in its own frame; no other room depends on its kind. The distance at the nodes of the grid is a
+kernel, `kernels.distance`, which distinguishes kinds by `Shape.code`.
 
     @shapes.register("torus")
     @dataclass(frozen=True)
@@ -19,9 +19,9 @@ the grid is a kernel, `kernels.distance`, which tells the kinds apart by `Shape.
 
 A scene that names the file in `plugins` then has `[[shapes]]` of `kind = "torus"` on a `body` of
 its model, with `radius` and `tube` as keys. In Python `PlacedShape(Torus(0.3, 0.1), "ring")` is one
-of the `shapes` of `SolidModel.from_string` or `from_file`. The distance has to be right to first
-order at the surface. Mass, inertia, contact and pictures come from triangles that are made of it
-once; the fluid takes the distance itself, looked up twice a cell.
+of the `shapes` of `SolidModel.from_string` or `from_file`. The distance must be accurate to first
+order at the surface. Mass, inertia, contact and pictures use triangles that are computed once; the
+fluid uses the distance itself, sampled twice per cell.
 """
 
 from __future__ import annotations
