@@ -24,14 +24,14 @@ FORMATS = {
     ".csv": "table",
     ".parquet": "table",
 }
-"""Ending -> module of flowborne.formats that registers it, imported when it is first asked for."""
+"""Ending -> module of flowborne.formats that registers it, imported on first use."""
 
 
 class Written(NamedTuple):
-    """What an exporter has written.
+    """The result of an exporter.
 
-    files  all of them
-    note   a sentence to tell with them, such as how near they are to the run; may be empty
+    files  all files that it has written
+    note   a sentence for the user, such as how exactly they match the run; may be empty
     """
 
     files: tuple[Path, ...]
@@ -42,27 +42,27 @@ class Exporter(Protocol):
     """Writes a run as a file."""
 
     def write(self, run: OpenRun, path: Path) -> Written | None:
-        """Write the whole run to `path`; None stands for that one file and no note."""
+        """Write the whole run to `path`; None means that one file and no note."""
         ...
 
 
 EXPORTERS: Registry[Exporter] = Registry("exporter", ("write",), keys=("file",))
-"""All exporters that are in use, by the ending of the files that they write: ".csv"."""
+"""All loaded exporters, by the ending of their files, such as ".csv"."""
 
 
 def provided(ending: str) -> Callable[[Class], Class]:
-    """Class decorator of flowborne's own exporters; a user's for the same ending stays."""
+    """Class decorator of flowborne's exporters; a user's exporter for the same ending is kept."""
     return EXPORTERS.register(ending) if ending not in EXPORTERS else lambda exporter: exporter
 
 
 def endings() -> tuple[str, ...]:
-    """Endings that can be written."""
+    """Endings with an exporter."""
     return (*FORMATS, *(kind for kind in EXPORTERS.kinds if kind not in FORMATS))
 
 
 def can_write(ending: str) -> bool:
-    """Whether there is an exporter for an ending, one's own before flowborne's."""
+    """Whether there is an exporter for an ending; a user's comes before flowborne's."""
     if ending not in EXPORTERS and ending in FORMATS:
-        # by name, for formats see scenes and bodies, which stand above this room
+        # by name, because formats import scenes and bodies, which are above this room
         import_module(f"flowborne.formats.{FORMATS[ending]}")
     return ending in EXPORTERS
