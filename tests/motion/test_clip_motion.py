@@ -18,7 +18,7 @@ from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
-from flowborne.motion.clip_motion import KEPT, TrajectoryClip
+from flowborne.motion.clip_motion import MOST_CACHED, TrajectoryClip
 from flowborne.motion.quaternions import about, angle, inverse, product
 from flowborne.solids.model import SolidModel
 
@@ -315,9 +315,9 @@ def test_real_clip_keeps_its_feet_on_the_ground() -> None:
 
 def test_what_a_motion_remembers_is_what_it_would_find_again() -> None:
     prescribed = motion(loop=True, blend=0.5)
-    times = np.linspace(0.0, 5.0, 2 * KEPT)
+    times = np.linspace(0.0, 5.0, 2 * MOST_CACHED)
     fresh = {}
-    for time in times[:: KEPT // 8]:
+    for time in times[:: MOST_CACHED // 8]:
         other = motion(loop=True, blend=0.5)
         fresh[time] = other.position(time), other.velocity(time)
     for _ in range(2):

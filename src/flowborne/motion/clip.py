@@ -19,13 +19,13 @@ class Clip:
 
     names        (n) joints, parents before children; the first is the root
     parents      (n,) int64 number of the parent, -1 for the root
-    offsets      (n, 3) m, from the parent's joint when no joint is turned; root: 0
-    ends         joint name -> (3,) m, end site of a last bone, likewise
+    offsets      (n, 3) m, from the parent joint with all rotations zero; root: 0
+    ends         joint name -> (3,) m, end site of a last bone, from its joint
     frame_time   s
     rotations    (frames, n, 4) unit quaternions, joint relative to parent (root: to the world)
-    translation  (frames, 3) m, place of the root
-    strays       joint name -> m by which the file has it off the end of its rigid bone, at most,
-                 and the frame where it does
+    translation  (frames, 3) m, position of the root
+    strays       joint name -> its largest distance in the file from the end of its rigid bone, m,
+                 and the frame of it
     """
 
     names: tuple[str, ...]
@@ -48,13 +48,13 @@ class Clip:
         return (self.frames - 1) * self.frame_time
 
     def turns(self) -> Array:
-        """(frames - 1, n) rad by which each joint turns from a frame to the next."""
+        """(frames - 1, n) rotation angle of each joint from a frame to the next, rad."""
         same = np.abs(np.einsum("fnk,fnk->fn", self.rotations[1:], self.rotations[:-1]))
         return 2.0 * np.arccos(np.minimum(same, 1.0))
 
     def placed(self, offset: tuple[float, ...], heading: float) -> Clip:
-        """The clip elsewhere: turned by `heading` (rad) about the vertical through where the root
-        begins, to the left, then moved by `offset` (3,) m."""
+        """The clip rotated to the left by `heading` (rad) about the vertical through the start of
+        the root, then moved by `offset` (3,) m."""
         if not any(offset) and heading == 0.0:
             return self
         left = np.array([np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading)])
@@ -65,10 +65,10 @@ class Clip:
         return replace(self, rotations=rotations, translation=translation)
 
     def places(self, frame: int | slice | NDArray[np.int64] = slice(None)) -> tuple[Array, Array]:
-        """Where the joints are in the world, in one frame or in several.
+        """Poses of the joints in the world, in one frame or in several.
 
-        returns  (..., n, 3) m, places and (..., n, 4) unit quaternions, the joints' rotations;
-                 without the leading axis for a single frame
+        returns  (..., n, 3) positions, m, and (..., n, 4) rotations, unit quaternions; without the
+                 leading axis for a single frame
         """
         local, root = self.rotations[frame], self.translation[frame]
         places, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)

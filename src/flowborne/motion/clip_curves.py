@@ -1,9 +1,9 @@
-"""What a clip says about the joints of a model, frame by frame.
+"""Positions of the joints of a model from a clip, frame by frame, and the stride of its loops.
 
-A model's bodies may be turned at rest. With B0 the world rotation of a joint's body at rest and L
-the clip's rotation of the mapped joint relative to the one mapped to the nearest mapped ancestor,
-a ball joint's quaternion is B0^-1 L B0: the body then stands in the world as the clip's bone does,
-turned from its rest as the bone is from its own.
+Bodies of a model may be rotated at rest. With B0 the world rotation of the body of a joint at rest
+and L the clip's rotation of the mapped joint relative to the joint of the nearest mapped ancestor,
+the quaternion of a ball joint is B0^-1 L B0: the body is then rotated from its rest pose as the
+bone of the clip is from its own.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ Integers = NDArray[np.int64]
 UP = np.array([0.0, 0.0, 1.0])
 
 CLOSED = 1e-4
-"""rad or m within which a clip that ends as it begins is taken for one whole cycle."""
+"""Largest difference between the ends of a clip that is one whole cycle, rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Where things are in a row of numbers: quaternions, then places of free joints, then angles
-    and, of slides, ways.
+    """Layout of a row of numbers: quaternions, then positions of free joints, then scalars.
+
+    The scalars are angles of hinges and displacements of slides.
 
     names     of the joints, as the model numbers them
-    owners    joint, by its place in `names`, of each quaternion, place and angle
-    balls     how many quaternions
-    free      which of them are of free joints, in the order of the places
+    owners    index in `names` of the joint of each quaternion, position and scalar
+    balls     number of quaternions
+    free      quaternions that belong to free joints, in the order of the positions
     q         (m,) column of each entry of q of those joints, in MuJoCo's order
-    v         (k,) column of each entry of v in a row of velocities: 3 per quaternion, then places
-              and angles
+    v         (k,) column of each entry of v in a row of velocities: 3 per quaternion, then
+              positions and scalars
     dofs      (k,) ascending
     """
 
@@ -60,16 +61,16 @@ class Columns:
         return rows[..., : 4 * self.balls].reshape(*rows.shape[:-1], self.balls, 4)
 
     def places(self, rows: Array) -> Array:
-        """(..., free, 3) view of the places of rows."""
+        """(..., free, 3) view of the positions in rows."""
         first, count = 4 * self.balls, len(self.free)
         return rows[..., first : first + 3 * count].reshape(*rows.shape[:-1], count, 3)
 
     def angles(self, rows: Array) -> Array:
-        """(..., hinges) view of the angles of rows."""
+        """(..., scalars) view of the scalars in rows."""
         return rows[..., 4 * self.balls + 3 * len(self.free) :]
 
     def moved(self, rows: Array, turn: Array, shift: Array) -> Array:
-        """Rows after a turn (4,) of free joints about the world's origin and a shift (..., 3)."""
+        """Rows after a rotation (4,) of free joints about the world origin and a shift (..., 3)."""
         result = rows.copy()
         here = self.quaternions(result)
         here[..., self.free, :] = product(turn, here[..., self.free, :])
@@ -80,11 +81,11 @@ class Columns:
 def curves_of(
     model: SolidModel, clip: Clip, mapping: Mapping[str, str], joints: Sequence[str]
 ) -> tuple[Columns, Array]:
-    """Rows of joint positions, one per frame; signs of quaternions and angles go on steadily.
+    """Rows of joint positions, one per frame; quaternions and angles are continuous.
 
     mapping  model joint -> clip joint; it may name joints that the model lacks
-    joints   model joints that follow
-    returns  where things are, and (frames, columns) rows
+    joints   model joints that follow the clip
+    returns  the layout, and (frames, columns) rows
     raises   SceneError when a joint cannot follow
     """
     followed = _sorted(model, mapping, joints)
@@ -165,7 +166,7 @@ def _ancestor(model: SolidModel, bodies: Mapping[int, int], body: int) -> int | 
 
 
 def columns_of(model: SolidModel, joints: Sequence[int]) -> Columns:
-    """Where the positions of joints, by their numbers in ascending order, are in a row."""
+    """Layout of the positions of joints, given by numbers in ascending order."""
     kinds = [int(model.mj.jnt_type[joint]) for joint in joints]
     turning = [n for n, kind in enumerate(kinds) if kind in (FREE, BALL)]
     free = [n for n, kind in enumerate(kinds) if kind == FREE]
@@ -198,20 +199,20 @@ def columns_of(model: SolidModel, joints: Sequence[int]) -> Columns:
 
 @dataclass(frozen=True)
 class Stride:
-    """What moves the first cycle onto the second: a turn about the vertical and a level shift.
+    """The motion from one cycle to the next: a rotation about the vertical and a level shift.
 
-    The height is no part of it: over many cycles on level ground the least difference between the
-    clip's two ends would lift the feet off or sink them.
+    The height is not part of it: over many cycles on level ground, the smallest difference between
+    the ends of the clip would lift or sink the feet.
 
     turn   rad
-    shift  m, x + iy, after the turn about the world's origin
+    shift  m, x + iy, after the rotation about the world origin
     """
 
     turn: float = 0.0
     shift: complex = 0.0j
 
     def times(self, cycles: int) -> tuple[Array, Array]:
-        """(4,) turn and (3,) shift that this many strides add up to; fewer than 0 go back."""
+        """(4,) rotation and (3,) shift of this many strides; negative numbers go back."""
         if abs(np.sin(self.turn / 2.0)) < 1e-12:
             total = self.shift * cycles
         else:
@@ -222,7 +223,7 @@ class Stride:
 
 
 def stride_between(columns: Columns, begin: Array, end: Array) -> Stride:
-    """Stride that brings the first free joint of a row as near to another row as it can."""
+    """Stride that brings the first free joint of a row closest to another row."""
     if not len(columns.free):
         return Stride()
     first = columns.free[0]
@@ -233,7 +234,7 @@ def stride_between(columns: Columns, begin: Array, end: Array) -> Stride:
 
 
 def mismatch(columns: Columns, begin: Array, end: Array, stride: Stride) -> tuple[float, str]:
-    """Largest difference, rad or m, between a row and another moved on by a stride; its joint."""
+    """Largest difference, rad or m, between a row and another one after a stride; its joint."""
     moved = columns.moved(begin, *stride.times(1))
     turns = angle(product(inverse(columns.quaternions(moved)), columns.quaternions(end)))
     off = np.abs(columns.places(end) - columns.places(moved)).max(axis=-1)

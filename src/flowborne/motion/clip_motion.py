@@ -18,21 +18,21 @@ Integers = NDArray[np.int64]
 Rows = tuple[Array, Array]
 """A row of joint positions (see Columns), unit quaternions, and its derivative."""
 
-KEPT = 64
-"""Most times whose positions and velocities a motion remembers."""
+MOST_CACHED = 64
+"""Most times with cached positions and velocities."""
 
 
 @dataclass(eq=False)
 class TrajectoryClip:
     """Joints that follow a clip; time 0 is the start of the trimmed clip.
 
-    Before, they stay still. For the first `blend` seconds they go over from the initial pose into
-    the running clip. At the end the clip slows down over `blend` seconds to rest, for which it
-    goes on for half of that; or it begins anew, where the first `overlap` seconds of a cycle are a
-    cross-fade out of the cycle before. Where blend is above 0, velocity is continuous.
+    Before time 0 they are at rest. During the first `blend` seconds they are blended from the
+    initial pose into the running clip. At the end the clip slows down to rest over `blend` seconds,
+    and continues for half of that; or it starts again, where the first `overlap` seconds of a cycle
+    are a cross-fade from the cycle before. If blend is above 0, velocity is continuous.
 
     dofs      (k,) all dofs of the joints, ascending
-    columns   where things are in the rows
+    columns   layout of the rows
     spline    row of joint positions over the clip's time, s; quaternions not of unit length
     start     s of the clip at time 0
     length    s of the clip until it ends or a cycle is over
@@ -57,16 +57,16 @@ class TrajectoryClip:
         return {**vars(self), "_known": {}}
 
     def position(self, time: float) -> Array:
-        """(m,) entries of q of the joints in MuJoCo's order at `time` (s); not to be written to."""
-        return self._told(time)[0]
+        """(m,) entries of q of the joints in MuJoCo's order at `time` (s). Read only."""
+        return self._prescribed(time)[0]
 
     def velocity(self, time: float) -> Array:
-        """(k,) entries of v of the joints: rad/s, a ball's in its body's axes; m/s in the world.
-        Not to be written to."""
-        return self._told(time)[1]
+        """(k,) entries of v of the joints: rad/s, for a ball in body axes; m/s in world axes. Read
+        only."""
+        return self._prescribed(time)[1]
 
-    def _told(self, time: float) -> Rows:
-        """Position and velocity; all trials of a decision ask for them at the same few times."""
+    def _prescribed(self, time: float) -> Rows:
+        """Position and velocity, cached: all trials of a decision use the same few times."""
         known = self._known.get(time)
         if known is None:
             row, rate = self._at(time)
@@ -76,7 +76,7 @@ class TrajectoryClip:
             known = row[self.columns.q], flat[self.columns.v]
             for values in known:
                 values.setflags(write=False)
-            if len(self._known) >= KEPT:
+            if len(self._known) >= MOST_CACHED:
                 self._known.clear()
             self._known[time] = known
         return known
@@ -110,7 +110,7 @@ class TrajectoryClip:
         return row, rate
 
     def _slowed(self, time: float) -> tuple[float, float]:
-        """Clip's time since the start, and how fast it goes."""
+        """Time of the clip since its start, and its rate."""
         brake = self.length - self.blend / 2.0
         if time <= brake and time < self.length:
             return time, 1.0
@@ -129,12 +129,12 @@ class TrajectoryClip:
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryPart:
-    """Some joints of a clip; where all of them are is found once for all parts.
+    """Some joints of a clip; the positions of all joints are computed once for all parts.
 
     clip        motion of these joints and others
     dofs        (k,) all dofs of these, ascending
-    positions   (m,) places of their entries among the clip's positions
-    velocities  (k,) places of theirs among its velocities
+    positions   (m,) indices of their entries in the positions of the clip
+    velocities  (k,) indices of their entries in its velocities
     """
 
     clip: TrajectoryClip
@@ -144,7 +144,7 @@ class TrajectoryPart:
 
     @staticmethod
     def of(clip: TrajectoryClip, model: SolidModel, dofs: Integers) -> TrajectoryPart:
-        """The part of `dofs`, which are the clip's."""
+        """The part of some dofs of the clip."""
         positions = np.searchsorted(model.indices_of(clip.dofs), model.indices_of(dofs))
         return TrajectoryPart(clip, dofs, positions, np.searchsorted(clip.dofs, dofs))
 
@@ -163,7 +163,7 @@ def smooth_step(u: float) -> tuple[float, float]:
 
 
 def faded(columns: Columns, old: Rows, new: Rows, share: float, slope: float) -> Rows:
-    """From one motion to another, of which there is a `share` that grows by `slope` (1/s)."""
+    """Blend from one motion to another with a `share` that grows by `slope` (1/s)."""
     row, rate = new[0].copy(), new[1].copy()
     across = np.sum(columns.quaternions(old[0]) * columns.quaternions(row), axis=-1) < 0.0
     columns.quaternions(row)[across] *= -1.0
@@ -175,7 +175,7 @@ def faded(columns: Columns, old: Rows, new: Rows, share: float, slope: float) ->
 
 
 def normalise(columns: Columns, row: Array, rate: Array) -> None:
-    """Give quaternions unit length and their rates what that makes of them, in place."""
+    """Normalise quaternions, and adapt their rates, in place."""
     q, dq = columns.quaternions(row), columns.quaternions(rate)
     size = np.sqrt(np.sum(q * q, axis=-1, keepdims=True))
     q /= size

@@ -1,4 +1,4 @@
-"""checkpoint.npz: the whole world in double precision, to go on from bit for bit."""
+"""checkpoint.npz: the whole world in double precision, for a bit-identical resume."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from flowborne.files.atomic import write_atomically
 
 
 def save_checkpoint(path: Path, world: World, frame: int) -> None:
-    """Write the state after `frame` frames; an earlier checkpoint is replaced in one go.
+    """Write the state after `frame` frames; an earlier checkpoint is replaced atomically.
 
-    The file depends on the state and the frame alone: two runs that agree write the same bytes.
-    Since the history has a row per frame, `frame` is also its length.
+    The file depends only on the state and the frame: equal runs write equal bytes. The history has
+    a row per frame, so `frame` is also its length.
     """
     arrays = world.arrays()
     write_atomically(path, lambda file: np.savez(file, frame=np.int64(frame), **arrays))  # type: ignore[arg-type]
@@ -27,10 +27,10 @@ def save_checkpoint(path: Path, world: World, frame: int) -> None:
 def load_checkpoint(
     path: Path, setup: Setup, memory: Mapping[str, tuple[int, ...]] | None = None
 ) -> tuple[World, int]:
-    """World of `setup` as it was saved, and the number of frames that it had done.
+    """The saved world of `setup`, and its number of frames.
 
-    memory  shapes of the controller's own arrays; none without a controller
-    raises  ValueError when the file is not a checkpoint, or is one of another setup
+    memory  shapes of the controller's arrays; none without a controller
+    raises  ValueError when the file is not a checkpoint, or belongs to another setup
     """
     try:
         arrays = read_arrays(path)
@@ -49,11 +49,11 @@ def load_checkpoint(
 def _check_arrays(
     arrays: Mapping[str, NDArray[Any]], setup: Setup, memory: Mapping[str, tuple[int, ...]]
 ) -> None:
-    """Raise KeyError or ValueError unless these are arrays of a world of `setup`."""
+    """Raise KeyError or ValueError unless these are the arrays of a world of `setup`."""
     at_rest = World.at_rest(setup).arrays()
     for name, like in at_rest.items():
         shapes = {like.shape}
-        if setup.fluid is not None and like.size == 0:  # made by the first step
+        if setup.fluid is not None and like.size == 0:  # the first step fills it
             shapes |= {setup.fluid.grid.shape, (setup.solid.nq,)}
         _check_array(name, arrays[name], shapes, like.dtype)
     for own, shape in memory.items():
@@ -75,5 +75,5 @@ def _check_array(
 
 
 def state_bytes(world: World) -> int:
-    """Bytes of memory that one copy of the state takes."""
+    """Bytes of one copy of the state."""
     return sum(values.nbytes for values in world.arrays().values())

@@ -1,4 +1,4 @@
-"""A run as an xarray data set that reads its states when their numbers are asked for."""
+"""A run as an xarray data set that reads its states lazily."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from flowborne.runs.states import StateArray
 
 
 class LazyStates(BackendArray):
-    """A `StateArray` as xarray asks for it."""
+    """A `StateArray` as a lazy array of xarray."""
 
     def __init__(self, array: StateArray) -> None:
         self._array = array
@@ -47,13 +47,13 @@ def dataset_of(
 ) -> xarray.Dataset:
     """The arrays of a run, see `OpenRun.dataset`.
 
-    frames   number of the frame of each state
+    frames   frame number of each state
     history  name -> quantity of the history
     rows     (k,) frame of each of its rows
-    bodies   names
-    joints   names
-    grid     of the fluid, None without
-    about    attributes of the whole
+    bodies   names of the bodies
+    joints   names of the joints
+    grid     of the fluid, None without a fluid
+    about    attributes of the data set
     """
     variables = {name: _of_history(array, rows, frames) for name, array in history.items()}
     for name, array in arrays.items():
@@ -69,14 +69,14 @@ def dataset_of(
         "axis": ("axis", list("xyz")),
     }
     if grid is not None:
-        coordinates |= _places(grid)
+        coordinates |= _coordinates(grid)
     return xarray.Dataset(variables, coordinates, about)
 
 
 def _of_history(
     array: HistoryArray, rows: NDArray[np.int64], frames: Sequence[int]
 ) -> xarray.Variable:
-    """A quantity of the history at the times of the states, nan where it has no row."""
+    """A quantity of the history at the times of the states, nan for states without a row."""
     values = np.full((len(frames), *array.values.shape[1:]), np.nan)
     _, here, there = np.intersect1d(np.array(frames), rows, return_indices=True)
     values[here] = array.values[there]
@@ -86,8 +86,8 @@ def _of_history(
     )
 
 
-def _places(grid: Grid) -> dict[str, Any]:
-    """Places of cells and faces along the axes on which there are some."""
+def _coordinates(grid: Grid) -> dict[str, Any]:
+    """Coordinates of cells and faces along the axes that have them."""
     found: dict[str, Any] = {}
     for axis, name in enumerate("xyz"):
         found[name] = (name, grid.cell_coordinates()[axis], {"units": "m"})

@@ -32,7 +32,7 @@ UNITS = {
     "W": "W",
     "m3": "m^3",
 }
-"""What may end the name of a column after its last underscore, and the unit that it stands for."""
+"""Suffix of a column name after its last underscore -> unit."""
 
 OF_JOINTS = {
     "angle": "angle of a hinge",
@@ -43,19 +43,19 @@ OF_JOINTS = {
     "force": "force of a joint's drive, mean over the frame",
     "power": "power of a joint's drive, mean over the frame",
 }
-"""Quantity of a joint, with its unit where it has several -> what it is."""
+"""Quantity of a joint, with the unit if it can have several -> meaning."""
 
 TARGETS = {"target_rad": "target_angle", "target_m": "target_position"}
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-"""Columns of a body's pose, which the states have as well."""
+"""Columns of the pose of a body, which is also in the states."""
 
 
 class History:
     """The history of a run, open for appending.
 
-    Numbers are written with as many digits as it takes to read the same number back. A row is
-    there whole, or is dropped when the history is next opened.
+    Numbers are written with enough digits to read the same number back. An incomplete row is
+    dropped when the history is opened again.
 
     columns  names, in the order of the file
     rows     number of rows written
@@ -70,7 +70,7 @@ class History:
 
     @classmethod
     def create(cls, path: Path, columns: Sequence[str]) -> History:
-        """New history with a header and no rows, in place of what was there."""
+        """New history with a header and no rows; it replaces an existing file."""
         write_text(path, _header(columns))
         return cls(path, columns, 0)
 
@@ -78,8 +78,8 @@ class History:
     def reopen(cls, path: Path, columns: Sequence[str], rows: int) -> History:
         """History cut to its first `rows` rows.
 
-        raises  ValueError when its columns are others, when it has fewer rows, or one that is no
-                row of finite numbers (nan in a column of nan alone) or not that of its frame
+        raises  ValueError when its columns differ, when it has fewer rows, or when a row has a
+                number that is not finite (nan is allowed in columns of nan) or a wrong frame
         """
         check_file(path, None)
         with open(path, "r+b") as file:
@@ -102,8 +102,8 @@ class History:
     def append(self, values: Mapping[str, float]) -> None:
         """Write a row; `values` has a number for every column.
 
-        raises  KeyError when a column is missing; OSError when the row cannot be written (no row
-                is then added)
+        raises  KeyError when a column is missing; OSError when the row cannot be written (then no
+                row is added)
         """
         line = memoryview((",".join(_text(values[name]) for name in self.columns) + "\n").encode())
         written = 0
@@ -117,7 +117,7 @@ class History:
         self.rows += 1
 
     def drop_last(self, length: int) -> None:
-        """Take back the last row; `length` is what `length` was before it was written."""
+        """Remove the last row; `length` is the value of `length` before it was written."""
         self._file.truncate(length)
         self._length = length
         self.rows -= 1
@@ -148,7 +148,7 @@ def history_columns(path: Path) -> tuple[str, ...]:
 def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ...]]:
     """The numbers of the named columns, row after row, without holding the whole file.
 
-    raises  ValueError when there is no such column, or a number is missing or none
+    raises  ValueError for a missing column, or a missing or bad number
     """
     check_file(path, None)
     with open(path, encoding="utf-8", newline="") as file:
@@ -164,12 +164,12 @@ def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ..
 
 
 def _lines(file: IO[str]) -> Iterator[str]:
-    """The lines of a file, none longer than what is read of a file."""
+    """The lines of a file, cut at the most bytes that are read of a file."""
     return iter(lambda: file.readline(MOST_BYTES), "")
 
 
 def _names(lines: Iterator[str]) -> tuple[str, ...]:
-    """What the first row names; it may go over several lines."""
+    """The names in the first row, which may span several lines."""
     try:
         return tuple(next(csv.reader(lines), ()))
     except csv.Error as error:
@@ -188,7 +188,7 @@ def _row(line: bytes, columns: Sequence[str], row: int, path: Path) -> dict[str,
 
 
 def _header(columns: Sequence[str]) -> str:
-    """The first row: a name that holds a comma, a quote or a line break is quoted."""
+    """The first row; names with a comma, a quote or a line break are quoted."""
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerow(columns)
     return text.getvalue()
@@ -200,12 +200,12 @@ def _text(value: float) -> str:
 
 
 class HistoryArray(NamedTuple):
-    """A quantity of the history, of all its owners.
+    """A quantity of the history, for all bodies or joints that have it.
 
     dimensions  of one frame: (), ("joint",), ("body", "axis"), ("joint", "axis") or ("axis",)
-    values      (frames, ...), nan where an owner has no such column
-    unit        "1" where it has none, "" where an objective decides
-    meaning     in a few words, "" where the name says it
+    values      (frames, ...), nan for a body or joint without such a column
+    unit        "1" without one, "" when it depends on an objective
+    meaning     in a few words, "" when the name says it
     """
 
     dimensions: tuple[str, ...]
@@ -215,7 +215,7 @@ class HistoryArray(NamedTuple):
 
 
 class _Column(NamedTuple):
-    """Where a column belongs: name of the array, its owner and its axis (0, 1, 2), if any."""
+    """The array of a column, and its joint, body and axis (0, 1, 2), if any."""
 
     name: str
     joint: str | None = None
@@ -225,7 +225,7 @@ class _Column(NamedTuple):
 
 
 def unit_of(column: str) -> str:
-    """Unit of a column of the history; "1" where it has none, "" where an objective decides."""
+    """Unit of a column of the history; "1" without one, "" when it depends on an objective."""
     if column.startswith(("objective", "measured_")):
         return ""
     if column == "effort":
@@ -240,8 +240,9 @@ def history_arrays(
 ) -> dict[str, HistoryArray]:
     """Name -> quantity of a history, without its frame, its time and the poses of bodies.
 
-    Of joints they are called `torque`, `power` and so on; where a joint has three components, as
-    `torque_xyz`. Of bodies as `body_force`, of the whole as their column without its unit.
+    Quantities of joints are called `torque`, `power` and so on, or `torque_xyz` with three
+    components; those of bodies `body_force` and so on. Others keep their column name without the
+    unit.
 
     history  column -> (frames,) numbers
     bodies   names in the order of the dimension `body`
@@ -250,7 +251,7 @@ def history_arrays(
     found: dict[str, HistoryArray] = {}
     lengths = {"body": len(bodies), "joint": len(joints), "axis": 3}
     for column, values in history.items():
-        at = _place(column, bodies, joints)
+        at = _owner(column, bodies, joints)
         if at is None:
             continue
         given = {"joint": at.joint, "body": at.body, "axis": at.axis}
@@ -265,8 +266,8 @@ def history_arrays(
     return found
 
 
-def _place(column: str, bodies: Collection[str], joints: Collection[str]) -> _Column | None:
-    """Where a column belongs; None for those that are left out."""
+def _owner(column: str, bodies: Collection[str], joints: Collection[str]) -> _Column | None:
+    """The array of a column; None for columns that are skipped."""
     stem, _, unit = column.rpartition("_")
     stem = stem if unit in UNITS else column
     if column in ("frame", "time_s"):

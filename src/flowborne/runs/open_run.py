@@ -1,4 +1,4 @@
-"""A run folder opened for reading: what holds for all frames at once, and frames as asked for."""
+"""A run folder opened for reading: common data of all frames, and single frames on request."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ Array = NDArray[np.float64]
 
 
 class OpenRun:
-    """What a run has left behind, read lazily and in its own units (SI, radians).
+    """The results of a run, read lazily, in SI units and radians.
 
     folder  of the run
-    raises  RunFolderError when it is none, or has no state yet
+    raises  RunFolderError when it is not the folder of a run, or has no state yet
 
     scene              the scene as run: its file as nested dictionaries
     name               of the scene
-    bodies             names of the bodies, the world's first
+    bodies             names of the bodies, the world first
     joints             names of the joints
     dyes               names of the dyes
-    frames             number of the frame of each state, 0 for the start
+    frames             frame number of each state, 0 for the start
     frames_per_second  of the run
     """
 
@@ -57,12 +57,12 @@ class OpenRun:
         self.frames = tuple(int(path.stem) for path in self._states)
 
     def __len__(self) -> int:
-        """Number of states: that of the frames, and the start."""
+        """Number of states: one per frame, and the start."""
         return len(self._states)
 
     @property
     def is_slab(self) -> bool:
-        """Whether it is a run in two dimensions, in which forces are per metre of depth."""
+        """Whether the run is two-dimensional, with forces per metre of depth."""
         return bool(self._model["slab"])
 
     @property
@@ -88,7 +88,7 @@ class OpenRun:
 
     @cached_property
     def history(self) -> dict[str, Array]:
-        """column -> (frames,) numbers, as history.csv has them; the unit ends the name."""
+        """column -> (frames,) numbers of history.csv; the column name ends with the unit."""
         with reading(self.folder):
             columns = list(history_columns(self._files.history))
             rows = np.array(list(history_rows(self._files.history, columns)), float)
@@ -101,7 +101,7 @@ class OpenRun:
 
     @cached_property
     def arrays(self) -> Mapping[str, StateArray]:
-        """Name -> array of all states, lazily; see state_arrays.QUANTITIES for shapes and units."""
+        """Name -> array of all states, read lazily; see states.QUANTITIES for shapes and units."""
         names = read_state(self._states[0])
         return MappingProxyType(
             {name: StateArray(self._states, name, quantity(name)) for name in names}
@@ -111,28 +111,27 @@ class OpenRun:
         """Arrays of a state by name, in single precision; negative numbers count from the end.
 
         time, q, v, body_position (nb, 3), body_rotation (nb, 3, 3), geom_position, geom_rotation,
-        fluid_force (nb, 3), flesh_vertices (k, 3); of the fluid velocity_x, velocity_y, velocity_z
-        on the faces, pressure, scalar_<dye>, and open, the part of each cell that no body takes up.
+        fluid_force (nb, 3), flesh_vertices (k, 3); with a fluid, velocity_x, velocity_y, velocity_z
+        on the faces, pressure, scalar_<dye>, and open, the part of each cell outside all bodies.
         """
         return read_state(self._states[number])
 
     def every(self, name: str) -> Array:
         """(n, ...) one array of all states, such as "body_position".
 
-        raises  KeyError when the states have none of that name
+        raises  KeyError when the states have no such array
         """
         return np.asarray(self.arrays[name], float)
 
     def dataset(self) -> xarray.Dataset:
-        """All arrays and the history as an xarray data set; a state is read when its numbers are
-        asked for.
+        """All arrays and the history as an xarray data set; states are read lazily.
 
-        Each has its dimensions, and its unit and meaning as attributes; times, bodies, joints, and
-        places of cells and faces are coordinates. Of the history there are `torque`, `force`,
-        `power`, `angle`, `position`, `target_angle` and `target_position` of joints, `torque_xyz`
-        and `force_xyz` of ball and free joints, `body_force` and so on of the bodies that the scene
-        names, and all else under the name of its column without the unit; nan at the start, where
-        the history has no row.
+        Each array has its dimensions, and its unit and meaning as attributes; times, bodies,
+        joints, and positions of cells and faces are coordinates. The history gives `torque`,
+        `force`, `power`, `angle`, `position`, `target_angle` and `target_position` of joints,
+        `torque_xyz` and `force_xyz` of ball and free joints, `body_force` and so on of the bodies
+        that the scene names, and other columns by their names without the unit. They are nan at the
+        start, where the history has no row.
         raises  SceneError when xarray is not installed
         """
         optional("xarray", "xarray", "xarray", "data sets")
@@ -154,9 +153,9 @@ class OpenRun:
 
 
 def open_run(folder: str | Path) -> OpenRun:
-    """What a run has left behind: times, poses, skin of flesh, fields and history, read lazily.
+    """The results of a run: times, poses, skin of flesh, fields and history, read lazily.
 
-    folder  of a run, which may still be going on
-    raises  RunFolderError when it is none, or has no state yet
+    folder  of a run, which may still be in progress
+    raises  RunFolderError when it is not the folder of a run, or has no state yet
     """
     return OpenRun(folder)

@@ -1,4 +1,4 @@
-"""What is kept of each frame, so that any frame can be drawn without the solver."""
+"""The state files of a run, from which any frame can be drawn without the solver."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from flowborne.solids.skins import clad_bodies, skins_of
 Array = NDArray[np.float64]
 
 BYTES_PER_MEMBER = 300
-"""What an array costs in an npz file besides its numbers: two headers and a name, twice."""
+"""Overhead of an array in an npz file: two headers and two names."""
 
 
 class Recorder:
     """Writes states/NNNNNN.npz of a run.
 
-    Each file holds, in single precision but for the time,
+    Each file contains, in single precision except for the time,
 
       time                                       s
       q (nq,), v (nv,)                           generalised coordinates
       geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
-      fluid_force (nb, 3)                        N, what fluid and winds do to each body: mean over
+      fluid_force (nb, 3)                        N, force of fluid and winds on each body: mean over
                                                  the frame, without the added-mass part
-      fluid_centre (nb, 3)                       m, where to draw it: the centroid of the body and
-                                                 the flesh that it carries
-      flesh_vertices (k, 3)                      m, the vertices of flesh that lie on its skin
+      fluid_centre (nb, 3)                       m, its point in pictures: the centroid of the body
+                                                 and the flesh that it carries
+      flesh_vertices (k, 3)                      m, the vertices on the skin of flesh
       velocity_x, velocity_y, velocity_z         m/s on the faces (no z in a slab)
       pressure                                   Pa in the cells
       scalar_<name>                              in the cells
-      open                                       part of each cell that no body takes up
+      open                                       part of each cell outside all bodies
 
-    A file is there whole or not at all when the process is killed. `sync` forces all of them to
-    the disc: one by one that would cost more than writing them.
+    Files are written atomically. `sync` flushes all of them to the disc together: one by one, this
+    would take longer than writing them.
     """
 
     def __init__(self, folder: RunFolder) -> None:
@@ -55,7 +55,7 @@ class Recorder:
         """Write the state after `frame` frames.
 
         force   (nb, 3) N, to draw; None at the start
-        raises  OSError when the disc refuses; nothing is then left of the file
+        raises  OSError when the file cannot be written; no part of it is then left
         """
         arrays = self.arrays(world, force)
         path = self.folder.state(frame)
@@ -63,12 +63,12 @@ class Recorder:
         self._written.append(path)
 
     def sync(self) -> None:
-        """Wait until every state that was written is on the disc."""
+        """Wait until every written state is on the disc."""
         sync_files(self._written)
         self._written.clear()
 
     def bytes_per_frame(self, world: World) -> int:
-        """About the size of a state file."""
+        """Approximate size of a state file."""
         solid = world.setup.solid
         numbers, members = 18 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
         if solid.flesh is not None:
@@ -82,7 +82,7 @@ class Recorder:
         return 4 * numbers + BYTES_PER_MEMBER * members
 
     def arrays(self, world: World, force: Array | None) -> dict[str, NDArray[Any]]:
-        """What is kept of `world`."""
+        """The arrays of a state file for `world`."""
         solid = world.setup.solid
         pose = kinematics(solid, world.solid.q)
         kept: dict[str, Array] = {
@@ -114,13 +114,13 @@ def open_cells(world: World, pose: Kinematics) -> Array:
     assert world.setup.fluid is not None
     distance = cut_by_bodies(world, pose).distance
     for _ in range(3):
-        # mean of neighbours along the first axis, which then becomes the last: all three in turn
+        # mean of neighbours along the first axis, which then becomes the last; once per axis
         distance = np.moveaxis(0.5 * (distance[1:] + distance[:-1]), 0, -1)
     return np.clip(0.5 + distance / world.setup.fluid.grid.spacing, 0.0, 1.0)
 
 
 def centres(solid: SolidModel, pose: Kinematics) -> Array:
-    """(nb, 3) centroid of what each body and the flesh that it carries take up, m."""
+    """(nb, 3) centroid of each body with the flesh that it carries, m."""
     flesh = solid.flesh
     if flesh is None:
         return pose.centroid
@@ -131,7 +131,7 @@ def centres(solid: SolidModel, pose: Kinematics) -> Array:
 
 
 def on_skin(flesh: Flesh) -> NDArray[np.int64]:
-    """(k,) vertices of flesh that a triangle of its surface has, ascending."""
+    """(k,) vertices of flesh on its surface, ascending."""
     return np.unique(flesh.surface)
 
 
@@ -144,11 +144,11 @@ def write_model(
     wind: list[list[float]],
     taken: Sequence[str] = (),
 ) -> None:
-    """Write model.json: what does not move, but is needed to draw the run or to go on from it.
+    """Write model.json: the constant data to draw the run or to use it in another run.
 
     controlled  names of the controlled joints
     wind        directions and speeds of the streams, m/s, to draw as arrows
-    taken       names of the joints that did what they did in an earlier run
+    taken       names of the joints that repeat their motion of an earlier run
     """
     solid, fluid = setup.solid, setup.fluid
     joint_bodies = solid.mj.jnt_bodyid
@@ -182,7 +182,7 @@ def write_model(
 
 
 def _places(solid: SolidModel, joint: str) -> list[int]:
-    """Where the entries of q of a joint begin and end."""
+    """Begin and end of the entries of q of a joint."""
     places = solid.positions_of(joint)
     return [int(places[0]), int(places[-1]) + 1]
 
@@ -206,7 +206,7 @@ def _geoms(solid: SolidModel) -> list[dict[str, Any]]:
 
 
 def _skins(solid: SolidModel) -> list[dict[str, Any]]:
-    """The model's skins in its own pose, and where the bodies that carry each are in it."""
+    """The skins of the model at its rest pose, and the poses of their bodies there."""
     listed = []
     position, rotation, _, _ = rest_poses(solid.mj)
     for skin in skins_of(solid.mj):
@@ -227,7 +227,7 @@ def _skins(solid: SolidModel) -> list[dict[str, Any]]:
 
 
 def _flesh(flesh: Flesh) -> dict[str, Any]:
-    """The skin: triangles of the vertices that a frame has, and the bodies that carry flesh."""
+    """The skin: triangles of the vertices in the states, and the bodies that carry flesh."""
     return {
         "names": list(flesh.names),
         "triangles": np.searchsorted(on_skin(flesh), flesh.surface).tolist(),

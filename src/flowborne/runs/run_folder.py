@@ -1,14 +1,14 @@
-"""The folder that a run leaves behind: what is in it, and who may write into it.
+"""The folder of a run: its files, and the lock for writing.
 
 scene.toml       the scene as run, every default written out; the model's files beside it
 history.csv      a row per frame
-summary.json     what came of the run; its key "flowborne" marks the folder as a run's
-states/          NNNNNN.npz, what is needed to draw a frame; 000000 is the start
+summary.json     the result of the run; its key "flowborne" marks the folder as a run's
+states/          NNNNNN.npz, the data to draw a frame; 000000 is the start
 checkpoint.npz   the whole state of the last saved frame
 model.json       the bodies' geometry and the skin of flesh, to draw them
 preview.png      the last frame
 preview.mp4      the film
-.lock            empty; whoever writes the run has it locked
+.lock            empty; locked by the process that writes the run
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from flowborne.files.given import possible_name, read_json, read_toml
 from flowborne.version import __version__
 
 MARK = "flowborne"
-"""Key of summary.json that tells a run folder from any other."""
+"""Key of summary.json that marks a run folder."""
 
 RUNNING = "running"
-"""Outcome in summary.json of a run that has none yet."""
+"""Outcome in summary.json of an unfinished run."""
 
 FIXED_NAMES = (
     "scene.toml",
@@ -43,16 +43,15 @@ FIXED_NAMES = (
     "preview.mp4",
     "summary.json",
 )
-"""Files of every run; the mark comes last, so that a folder half removed is still a run's."""
+"""Files of every run; the mark is last, so that a partly removed folder is still a run's."""
 
 LOCK_NAME = ".lock"
 
 OWN_NAMES = (*FIXED_NAMES, LOCK_NAME, "states")
-"""Names in a run folder that nothing else can have."""
+"""Names that are reserved in a run folder."""
 
 STATE_NAME = re.compile(r"\d{6,}\.npz")
 PARTIAL_STATE_NAME = re.compile(r"\.\d{6,}\.npz\.partial")
-
 
 UNREADABLE = (
     ArithmeticError,
@@ -63,15 +62,15 @@ UNREADABLE = (
     TypeError,
     ValueError,
 )
-"""What reading a file raises that is not as a run has written it."""
+"""Errors from reading a damaged file of a run."""
 
 
 class RunFolderError(Exception):
-    """A run cannot be written or found there; the text says why and what to do."""
+    """A run cannot be written or found; the text says why and what to do."""
 
 
 class RunFolder:
-    """Names of everything in a run folder."""
+    """The paths in a run folder."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -86,10 +85,10 @@ class RunFolder:
 
     @classmethod
     def create(cls, path: Path, *, replace: bool = False) -> RunFolder:
-        """Folder for a new run, with its mark in it and nothing else of a run.
+        """Folder for a new run, with its mark and no other file of a run.
 
-        replace  take the place of an earlier run; only files that a run writes are removed
-        raises   RunFolderError when the place is taken or cannot be written
+        replace  replace an earlier run; only files that a run writes are removed
+        raises   RunFolderError when the folder is in use or cannot be written
         """
         folder = cls(path)
         folder.check_new(replace=replace)
@@ -105,7 +104,7 @@ class RunFolder:
 
     @classmethod
     def existing(cls, path: Path) -> RunFolder:
-        """Folder of an earlier run. Raises RunFolderError when it is none."""
+        """Folder of an earlier run. Raises RunFolderError for any other folder."""
         folder = cls(path)
         check_name(path)
         if not path.is_dir():
@@ -116,9 +115,9 @@ class RunFolder:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Context in which no other process writes a run here; a folder that is missing is made.
+        """Context in which no other process writes a run here; a missing folder is created.
 
-        A folder that has nothing in it at the end is removed. The lock ends with the process.
+        A folder that is empty at the end is removed. The lock ends with the process.
         raises  RunFolderError when a run is being written here, or the folder cannot be made
         """
         lock = FileLock(self.path / LOCK_NAME, blocking=False)
@@ -141,7 +140,7 @@ class RunFolder:
             lock.release()
 
     def check_writable(self) -> None:
-        """Raise RunFolderError unless a run that is there can go on."""
+        """Raise RunFolderError unless the run here can be resumed."""
         self.check_links()
         if not os.access(self.path, os.W_OK):
             raise RunFolderError(
@@ -263,17 +262,17 @@ class RunFolder:
         return [*self.model_files(), *FIXED_NAMES]
 
     def _named_files(self) -> list[Path]:
-        """Those of them that are there."""
+        """The existing ones of these files."""
         return [self.path / name for name in self._names() if (self.path / name).is_file()]
 
     def state_files(self) -> list[Path]:
-        """Files of the states that are there, in no order."""
+        """Files of the existing states, unordered."""
         if not self.states.is_dir():
             return []
         return [path for path in self.states.iterdir() if STATE_NAME.fullmatch(path.name)]
 
     def _is_empty(self) -> bool:
-        """Whether nothing is here but what a run leaves that was killed before it began."""
+        """Whether only remains of a run that was killed at its start are here."""
         return all(
             (entry == self.states and entry.is_dir() and not any(entry.iterdir()))
             or entry.name in (LOCK_NAME, partial_name(self.summary.name))
@@ -289,7 +288,7 @@ class RunFolder:
                 folder.rmdir()
 
     def _remove_partial(self) -> None:
-        """Remove what a killed run had half-written."""
+        """Remove partial files of a killed run."""
         for name in self._names():
             path = self.path / name
             path.with_name(partial_name(path.name)).unlink(missing_ok=True)
@@ -300,7 +299,7 @@ class RunFolder:
 
 @contextmanager
 def reading(folder: Path) -> Iterator[None]:
-    """Context in which whatever the files of a run lack, or have wrong, is a RunFolderError."""
+    """Context in which errors from damaged files of a run become a RunFolderError."""
     try:
         yield
     except UNREADABLE as error:
@@ -312,7 +311,7 @@ def reading(folder: Path) -> Iterator[None]:
 
 
 def _is_possible(name: str) -> bool:
-    """Whether a file can be called so."""
+    """Whether a file can have this name."""
     try:
         return bool(possible_name(name))
     except ValueError:
@@ -320,7 +319,7 @@ def _is_possible(name: str) -> bool:
 
 
 def check_name(path: Path) -> None:
-    """Raise RunFolderError for a path that no folder can have."""
+    """Raise RunFolderError for an impossible path of a folder."""
     try:
         path.exists()
     except OSError as error:
@@ -337,7 +336,7 @@ def cannot_write(path: Path, error: OSError) -> RunFolderError:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder if need be. Raises RunFolderError when it cannot be written into."""
+    """Create a folder if it is missing. Raises RunFolderError when it is not writable."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -17,10 +17,10 @@ from flowborne.fluid.grid import Grid
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 
 IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
-"""Arrays of a state that are drawn, whatever the scene has."""
+"""Arrays of every state, which are needed to draw it."""
 
 NUMBERS = "biuf"
-"""Kinds of NumPy's types that a state has."""
+"""Kinds of the NumPy types in a state."""
 
 Array = NDArray[np.float64]
 
@@ -28,10 +28,10 @@ Arrays = Mapping[str, NDArray[np.floating]]
 
 
 class Quantity(NamedTuple):
-    """What an array of the states is.
+    """Meaning of an array of the states.
 
     dimensions  names of its axes in one state
-    unit        "1" where it has none; in a slab forces are per metre of depth
+    unit        "1" without one; in a slab forces are per metre of depth
     meaning     in a few words
     """
 
@@ -67,12 +67,12 @@ DYE = re.compile(r"scalar_(.+)")
 
 
 class StateArray:
-    """One array of all states, read from the files as it is asked for.
+    """One array of all states, read from the files lazily.
 
-    `array[3]` and `array[-1]` are those of one state; `array[2:9]` and `numpy.asarray(array)` those
-    of several, one after the other along the first axis.
+    `array[3]` and `array[-1]` are the array of one state; `array[2:9]` and `numpy.asarray(array)`
+    stack those of several states along the first axis.
 
-    quantity  what it is, in which unit
+    quantity  meaning and unit
     shape     (n, ...), n the number of states
     dtype     of its numbers
     """
@@ -88,7 +88,7 @@ class StateArray:
         return len(self._states)
 
     def __getitem__(self, number: int | slice) -> NDArray[Any]:
-        """(...) of one state, or (k, ...) of a slice of them."""
+        """(...) of one state, or (k, ...) of a slice of states."""
         if isinstance(number, slice):
             chosen = range(len(self))[number]
             empty = np.empty((0, *self.shape[1:]), self.dtype)
@@ -110,8 +110,11 @@ def quantity(name: str) -> Quantity:
 
 
 def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
-    """Arrays of a file of states/, all unless names are given; raises RunFolderError when it is
-    missing or cut, has arrays that hold no numbers, or has not what is drawn of every state."""
+    """Arrays of a file of states/, all unless names are given.
+
+    raises  RunFolderError when the file is missing or cut, has arrays without numbers, or lacks an
+            array of IN_EVERY_STATE
+    """
     try:
         arrays = read_arrays(path, names)
     except (OSError, ValueError) as error:
@@ -144,7 +147,7 @@ def _check_shapes(path: Path, arrays: Arrays) -> None:
 
 
 def check_states(folder: RunFolder, frame: int) -> None:
-    """Raise RunFolderError where a state up to a frame is cut; one that is missing is no fault."""
+    """Raise RunFolderError when a state up to a frame is cut; missing states are allowed."""
     for path in folder.state_files():
         if int(path.stem) <= frame:
             try:

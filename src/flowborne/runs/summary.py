@@ -1,4 +1,4 @@
-"""What came of a run, from its history: final means, convergence, timing and doubts."""
+"""The result of a run, from its history: final means, convergence, timing and doubts."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from flowborne.coupling.world import Fluid
 
 FINAL_PART = 0.1
-"""Part of the frames, the last ones, whose mean is a joint's final mean ..."""
+"""Part of the frames, at the end, for the final mean of a joint ..."""
 
 FINAL_FRAMES = 10
-"""... but at least this many of them."""
+"""... and the least number of these frames."""
 
 BUDGET_OPEN = 1e-6
-"""`momentum_budget_error` above which momentum is lost or made; a sound run has some 1e-13."""
+"""`momentum_budget_error` above which momentum is not conserved; a sound run has about 1e-13."""
 
 
 def final_frames(frames: int) -> int:
-    """Number of frames at the end over which a final mean is taken."""
+    """Number of frames at the end for a final mean."""
     return min(frames, max(FINAL_FRAMES, round(FINAL_PART * frames)))
 
 
@@ -45,20 +45,20 @@ def final_means(path: Path, columns: list[str], frames: int) -> dict[str, float]
 def converged_frame(
     path: Path, means: dict[str, float], within: dict[str, float], least: int
 ) -> int | None:
-    """The first frame after which every joint stays within one strength step of its final mean.
+    """The first frame from which every joint stays within one strength step of its final mean.
 
     path    of the history
     means   column -> final mean
     within  column -> length of a strength step, rad or m
-    least   frames, this one included, over which they have to stay
-    returns None when there is no such joint, and when one was away in the last `least` frames
+    least   number of frames, including the first, over which they must stay
+    returns None without such joints, and when one leaves in the last `least` frames
     source  design page, section 8
     """
     columns = list(means)
     if not columns:
         return None
     target = np.array([means[column] for column in columns])
-    # one part in 1e9 more: a joint that is exactly a step away counts as within
+    # one part in 1e9 more: a joint exactly one step away counts as within
     radius = np.array([within[column] for column in columns]) * (1.0 + 1e-9)
     converged: int | None = None
     frame = 0.0
@@ -75,7 +75,7 @@ def summarise(path: Path, within: dict[str, float], every: int | None) -> dict[s
     """Final angles and objective, convergence and timing of a history.
 
     within  column of each controlled joint -> length of a strength step, rad or m
-    every   frames from decision to decision; None where the joints cannot come to rest
+    every   frames from decision to decision; None when the joints cannot come to rest
     """
     columns = history_columns(path)
     frames = sum(1 for _ in history_rows(path, ["frame"]))
@@ -113,7 +113,7 @@ _version = cache(version)
 
 
 def versions() -> dict[str, str]:
-    """Versions of what the numbers depend on."""
+    """Versions of the packages that determine the numbers."""
     return {
         "flowborne": __version__,
         "python": platform.python_version(),
@@ -123,7 +123,7 @@ def versions() -> dict[str, str]:
 
 
 def machine_memory() -> int | None:
-    """Memory of this machine, bytes; None where the system does not tell."""
+    """Memory of this machine, bytes; None if the system does not report it."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):
@@ -131,7 +131,7 @@ def machine_memory() -> int | None:
 
 
 def peak_memory() -> int | None:
-    """Largest memory that this process has held, bytes; None where the system does not tell."""
+    """Peak memory of this process, bytes; None if the system does not report it."""
     if sys.platform == "win32":
         return None
     import resource
@@ -141,9 +141,9 @@ def peak_memory() -> int | None:
 
 
 def doubts_of(history: Path, bodies: Sequence[str], fluid: Fluid | None) -> list[str]:
-    """A sentence, without its full stop, for each reason not to trust the run; none in a sound one.
+    """A sentence, without its full stop, for each reason not to trust the run.
 
-    bodies  names of those that move and that the fluid meets; a scene starts with them inside
+    bodies  names of the moving bodies that displace fluid; they start inside the domain
     fluid   of the run
     """
     if fluid is None:
@@ -153,8 +153,10 @@ def doubts_of(history: Path, bodies: Sequence[str], fluid: Fluid | None) -> list
 
 
 def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
-    """The first body that leaves the fluid's domain, more than a cell beyond a side; None when all
-    stay there. Through periodic sides none leaves."""
+    """The first body more than a cell outside the domain of the fluid; None when all stay inside.
+
+    Periodic sides do not count.
+    """
     grid, periodic = fluid.grid, fluid.boundaries.periodic()
     axes = [axis for axis in grid.axes if not periodic[axis]]
     columns = [f"{body}_{'xyz'[axis]}_m" for body in bodies for axis in axes]
@@ -162,8 +164,8 @@ def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
         return None
     low = np.array([grid.origin[axis] - grid.spacing for axis in axes])
     high = np.array([grid.origin[axis] + (grid.shape[axis] + 1) * grid.spacing for axis in axes])
-    for frame, *places in history_rows(history, ["frame", *columns]):
-        at = np.reshape(places, (len(bodies), len(axes)))
+    for frame, *coordinates in history_rows(history, ["frame", *columns]):
+        at = np.reshape(coordinates, (len(bodies), len(axes)))
         left = np.any((at < low) | (at > high), axis=1)
         if left.any():
             return (
@@ -174,7 +176,7 @@ def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
 
 
 def open_budget(history: Path) -> str | None:
-    """The frame in which the momentum budget is open most, if it is in any."""
+    """The frame with the largest error of the momentum budget, if above BUDGET_OPEN."""
     column = "momentum_budget_error"
     if column not in history_columns(history):
         return None

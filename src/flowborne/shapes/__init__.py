@@ -1,6 +1,6 @@
 """Geometries: one contract, `shape.Shape`, and its kinds.
 
-A shape knows its volume, its distance, what a slab or a line cuts out of it, its surface and how
-thick it is, all in its own frame; no other room asks what kind it is. The distance at the nodes of
-the grid is a kernel, `kernels.distance`, which tells the kinds apart by `Shape.code`.
+A shape has a volume, a distance, a cross-section, crossings with lines, a surface and a thickness,
+all in its own frame; no other room depends on its kind. The distance at the nodes of the grid is a
+kernel, `kernels.distance`, which distinguishes kinds by `Shape.code`.
 """

@@ -1,4 +1,4 @@
-"""Surfaces of triangles with holes, and how they are closed."""
+"""Closing the holes of surfaces of triangles."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from flowborne.shapes.mesh import welded
 from flowborne.shapes.shape import Array, Integers, Mesh
 
 SMALL_HOLE = 0.05
-"""Part of the surface's size that a hole may be across to be closed without being asked for: seams
-that do not meet, the back of an eye, the end of a lash."""
+"""Largest hole, relative to the size of the surface, that is closed by default: open seams, the
+back of an eye, the end of a lash."""
 
 
 def closed(mesh: Mesh, widest: float) -> Mesh | None:
-    """A surface with its holes closed and all of it outward; None where it stays open.
+    """A surface with closed holes, oriented outward; None when it stays open.
 
-    widest  holes up to this part of its size across are closed
+    widest  largest hole that is closed, relative to the size of the surface
     """
     points, faces = welded(*mesh)
     faces = wound(faces)
@@ -35,7 +35,7 @@ def closed(mesh: Mesh, widest: float) -> Mesh | None:
 
 
 def hull(mesh: Mesh) -> Mesh | None:
-    """The convex hull of a surface; None of one that is flat."""
+    """The convex hull of a surface; None for a flat one."""
     vertices, faces = mesh
     points = vertices[np.unique(faces)]
     try:
@@ -67,7 +67,7 @@ def across_of(rim: Array) -> float:
 
 
 def fans(points: Array, loops: list[Integers]) -> Mesh:
-    """Fans about their middles that close rims, which are points followed by those middles.
+    """Points and triangles of fans that close rims; the points are followed by the fans' middles.
 
     loops  numbers of the points along each rim
     """
@@ -82,13 +82,15 @@ def fans(points: Array, loops: list[Integers]) -> Mesh:
 
 
 def edges_of(faces: Integers) -> Integers:
-    """(3 m, 2) directed edges of triangles (m, 3): the first of each, the second, the third."""
+    """(3 m, 2) directed edges of triangles (m, 3): all first ones, then second, then third."""
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
 def wound(faces: Integers) -> Integers:
-    """Triangles (m, 3) of which fewer than half in each connected part are turned over, so that
-    neighbours use the edge between them in opposite directions, where that can be."""
+    """Triangles (m, 3), reversed such that neighbours use common edges in opposite directions.
+
+    In each connected part, fewer than half are reversed. A part that cannot be oriented is left.
+    """
     edges = edges_of(faces)
     _, number, uses = np.unique(
         np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
@@ -98,7 +100,7 @@ def wound(faces: Integers) -> Integers:
     alike = edges[between[:, 0], 0] == edges[between[:, 1], 0]
     if not alike.any():
         return faces
-    # each triangle stands twice, as it is and turned over: a part and its reverse are connected
+    # two nodes per triangle, as given and reversed; edges connect consistent orientations
     count = len(faces)
     first, second = (between % count).T
     start = np.concatenate([first, first + count])
@@ -106,12 +108,12 @@ def wound(faces: Integers) -> Integers:
     links = coo_array((np.ones(len(start)), (start, stop)), shape=(2 * count, 2 * count))
     part = np.asarray(connected_components(links, directed=False)[1])
     kept = np.bincount(part[:count], minlength=part.max() + 1)
-    turned = kept[part[count:]] > kept[part[:count]]
-    return np.where(turned[:, None], faces[:, ::-1], faces)
+    flipped = kept[part[count:]] > kept[part[:count]]
+    return np.where(flipped[:, None], faces[:, ::-1], faces)
 
 
 def rims_of(faces: Integers) -> Integers:
-    """(k, 2) directed edges that are not used as often in the other direction."""
+    """(k, 2) directed edges that are used less often in the opposite direction."""
     edges = edges_of(faces)
     edges = edges[edges[:, 0] != edges[:, 1]]
     low, high = edges.min(axis=1), edges.max(axis=1)
@@ -126,27 +128,27 @@ def rims_of(faces: Integers) -> Integers:
 
 
 def loops_of(edges: Integers) -> list[Integers]:
-    """Closed ways through directed edges (k, 2) of which as many enter as leave every point."""
+    """Closed paths through directed edges (k, 2); as many enter as leave every point."""
     leaving: dict[int, list[int]] = {}
     for start, stop in edges.tolist():
         leaving.setdefault(start, []).append(stop)
     loops = []
     while leaving:
-        way = [next(iter(leaving))]
-        place = {way[0]: 0}
-        while way:
-            after = leaving[way[-1]].pop()
-            if not leaving[way[-1]]:
-                del leaving[way[-1]]
-            if after not in place:
-                place[after] = len(way)
-                way.append(after)
+        path = [next(iter(leaving))]
+        index = {path[0]: 0}
+        while path:
+            after = leaving[path[-1]].pop()
+            if not leaving[path[-1]]:
+                del leaving[path[-1]]
+            if after not in index:
+                index[after] = len(path)
+                path.append(after)
                 continue
-            loop = way[place[after] :]
+            loop = path[index[after] :]
             loops.append(np.array(loop))
             for point in loop[1:]:
-                del place[point]
-            way = way[: place[after] + 1]
-            if way[-1] not in leaving:
+                del index[point]
+            path = path[: index[after] + 1]
+            if path[-1] not in leaving:
                 break
     return loops

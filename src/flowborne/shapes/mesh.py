@@ -1,4 +1,4 @@
-"""A body of triangles, the user's own."""
+"""A solid bounded by the user's triangles."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from flowborne.shapes.shape import (
 from flowborne.shapes.thickness import thin_parts, thinnest
 
 UNDETERMINED = 0.02
-"""Mean square of the normals' part along a direction up to which they do not determine a vertex's
-motion along it: all of them are within some 8 degrees of a plane across."""
+"""Largest mean square of the normals along a direction for which they do not determine the motion
+of a vertex along it: all normals are within about 8 degrees of the plane across."""
 
 SMOOTH = np.cos(np.pi / 4.0)
-"""Cosine of the angle between triangles up to which a sheet goes on from one to the other."""
+"""Cosine of the largest angle between triangles of one smooth sheet."""
 
 SHEET_FINENESS = 2.0
-"""Samples of the distance to sheets for each cell of the grid along an axis."""
+"""Samples of the distance to sheets per cell of the grid along an axis."""
 
 SHEET_BAND = 2.5
-"""Cells up to which these are known."""
+"""Width of the band in which this distance is sampled, in cells."""
 
 
 class ShapeMesh(Shape):
-    """What a closed surface encloses.
+    """The inside of a closed surface.
 
     vertices  (k, 3) m
     faces     (m, 3) outward
@@ -92,7 +92,7 @@ class ShapeMesh(Shape):
         return distances_to_mesh(points, self.vertices, self.faces)
 
     def samples(self, spacing: float) -> Samples:
-        """As far apart as the grid's nodes: what is near the surface is not taken from them."""
+        """Spaced as the nodes of the grid; near the surface they are not used."""
         corner, counts = lattice(self.reach, spacing, BAND * spacing)
         box = np.stack([np.zeros_like(counts), counts], axis=1)
         found = sample_skin(self.vertices, self.faces, box, corner, spacing, False, BAND)
@@ -102,9 +102,9 @@ class ShapeMesh(Shape):
         return self.vertices, self.faces
 
     def section(self, rotation: Array, height: float) -> Section:
-        """One oriented segment for each triangle that is cut.
+        """One oriented segment for each cut triangle.
 
-        A vertex in the plane counts as just above it, so that the outline closes.
+        A vertex in the plane counts as just above it, so that the outline is closed.
         """
         x, y, z = rotation
         axes, foot = np.stack([x, y]), -height * z
@@ -130,7 +130,7 @@ class ShapeMesh(Shape):
         return crossings(self.vertices, self.faces, origins, direction)
 
     def patches(self) -> tuple[Array, Array]:
-        import trimesh  # a tenth of a second that only meshes need
+        import trimesh  # takes 0.1 s, and only meshes need it
 
         longest = float(np.ptp(self.vertices, axis=0).max()) / FINENESS
         vertices, faces = trimesh.remesh.subdivide_to_size(
@@ -151,7 +151,7 @@ class ShapeMesh(Shape):
         return np.asarray(self.vertices[farthest])
 
     def thickened(self, half: float) -> Shape:
-        """With sheets in its thin parts."""
+        """The mesh with sheets in its thin parts."""
         if half not in self._thickened:
             thin = self._way < 2.0 * half
             self._thickened[half] = ShapeThickened(self, half) if thin.any() else self
@@ -163,7 +163,7 @@ class ShapeMesh(Shape):
         return self._tips[width]
 
     def endless(self, rotation: Array, height: float) -> Shape:
-        """The sides of a prism, whose ends are missing."""
+        """The sides of a prism without its ends."""
         section = self.section(rotation, height)
         points, number = np.unique(section.segments.reshape(-1, 2), axis=0, return_inverse=True)
         start, end = number.reshape(-1, 2).T
@@ -183,7 +183,7 @@ class ShapePrism(ShapeMesh):
     """The sides of a prism."""
 
     def thickened(self, half: float) -> Shape:
-        """Each thin side moves outward, by moving its corners along the normals of thin sides."""
+        """The prism with thin sides moved outward, by their corners along the normals."""
         offset = np.maximum(half - 0.5 * self._way, 0.0)
         if not offset.any():
             return self
@@ -193,10 +193,10 @@ class ShapePrism(ShapeMesh):
 class ShapeThickened(ShapeMesh):
     """A mesh with sheets 2 `half` m thick along the middle of its thin parts.
 
-    The fluid takes the distance to both; all else is the mesh's. A sheet ends at a rim where its
-    part does; there it is as long and wide as the mesh.
+    The fluid uses the distance to mesh and sheets; all other properties are those of the mesh. At a
+    rim, a sheet ends where its thin part ends: it is as long and wide as the mesh.
 
-    mesh  as it is given
+    mesh  the original mesh
     half  m
     """
 
@@ -223,7 +223,7 @@ class ShapeThickened(ShapeMesh):
         return Samples(corner, pitch, values)
 
     def tips(self, width: float) -> float:
-        """A ball fits into the sheets."""
+        """As for the mesh, where a ball fits into the sheets."""
         return thin_parts(self.vertices, self.faces, width, self._thin)
 
     def _sheets(self) -> tuple[Array, Array, Array, Array, Integers, Integers, Integers]:
@@ -249,7 +249,7 @@ class ShapeThickened(ShapeMesh):
 
 
 def neighbours(faces: Integers) -> Integers:
-    """(m, 3) triangle on the other side of each edge of triangles (m, 3); itself where none is."""
+    """(m, 3) neighbour across each edge of triangles (m, 3); the triangle itself without one."""
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
     order = np.lexsort(edges.T)
     same = np.flatnonzero((edges[order[1:]] == edges[order[:-1]]).all(axis=1))
@@ -260,7 +260,7 @@ def neighbours(faces: Integers) -> Integers:
 
 
 def welded(vertices: Array, faces: Integers) -> Mesh:
-    """The same surface without vertices that stand twice, nor triangles without area."""
+    """The surface without duplicate vertices and without triangles that this collapses."""
     places, number = np.unique(vertices, axis=0, return_inverse=True)
     if len(places) == len(vertices):
         return vertices, faces
@@ -273,8 +273,8 @@ def offsets(vertices: Array, faces: Integers, distance: Array) -> Array:
     """(k, 3) how vertices move so that each triangle moves outward by its `distance` (m,), m.
 
     The least-squares solution of n . d = distance over the triangles of a vertex, weighted by
-    their angles there; n is their normal. Directions that they hardly determine are left out, and
-    no vertex moves farther than the corner of a cube.
+    their angles there; n is their normal. Directions that they hardly determine are dropped, and no
+    vertex moves farther than the corner of a cube.
     """
     corners = vertices[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

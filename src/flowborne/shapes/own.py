@@ -1,4 +1,4 @@
-"""Geometries of one's own: a signed distance, and how far it reaches."""
+"""The user's own geometries: a signed distance and its half extents."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Array, Integers, Mesh, Samples, Shape, lattice, lattice_points
 
 ACROSS = 48
-"""Samples along the longest side of a geometry from which its triangles are made."""
+"""Samples along the longest side of a geometry for its triangles."""
 
 FINER = 2.0
-"""Samples of a distance that the fluid looks up, for each cell of its grid along an axis."""
+"""Samples of a distance for the fluid, per cell of its grid along an axis."""
 
 
 class OwnGeometry(Protocol):
-    """A closed solid about the origin of a frame of its own; lengths in m."""
+    """A closed solid around the origin of its own frame; lengths in m."""
 
     def distance(self, points: Array) -> Array:
         """(n,) signed distances of points (n, 3), negative inside, m."""
         ...
 
     def half_extents(self) -> Array:
-        """(3,) half extents of a box about the origin around it, m."""
+        """(3,) half extents of a box around it, about the origin, m."""
         ...
 
 
@@ -40,18 +40,18 @@ SHAPES: Registry[OwnGeometry] = Registry(
     taken=(*PRIMITIVES, ShapeMesh.kind),
     keys=("body", "position", "euler", "axis", "density"),
 )
-"""Geometries of one's own, by kind."""
+"""The user's own geometries, by kind."""
 
 
 @dataclass(frozen=True)
 class PlacedShape:
-    """A geometry of one's own as part of a body.
+    """A user's geometry as part of a body.
 
     geometry  an object of the registered class
     body      name
     position  (3,) of its origin in the body's frame, m
     rotation  (3, 3) its frame to the body's
-    density   kg/m^3; the model's own for geoms unless given
+    density   kg/m^3; None for that of the model's geoms
     """
 
     geometry: OwnGeometry
@@ -62,13 +62,13 @@ class PlacedShape:
 
 
 class ShapeOwn(ShapeMesh):
-    """A geometry of one's own in the frame of the triangles that stand for it in the model.
+    """A user's geometry in the frame of the triangles that represent it in the model.
 
-    The fluid takes the geometry's own distance, and all else the triangles.
+    The fluid uses the distance of the geometry; everything else uses the triangles.
 
     centre, rotation  (3,) m, (3, 3): the triangles' frame to the geometry's
     vertices, faces   of the triangles, in their frame
-    offset            how much thicker the fluid sees it all around, m
+    offset            distance by which the surface in the fluid is moved outward, m
     """
 
     def __init__(
@@ -93,8 +93,8 @@ class ShapeOwn(ShapeMesh):
         return super().thickness + 2.0 * self.offset
 
     def distance(self, points: Array) -> Array:
-        places = self._centre + points @ self._rotation.T
-        return own_distance(self.geometry, places) - self.offset
+        local = self._centre + points @ self._rotation.T
+        return own_distance(self.geometry, local) - self.offset
 
     def samples(self, spacing: float) -> Samples:
         pitch = spacing / FINER
@@ -106,7 +106,7 @@ class ShapeOwn(ShapeMesh):
         return None
 
     def thickened(self, half: float) -> Shape:
-        """Thicker all around by what its thinnest part lacks."""
+        """The geometry moved outward by half of what its thinnest part lacks."""
         offset = half - 0.5 * self.thickness
         if offset <= 0.0:
             return self
@@ -114,7 +114,7 @@ class ShapeOwn(ShapeMesh):
         return ShapeOwn(self.geometry, *frame, self.vertices, self.faces, self.offset + offset)
 
     def tips(self, width: float) -> float:
-        """A ball fits into it where a smaller one, by its offset, fits within its triangles."""
+        """As for the triangles, with a ball smaller by twice the offset."""
         return super().tips(width - 2.0 * self.offset)
 
 
@@ -124,7 +124,7 @@ def named(geometry: OwnGeometry) -> str:
 
 
 def own_distance(geometry: OwnGeometry, points: Array) -> Array:
-    """(n,) what the geometry says of points (n, 3), m. Raises PartError when it is no distance."""
+    """(n,) distances of points (n, 3) from the geometry, m. Raises PartError for bad results."""
     what = named(geometry)
     with PartError.guarding(what):
         distance = np.asarray(geometry.distance(points), dtype=np.float64)
@@ -137,10 +137,10 @@ def own_distance(geometry: OwnGeometry, points: Array) -> Array:
 
 
 def triangulated(geometry: OwnGeometry) -> Mesh:
-    """Closed outward surface of a geometry of one's own, in its frame; it has its volume.
+    """Closed outward surface of a user's geometry, in its frame, with its volume.
 
-    What is thinner than a 48th of its longest side may be lost.
-    raises  PartError when it is empty, or reaches beyond its half extents
+    Parts thinner than a 48th of the longest side may be lost.
+    raises  PartError when the geometry is empty, or extends beyond its half extents
     """
     pv = optional("pyvista", "PyVista", "flesh", "surfaces of shapes of one's own")
 
@@ -151,9 +151,9 @@ def triangulated(geometry: OwnGeometry) -> Mesh:
         raise PartError(f"{what} has the half extents {half}: give three positive ones in m")
     pitch = 2.0 * half.max() / ACROSS
     corner, counts = lattice(half, pitch, pitch)
-    places = lattice_points(corner, pitch, counts)
-    distance = own_distance(geometry, places)
-    beyond = (np.abs(places) > half * (1.0 + 1e-9)).any(axis=1)
+    points = lattice_points(corner, pitch, counts)
+    distance = own_distance(geometry, points)
+    beyond = (np.abs(points) > half * (1.0 + 1e-9)).any(axis=1)
     if distance.min() >= 0.0:
         raise PartError(f"{what} holds none of its box: its distance is negative nowhere in it")
     if distance[beyond].min() < 0.0:

@@ -1,4 +1,4 @@
-"""What round shapes have in common: they are swept by a profile that turns about z."""
+"""Surfaces of revolution: profiles that rotate about z."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 ARC = 32
-"""Patches around a circle, and sides of one that is drawn."""
+"""Patches around a circle, and sides of a drawn circle."""
 
 
 def parts(length: float, longest: float) -> int:
-    """Into how many parts, none above `longest`, a length is divided."""
+    """Number of equal parts of a length, none above `longest`."""
     return max(int(np.ceil(length / longest - 1e-9)), 1)
 
 
 def capsule_profile(radius: float, half_length: float, longest: float, arc: int) -> Array:
     """(k, 2) distance from the axis and height, from pole to pole of a capsule or sphere.
 
-    longest  of the parts of its straight side, m
+    longest  largest part of the straight side, m
     arc      parts of a full circle
     """
     angle = np.linspace(-0.5 * np.pi, 0.0, arc // 4 + 1)
@@ -36,7 +36,7 @@ def capsule_profile(radius: float, half_length: float, longest: float, arc: int)
 
 
 def cylinder_profile(radius: float, half_length: float, longest: float) -> Array:
-    """(k, 2) as `capsule_profile`, of a cylinder; no part is above `longest` m."""
+    """(k, 2) as `capsule_profile`, for a cylinder; no part is above `longest` m."""
     rise = np.linspace(-half_length, half_length, parts(2.0 * half_length, longest) + 1)
     disc = np.linspace(0.0, radius, parts(radius, longest) + 1)[:-1]
     return np.concatenate(
@@ -49,7 +49,7 @@ def cylinder_profile(radius: float, half_length: float, longest: float) -> Array
 
 
 def revolved(profile: Array, scale: Array) -> tuple[Array, Array]:
-    """Patches (see `Shape.patches`) of what a profile sweeps about z, stretched by `scale` (3,)."""
+    """Patches (see `Shape.patches`) of a profile rotated about z, scaled by `scale` (3,)."""
     angle = 2.0 * np.pi * np.arange(ARC + 1) / ARC
     angle[-1] = 0.0
     points = np.empty((len(profile), ARC + 1, 3))
@@ -62,7 +62,7 @@ def revolved(profile: Array, scale: Array) -> tuple[Array, Array]:
 
 
 def _quads(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
-    """Centroids and area vectors of plane quadrangles given by corners in turn."""
+    """Centroids and area vectors of plane quadrangles given by their corners in order."""
     first, second = 0.5 * np.cross(b - a, c - a), 0.5 * np.cross(c - a, d - a)
     vector = first + second
     weight = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
@@ -72,7 +72,7 @@ def _quads(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
 
 
 def swept_triangles(profile: Array, scale: Array) -> tuple[Array, Integers]:
-    """Closed surface that a profile from pole to pole sweeps about z, stretched by `scale` (3,)."""
+    """Closed surface of a profile from pole to pole, rotated about z, scaled by `scale` (3,)."""
     angle = 2.0 * np.pi * np.arange(ARC) / ARC
     radius, height = profile[1:-1].T
     rings = np.empty((len(radius), ARC, 3))
@@ -94,7 +94,7 @@ def swept_triangles(profile: Array, scale: Array) -> tuple[Array, Integers]:
 
 
 def section_of_rod(family: str, size: Array, z: Array, height: float) -> Section:
-    """Cross-section of a rod about its local z: a disc where it stands, `family` where it lies.
+    """Cross-section of a rod about its local z: a disc if upright, `family` if lying.
 
     size  (3,) radius first, half length second, m
     z     (3,) the world's z in its frame

@@ -11,22 +11,22 @@ from flowborne.shapes.thickness import thin_parts
 
 Array = NDArray[np.float64]
 TIP_ARC = 64
-"""Sides of what is round, to look for its tips."""
+"""Sides of round outlines in the search for tips."""
 
 ALIGNED = 1e-6
-"""Largest sine of the angle by which a local axis may be off the z axis."""
+"""Largest sine of the angle between a local axis and the z axis that counts as 0."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """Cross-section of one geometry, in the geometry's own frame.
+    """Cross-section of one geometry, in the frame of the geometry.
 
     family    "rectangle", "ellipse", "stadium" or "segments"
     half      (2,) half extents along `axes`; for a stadium half length of the straight part, radius
     centre    (3,) centre of the section, m
     axes      (2, 3) unit vectors that span the plane; axes[0] x axes[1] is the world's z
-    segments  (k, 2, 2) oriented outline of a mesh in the coordinates of `axes` about `centre`,
-              material on its left; empty for the other families
+    segments  (k, 2, 2) oriented outline of a mesh in the coordinates of `axes` about `centre`, with
+              the material on the left; empty for the other families
     """
 
     family: str
@@ -75,7 +75,7 @@ class Section:
         return about_centre - self.area * float(offset @ offset)
 
     def outline(self, arc: int) -> Array:
-        """(k, 2, 3) oriented outline segments in the geometry's frame; `arc` of them a turn."""
+        """(k, 2, 3) oriented outline in the frame of the geometry; `arc` segments per full turn."""
         if self.family == "segments":
             plane = self.segments
         else:
@@ -84,7 +84,7 @@ class Section:
         return np.asarray(self.centre + plane @ self.axes)
 
     def tips(self, width: float) -> float:
-        """How far it reaches along its outline beyond where a disc `width` m across fits in, m."""
+        """Length of its tips along the outline, where no disc of diameter `width` m fits in, m."""
         start, end = np.moveaxis(self.outline(TIP_ARC), 1, 0)
         rise, first = 0.5 * width * np.cross(*self.axes), np.arange(len(start))
         a, b, c, d = (first + k * len(start) for k in range(4))
@@ -116,7 +116,7 @@ def chord(radius: float, height: float) -> float:
 
 
 def upright_axis(z: Array) -> int:
-    """Index of the local axis along the world's z, whose local components are `z`."""
+    """Index of the local axis along the world's z, given as local components `z`."""
     k = int(np.argmax(np.abs(z)))
     if np.hypot(z[(k + 1) % 3], z[(k + 2) % 3]) > ALIGNED:
         raise ValueError("has no local axis along z")

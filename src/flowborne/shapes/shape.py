@@ -31,10 +31,10 @@ DIRECTIONS = AROUND / np.linalg.norm(AROUND, axis=1, keepdims=True)
 
 
 class Samples(NamedTuple):
-    """Distances on a lattice in a shape's frame.
+    """Distances on a lattice in the frame of a shape.
 
-    corner  (3,) place of the first, m
-    pitch   m between two
+    corner  (3,) position of the first sample, m
+    pitch   spacing, m
     values  (nx, ny, nz) m
     """
 
@@ -44,11 +44,11 @@ class Samples(NamedTuple):
 
 
 class Shape(ABC):
-    """A solid in its own frame, about its origin; lengths in m. Never changed after it is made.
+    """A solid in its own frame, around the origin; lengths in m. Immutable.
 
-    kind  name, as MJCF spells it
+    kind  name in MJCF
     code  number of the kind for `kernels.distance.signed_distance`
-    size  (3,) half sizes as MuJoCo has them, m
+    size  (3,) MuJoCo's half sizes, m
     """
 
     kind: ClassVar[str]
@@ -68,7 +68,7 @@ class Shape(ABC):
     @property
     @abstractmethod
     def reach(self) -> Array:
-        """(3,) half extents of a box about the origin around it, m; 0 where it is endless."""
+        """(3,) half extents of a box around it, about the origin, m; 0 where it is endless."""
 
     @property
     @abstractmethod
@@ -80,11 +80,11 @@ class Shape(ABC):
         """(n,) signed distances of points (n, 3), negative inside, m."""
 
     def samples(self, spacing: float) -> Samples | None:
-        """Distances for a grid of `spacing` m to look up; None of a kind that has a formula."""
+        """Distances for interpolation on a grid of `spacing` m; None for kinds with a formula."""
         return None
 
     def skin(self) -> Mesh | None:
-        """Triangles to which the distance near by is exact; None of a kind that has none."""
+        """Triangles for exact distances near the surface; None for kinds without triangles."""
         return None
 
     @abstractmethod
@@ -92,14 +92,15 @@ class Shape(ABC):
         """Cross-section at z = 0 when the origin is at z = `height` m.
 
         rotation  (3, 3) its frame to the world's
-        raises    ValueError when no local axis is along z, or it misses the plane z = 0
+        raises    ValueError when no local axis is along z, or when it misses the plane z = 0
         """
 
     @abstractmethod
     def crossings(self, origins: Array, direction: Array) -> tuple[Integers, Array, Array]:
         """Where lines from origins (n, 3) along direction (3,) enter (+1) and leave (-1) it.
 
-        returns  (k,) numbers of the lines, (k,) places in directions from the origin, (k,) signs
+        returns  (k,) numbers of the lines, (k,) distances from the origins in units of the
+                 direction, (k,) signs
         """
 
     @abstractmethod
@@ -111,33 +112,33 @@ class Shape(ABC):
 
     @abstractmethod
     def triangles(self) -> Mesh:
-        """The surface to draw, closed; what is round has 32 sides."""
+        """The closed surface for pictures; round shapes have 32 sides."""
 
     @abstractmethod
     def landmarks(self) -> Array:
-        """(k, 3) places all over the surface, m."""
+        """(k, 3) points all over the surface, m."""
 
     @abstractmethod
     def outermost(self) -> Array:
-        """(k, 3) places on the surface that lie farthest out, a few in every direction, m."""
+        """(k, 3) outermost points of the surface, a few in every direction, m."""
 
     @abstractmethod
     def thickened(self, half: float) -> Shape:
-        """The same, at least 2 `half` m thick everywhere; no longer and no wider."""
+        """The shape made at least 2 `half` m thick everywhere, without becoming longer or wider."""
 
     def tips(self, width: float) -> float:
-        """How far it reaches along its surface beyond where a ball `width` m across fits in, m."""
+        """Length of its tips along the surface, where no ball of diameter `width` m fits in, m."""
         return thin_parts(*self.triangles(), width)
 
     @abstractmethod
     def endless(self, rotation: Array, height: float) -> Shape:
-        """What a slab holds of it, placed as for `section`: the same along the world's z."""
+        """The shape extended along the world's z, for a slab; arguments as in `section`."""
 
 
 class Primitive(Shape):
-    """A convex shape about its origin that its half sizes say all of.
+    """A convex shape around its origin, defined by its half sizes.
 
-    size  (3,) half sizes as MuJoCo has them, m; those that the kind does not need say nothing
+    size  (3,) MuJoCo's half sizes, m; entries that the kind does not need have no meaning
     """
 
     def __init__(self, size: Array) -> None:
@@ -154,8 +155,8 @@ class Primitive(Shape):
         enter, leave = self.interval(origins, direction)
         hit = np.flatnonzero(leave > enter)
         one = np.ones(hit.size)
-        places, signs = (enter[hit], leave[hit]), (one, -one)
-        return np.tile(hit, 2), np.concatenate(places), np.concatenate(signs)
+        distances, signs = (enter[hit], leave[hit]), (one, -one)
+        return np.tile(hit, 2), np.concatenate(distances), np.concatenate(signs)
 
     def outermost(self) -> Array:
         return self.landmarks()
@@ -168,7 +169,7 @@ class Primitive(Shape):
         return type(self)(np.maximum(self.size, half))
 
     def tips(self, width: float) -> float:
-        """None: it is round, or its angles are right ones."""
+        """0: it is round, or has right angles."""
         return 0.0
 
     def endless(self, rotation: Array, height: float) -> Shape:
@@ -176,17 +177,17 @@ class Primitive(Shape):
 
 
 def lattice(reach: Array, pitch: float, margin: float) -> tuple[Array, Integers]:
-    """First place (3,) and counts (3,) of a lattice `margin` m beyond the half extents `reach`."""
+    """First point (3,) and counts (3,) of a lattice `margin` m beyond the half extents `reach`."""
     corner = -np.ceil((reach + margin) / pitch) * pitch
     return corner, np.rint(-2.0 * corner / pitch).astype(np.int64) + 1
 
 
 def lattice_points(corner: Array, pitch: float, counts: Integers) -> Array:
-    """(n, 3) places on a lattice, z fastest, m."""
+    """(n, 3) points of a lattice, z fastest, m."""
     return corner + pitch * np.stack([i.ravel() for i in np.indices(tuple(counts))], axis=1)
 
 
 def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) of length 1; 0 of those without one."""
+    """Vectors (..., 3) scaled to length 1; zero vectors stay 0."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny))

@@ -1,4 +1,4 @@
-"""How thick a body of triangles is, and how far its tips reach."""
+"""Thickness of a body of triangles, and length of its tips."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 RIMS = 0.05
-"""Part of a skin's area that may be thinner: around rims, where both sides meet."""
+"""Part of the area of a surface that may be thinner: around rims, where both sides meet."""
 
 FITTING = 0.95
-"""Part of its radius that a ball has to be off a skin to fit beneath it, for facets are flat."""
+"""Part of its radius by which a ball must clear the surface to fit; facets are flat."""
 
 BALLS = 1.0, 0.05
-"""Balls that have to fit, in widths: the centre of the large one may lie beyond a thin part."""
+"""Balls that must fit, in widths: the centre of the large one may lie beyond a thin part."""
 
 MOST_FACETS = 1e5
-"""Pieces that a skin is cut into to look for its tips, about."""
+"""Approximate number of pieces of a surface in the search for tips."""
 
 
 def thinnest(vertices: Array, triangles: Indices, slab: bool, way: Array | None = None) -> float:
-    """Thickness in m that all of a closed skin has but for its `RIMS`.
+    """Thickness in m that a closed surface has everywhere except at its `RIMS`.
 
     vertices, triangles  (n, 3) m; (k, 3) outward
-    slab                 whether its faces across z are cuts, not skin
-    way                  what `way_inward` gives of it, where that is known
+    slab                 whether its faces across z are cuts and do not count
+    way                  the result of `way_inward`, if known
     """
     normal = outward(vertices[triangles])
     area = np.linalg.norm(normal, axis=1)
@@ -47,14 +47,14 @@ def thin_parts(
     width: float,
     thickened: NDArray[np.bool_] | None = None,
 ) -> float:
-    """How far a body reaches along its skin beyond where a ball `width` m across fits in, m.
+    """Length of the tips of a body along its surface, where no ball of diameter `width` m fits, m.
 
-    Up to the edge of a wedge of angle a that is half the width over tan(a / 2). It is found to a
-    third of the width; of a body that would take more than `MOST_FACETS` less finely, and rather
-    too short. It is 0 where the ball fits nowhere: such a body is thin, and has no tips.
+    For a wedge of angle a it is half the width over tan(a / 2). The error is a third of the width;
+    bodies that would need more than `MOST_FACETS` have a coarser result, which is rather too short.
+    It is 0 when the ball fits nowhere: such a body is thin, and has no tips.
 
-    vertices, triangles  (n, 3) m; (k, 3) outward. Of a prism the sides, without its ends
-    thickened            (k,) triangles beneath which the ball fits in any case
+    vertices, triangles  (n, 3) m; (k, 3) outward. For a prism its sides, without its ends
+    thickened            (k,) triangles beneath which the ball always fits
     """
     if width <= 0.0:
         return 0.0
@@ -80,7 +80,7 @@ def thin_parts(
 def ball_fits(
     facets: Array, vertices: Array, triangles: Indices, cells: Cells, width: float
 ) -> NDArray[np.bool_]:
-    """(k,) whether a ball `width` m across that lies beneath the middle of a facet is off the skin.
+    """(k,) whether a ball of diameter `width` m beneath the middle of a facet clears the surface.
 
     facets               (k, 3, 3) corners of pieces of its triangles, m
     vertices, triangles  (n, 3) m; (k, 3) outward
@@ -93,9 +93,9 @@ def ball_fits(
 
 
 def divided(facets: Array, longest: float) -> Array:
-    """(n, 3, 3) triangles (k, 3, 3), their longest sides halved until none is above `longest` m.
+    """(n, 3, 3) triangles (k, 3, 3), with longest sides halved until none is above `longest` m.
 
-    Four times `MOST_FACETS` at once, as slivers come to, are not divided further.
+    More than four times `MOST_FACETS` at once, as from slivers, are not divided further.
     """
     done = [facets[:0]]
     while len(facets):
@@ -116,7 +116,7 @@ def side_lengths(facets: Array) -> Array:
 
 
 def sides(vertices: Array, triangles: Indices) -> Indices:
-    """(m, 3) triangles of the skin of a slab's body, without those across z, its cuts."""
+    """(m, 3) triangles of the surface of a body in a slab, without its cuts across z."""
     return triangles[~across(outward(vertices[triangles]))]
 
 
@@ -126,5 +126,5 @@ def across(normal: Array) -> NDArray[np.bool_]:
 
 
 def outward(facets: Array) -> Array:
-    """(k, 3) normals of triangles (k, 3, 3), twice as long as their areas, m^2."""
+    """(k, 3) normals of triangles (k, 3, 3) with twice their areas as lengths, m^2."""
     return np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
