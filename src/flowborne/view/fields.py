@@ -20,7 +20,7 @@ Pixels = NDArray[np.uint8]
 Scale = tuple[Array, float, float, str]
 """Colours from lowest to highest (k, 3), lowest value, highest value, name."""
 Legend = Sequence[tuple[str, str]]
-"""(name, colour) of each thing shown in a colour of its own."""
+"""(name, colour) of each thing shown in its own colour."""
 
 SAMPLES = 24
 """Frames from which the scale of a film is taken."""

@@ -199,7 +199,7 @@ class Fluid:
         self._layer.show_velocity(state, axis, place, speed, wanted.velocity)
 
     def legend(self, wanted: Settings) -> tuple[Legend, Sequence[Scale]]:
-        """(name, colour) of what is shown in a colour of its own, and the colour scales."""
+        """(name, colour) of what is shown in its own colour, and the colour scales."""
         if self._run.slab:
             field = self._slab_field(wanted.field)
             if field is None:

@@ -1,4 +1,4 @@
-"""The panel beside the scene: time, what is shown, legend and curves."""
+"""The panel next to the scene: time, what is shown, legend and curves."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def legend_html(
 ) -> str:
     """The legend as HTML.
 
-    names   (name, colour) of what has a colour of its own
+    names   (name, colour) of what has its own colour
     scales  of colours
     forces  that are shown as arrows, if any
     """
