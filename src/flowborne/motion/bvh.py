@@ -1,8 +1,8 @@
 """BVH in and out.
 
-A BVH is y up as a rule, its character facing +z, its left at +x; where z is up the left is at +x
-as well, so that it faces -y (Blender's way). Lengths have no unit, angles are degrees, and a
-joint's rotation is the product of its rotation channels in the file's order.
+In most BVH files y is up, and the character faces +z with its left at +x. In files with z up, its
+left is at +x too, so it faces -y (as in Blender). Lengths have no unit, angles are in degrees, and
+the rotation of a joint is the product of its rotation channels in the order of the file.
 """
 
 from __future__ import annotations
@@ -28,40 +28,40 @@ _OVER = np.diag([1.0, -1.0, -1.0])
 """Half a turn about x."""
 
 TO_WORLD: dict[str, Array] = {"y": _Y_UP, "z": _Z_UP, "-y": _Y_UP @ _OVER, "-z": _Z_UP @ _OVER}
-"""Axis that is up in the file -> (3, 3) rotation of its axes to x forward, y left, z up."""
+"""Up axis of the file -> (3, 3) rotation of its axes to x forward, y left, z up."""
 
 RIGID = 0.2
-"""Of its distance from the joint above, what a joint moves to be no bone's end but a root."""
+"""Motion of a joint, relative to its distance from the joint above, that makes it a root."""
 
 STILL = 1e-3
-"""m; a bone whose length channels move less counts as rigid: exporters round and solve so far."""
+"""Largest motion of the length channels of a rigid bone, m: exporters round and solve so far."""
 
 SAME = 1e-6
-"""rad; a rotation this near to the file's own keeps the file's numbers."""
+"""Largest change of a rotation, rad, that keeps the numbers of the file."""
 
 DEGREES_OF_FREEDOM = 0.01
-"""degrees that may be lost where a joint of the file has fewer than three rotation channels."""
+"""Degrees that may be lost if a joint of the file has fewer than three rotation channels."""
 
 SHORTEST = 1e-6
-"""m of a bone that has a length: programs that read BVH drop or lengthen the others."""
+"""Least length of a bone, m: programs that read BVH drop or lengthen shorter ones."""
 
 LONE = 0.1
-"""m of a bone that has no length by itself, and none above it."""
+"""Length of a bone that has none, nor a bone above it, m."""
 
 ZXY = (2, 0, 1)
-"""Axes of the rotation channels in clips that have no file to take after."""
+"""Axes of the rotation channels in clips without an original file."""
 
 
 def read_bvh(path: str | Path, unit: float = 1.0, up: str = "y", skip: int = 0) -> Clip:
     """The motion of a BVH file.
 
     unit    m per length of the file
-    up      axis of the file that is up, one of TO_WORLD
-    skip    frames left out at the start, such as a T-pose that an exporter put there
-    raises  SceneError when the file is missing, none, cut or not finite, when a bone changes its
+    up      up axis of the file, one of TO_WORLD
+    skip    frames to drop at the start, such as the T-pose of an exporter
+    raises  SceneError when the file is missing, not BVH, cut or not finite, when a bone changes its
             length by more than 1 mm, and when `skip` leaves no frame
-    note    where the root has position channels they are its place and its OFFSET is not added. A
-            root with a single joint below it that moves in it is folded into that joint
+    note    position channels of the root give its position, and its OFFSET is not added. A root
+            with a single joint below it that moves relative to it is merged into that joint
     """
     bvh = load_bvh(Path(path))
     clip = clip_of(bvh, unit, up, skip)
@@ -72,11 +72,11 @@ def read_bvh(path: str | Path, unit: float = 1.0, up: str = "y", skip: int = 0) 
 def clip_of(
     bvh: BvhFile, unit: float = 1.0, up: str = "y", skip: int = 0, root: str | None = None
 ) -> Clip:
-    """The motion of a BVH file that has been read, its bones made rigid.
+    """The motion of a loaded BVH file, with rigid bones.
 
-    root    joint with which the clip begins: those above are folded into it, and what hangs on
-            them beside it is left out. By default the file's own, or the first below it that does
-            not move in one that carries nothing else
+    root    first joint of the clip: the joints above are merged into it, and their other branches
+            are dropped. By default the root of the file, or the first joint below it that does not
+            move relative to a joint with a single child
     raises  SceneError when `skip` leaves no frame
     """
     if not 0 <= skip < len(bvh.values):
@@ -115,8 +115,7 @@ def clip_of(
 
 
 def check_rigid(bvh: BvhFile, clip: Clip, joints: Iterable[str], most: float = STILL) -> None:
-    """Raise SceneError where one of some joints of a file moves by more than `most` (m) about where
-    a rigid bone has it."""
+    """Raise SceneError when a joint moves more than `most` (m) about the end of its rigid bone."""
     for joint in joints:
         stray, frame = clip.strays.get(joint, (0.0, 0))
         if stray > most:
@@ -139,17 +138,17 @@ def write_bvh(
     first: int = 0,
     last: int | None = None,
 ) -> None:
-    """Write a BVH file anew with other rotations of some joints; all else stays as it came.
+    """Write a copy of a BVH file with other rotations of some joints; the rest is unchanged.
 
-    source     file whose skeleton, channels, frame time and numbers are taken over, verbatim
-    rotations  joint -> (frames, 4) unit quaternions relative to its parent in the file, in the
-               world's axes. Their angles go on from frame to frame without a turn of 360 degrees;
-               those of a rotation that is the file's own stay the file's
-    root       a joint with channels of position, and its (frames, 3) places, m, and (frames, 4)
+    source     file for the skeleton, channels, frame time and numbers, which are copied verbatim
+    rotations  joint -> (frames, 4) unit quaternions relative to its parent in the file, in world
+               axes. Their angles are continuous from frame to frame; unchanged rotations keep the
+               angles of the file
+    root       a joint with position channels, and its (frames, 3) positions, m, and (frames, 4)
                rotations in the world
     unit, up   as in `read_bvh`
-    first      frame of the file with which the new one begins, skipped ones counted
-    last       frame after the last one; the file's end by default
+    first      first frame of the file to write, counting skipped ones
+    last       frame after the last one; the end of the file by default
     raises     SceneError when the file is bad, lacks a joint or a channel, or has no frame in the
                range; OSError
     """
@@ -188,11 +187,11 @@ def write_clip(
 ) -> None:
     """Write a clip as a BVH file: y up, facing +z, channels Zrotation Xrotation Yrotation.
 
-    Every last bone gets an end site, and none of them has zero length (see `_tip`).
+    Every last bone gets an end site of nonzero length (see `_tip`).
 
     unit     m per length of the file
-    sliding  joint -> (frames, 3) m, places in the parent's axes of joints other than the root that
-             do not stay where their offset is
+    sliding  joint -> (frames, 3) m, positions in the parent's axes of joints other than the root
+             that move relative to their parent
     raises   OSError
     """
     back = TO_WORLD["y"].T
@@ -220,12 +219,12 @@ def write_clip(
 
 
 def _places(joint: BvhJoint, values: Array) -> tuple[Array, bool]:
-    """(frames, 3) a joint's place in its parent's axes, in the file's unit, and whether channels
-    give it.
+    """(frames, 3) position of a joint in its parent's axes, in the file's unit, and whether it has
+    position channels.
 
-    Of the root it is what the position channels say. Of others some tools write the whole place
-    into them, and others what comes on top of OFFSET: the numbers are nearer to OFFSET in the first
-    case and nearer to 0 in the second.
+    For the root, the position channels give it. For other joints, some tools write the full
+    position, and others the difference from OFFSET: the numbers are closer to OFFSET in the first
+    case and closer to 0 in the second.
     """
     result = np.tile(joint.offset, (len(values), 1))
     axes = [axis for axis, turns in joint.channels if not turns]
@@ -238,7 +237,7 @@ def _places(joint: BvhJoint, values: Array) -> tuple[Array, bool]:
 
 
 def _folded(bvh: BvhFile, joint: int, values: Array, world: Array) -> tuple[Array, Array]:
-    """(frames, 3) place, in the file's unit, and (frames, 4) rotation of a joint in the world."""
+    """(frames, 3) position, in the file's unit, and (frames, 4) rotation of a joint, world axes."""
     own = bvh.joints[joint]
     place, rotation = _places(own, values)[0] @ world.T, _rotations(own, values, world)
     if own.parent < 0:
@@ -250,8 +249,8 @@ def _folded(bvh: BvhFile, joint: int, values: Array, world: Array) -> tuple[Arra
 def _within(
     bvh: BvhFile, name: str, places: Array, rotations: Array, values: Array, world: Array
 ) -> tuple[list[int], Array, Array]:
-    """Columns of a joint's position channels, (frames, k) numbers for them, and (frames, 4) the
-    joint's rotations in its parent, of places in the file's unit and rotations in the world."""
+    """Columns of the position channels of a joint, (frames, k) numbers for them, and (frames, 4)
+    rotations relative to its parent, from positions in the file's unit and world rotations."""
     joint = next(joint for joint in bvh.joints if joint.name == name)
     if joint.parent >= 0:
         start, above = _folded(bvh, joint.parent, values, world)
@@ -261,12 +260,12 @@ def _within(
         (joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if not turns
     ]
     columns, axes = [column for column, _ in numbered], [axis for _, axis in numbered]
-    added = _places(joint, values)[0][:, axes] - values[:, columns]  # OFFSET, where that is added
+    added = _places(joint, values)[0][:, axes] - values[:, columns]  # OFFSET, if it is added
     return columns, (places @ world)[:, axes] - added, rotations
 
 
 def _first_at_rest(bvh: BvhFile, values: Array) -> int:
-    """The joint to begin with: each that moves within the only one above it takes its place."""
+    """The first joint of a clip: an only child that moves relative to its parent replaces it."""
     first = 0
     while True:
         below = [number for number, j in enumerate(bvh.joints) if j.parent == first]
@@ -279,30 +278,30 @@ def _first_at_rest(bvh: BvhFile, values: Array) -> int:
         first = below[0]
 
 
-def _turning(joint: BvhJoint) -> tuple[list[int], list[int]]:
+def _rotation_channels(joint: BvhJoint) -> tuple[list[int], list[int]]:
     """Columns and axes of a joint's rotation channels."""
     found = [(joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if turns]
     return [column for column, _ in found], [axis for _, axis in found]
 
 
 def _rotations(joint: BvhJoint, values: Array, world: Array) -> Array:
-    """(frames, 4) relative to the parent, in the world's axes."""
-    columns, axes = _turning(joint)
+    """(frames, 4) rotations relative to the parent, in world axes."""
+    columns, axes = _rotation_channels(joint)
     return quaternions_of(values[:, columns], world.T[axes])
 
 
 def _in_axes(rotations: Array, axes: Array) -> Array:
-    """(frames, 4) the same rotations seen from axes turned by a (3, 3) rotation."""
+    """(frames, 4) the same rotations in axes rotated by a (3, 3) rotation."""
     return np.concatenate([rotations[:, :1], rotations[:, 1:] @ axes.T], axis=1)
 
 
 def _replaced(
     bvh: BvhFile, joint: BvhJoint, values: Array, wanted: Array, world: Array
 ) -> tuple[list[int], Array, Mask]:
-    """Columns, angles (frames, k) in degrees for them, and the frames where they are new."""
+    """Columns, angles (frames, k) in degrees for them, and the frames with new angles."""
     if wanted.shape != (len(values), 4):
         raise ValueError(f"{wanted.shape} is not the shape of {len(values)} quaternions.")
-    columns, axes = _turning(joint)
+    columns, axes = _rotation_channels(joint)
     if len(set(axes)) != len(axes):
         raise SceneError(
             f"{bvh.name}, line {joint.line}: joint '{joint.name}' turns twice about one axis. "

@@ -27,7 +27,7 @@ LARGEST = 1e9
 large."""
 
 LOCKED = 1e-7
-"""Cosine of the middle angle below which only the sum or difference of the others is known."""
+"""Cosine of the middle angle below which only the sum or difference of the others is defined."""
 
 CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
 
@@ -41,12 +41,12 @@ def quaternions_of(angles: Array, axes: Array) -> Array:
 
 
 def angles_of(rotations: Array, order: tuple[int, int, int], start: Array) -> Array:
-    """(frames, 3) angles in degrees, each frame's nearest to those of the frame before.
+    """(frames, 3) angles in degrees, in each frame closest to those of the frame before.
 
     rotations  (frames, 4) unit quaternions
     order      the axes, all different, of 0, 1, 2
-    start      (3,) angles that the first frame's are nearest to; they also decide how a turn is
-               shared between first and last angle where the middle one is at 90 degrees
+    start      (3,) reference angles for the first frame; they also decide how a rotation is
+               shared between first and last angle when the middle one is at 90 degrees
     source     two triples of angles make one rotation: (a, b, c), (a + 180, 180 - b, c + 180)
     """
     i, j, k = order
@@ -74,18 +74,18 @@ def angles_of(rotations: Array, order: tuple[int, int, int], start: Array) -> Ar
 
 
 def _wrapped(degrees: Array) -> Array:
-    """From -180 to 180."""
+    """Degrees wrapped to -180 to 180."""
     return (degrees + 180.0) % 360.0 - 180.0
 
 
 @dataclass
 class BvhJoint:
-    """A joint as the file has it.
+    """A joint of the file.
 
     parent    number of the parent, -1 for the root
-    line      of the file, from 1
+    line      line of the file, from 1
     offset    (3,) in the file's unit and axes; NaN until its line is read
-    channels  (axis, whether it turns) in the file's order; axis 0, 1, 2 for X, Y, Z
+    channels  (axis, whether it is a rotation) in the file's order; axis 0, 1, 2 for X, Y, Z
     first     column of its first channel
     end       (3,) offset of its End Site, the first if there are several
     """
@@ -100,10 +100,10 @@ class BvhJoint:
 
 
 def read_hierarchy(lines: list[str], name: str) -> tuple[list[BvhJoint], int]:
-    """Joints, and the number of lines up to and with MOTION.
+    """Joints, and the number of lines up to and including MOTION.
 
-    name    of the file, for messages
-    raises  SceneError with the line when the skeleton is cut or makes no sense
+    name    name of the file, for messages
+    raises  SceneError with the line when the skeleton is cut or invalid
     """
     statements = _statements(lines)
     number, text = next(statements, (1, ""))
@@ -144,7 +144,7 @@ def read_hierarchy(lines: list[str], name: str) -> tuple[list[BvhJoint], int]:
 
 
 def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
-    """Line number and text of what the lines say, braces on their own."""
+    """Line number and text of the statements, with braces as separate statements."""
     for number, line in enumerate(lines, start=1):
         for part in re.split(r"([{}])", line):
             if part.strip():
@@ -195,7 +195,7 @@ def _channels(text: str, where: str) -> tuple[tuple[int, bool], ...]:
 
 
 def _checked(joints: list[BvhJoint], unclosed: bool, where: str) -> list[BvhJoint]:
-    """The joints with their columns, if the skeleton is whole."""
+    """The joints with their columns, if the skeleton is complete."""
     if not joints:
         raise SceneError(f"{where}: there is no ROOT before MOTION. Give a file with a skeleton.")
     if unclosed:
@@ -219,7 +219,7 @@ def _checked(joints: list[BvhJoint], unclosed: bool, where: str) -> list[BvhJoin
 
 
 def number_in(text: str) -> float:
-    """The number that a text is; NaN when it is none."""
+    """The number in a text; NaN without one."""
     try:
         return float(text)
     except ValueError:

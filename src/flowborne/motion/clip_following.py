@@ -27,32 +27,32 @@ from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
 
-FASTER = 5.0
-"""How many times as fast as in the rest of a loop its joints may go where its ends are joined."""
+MOST_SPEED_RATIO = 5.0
+"""Largest speed of a joint in the seam of a loop, relative to the rest of the loop."""
 
-MORE = 1.2
-"""Blend that is proposed, over the one at which they would go as fast as that."""
+BLEND_MARGIN = 1.2
+"""Proposed blend over the blend at which this ratio is reached."""
 
-SLOW = 1.0
-"""rad/s or m/s that counts as the speed of a joint which hardly moves in the clip."""
+LEAST_SPEED = 1.0
+"""Least reference speed of a joint, rad/s or m/s, for joints that hardly move."""
 
 SHORTEST = 0.5
-"""s of a loop that is proposed."""
+"""Least duration of a proposed loop, s."""
 
 TIMES = 240
-"""At which speeds are looked at, of a round and of its seam each."""
+"""Times at which speeds are evaluated, in a cycle and in its seam each."""
 
 
 @dataclass(frozen=True)
 class Passage:
-    """What of a clip is followed, and how.
+    """The part of a clip to follow, and how.
 
     start, stop  s of the clip; None is its end
-    loop         begin anew at the end, from the place and heading that were reached
-    blend        s, at most half of what is between start and stop; see MotionClip. A clip that
-                 ends as it begins makes a loop as it is, any other is joined over `blend`
-    smooth       Hz at which a low-pass halves the power (two passes of a Butterworth filter of
-                 second order, forth and back, so that there is no lag), or None
+    loop         start again at the end, from the position and heading reached
+    blend        s, at most half the time from start to stop; see TrajectoryClip. A clip that ends
+                 as it begins is a loop without changes, any other is joined over `blend`
+    smooth       Hz at which a low-pass halves the power (a Butterworth filter of second order,
+                 forward and backward, so that there is no lag), or None
     source       Winter 2009, Biomechanics and Motor Control of Human Movement, section 3.4.4.2
                  (what the cut-off of one pass is for two)
     """
@@ -79,10 +79,10 @@ def trajectory_of_clip(
 ) -> TrajectoryClip:
     """Motion of a model's joints along a clip.
 
-    mapping  model joint -> clip joint; names that the model lacks are passed over
-    joints   model joints that follow; all mapped ones by default
-    initial  (nq,) pose before the start, put where the clip starts; the model's rest by default
-    raises   SceneError when one of these does not fit the clip or the model
+    mapping  model joint -> clip joint; names that the model lacks are ignored
+    joints   model joints that follow the clip; all mapped ones by default
+    initial  (nq,) pose before the start, moved to the start of the clip; the rest pose by default
+    raises   SceneError when an argument does not fit the clip or the model
     """
     start, blend = passage.start, passage.blend
     chosen = joints if joints is not None else [j for j in mapping if j in model.joint_names]
@@ -128,7 +128,7 @@ def _check_times(clip: Clip, start: float, stop: float, blend: float) -> None:
 
 
 def _whole_cycle(columns: Columns, rows: Array, first: float, last: float) -> Stride | None:
-    """Stride of a loop between two frames where the clip ends as it begins; None where not."""
+    """Stride of a loop between two frames if the clip ends as it begins, else None."""
     begin, end = round(first), round(last)
     if max(abs(first - begin), abs(last - end)) > 1e-6:
         return None
@@ -139,7 +139,7 @@ def _whole_cycle(columns: Columns, rows: Array, first: float, last: float) -> St
 def _repeated(
     columns: Columns, rows: Array, frame_time: float, span: tuple[float, float], stride: Stride
 ) -> tuple[Array, Array]:
-    """Times and rows of a cycle with one before and one after it, so that its ends are smooth."""
+    """Times and rows of three cycles in a row, so that the ends of the middle one are smooth."""
     begin, end = round(span[0] / frame_time), round(span[1] / frame_time)
     cycle = rows[begin:end]
     repeated = np.concatenate(
@@ -155,7 +155,7 @@ def _repeated(
 def _joined(
     columns: Columns, spline: CubicSpline, start: float, length: float, overlap: float
 ) -> Stride:
-    """Stride of a loop whose ends fade into each other, true in the middle of the fade."""
+    """Stride of a loop with cross-faded ends, exact in the middle of the fade."""
     begin, end = spline(start + overlap / 2.0), spline(start + length + overlap / 2.0)
     for row in (begin, end):
         normalise(columns, row, np.zeros_like(row))
@@ -169,8 +169,8 @@ def _joined(
     return stride
 
 
-SLOWEST = 0.1
-"""Least part of a period of the low-pass that a clip is long."""
+SHORTEST_IN_PERIODS = 0.1
+"""Least duration of a clip, in periods of the low-pass."""
 
 
 def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
@@ -182,7 +182,7 @@ def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
             f"smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the most for a clip "
             f"of {1.0 / frame_time:.4g} frames a second. Leave it out or lower it."
         )
-    if cut_off * len(rows) * frame_time < SLOWEST:
+    if cut_off * len(rows) * frame_time < SHORTEST_IN_PERIODS:
         raise SceneError(
             f"smooth {cut_off:g} Hz keeps nothing of a clip of {len(rows) * frame_time:.3g} s. "
             "Leave it out or raise it."
@@ -195,7 +195,7 @@ def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
 
 
 def _put(columns: Columns, pose: Array, first: Array) -> Array:
-    """A pose with its free joints where a clip's first row has them, and headed like there."""
+    """A pose with the positions and headings of its free joints from the first row of a clip."""
     result = pose.copy()
     columns.places(result)[...] = columns.places(first)
     here, there = columns.quaternions(result), columns.quaternions(first)
@@ -206,20 +206,21 @@ def _put(columns: Columns, pose: Array, first: Array) -> Array:
 
 
 def check_seam(motion: TrajectoryClip) -> None:
-    """Raise SceneError where ends that differ are to be joined in so short a time that joints jump:
-    what a joint is off by, over the time of the fade, is a speed of its own.
+    """Raise SceneError when different ends are joined in so short a time that joints jump.
+
+    The cross-fade adds a speed: the difference of the ends over its duration.
 
     motion  a loop with an overlap
     """
     within = np.linspace(motion.overlap, motion.length, TIMES)
     seam = motion.length + np.linspace(0.0, motion.overlap, TIMES)
     own, joined = _speeds(motion, motion.length + within), _speeds(motion, seam)
-    ratio = joined / np.maximum(own, SLOW)
+    ratio = joined / np.maximum(own, LEAST_SPEED)
     worst = int(ratio.argmax())
-    if ratio[worst] <= FASTER:
+    if ratio[worst] <= MOST_SPEED_RATIO:
         return
     joint = _joint(motion.columns, worst)
-    longer, remedies = MORE * motion.overlap * ratio[worst] / FASTER, []
+    longer, remedies = BLEND_MARGIN * motion.overlap * ratio[worst] / MOST_SPEED_RATIO, []
     if longer < 0.5 * (motion.length + motion.overlap):
         remedies.append(f"make blend {longer:.2g} s or longer")
     better = _best_stop(motion)
@@ -234,7 +235,7 @@ def check_seam(motion: TrajectoryClip) -> None:
 
 
 def _joint(columns: Columns, dof: int) -> str:
-    """Joint of a dof, by its place among those that follow."""
+    """Joint of a dof, by its index among the followed dofs."""
     column, turns = int(columns.v[dof]), columns.balls + len(columns.free)
     owner = column // 3 if column < 3 * turns else column - 2 * turns
     return columns.names[columns.owners[owner]]
@@ -246,8 +247,7 @@ def _speeds(motion: TrajectoryClip, times: Array) -> Array:
 
 
 def _best_stop(motion: TrajectoryClip) -> float | None:
-    """s of the clip: a stop after which the fade joins what is most alike; None for clips that are
-    too short for another."""
+    """The stop of the clip, s, for which the ends are most alike; None for too short clips."""
     columns, half = motion.columns, 0.5 * motion.overlap
     last = motion.start + motion.length + motion.overlap
 

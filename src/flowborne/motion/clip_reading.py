@@ -34,7 +34,7 @@ USUAL = 0.856
 """m from hip to ankle, of the standard skeleton."""
 
 UPRIGHT = 0.5
-"""Cosine of the angle to the vertical at which a person stands rather than lies."""
+"""Least cosine of the angle between a standing person and the vertical."""
 
 UNITS = {
     0.001: "mm",
@@ -46,7 +46,7 @@ UNITS = {
 }
 
 STRETCH = 0.02
-"""m by which the bones of a person may stretch in a file, whose joints then have their middle."""
+"""Largest stretch of the bones of a person in a file, m; joints get their mean position."""
 
 
 def leg_length(clip: Clip, mapping: Mapping[str, str]) -> float:
@@ -111,18 +111,18 @@ def standing_axis(up: Array, read_as: str) -> str | None:
 
 @dataclass(frozen=True)
 class Capture:
-    """A clip and what it means.
+    """A clip and its interpretation.
 
-    clip      the motion, of a human counted from a pose in which the person stands
+    clip      the motion; for a human, relative to a pose in which the person stands
     mapping   joint of the model -> joint of the clip
     skeleton  of the human with the clip's bones; None in a scene without [human]
-    unit, up  m per length of the file, and its axis that is up
-    rest      (n, 4) what the clip's joints are counted from, as counted by the file; None where it
-              is the file's own zeros
+    unit, up  m per length of the file, and its up axis
+    rest      (n, 4) reference rotations of the joints, relative to the zeros of the file; None for
+              these zeros themselves
     posture   the person's mean direction from ankles to shoulders, z up; None without [human]
-    lift      (frames,) m by which the root is raised above where the file has it, or None
-    held      joints of the human that the clip's file does not have
-    note      what is wrong with the file's number of frames; may be empty
+    lift      (frames,) height added to the root of the file, m, or None
+    held      joints of the human that the file lacks
+    note      error in the number of frames of the file; may be empty
     """
 
     clip: Clip
@@ -138,20 +138,20 @@ class Capture:
 
     @property
     def links(self) -> set[str]:
-        """Joints that the human has for those of the clip between its own."""
+        """Joints of the human for additional joints of the clip between its own."""
         return set(self.mapping) - set(JOINTS) if self.skeleton is not None else set()
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a file is read: what the motion and the bones of a person depend on.
+    """Settings for reading a file.
 
-    unit     m per length of the file; None for that which makes a person's legs as long as legs are
-    up       axis of the file that is up; None for that along which a person stands
-    skip     frames at the start of the file that are left out
+    unit     m per length of the file; None for the unit that makes legs of a person's length
+    up       up axis of the file; None for the axis along which the person stands
+    skip     frames to drop at the start of the file
     mapping  joint of the model -> joint of the clip, in pairs
-    floor    "soles" for a person whose soles are to be on the floor
-    mass     kg of a person;  sex  of whose proportions they are
+    floor    "soles" to put the soles of a person on the floor
+    mass     mass of a person, kg;  sex  for the proportions of a person
     """
 
     unit: float | None
@@ -164,9 +164,9 @@ class Reading:
 
 
 def read_clip(path: Path, how: Reading, *, person: bool) -> Capture:
-    """The clip of a file, as it lies there, and not where a scene places it.
+    """The clip of a file, before a scene places it.
 
-    person  whether it moves a human, whose bones are then the clip's
+    person  whether it moves a human, with the bones of the clip
     raises  SceneError when the file cannot be used
     """
     return (_person if person else _creature)(path, _stamp(path), how)
@@ -174,7 +174,7 @@ def read_clip(path: Path, how: Reading, *, person: bool) -> Capture:
 
 @lru_cache(maxsize=8)
 def _creature(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
-    """The clip of a creature of any kind. Read once, though model, motion and checks ask for it."""
+    """The clip of any creature, cached for model, motion and checks."""
     bvh = _load(path, stamp)
     unit, up = 1.0 if how.unit is None else how.unit, how.up or "y"
     clip = clip_of(bvh, unit, up, how.skip)
@@ -191,8 +191,7 @@ def _creature(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
 
 @lru_cache(maxsize=8)
 def _person(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
-    """The clip of a person, in the unit and with the axis up that make one who stands, unless they
-    are given."""
+    """The clip of a person; unit and up axis default to those of a standing person."""
     bvh = _load(path, stamp)
     raw = clip_of(bvh, skip=how.skip)
     mapping = mapping_of(raw, dict(how.mapping))
@@ -233,7 +232,7 @@ def _above(clip: Clip, joint: str) -> Iterator[str]:
 
 
 def with_still(found: Capture, joints: tuple[str, ...]) -> Capture:
-    """The capture with joints that its file lacks, none of which turns."""
+    """The capture with the joints that its file lacks, at rest."""
     clip, names = found.clip, dict(found.mapping)
     assert found.skeleton is not None
     for joint in joints:
@@ -267,7 +266,7 @@ def _named(clip: Clip, table: Mapping[str, str]) -> Mapping[str, str]:
 
 
 def _stamp(path: Path) -> tuple[int, int]:
-    """What changes when a file does."""
+    """A cache key that changes with the file."""
     try:
         status = path.stat()
     except OSError:
@@ -277,5 +276,5 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 @lru_cache(maxsize=4)
 def _load(path: Path, stamp: tuple[int, int]) -> BvhFile:
-    """A file is parsed once, whatever it is read as."""
+    """The parsed file, cached for all uses."""
     return load_bvh(path)

@@ -1,4 +1,4 @@
-"""What enters through an inflow side: velocity profiles in space and time, and bands of dye."""
+"""Inflow through a side: velocity profiles in space and time, and bands of dye."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Span = tuple[int, float, float]
 
 
 class Factor(Protocol):
-    """How strong an inflow or a mouth is over time."""
+    """The strength of an inflow or a mouth over time."""
 
     def at(self, time: float) -> float:
         """Part of the full velocity at `time` (s)."""

@@ -1,7 +1,7 @@
-"""The pose of a clip in which its person stands, and the clip as counted from that pose.
+"""The pose of a clip in which its person stands, and the clip relative to that pose.
 
-The angles of a file are counted from a pose of its maker's choice, in which the bones may lie along
-any axis. A clip whose joints are counted from a standing person instead has the same motion.
+The angles of a file are relative to a pose chosen by its author, in which the bones may lie along
+any axis. A clip relative to a standing person instead has the same motion.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ BODY = {
     ("lower_neck", "head"): 0.25,
 }
 ARM = {("shoulder", "elbow"): 1.0, ("elbow", "wrist"): 1.0}
-"""Joints at the ends of a line of the body, on either side, and of an arm -> weight of its
-direction in how far a pose is from standing, by one less the cosine of the angle."""
+"""Ends of a line of the body, on either side, and of an arm -> weight of its direction in the
+deviation of a pose from standing, which sums 1 - cosine of the angles."""
 
 PERSON = 0.5
-"""The most by which a pose of a person who stands is so judged: near 25 degrees everywhere."""
+"""Largest deviation of the pose of a standing person: about 25 degrees everywhere."""
 
 POSES = 400
-"""Most frames of a clip that are looked at, evenly spread."""
+"""Most frames of a clip that are evaluated, evenly spaced."""
 
 DIGITS = 1e-6
-"""rad that the digits of a file leave open."""
+"""Rounding error of rotations in a file, rad."""
 
 FAR = np.radians(60.0)
-"""A joint of trunk or leg that turns farther than this from a file's zeros to where its person
-stands: these zeros are no pose of a person, however they look."""
+"""Largest rotation of a joint of trunk or leg from the zeros of a file to its standing pose, for
+zeros that are the pose of a person."""
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """How the person of a clip is held.
+    """The posture of the person of a clip.
 
-    rest  (n, 4) rotations of the clip's joints, from the pose of its zeros to one in which the
+    rest  (n, 4) rotations of the clip's joints, from the pose of its zeros to a pose in which the
           person stands upright and faces forward
     up    (3,) mean over the clip of the unit vector from between the ankles to between the
           shoulders, in the clip's axes
@@ -60,9 +60,9 @@ class Posture:
 def posture_of(clip: Clip, mapping: Mapping[str, str]) -> Posture:
     """A standing pose of a clip's person, and the mean direction.
 
-    Trunk and legs have the pose of the clip that is most like standing, or that of the file's zeros
-    where these are a person who stands; each arm has the pose in which it hangs most, of which
-    zeros that hold it out are none.
+    Trunk and legs take the pose of the clip closest to standing, or the zeros of the file if these
+    are a standing person; each arm takes the pose in which it hangs most, without zeros that hold
+    it out.
 
     mapping  joint of the human -> joint of the clip; hips, knees, ankles and shoulders among them
     raises   SceneError when hips, shoulders and ankles lie on a line
@@ -111,16 +111,16 @@ def _is_below(clip: Clip, joint: int, above: int) -> bool:
 
 
 def _back(axes: Array) -> Array:
-    """(4,) the inverse of a rotation (3, 3); none where a file's digits alone make it one."""
+    """(4,) the inverse of a rotation (3, 3); the identity for rounding errors of a file."""
     if np.abs(axes - np.eye(3)).max() < DIGITS:
         return np.array([1.0, 0.0, 0.0, 0.0])
     return np.asarray(Rotation.from_matrix(axes.T).as_quat(scalar_first=True))
 
 
 def counted_from(clip: Clip, rest: Array) -> Clip:
-    """The clip with the same places, its joints counted from a pose.
+    """The clip with the same positions, its rotations relative to another pose.
 
-    rest  (n, 4) rotations of the joints in that pose, from the one that they were counted from
+    rest  (n, 4) rotations of the joints in that pose, relative to the zeros of the clip
     """
     parents = clip.parents.clip(0)
     above = np.where((clip.parents < 0)[:, None], [1.0, 0.0, 0.0, 0.0], rest[parents])
@@ -134,9 +134,9 @@ def counted_from(clip: Clip, rest: Array) -> Clip:
 
 
 def axes_of_bodies(places: Array, number: Mapping[str, int]) -> Array:
-    """(frames, 3, 3) columns: forward, left and up of a person, of places (frames, n, 3).
+    """(frames, 3, 3) columns: forward, left and up of a person, from positions (frames, n, 3).
 
-    number  joint of the human -> its place among the n
+    number  joint of the human -> its index among the n
     """
     ends = {joint: places[:, n] for joint, n in number.items()}
     left = ends["left_hip"] - ends["right_hip"] + ends["left_shoulder"] - ends["right_shoulder"]
@@ -152,8 +152,8 @@ def _judged(
     lines: Mapping[tuple[str, str], float],
     sides: Iterable[str],
 ) -> tuple[Array, Array]:
-    """(frames, 3, 3) by which a standing person is turned to be as these are, and (frames,) how far
-    some lines are from a standing person's so turned."""
+    """(frames, 3, 3) rotations from a standing person to these positions, and (frames,) deviations
+    of some lines from those of the rotated standing person."""
     standard = standard_skeleton()
     names = [*standard.joints]
     still = np.array([standard[name] for name in names])[None]

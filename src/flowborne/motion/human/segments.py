@@ -11,15 +11,15 @@ from flowborne.motion.human.skeleton import SIDES, Array, Skeleton
 
 Sex = Literal["male", "female"]
 
-APART = 0.95
-"""Most that the distances between a segment's bodies may make of its inertia in any direction."""
+MOST_SPREAD = 0.95
+"""Largest part of a segment's inertia from the distances of its bodies, in any direction."""
 
 
 @dataclass(frozen=True)
 class Measures:
-    """A segment's inertia, in parts of the body's mass and of the segment's length.
+    """Inertia of a segment, relative to the mass of the body and the length of the segment.
 
-    mass          of the body's mass, one side
+    mass          of the mass of the body, one side
     centre        of the length, centre of mass from the start of the segment
     sagittal      of the length, radius of gyration about the axis from back to front
     transverse    ... about the axis from right to left
@@ -83,12 +83,12 @@ def segments() -> tuple[str, ...]:
 
 
 def measures_of(segment: str, sex: Sex) -> Measures:
-    """The figures of a segment."""
+    """The measures of a segment."""
     return MEASURES[sex][segment.removeprefix("left_").removeprefix("right_")]
 
 
 def ends_of(segment: str, skeleton: Skeleton) -> tuple[Array, Array]:
-    """Start and end (3,) of a segment, m: where its length and its centre of mass are counted."""
+    """Start and end (3,) of a segment, m, for its length and its centre of mass."""
     if segment == "head":
         return skeleton.tips["head_top"], skeleton.joints["lower_neck"]
     if segment == "trunk":
@@ -102,7 +102,7 @@ def ends_of(segment: str, skeleton: Skeleton) -> tuple[Array, Array]:
 
 
 def shares_of(segment: str, sex: Sex) -> dict[str, float]:
-    """Bodies that a segment is made of -> their part of its mass."""
+    """Bodies of a segment -> their parts of its mass."""
     if segment == "head":
         return {"lower_neck": NECK, "upper_neck": NECK, "head": 1.0 - 2.0 * NECK}
     if segment == "trunk":
@@ -136,15 +136,15 @@ class Inertia:
     tensor: Array
 
     def part(self, share: float) -> Inertia:
-        """A share of the mass, spread as the whole."""
+        """A share of the mass with the same distribution."""
         return Inertia(share * self.mass, self.centre, share * self.tensor)
 
 
 def axes_of(start: Array, end: Array, ahead: Array | None = None) -> Array:
     """(3, 3) columns: sagittal, transverse and longitudinal axis of a segment, right-handed.
 
-    The longitudinal axis points from end to start. The sagittal one is as near to `ahead` as can
-    be: x when not given, or z when the segment itself points along x, as a foot does.
+    The longitudinal axis points from end to start. The sagittal axis is as close as possible to
+    `ahead`: by default x, or z for a segment along x, such as a foot.
     """
     longitudinal = (start - end) / np.linalg.norm(start - end)
     if ahead is None:
@@ -157,10 +157,10 @@ def axes_of(start: Array, end: Array, ahead: Array | None = None) -> Array:
 def inertias(skeleton: Skeleton, mass: float, sex: Sex) -> dict[str, Inertia]:
     """Inertia of each body of a human of `mass` kg.
 
-    A segment that is one body has de Leva's figures. One of several bodies, at rest, has them as
-    a whole: the bodies' centres of mass are the middles of their bones, moved together so that the
-    segment's is in its place; where they are too far apart for the segment's radii of gyration
-    they are drawn in towards it. What inertia then remains the bodies share by their mass.
+    A segment of one body has de Leva's values. A segment of several bodies has them as a whole, at
+    rest: the centres of mass of the bodies are the middles of their bones, moved together so that
+    the centre of the segment is right. If they are too far apart for the radii of gyration of the
+    segment, they move towards its centre. The bodies share the remaining inertia by their mass.
     """
     found: dict[str, Inertia] = {}
     for segment in segments():
@@ -178,7 +178,7 @@ def _of_segment(segment: str, skeleton: Skeleton, mass: float, sex: Sex) -> dict
     away = middle - weight @ middle
     inward = np.linalg.inv(np.linalg.cholesky(whole))
     spread = float(np.linalg.eigvalsh(inward @ (away.T * weight) @ away @ inward.T)[-1])
-    away *= min(1.0, np.sqrt(APART / max(spread, APART)))
+    away *= min(1.0, np.sqrt(MOST_SPREAD / max(spread, MOST_SPREAD)))
     rest = whole - (away.T * weight) @ away
     tensor = np.trace(rest) * np.eye(3) - rest
     kilograms = figures.mass * mass
@@ -189,7 +189,7 @@ def _of_segment(segment: str, skeleton: Skeleton, mass: float, sex: Sex) -> dict
 
 
 def _second_moment(segment: str, skeleton: Skeleton, sex: Sex) -> Array:
-    """(3, 3) m^2: a segment's mean of x x^T about its centre of mass, along the world's axes."""
+    """(3, 3) m^2: the mean of x x^T of a segment about its centre of mass, in world axes."""
     figures = measures_of(segment, sex)
     start, end = ends_of(segment, skeleton)
     radii = np.array([figures.sagittal, figures.transverse, figures.longitudinal])

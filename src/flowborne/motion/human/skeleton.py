@@ -1,4 +1,4 @@
-"""Where the joints of the human are at rest, and which body hangs on which."""
+"""The joints of the human at rest, and the tree of its bodies."""
 
 from __future__ import annotations
 
@@ -80,20 +80,20 @@ TIPS: Mapping[str, str] = MappingProxyType(
 PARENTS: Mapping[str, str] = MappingProxyType(
     {joint: parent for _, joint, parent in BODIES[1:]} | dict(TIPS)
 )
-"""Joint or tip -> the joint that carries it; the root is not in it."""
+"""Joint or tip -> its parent joint; without the root."""
 
 _BRANCHES = ("root", "thorax")
 
 _FAR_ENDS = {parent: name for name, parent in PARENTS.items() if parent not in _BRANCHES}
 
 _FAR_ENDS["thorax"] = "lower_neck"
-"""Joint -> the joint or tip at which its body ends."""
+"""Joint -> the joint or tip at the end of its body."""
 
 HEEL = 1.0 / 3.0
 """Heel behind the ankle, per length from ankle to toe tip: a quarter of the whole foot."""
 
 SOLE = 0.06
-"""Of the foot's length, half the thickness of the toes: how far the sole is below their bone."""
+"""Distance of the sole below the bone of the toes, half their thickness, per length of the foot."""
 
 KNUCKLES = 86.2 / 187.9
 """Wrist to third knuckle, per length from wrist to fingertip (de Leva 1996, Table 4, men)."""
@@ -101,7 +101,7 @@ KNUCKLES = 86.2 / 187.9
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A joint of a clip between two that the human has.
+    """A joint of a clip between two joints of the human.
 
     name   of its joint and body in the model
     bone   the clip's joint
@@ -115,11 +115,11 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Rest positions; z up, x forward, y left, m. No joint is turned there.
+    """Rest positions; z up, x forward, y left, m. All rotations are zero there.
 
     joints  name -> (3,), all 23
     tips    name -> (3,): head_top, left_ and right_fingertip and _toe_tip
-    links   joint -> what stands between it and the one that carries it, from there
+    links   joint -> the links between its parent and itself, in this order
     """
 
     joints: Mapping[str, Array]
@@ -127,7 +127,7 @@ class Skeleton:
     links: Mapping[str, tuple[Link, ...]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
-        """(3,) place of a joint or tip."""
+        """(3,) position of a joint or tip."""
         return self.joints[name] if name in self.joints else self.tips[name]
 
     @property
@@ -173,15 +173,15 @@ _JOINTS = {body: joint for body, joint, _ in BODIES}
 
 
 def joint_of(body: str) -> str:
-    """The joint on which a body turns."""
+    """The joint of a body."""
     return _JOINTS[body]
 
 
 def standard_skeleton(height: float = STATURE) -> Skeleton:
     """Skeleton standing at the origin, facing +x, its arms hanging down.
 
-    Lengths are de Leva's means for men times height / 1.741 m; the ankles stand at what height is
-    left below them. C7 is behind the line from vertex to mid hip. The neck's joints: C7, the atlas
+    Lengths are de Leva's means for men times height / 1.741 m; the ankles are at the remaining
+    height. C7 is behind the line from vertex to mid hip. The neck's joints: C7, the atlas
     145 mm below the vertex (25 mm below the tragion, Gordon et al. 1989), and half way. The
     collar bones start at the upper end of the breast bone, 71.4 mm below C7 along the trunk.
 
@@ -212,7 +212,7 @@ def standard_skeleton(height: float = STATURE) -> Skeleton:
 
 
 def _limbs(nape: float, drop: float) -> dict[str, tuple[float, float, float]]:
-    """Joints and tips of the left limbs, below a nape at that height and a trunk that drops so."""
+    """Joints and tips of the left limbs, from the height of the nape and of the trunk."""
     hip = nape - drop
     ankle = hip - THIGH - SHANK
     shoulder = nape - 0.105

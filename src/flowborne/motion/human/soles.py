@@ -1,4 +1,4 @@
-"""Where the floor of a clip is: under the soles of its feet while they stand."""
+"""The floor of a clip: under the soles of standing feet."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from flowborne.motion.human.skeleton import PARENTS, SIDES, Array, Skeleton, joi
 from flowborne.motion.quaternions import turned
 
 STILL = 0.3
-"""m/s below which the lowest place of a foot stands. In a walk a foot swings by at 1 m/s and more,
-and rolls off at less than 0.1."""
+"""Largest speed of the lowest point of a standing foot, m/s. In a walk a foot swings at 1 m/s and
+more, and rolls off at less than 0.1 m/s."""
 
 TREMOR = 1.0 / 30.0
-"""s over which that speed is taken, so that a capture's noise is none."""
+"""Interval for that speed, s, long enough to suppress the noise of a capture."""
 
 STEP = 0.25
-"""s, standard deviation of the weights by which the floor under neighbouring steps is one."""
+"""Standard deviation of the weights that smooth the floor between steps, s."""
 
 UNEVEN = 0.15
-"""m between the floor under two steps of a level floor. Floors of captures are off by 5 to 10 cm;
-where steps differ by more, the ground itself goes up or down, and is left as it is."""
+"""Largest height difference of a level floor, m. Floors of captures are wrong by 5 to 10 cm; larger
+differences belong to the ground itself and are kept."""
 
 
 def on_the_floor(
     clip: Clip, mapping: Mapping[str, str], skeleton: Skeleton, mass: float, sex: Sex
 ) -> Clip:
-    """The clip, raised or lowered so that the soles that stand are at z = 0.
+    """The clip, raised or lowered so that standing soles are at z = 0.
 
-    The floor of a capture is not at 0, and neither even nor level: it is found under every step,
-    and goes over smoothly from one to the next. Nothing but the height of the root changes; a clip
-    in which no foot stands is left as it is.
+    The floor of a capture is not at 0, and neither even nor level: it is determined under every
+    step, and changes smoothly from one to the next. Only the height of the root changes; a clip
+    without a standing foot is returned unchanged.
 
     mapping  joint of the model -> joint of the clip
     mass     kg, of the person: how broad the feet are
@@ -85,7 +85,7 @@ def _lowest(
 
 
 def _stands(place: Array, frame_time: float) -> NDArray[np.bool_]:
-    """(frames,) whether the lowest place (frames, 3) of a foot is at rest."""
+    """(frames,) whether the lowest point (frames, 3) of a foot is at rest."""
     apart = max(1, round(0.5 * TREMOR / frame_time))
     if len(place) <= 2 * apart:
         return np.zeros(len(place), bool)
