@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 
-import mujoco
+from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
 
-from flowborne.solids.model import SolidModel
+__all__ = ["BALL", "FREE", "HINGE", "JOINT_KINDS", "SLIDE", "joint_kind", "joint_unit"]
 
-HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
-BALL = int(mujoco.mjtJoint.mjJNT_BALL)
-FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free joint"}
 
 
