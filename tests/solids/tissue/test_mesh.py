@@ -220,9 +220,19 @@ def test_bone_too_thin_for_flesh_is_refused_with_a_thickness_that_will_do(
         grow(" ".join([*broad, str(0.5 * float(found[1]))]))
 
 
-def test_edges_as_long_as_one_likes_give_no_more_elements_than_short_ones(ball: FleshMesh) -> None:
-    longest = skin_mesh(mujoco.MjSpec.from_string(BALL), ["ball"], 0.25, 1e12)
-    assert 0 < len(longest.elements) < len(ball.elements)
+def test_the_mesher_gets_no_longer_edges_than_the_flesh_has_room_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+
+    def stop(folder: str, *_: object) -> str:
+        asked.append(float(np.load(Path(folder) / mesh_run.SURFACES)["size"]))
+        return "stopped"
+
+    monkeypatch.setattr("flowborne.solids.tissue.mesher.run_apart", stop)
+    with pytest.raises(ValueError, match="stopped"):
+        skin_mesh(mujoco.MjSpec.from_string(BALL), ["ball"], 0.25, 1e12)
+    assert asked == [pytest.approx(1.5 * np.sqrt(3.0), rel=0.02)]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
