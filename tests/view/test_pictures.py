@@ -22,6 +22,7 @@ from flowborne.view.fields import (
 )
 from flowborne.view.layout import Box
 from flowborne.view.pictures import Picture
+from flowborne.view.plots import shortened
 from flowborne.view.run import Run
 
 Write = Callable[..., Path]
@@ -287,3 +288,9 @@ def test_a_bare_picture_has_a_bar_of_the_length_that_it_says(write_run: Write) -
     longest = max(np.split(bar, np.flatnonzero(np.diff(bar) > 1) + 1), key=len)
     # 1 m of the 4 m across
     assert len(longest) == pytest.approx(120, abs=3)
+
+
+def test_long_names_of_curves_lose_their_middle():
+    assert shortened("hinge", 10) == "hinge"
+    assert shortened("rx_head_Armature", 10) == "rx_he…ture"
+    assert all(len(shortened("a" * n, 7)) == min(n, 7) for n in range(1, 20))

@@ -19,7 +19,13 @@ from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
 from flowborne.view.maps import Map, MapSlab, MapSpace
-from flowborne.view.plots import Strip, joint_curves, strip_curves
+from flowborne.view.plots import (
+    LETTERS_IN_LEGEND,
+    Strip,
+    joint_curves,
+    shortened,
+    strip_curves,
+)
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 
@@ -195,7 +201,9 @@ class Picture:
         unit, digits = ("°", 1) if "°" in title else (" m", 3)
         for name, values in list(joints.items())[:NAMED_JOINTS] if row is not None else ():
             number = f"{values[row]:+{digits + 5}.{digits}f}".replace(" ", FIGURE_SPACE)
-            words.append(f"{name} {number.replace('-', '−')}{unit}")
+            words.append(
+                f"{shortened(name, LETTERS_IN_LEGEND // 5)} {number.replace('-', '−')}{unit}"
+            )
         return (4 * FIGURE_SPACE).join([*words, f"t = {time:.2f} s"])
 
 

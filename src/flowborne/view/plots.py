@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 MAX_CURVES = 6
 """Maximum number of curves in a strip."""
 
+LETTERS_IN_LEGEND = 60
+"""Maximum number of letters of all names above a strip."""
+
 EFFORT = "measured_effort_"
 """Prefix of the columns with the effort of named joints."""
 
@@ -105,10 +108,12 @@ class Strip:
         axes.set_ylim(*robust_limits(np.concatenate(self.curves)))
         axes.set_title(title, loc="left", fontsize=8.5, color=style.MUTED, pad=4)
         self._past, self._heads = [], []
+        letters = LETTERS_IN_LEGEND // max(len(curves), 1)
         for n, (name, values) in enumerate(curves.items()):
             colour = style.CURVES[n % len(style.CURVES)]
             axes.plot(times, values, color=colour, lw=1.1, alpha=0.3)
-            self._past += axes.plot([], [], color=colour, lw=1.9, animated=True, label=name)
+            self._past += axes.plot([], [], color=colour, lw=1.9, animated=True)
+            self._past[-1].set_label(shortened(name, letters))
             self._heads += axes.plot([], [], "o", ms=4.5, mec="none", color=colour, animated=True)
         if len(curves) > 1:
             legend(axes, self._past)
@@ -122,6 +127,14 @@ class Strip:
         for values, past, head in zip(self.curves, self._past, self._heads, strict=True):
             past.set_data(self.times[:count], values[:count])
             head.set_data(self.times[max(count - 1, 0) : count], values[max(count - 1, 0) : count])
+
+
+def shortened(name: str, letters: int) -> str:
+    """A name of at most so many letters: an ellipsis replaces the middle of a longer one."""
+    if len(name) <= letters:
+        return name
+    tail = (letters - 1) // 2
+    return f"{name[: letters - 1 - tail]}…{name[-tail:]}"
 
 
 def strip_style(axes: Axes) -> None:
