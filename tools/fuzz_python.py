@@ -87,7 +87,7 @@ class Rule:
     def step_scale(self, scale, before, gradient):
         return np.ones_like(scale)  # step_scale
     def step(self, poses, gradient, limit):
-        return self.part * rules.descent(gradient, limit)  # step
+        return self.part * parts.descent(gradient, limit)  # step
 
 @parts.gradient("gradient_{name}")
 @dataclass(frozen=True)
