@@ -20,7 +20,6 @@ from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallabl
 from flowborne.control.phases import PhaseTable
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
-from flowborne.errors import SceneError
 from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
 from flowborne.python_function import with_parameters
 from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind
@@ -492,11 +491,7 @@ class ObjectivePythonTable(ObjectiveTable):
     parameters: Parameters = Field(default_factory=dict)
 
     def check(self, around: Surroundings) -> Iterator[str]:
-        if around.read("plugins"):
-            try:
-                with_parameters(self.function, self.parameters)
-            except SceneError as error:
-                yield str(error)
+        yield from around.unusable_function(self.function, self.parameters)
 
     def build(self, around: Surroundings) -> ObjectiveCallable:
         return ObjectiveCallable(with_parameters(self.function, self.parameters), self.function)

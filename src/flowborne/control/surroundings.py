@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
+from flowborne.errors import SceneError
 from flowborne.phrases import suggestion
+from flowborne.python_function import with_parameters
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.model import SolidModel
 
@@ -60,6 +63,14 @@ class Surroundings:
     def unknown_bodies(self, bodies: Iterable[str]) -> Iterator[str]:
         """A complaint for each body that the model lacks."""
         return unknown_bodies(self.model, self.source, bodies)
+
+    def unusable_function(self, name: str, parameters: Mapping[str, Any]) -> Iterator[str]:
+        """A complaint where a function "module:function" is not found, or refuses a parameter."""
+        if self.read("plugins"):
+            try:
+                with_parameters(name, parameters)
+            except SceneError as error:
+                yield str(error)
 
     def bodies(self, names: tuple[str, ...] | None) -> Integers:
         """(k,) numbers of the named bodies, or of all that can move."""

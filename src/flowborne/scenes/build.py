@@ -32,7 +32,7 @@ def surroundings_of(
 
     unread  tables of which something was left out because it was wrong
     """
-    capture, path = capture_of(scene), scene.model_path
+    capture = capture_of(scene)
     driven = {*scene.moved_joints(), *earlier_joints(scene)}
     driven |= set() if capture is None else set(followers(scene, capture, model))
     tables = {table.joint: table for table in scene.motion}
@@ -47,7 +47,7 @@ def surroundings_of(
 
     return Surroundings(
         model=model,
-        source="the human" if path is None else f"model {path.name}",
+        source=scene.model_source,
         controlled=scene.controlled_joints(),
         driven=frozenset(driven),
         followed=tuple(tables),

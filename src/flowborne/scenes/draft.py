@@ -213,16 +213,16 @@ class Draft:
         default = Scene.model_fields[table].get_default(call_default_factory=True)
         return table in self.broken or getattr(self.scene, table) != default
 
-    @property
-    def source(self) -> str:
-        """Where the model is from, for messages."""
-        path = self.scene.model_path
-        return "the human" if path is None else f"model {path.name}"
-
     def unknown_joint(self, model: SolidModel, joint: str, *keys: Key) -> list[str]:
         """The problem when `joint` is not in the model."""
-        return [f"{self.at(*keys)}: {said}" for said in unknown_joints(model, self.source, [joint])]
+        return [
+            f"{self.at(*keys)}: {said}"
+            for said in unknown_joints(model, self.scene.model_source, [joint])
+        ]
 
     def unknown_body(self, model: SolidModel, body: str, *keys: Key) -> list[str]:
         """The problem when `body` is not in the model."""
-        return [f"{self.at(*keys)}: {said}" for said in unknown_bodies(model, self.source, [body])]
+        return [
+            f"{self.at(*keys)}: {said}"
+            for said in unknown_bodies(model, self.scene.model_source, [body])
+        ]

@@ -38,7 +38,26 @@ def _check_box(lower: tuple[float, ...], upper: tuple[float, ...]) -> None:
             )
 
 
-class SourceTable(Table):
+class BoxTable(Table):
+    """A box inside the domain where something holds for a time.
+
+    lower, upper  corners, m
+    start, stop   s between which it holds
+    """
+
+    lower: Vector
+    upper: Vector
+    start: Number = 0.0
+    stop: Number | None = None
+
+    @model_validator(mode="after")
+    def _check_place(self) -> Self:
+        _check_box(self.lower, self.upper)
+        check_interval(self.start, self.stop)
+        return self
+
+
+class SourceTable(BoxTable):
     """[[sources]]: a box inside the domain where fluid appears or is driven.
 
     lower, upper  corners, m
@@ -48,18 +67,12 @@ class SourceTable(Table):
     start, stop   s
     """
 
-    lower: Vector
-    upper: Vector
     volume_rate: Number | None = None
     velocity: Vector | None = None
     dye: dict[str, Number] = Field(default_factory=dict)
-    start: Number = 0.0
-    stop: Number | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_box(self.lower, self.upper)
-        check_interval(self.start, self.stop)
         if (self.volume_rate is None) == (self.velocity is None):
             raise ValueError("needs one of volume_rate and velocity. Give exactly one of them")
         return self
@@ -135,7 +148,7 @@ class DyeBands(Table):
         return Bands(self.axis, ends, self.value, as_interval(self.start, self.stop))
 
 
-class DyeBox(Table):
+class DyeBox(BoxTable):
     """Dye that is always present in a box inside the domain.
 
     name          of the dye
@@ -146,17 +159,7 @@ class DyeBox(Table):
 
     kind: Literal["box"]
     name: Text = "dye"
-    lower: Vector
-    upper: Vector
     value: Number = 1.0
-    start: Number = 0.0
-    stop: Number | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _check_box(self.lower, self.upper)
-        check_interval(self.start, self.stop)
-        return self
 
     def build(self) -> Source:
         """The source that keeps the dye's value."""

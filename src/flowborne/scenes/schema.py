@@ -224,6 +224,12 @@ class Scene(Table):
         return None if self.solids is None else self._folder / self.solids.model
 
     @property
+    def model_source(self) -> str:
+        """Where the model is from, for messages."""
+        path = self.model_path
+        return "the human" if path is None else f"model {path.name}"
+
+    @property
     def frame_time(self) -> float:
         """s between frames."""
         return 1.0 / self.time.frames_per_second

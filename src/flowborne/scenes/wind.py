@@ -11,7 +11,6 @@ from pydantic import Field
 
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.stream import WindStream
-from flowborne.errors import SceneError
 from flowborne.fluid.grid import Array
 from flowborne.motion.inflow import Factor, FactorSteady
 from flowborne.python_function import WindFunction, with_parameters
@@ -133,11 +132,7 @@ class WindPythonTable(AnyWindTable):
 
     def check(self, around: Surroundings) -> Iterator[str]:
         yield from super().check(around)
-        if around.read("plugins"):
-            try:
-                with_parameters(self.function, self.parameters)
-            except SceneError as error:
-                yield str(error)
+        yield from around.unusable_function(self.function, self.parameters)
 
     def build(self, around: Surroundings) -> WindFaces:
         function = with_parameters(self.function, self.parameters)
