@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from flowborne import FrameReport, Grid, Setup, SolidModel, World, step
-from flowborne.measures import Measures, quaternion
+from flowborne.measures import Measures
+from flowborne.solids.geoms import quaternion_of
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, cut_by_bodies, make_world
 
@@ -83,7 +84,7 @@ def test_quaternions_turn_as_their_matrices_do():
     for seed in range(5):
         rotation, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
         rotation *= np.linalg.det(rotation)
-        w, *xyz = quaternion(rotation)
+        w, *xyz = quaternion_of(rotation)
         assert w >= 0
         v = np.array([0.3, -0.5, 0.7])
         turned = v + 2 * np.cross(xyz, np.cross(xyz, v) + w * v)

@@ -63,6 +63,7 @@ def test_kernels_and_solvers_import_nothing_else_of_ours() -> None:
     ]
 
 
-def test_numba_is_imported_by_kernels_alone() -> None:
-    users = {module for module, others in MODULES.items() if "numba" in others}
-    assert {room_of(module) for module in users} == {"kernels"}
+@pytest.mark.parametrize(("package", "room"), [("numba", "kernels"), ("mujoco", "solids")])
+def test_only_one_room_imports(package: str, room: str) -> None:
+    users = {module for module, others in MODULES.items() if package in others}
+    assert {room_of(module) for module in users} == {room}

@@ -18,6 +18,7 @@ from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
 from flowborne.solids.flesh_solve import prescribe_flesh
+from flowborne.solids.mjcf import read_spec
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import (
     halfway_momentum,
@@ -72,6 +73,7 @@ __all__ = [
     "potential_energy",
     "prescribe_flesh",
     "read_mesh",
+    "read_spec",
     "standard_skeleton",
     "static_forces",
     "symmetric_factor",

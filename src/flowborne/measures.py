@@ -17,6 +17,7 @@ from flowborne.errors import SceneError
 from flowborne.joint_measures import JointMeasures
 from flowborne.runs.frame_report import FrameReport
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.geoms import quaternion_of
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
@@ -187,7 +188,7 @@ class Measures:
         for body, name in list(enumerate(self._model.body_names))[1:]:
             for axis, x in zip("xyz", poses.body_position[body], strict=True):
                 values[f"{name}_{axis}_m"] = float(x)
-            for axis, x in zip("wxyz", quaternion(poses.body_rotation[body]), strict=True):
+            for axis, x in zip("wxyz", quaternion_of(poses.body_rotation[body]), strict=True):
                 values[f"{name}_q{axis}"] = float(x)
         return values
 
@@ -200,15 +201,6 @@ def _check_distinct(columns: Sequence[str]) -> None:
             f"the history would have two columns '{twice[0]}', because the name of one joint or "
             "body is that of another with '_x' or a quantity behind it. Rename one in the model."
         )
-
-
-def quaternion(rotation: Array) -> Array:
-    """(w, x, y, z) of a rotation matrix (3, 3), with w >= 0."""
-    import mujoco
-
-    unit = np.zeros(4)
-    mujoco.mju_mat2Quat(unit, np.ascontiguousarray(rotation).ravel())
-    return unit if unit[0] >= 0.0 else -unit
 
 
 def _terms(controller: Controller) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,10 +15,9 @@ from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_solids import SolidsTable
 from flowborne.solids import mjcf
-from flowborne.solids.compiler import compiled_quietly
+from flowborne.solids.compiler import MjModel, MjSpec, compiled_quietly
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
-from flowborne.solids.geoms import element_name
 from flowborne.solids.joint_kinds import FREE, HINGE, SLIDE, joint_kind, joint_unit
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
@@ -89,14 +87,14 @@ def given_of(scene: Scene) -> Given:
     )
 
 
-def bones_of(scene: Scene) -> mujoco.MjSpec:
+def bones_of(scene: Scene) -> MjSpec:
     """The model file of a scene before flesh grows on it. Raises ValueError when it is bad."""
     x, y, z = scene.gravity
     assert scene.model_path is not None
     return mjcf.bones_of(scene.model_path, scene.is_slab, (x, y, z), given_of(scene))[0]
 
 
-def spec_of(scene: Scene) -> mujoco.MjSpec:
+def spec_of(scene: Scene) -> MjSpec:
     """The model file of a scene as it is. Raises ValueError when it is bad."""
     assert scene.model_path is not None
     return mjcf.read_spec(scene.model_path, packages_of(scene))
@@ -108,7 +106,7 @@ def packages_of(scene: Scene) -> list[Path]:
     return [scene.folder / folder for folder in scene.solids.packages]
 
 
-def fleshed(scene: Scene) -> tuple[mujoco.MjSpec, list[Grown]]:
+def fleshed(scene: Scene) -> tuple[MjSpec, list[Grown]]:
     """The model of a scene with its flesh. Raises ValueError when it cannot be made."""
     from flowborne.scenes.flesh import grow
 
@@ -136,21 +134,11 @@ def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Traj
 
 def own_pose(scene: Scene, model: SolidModel) -> SolidState:
     """The model's own pose, or its keyframe that [initial] names."""
-    state = model.rest()
-    if scene.initial.keyframe is None:
-        return state
-    mj = keyframes(scene, model)
-    key = mj.key(scene.initial.keyframe)
-    for j in range(mj.njnt):
-        name = element_name(mj, mujoco.mjtObj.mjOBJ_JOINT, j)
-        places, dofs = model.positions_of(name), model.dofs_of(name)
-        first, speed = mj.jnt_qposadr[j], mj.jnt_dofadr[j]
-        state.q[places] = key.qpos[first : first + len(places)]
-        state.v[dofs] = key.qvel[speed : speed + len(dofs)]
-    return state
+    name = scene.initial.keyframe
+    return model.rest() if name is None else model.at_keyframe(keyframes(scene, model), name)
 
 
-def keyframes(scene: Scene, model: SolidModel) -> mujoco.MjModel:
+def keyframes(scene: Scene, model: SolidModel) -> MjModel:
     """A model with the keyframes as the file has them: MuJoCo does not make room in them for the
     joints of flesh and of floating bodies."""
     if scene.model_path is None or not (scene.flesh or (scene.solids and scene.solids.floating)):

@@ -9,15 +9,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-import mujoco
-import numpy as np
 from pydantic import Field, model_validator
 
 from flowborne.scenes.domain import Domain
-from flowborne.solids.compiler import compiled_quietly
+from flowborne.solids.compiler import MjSpec
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
+from flowborne.solids.tissue.bones import digest
 from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
 from flowborne.solids.tissue.mesh import (
     ASTRAY,
@@ -90,7 +89,7 @@ LAWS = {
 }
 
 
-def grow(spec: mujoco.MjSpec, tables: tuple[FleshTable, ...], folder: Path) -> list[Grown]:
+def grow(spec: MjSpec, tables: tuple[FleshTable, ...], folder: Path) -> list[Grown]:
     """Add the flesh of `tables` to a model; their files are found from `folder`.
 
     returns what `SolidModel.with_flesh` asks for
@@ -108,7 +107,7 @@ def tissue_of(table: FleshTable) -> Tissue:
     return Tissue(table.young, table.poisson, table.density, table.damping, LAWS[table.law])
 
 
-def meshed(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, str]:
+def meshed(spec: MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, str]:
     """The mesh of a flesh around the bones of a model without any, and its recipe.
 
     The mesher never makes the same mesh twice, so a file's mesh is taken where its recipe is the
@@ -130,7 +129,7 @@ _made: dict[str, FleshMesh] = {}
 """What this process has meshed, by recipe."""
 
 
-def _mesh(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
+def _mesh(spec: MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
     assert table.size is not None
     if table.surface is not None:
         return surface_mesh(folder / table.surface, spec, table.bones, table.size)
@@ -138,25 +137,11 @@ def _mesh(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
     return skin_mesh(spec, table.bones, table.thickness, table.size)
 
 
-def _recipe(spec: mujoco.MjSpec, table: FleshTable, folder: Path) -> str:
+def _recipe(spec: MjSpec, table: FleshTable, folder: Path) -> str:
     """What decides a mesh, as JSON: the bones' shapes and places at rest, and how it is made."""
-    mj = compiled_quietly(spec.copy())
-    data = mujoco.MjData(mj)
-    mujoco.mj_kinematics(mj, data)
-    shapes = hashlib.sha256()
-    for name in table.bones:
-        body = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name)
-        for geom in np.flatnonzero(mj.geom_bodyid == body) if body >= 0 else ():
-            for values in (mj.geom_size[geom], data.geom_xpos[geom], data.geom_xmat[geom]):
-                shapes.update(np.round(values, 9).tobytes())
-            shapes.update(bytes([mj.geom_type[geom]]))
-            mesh = mj.geom_dataid[geom]
-            if mesh >= 0:
-                first = mj.mesh_vertadr[mesh]
-                shapes.update(mj.mesh_vert[first : first + mj.mesh_vertnum[mesh]].tobytes())
     recipe = {
         "bones": list(table.bones),
-        "shapes": shapes.hexdigest(),
+        "shapes": digest(spec, table.bones),
         "thickness": table.thickness,
         "size": table.size,
         "rules": [FIDELITY, THICKNESSES, HELD, JOINT, JOINT_EDGES, ASTRAY, SAME],

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD
+from flowborne.coupling.servo import ServoExact, ServoPD
 from flowborne.scenes.motions import driven
 from flowborne.scenes.schema import Scene
+from flowborne.solids.joint_kinds import position_actuator
 from flowborne.solids.model import BALL, HINGE, SLIDE, SolidModel
 
 Array = NDArray[np.float64]
@@ -77,29 +76,15 @@ def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> 
 def held(
     scene: Scene, model: SolidModel, motions: Iterable[Trajectory], start: Array
 ) -> Iterator[Trajectory]:
-    """Motions of the joints that [solids] hold keeps at `start` (nq,)."""
+    """Motions of the joints that [solids] hold keeps at `start` (nq,).
+
+    A joint's position actuator becomes its servo; without one the servo is exact.
+    """
     hold = () if scene.solids is None else scene.solids.hold
     if isinstance(hold, bool):
         hold = tuple(undriven(scene, model, motions)) if hold else ()
     for joint in hold:
+        actuator = position_actuator(model, joint)
+        servo = ServoExact() if actuator is None else ServoPD(*actuator)
         place = start[model.positions_of(joint)]
-        yield driven(TrajectoryHeld(model.dofs_of(joint), place), _servo(model, joint))
-
-
-def _servo(model: SolidModel, joint: str) -> Servo:
-    """That of the joint's position actuator: w = sqrt(kp / M) with M the inertia that the joint
-    feels at rest, and its largest force; exact without one."""
-    mj, number = model.mj, model.joint(joint)
-    for actuator in np.flatnonzero(mj.actuator_trnid[:, 0] == number):
-        if mj.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_JOINT:
-            continue
-        gear, gain = mj.actuator_gear[actuator, 0], mj.actuator_gainprm[actuator, 0]
-        stiffness = -gear * gear * mj.actuator_biasprm[actuator, 1]
-        if stiffness <= 0.0 or gain <= 0.0:
-            continue
-        inertia = mj.dof_M0[model.dofs_of(joint)[0]]
-        limit = np.inf
-        if mj.actuator_forcelimited[actuator]:
-            limit = abs(gear) * np.abs(mj.actuator_forcerange[actuator]).min()
-        return ServoPD(math.sqrt(stiffness / inertia), float(limit) or np.inf)
-    return ServoExact()
+        yield driven(TrajectoryHeld(model.dofs_of(joint), place), servo)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import mujoco
 import numpy as np
 
 from flowborne.coupling.world import Fluid, Setup
@@ -13,7 +12,7 @@ from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.check_bodies import geom_boxes
 from flowborne.scenes.creature import counted_bodies, unmet_bodies
 from flowborne.scenes.schema import Scene
-from flowborne.solids.geoms import element_name, floors, kind_of, rest_poses
+from flowborne.solids.geoms import floors, geom_name, kind_of, rest_poses
 from flowborne.solids.model import SolidModel
 
 LIGHT, HEAVY = 0.1, 10.0
@@ -155,8 +154,8 @@ def floors_in_fluid(scene: Scene, setup: Setup) -> Iterator[str]:
         height = (corners - position[geom]) @ rotation[geom][:, 2]
         top = mj.hfield_size[mj.geom_dataid[geom], 2] if kind == "hfield" else 0.0
         if height.min() < -grid.spacing and height.max() > top + grid.spacing:
-            name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
             yield (
-                f"[domain]: the {kind} '{name}' lies inside the fluid, which flows through it; a "
-                "domain that ends there has a solid side, and a box in the model is met"
+                f"[domain]: the {kind} '{geom_name(mj, geom)}' lies inside the fluid, which flows "
+                "through it; a domain that ends there has a solid side, and a box in the model is "
+                "met"
             )

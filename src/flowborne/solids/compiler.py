@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import mujoco
 import numpy as np
+from mujoco import MjModel, MjSpec
 
 STDERR = 2
 """File descriptor that Qhull writes to, past Python's `sys.stderr`."""
@@ -24,7 +24,7 @@ REMEDIES = (
 """Attributes of the compiler element that correct inertias, in the order of trial."""
 
 
-def compiled_quietly(spec: mujoco.MjSpec) -> mujoco.MjModel:
+def compiled_quietly(spec: MjSpec) -> MjModel:
     """The model of a spec, with colours clipped to 0 to 1 and without Qhull's messages.
 
     raises  ValueError for a bad model
@@ -53,7 +53,7 @@ def unreadable(where: str, error: Exception) -> ValueError:
     return ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.")
 
 
-def refusal(spec: mujoco.MjSpec, where: str, error: ValueError) -> ValueError:
+def refusal(spec: MjSpec, where: str, error: ValueError) -> ValueError:
     """The error for a model that does not compile, with a remedy that has been tried.
 
     spec   of the model, not changed
@@ -68,7 +68,7 @@ def refusal(spec: mujoco.MjSpec, where: str, error: ValueError) -> ValueError:
     )
 
 
-def _remedy(spec: mujoco.MjSpec) -> str:
+def _remedy(spec: MjSpec) -> str:
     """A sentence: how to correct inertias that MuJoCo refuses."""
     for keys in REMEDIES:
         corrected = spec.copy()

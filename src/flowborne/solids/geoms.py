@@ -103,6 +103,11 @@ def element_name(mj: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
     return str(name) if name else f"{kind.name.removeprefix('mjOBJ_').lower()}{index}"
 
 
+def geom_name(mj: mujoco.MjModel, geom: int) -> str:
+    """Name of a geometry, see `element_name`."""
+    return element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
+
+
 def mesh_of(mj: mujoco.MjModel, geom: int) -> Mesh | None:
     """Vertices in the geometry's frame and faces of a mesh geometry; None for the others."""
     if kind_of(mj, geom) != "mesh":
@@ -135,6 +140,13 @@ def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:
         data.geom_xpos.copy(),
         data.geom_xmat.reshape(-1, 3, 3).copy(),
     )
+
+
+def quaternion_of(rotation: Array) -> Array:
+    """(4,) w, x, y, z of a rotation matrix (3, 3), with w >= 0."""
+    unit = np.zeros(4)
+    mujoco.mju_mat2Quat(unit, np.ascontiguousarray(rotation).ravel())
+    return unit if unit[0] >= 0.0 else -unit
 
 
 def said_to_displace(mj: mujoco.MjModel, body: int) -> tuple[float, Array] | None:

@@ -22,6 +22,7 @@ from flowborne.solids.geoms import (
     add_shapes,
     displacing_geoms,
     element_name,
+    geom_name,
     geom_shape,
     kind_of,
     rest_poses,
@@ -247,10 +248,9 @@ def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
             "model, and describe the flesh by a [[flesh]] table of the scene."
         )
     for geom in displacing_geoms(mj):
-        name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
         if kind_of(mj, geom) == "sdf":
             raise ValueError(
-                f"{where}: geom '{name}' is a signed distance plugin. "
+                f"{where}: geom '{geom_name(mj, geom)}' is a signed distance plugin. "
                 f"Use a mesh, or put it into group {HIDDEN_GROUP} or above."
             )
 
@@ -264,10 +264,9 @@ def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array
     try:
         return shape.section(rotation, float(position[2]))
     except ValueError as error:
-        name = element_name(mj, mujoco.mjtObj.mjOBJ_GEOM, geom)
         raise ValueError(
-            f"geom '{name}' ({shape.kind}) {error}. In a slab every geom crosses z = 0 "
-            "with a local axis along z: turn or move it."
+            f"geom '{geom_name(mj, geom)}' ({shape.kind}) {error}. In a slab every geom crosses "
+            "z = 0 with a local axis along z: turn or move it."
         ) from error
 
 

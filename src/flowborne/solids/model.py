@@ -167,6 +167,16 @@ class SolidModel:
         """The rest pose of the model, without velocity."""
         return SolidState(np.array(self.mj.qpos0), np.zeros(self.nv))
 
+    def at_keyframe(self, mj: mujoco.MjModel, name: str) -> SolidState:
+        """State at a keyframe of `mj`, a model that has some of these joints; others rest."""
+        state, key = self.rest(), mj.key(name)
+        for j, joint in enumerate(_names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)):
+            indices, dofs = self.positions_of(joint), self.dofs_of(joint)
+            first, speed = mj.jnt_qposadr[j], mj.jnt_dofadr[j]
+            state.q[indices] = key.qpos[first : first + len(indices)]
+            state.v[dofs] = key.qvel[speed : speed + len(dofs)]
+        return state
+
     def integrate(self, q: Array, velocity: Array, dt: float) -> Array:
         """(nq,) positions after moving with constant velocity (nv,) for dt s."""
         moved = np.array(q, dtype=np.float64)

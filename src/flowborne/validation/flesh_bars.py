@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, dia_array
@@ -19,6 +18,7 @@ from flowborne.bodies import (
     FleshTable,
     grow,
     mesh_bytes,
+    read_spec,
     static_forces,
     symmetric_factor,
 )
@@ -155,7 +155,7 @@ def grown_from(mesh: FleshMesh, tissue: FleshTable, others: str, gravity: Vector
     others  MJCF of other elements of the world body
     """
     slab = mesh.elements.shape[1] == 3
-    spec = mujoco.MjSpec.from_string(CLAMP.format(others=others))
+    spec = read_spec(CLAMP.format(others=others))
     with TemporaryDirectory() as folder:
         (Path(folder) / "bar.npz").write_bytes(mesh_bytes(mesh, ""))
         grown = grow(spec, (tissue,), Path(folder))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -130,6 +131,24 @@ def bones_of(spec: mujoco.MjSpec, names: Sequence[str]) -> Bones:
             )
         parts += [_part(mj, g, bone, position[g], rotation[g]) for g in own]
     return Bones(tuple(names), tuple(parts))
+
+
+def digest(spec: mujoco.MjSpec, names: Sequence[str]) -> str:
+    """SHA-256 of the shapes and rest poses of all geometries of the bodies `names`, in hex."""
+    mj = compiled_quietly(spec.copy())
+    _, _, position, rotation = rest_poses(mj)
+    found = hashlib.sha256()
+    for name in names:
+        body = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name)
+        for geom in np.flatnonzero(mj.geom_bodyid == body) if body >= 0 else ():
+            for values in (mj.geom_size[geom], position[geom], rotation[geom]):
+                found.update(np.round(values, 9).tobytes())
+            found.update(bytes([mj.geom_type[geom]]))
+            mesh = mj.geom_dataid[geom]
+            if mesh >= 0:
+                first = mj.mesh_vertadr[mesh]
+                found.update(mj.mesh_vert[first : first + mj.mesh_vertnum[mesh]].tobytes())
+    return found.hexdigest()
 
 
 def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: Array) -> Part:
