@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Protocol, Self
 
 from pydantic import (
@@ -182,6 +183,35 @@ class OwnTable(BaseModel):
     def _check(self) -> Self:
         self.registry.check(self.kind, self.parameters)
         return self
+
+
+def check_keyframes(
+    times: Sequence[float] | None, values: Sequence[float] | None, name: str, least: int = 2
+) -> None:
+    """Raise ValueError unless times and values are given, are equally many, and times increase.
+
+    name   of the values in the table
+    least  least number of keyframes
+    """
+    if times is None or values is None:
+        missing = "times" if times is None else name
+        raise ValueError(f"has no {missing}. Give both times and {name}")
+    if len(times) != len(values):
+        raise ValueError(f"has {len(times)} times and {len(values)} {name}. Give as many of both")
+    if len(times) < least:
+        raise ValueError(f"has {len(times)} times. Give at least {least}")
+    for number, (before, after) in enumerate(pairwise(times), start=2):
+        if after <= before:
+            raise ValueError(
+                f"has times that do not increase: entry {number} is {after:g} s after {before:g} "
+                "s. Put them in order, each once"
+            )
+
+
+def check_interval(start: float, stop: float | None) -> None:
+    """Raise ValueError unless `stop` is later than `start`."""
+    if stop is not None and stop <= start:
+        raise ValueError(f"starts at {start:g} s and stops at {stop:g} s. Make stop later")
 
 
 def as_interval(start: float, stop: float | None) -> tuple[float, float]:

@@ -239,6 +239,11 @@ APPENDED_FAULT = {
         "scene swim.toml, [[motion]] 2 has times that do not increase: entry 3 is 1 s after 2 s. "
         "Put them in order, each once.",
     ),
+    "an input motion that goes back in time": (
+        '[[objectives]]\nkind = "input-motion"\njoint = "rail"\ntimes = [0, 2, 1]\n'
+        "values = [0, 1, 2]",
+        "has times that do not increase: entry 3 is 1 s after 2 s. Put them in order, each once.",
+    ),
     "NaN in keyframes": (
         '[[motion]]\nkind = "keyframes"\njoint = "rail"\ntimes = [0, 1]\nvalues = [0, nan]',
         "scene swim.toml, [[motion]] 2, values, entry 2: nan is not a finite number. "

@@ -52,7 +52,7 @@ def test_a_motion_takes_the_column_that_it_names(write: Write, tmp_path: Path) -
             "walk.csv, line 3, column 'rail': 'nan' is not a finite number",
         ),
         ("time,rail\n1,1\n0,2\n", "[[motion]] 2 has times that do not increase"),
-        ("time,rail\n1,1\n", "[[motion]] 2 has 1 times. Give at least two"),
+        ("time,rail\n1,1\n", "[[motion]] 2 has 1 times. Give at least 2"),
     ],
 )
 def test_a_bad_file_is_told(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -36,6 +35,7 @@ from flowborne.tables import (
     Text,
     Vector,
     by_kind_or_own,
+    check_keyframes,
     triple,
 )
 
@@ -300,21 +300,8 @@ class ObjectiveInputMotionTable(ObjectiveTable):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.values is None:
-            if self.times is not None:
-                raise ValueError("has times and no values. Give both, or neither")
-            return self
-        times = self.keyframe_times()
-        if len(times) != len(self.values):
-            raise ValueError(
-                f"has {len(times)} times and {len(self.values)} values. Give as many of both"
-            )
-        for before, after in pairwise(times):
-            if after <= before:
-                raise ValueError(
-                    f"has times that do not increase: {after:g} s after {before:g} s. "
-                    "Put them in order, each once"
-                )
+        if self.times is not None or self.values is not None:
+            check_keyframes(self.keyframe_times(), self.values, "values", least=1)
         return self
 
     def keyframe_times(self) -> tuple[float, ...]:

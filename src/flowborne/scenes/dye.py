@@ -11,7 +11,6 @@ from flowborne.fluid.boundary import Source
 from flowborne.fluid.grid import Grid
 from flowborne.motion.inflow import Bands, even_bands
 from flowborne.scenes.domain import Domain
-from flowborne.scenes.factors import check_interval
 from flowborne.scenes.sides import BoundariesTable, Side
 from flowborne.tables import (
     ByKind,
@@ -22,6 +21,7 @@ from flowborne.tables import (
     Text,
     Vector,
     as_interval,
+    check_interval,
     triple,
 )
 

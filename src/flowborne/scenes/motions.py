@@ -23,10 +23,18 @@ from flowborne.motion.tracks import (
     TrajectorySinusoid,
 )
 from flowborne.phrases import suggestion
-from flowborne.scenes.factors import check_table
 from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind, joint_unit
 from flowborne.solids.model import SolidModel
-from flowborne.tables import ByKind, FileName, Number, Places, Positive, Table, Text
+from flowborne.tables import (
+    ByKind,
+    FileName,
+    Number,
+    Places,
+    Positive,
+    Table,
+    Text,
+    check_keyframes,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -150,7 +158,7 @@ class MotionKeyframesTable(DrivenTable):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        check_table(self.times, self.values, "times", "values")
+        check_keyframes(self.times, self.values, "values")
         return self
 
     def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:

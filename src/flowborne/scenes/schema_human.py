@@ -6,7 +6,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.scenes.factors import check_interval
 from flowborne.tables import (
     FileName,
     NotNegative,
@@ -16,6 +15,7 @@ from flowborne.tables import (
     Text,
     Vector,
     WholeNumber,
+    check_interval,
 )
 
 
