@@ -1,4 +1,4 @@
-"""Tables of a scene: their base, and the kinds of values in them."""
+"""Tables of a scene: their base class, the kinds of values in them, and checks of these."""
 
 from __future__ import annotations
 
@@ -217,11 +217,6 @@ def check_interval(start: float, stop: float | None) -> None:
 def as_interval(start: float, stop: float | None) -> tuple[float, float]:
     """(start, stop) in s, without end when `stop` is None."""
     return (start, float("inf") if stop is None else stop)
-
-
-def filled(data: Any, defaults: Mapping[str, Any]) -> Any:
-    """`data` with the keys of `defaults` that it lacks; anything but a table as it is."""
-    return {**defaults, **data} if isinstance(data, Mapping) else data
 
 
 def triple(vector: tuple[float, ...]) -> tuple[float, float, float]:

@@ -17,9 +17,9 @@ from flowborne.motion.quaternions import product
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.load import check_scene, load_scene
-from flowborne.scenes.notes import notes_of
-from flowborne.scenes.notes_clip import clip_notes, lying
+from flowborne.scenes.notes import clip_notes, notes_of
 from flowborne.scenes.save import HUMAN_FILE, scene_files
+from flowborne.scenes.warn import lying
 from flowborne.simulation import Simulation
 
 from .saved import save_scene

@@ -118,7 +118,7 @@ def test_a_generated_walk_is_written_anew(finished: Finished, tmp_path: Path) ->
 def test_a_run_without_a_clip_is_refused(tmp_path: Path) -> None:
     """The exporter of .bvh files takes the bodies' own skeleton then."""
     run(load_scene("block-effort-wind"), out=tmp_path / "run", film=False, frames=2)
-    with pytest.raises(SceneError, match=r"follows no clip, and there is none to give back"):
+    with pytest.raises(SceneError, match=r"follows no clip, so there is no skeleton to export"):
         export_bvh(tmp_path / "run", tmp_path / "out.bvh")
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from flowborne.coupling.seen import Seen
 from flowborne.coupling.world import HYPOTHETICAL
-from flowborne.scenes import warn_drives, warn_size
+from flowborne.scenes import warn, warn_bodies
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.warn import warnings_of
@@ -126,12 +126,12 @@ def test_bodies_that_are_thickened(warned: Warned) -> None:
 def test_a_domain_for_which_there_is_no_memory_is_to_be_smaller_or_the_body_thicker(
     warned: Warned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(warn_size, "fits_memory", lambda counts: max(counts) <= 80)
+    monkeypatch.setattr(warn_bodies, "fits_memory", lambda counts: max(counts) <= 80)
     wide = {"domain.lower": "[-3.0, -3.0]", "domain.upper": "[3.0, 3.0]"}
     coarse = wide | {"domain.resolution": "50"}
     (warning,) = warned(coarse)
     assert proposed(warning) == {"domain.resolution": "60"}
-    monkeypatch.setattr(warn_size, "fits_memory", lambda counts: False)
+    monkeypatch.setattr(warn_bodies, "fits_memory", lambda counts: False)
     (warning,) = warned(coarse)
     assert "; in a domain 5 m long as many cells give 2" in warning
     half = {"domain.lower": "[-2.5, -2.5]", "domain.upper": "[2.5, 2.5]"}
@@ -143,7 +143,7 @@ def test_a_domain_for_which_there_is_no_memory_is_to_be_smaller_or_the_body_thic
 
 def test_fluid_that_passes_through_a_body(warned: Warned, monkeypatch: pytest.MonkeyPatch) -> None:
     net = Seen("net", 0.04, 0.04, 0.8, False, 0.0, 0.0)
-    monkeypatch.setattr(warn_size, "seen_bodies", lambda setup: [net])
+    monkeypatch.setattr(warn_bodies, "seen_bodies", lambda setup: [net])
     (warning,) = warned()
     assert warning.startswith(
         "[domain]: net is 0.04 m thick, 0.8 cells, and fluid passes through it"
@@ -163,7 +163,7 @@ def test_a_domain_far_larger_than_the_creature_and_the_size_that_will_do(warned:
     side = float(re.findall(r"; ([\d.]+) m or less", warning)[0])
     assert 99.0 < side < 103.0
     assert sized(side) == []
-    assert pytest.approx(1e-4) == 1.0 / warn_size.LARGEST_DOMAIN**2
+    assert pytest.approx(1e-4) == 1.0 / warn_bodies.LARGEST_DOMAIN**2
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,7 @@ def test_strength_and_probe_in_radians(
 
 
 def test_a_probe_as_small_as_may_be_has_a_gradient_right_to_a_thousandth() -> None:
-    assert HYPOTHETICAL / np.radians(warn_drives.LEAST_PROBE) == pytest.approx(1e-3)
+    assert HYPOTHETICAL / np.radians(warn.LEAST_PROBE) == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize("strength", ["120.0", "360.0"])

@@ -1,7 +1,9 @@
-"""The bodies of a scene: their model, and the state in which they start."""
+"""The bodies of a scene: their model, initial state, and steps for their contacts."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,20 +11,31 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
+from flowborne.phrases import suggestion
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
-from flowborne.scenes.earlier import earlier_motion
+from flowborne.scenes.draft import Draft
+from flowborne.scenes.earlier import earlier_joints, earlier_motion
+from flowborne.scenes.flesh import grow
 from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_solids import SolidsTable
+from flowborne.scenes.schema_bodies import SolidsTable
 from flowborne.solids import mjcf
 from flowborne.solids.compiler import MjModel, MjSpec, compiled_quietly
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
-from flowborne.solids.joint_kinds import FREE, HINGE, SLIDE, joint_kind, joint_unit
+from flowborne.solids.geoms import floors
+from flowborne.solids.joint_kinds import (
+    BALL,
+    FREE,
+    HINGE,
+    JOINT_KINDS,
+    SLIDE,
+    joint_kind,
+    joint_unit,
+)
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-from flowborne.solids.tissue.growth import Grown
 
 Array = NDArray[np.float64]
 
@@ -52,7 +65,8 @@ def _loaded(scene: Scene) -> SolidModel:
         raise SceneError(f"there is no model file {path}. Correct solids.model.")
     try:
         if scene.flesh:
-            spec, grown = fleshed(scene)
+            spec = bones_of(scene)
+            grown = grow(spec, scene.flesh, scene.folder)
             return SolidModel.with_flesh(
                 spec,
                 grown,
@@ -64,7 +78,7 @@ def _loaded(scene: Scene) -> SolidModel:
             path, slab=scene.is_slab, gravity=(x, y, z), given=given_of(scene)
         )
     except ValueError as error:
-        raise SceneError(_sentence(str(error))) from None
+        raise SceneError(" ".join(str(error).split()).removesuffix(".") + ".") from None
 
 
 def displace_of(solids: SolidsTable) -> Displace:
@@ -73,7 +87,7 @@ def displace_of(solids: SolidsTable) -> Displace:
 
 
 def given_of(scene: Scene) -> Given:
-    """What a scene with a model file says about its model besides."""
+    """Settings of a scene's model in addition to the model file."""
     solids = scene.solids
     assert solids is not None
     return Given(
@@ -101,27 +115,13 @@ def spec_of(scene: Scene) -> MjSpec:
 
 
 def packages_of(scene: Scene) -> list[Path]:
-    """Folders in which packages of ROS are looked for that the model names."""
+    """Folders that are searched for the ROS packages that the model names."""
     assert scene.solids is not None
     return [scene.folder / folder for folder in scene.solids.packages]
 
 
-def fleshed(scene: Scene) -> tuple[MjSpec, list[Grown]]:
-    """The model of a scene with its flesh. Raises ValueError when it cannot be made."""
-    from flowborne.scenes.flesh import grow
-
-    spec = bones_of(scene)
-    return spec, grow(spec, scene.flesh, scene.folder)
-
-
-def _sentence(text: str) -> str:
-    text = " ".join(text.split())
-    return text if text.endswith(".") else f"{text}."
-
-
 def trajectories_of(scene: Scene, model: SolidModel, start: Array) -> tuple[Trajectory, ...]:
-    """All prescribed motions: those of [[motion]] in their order, then that of [clip], then that of
-    [earlier], then joints that are held.
+    """All prescribed motions: of [[motion]] in their order, [clip], [earlier], and held joints.
 
     start   (nq,) pose from which a clip is entered
     raises  SceneError when the clip or the earlier run cannot be used
@@ -139,8 +139,8 @@ def own_pose(scene: Scene, model: SolidModel) -> SolidState:
 
 
 def keyframes(scene: Scene, model: SolidModel) -> MjModel:
-    """A model with the keyframes as the file has them: MuJoCo does not make room in them for the
-    joints of flesh and of floating bodies."""
+    """A model with the file's keyframes: those of `model` do not fit the joints that flesh and
+    floating bodies add."""
     if scene.model_path is None or not (scene.flesh or (scene.solids and scene.solids.floating)):
         return model.mj
     return compiled_quietly(spec_of(scene))
@@ -153,14 +153,12 @@ def posed(scene: Scene, model: SolidModel) -> SolidState:
     places = model.dof_position[dofs]
     state.q[places] = np.clip(state.q[places], *model.dof_range[dofs].T)
     for joint, values in scene.initial.positions.items():
-        places = model.positions_of(joint)
-        kind = joint_kind(model, joint)
-        if kind in (HINGE, SLIDE):
-            state.q[places] = joint_unit(model, joint) * values[0]
-            continue
         numbers = np.array(values)
-        numbers[-4:] /= np.linalg.norm(numbers[-4:])
-        state.q[places] = numbers
+        if joint_kind(model, joint) in (HINGE, SLIDE):
+            numbers *= joint_unit(model, joint)
+        else:
+            numbers[-4:] /= np.linalg.norm(numbers[-4:])
+        state.q[model.positions_of(joint)] = numbers
     for joint, values in scene.initial.velocities.items():
         units = np.full(len(values), joint_unit(model, joint))
         if joint_kind(model, joint) == FREE:
@@ -170,7 +168,7 @@ def posed(scene: Scene, model: SolidModel) -> SolidState:
 
 
 def initial_state(scene: Scene, model: SolidModel) -> SolidState:
-    """Where the bodies start: the model's own pose, `initial`, and the prescribed motions."""
+    """State at the start: the model's own pose, [initial], and the prescribed motions."""
     state = posed(scene, model)
     motions = trajectories_of(scene, model, state.q.copy())
     pose_controlled(scene, model, state.q)
@@ -180,3 +178,83 @@ def initial_state(scene: Scene, model: SolidModel) -> SolidState:
     state.q = posed_flesh(model, state.q)
     state.v = follow(model, state.q, state.v)
     return state
+
+
+def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
+    """Problems of [initial] with the model's keyframes and joints."""
+    initial = draft.scene.initial
+    if initial.keyframe is not None:
+        own, where = keyframes(draft.scene, model), draft.at("initial", "keyframe")
+        keys = [own.key(n).name for n in range(own.nkey)]
+        if initial.keyframe not in keys:
+            end = suggestion(initial.keyframe, keys, "Its keyframes are")
+            yield f"{where}: the model has no '{initial.keyframe}'{end}"
+            return
+        if own is not model.mj and not all(own.joint(j).name for j in range(own.njnt)):
+            yield (
+                f"{where}: the model has nameless joints, which with flesh and floating bodies are "
+                "not found in a keyframe. Name them."
+            )
+            return
+    if initial.impulse == "none" and not any(
+        joint_kind(model, joint) == FREE for joint in model.joint_names
+    ):
+        yield (
+            f"{draft.at('initial', 'impulse')}: 'none' is for creatures that float, and the model "
+            "has no free joint. Drop it."
+        )
+    moved = {table.joint: "a [[motion]]" for table in draft.scene.motion}
+    moved |= dict.fromkeys(earlier_joints(draft.scene), "a motion of the [earlier] run")
+    for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
+        for joint, numbers in values.items():
+            where = draft.at("initial", key)
+            unknown = draft.unknown_joint(model, joint, "initial", key)
+            yield from unknown
+            if unknown:
+                continue
+            kind = joint_kind(model, joint)
+            places = model.positions_of(joint) if key == "positions" else model.dofs_of(joint)
+            if len(numbers) != len(places):
+                yield (
+                    f"{where}: joint '{joint}' is a {JOINT_KINDS[kind]} and has {len(numbers)} "
+                    f"numbers. Give {len(places)}."
+                )
+            elif joint in moved:
+                yield (
+                    f"{where}: joint '{joint}' has {moved[joint]}, which says where it starts. "
+                    "Drop one of them."
+                )
+            elif key == "positions" and kind in (BALL, FREE) and not any(numbers[-4:]):
+                yield f"{where}: the quaternion of joint '{joint}' is 0. Give (1, 0, 0, 0) or so."
+
+
+def with_steps(scene: Scene) -> Scene:
+    """The scene with enough steps a frame for stiff contact with floors, unless it gives them.
+
+    A contact of MuJoCo is a critically damped spring with the time constant of `solref`, and steps
+    longer than half of that soften it (`refsafe`): the feet of a humanoid rest 12 mm deep with one
+    step of 42 ms, and 0.8 mm with five. If `solref` is a stiffness, the file's timestep counts.
+    """
+    if "steps_per_frame" in scene.time.model_fields_set or scene.model_path is None:
+        return scene
+    longest = longest_step(load_model(scene))
+    steps = max(1, math.ceil(scene.frame_time / longest * (1.0 - 1e-9)))
+    if steps == scene.time.steps_per_frame:
+        return scene
+    time = scene.time.model_copy(update={"steps_per_frame": steps})
+    return scene.model_copy(update={"time": time})
+
+
+def longest_step(model: SolidModel) -> float:
+    """Longest step, s, in which contacts of moving bodies with floors are stiff."""
+    mj = model.mj
+    types, affinities = mj.geom_contype, mj.geom_conaffinity
+    moving = np.flatnonzero(model.moving[mj.geom_bodyid]).tolist()
+    longest = np.inf
+    for floor in floors(mj):
+        for geom in moving:
+            collide = types[floor] & affinities[geom] or types[geom] & affinities[floor]
+            if collide:
+                constant = mj.geom_solref[[floor, geom], 0].min()
+                longest = min(longest, 0.5 * constant if constant > 0.0 else mj.opt.timestep)
+    return longest

@@ -28,9 +28,9 @@ from flowborne.solids.model import SolidModel
 def surroundings_of(
     scene: Scene, model: SolidModel, unread: frozenset[str] = frozenset()
 ) -> Surroundings:
-    """What the scene has around its tables.
+    """What tables may look at; see `Surroundings`.
 
-    unread  tables of which something was left out because it was wrong
+    unread  tables that had wrong entries, which were left out
     """
     capture = capture_of(scene)
     driven = {*scene.moved_joints(), *earlier_joints(scene)}
@@ -67,7 +67,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Built:
-    """What a scene describes, ready to be stepped.
+    """World and controller of a scene, ready to be stepped.
 
     scene            the scene
     world            its initial state
@@ -86,9 +86,9 @@ class Built:
 
 
 def build(scene: Scene, executor: Mapper | None = None) -> Built:
-    """The world and the controller of a scene that `load_scene` gave.
+    """The world and the controller of a scene from `load_scene`.
 
-    executor  runs the controller's trials; one after the other when None
+    executor  runs the controller's trials; serial by default
     raises    SceneError when the model file cannot be read
     """
     model = load_model(scene) if scene.has_bodies else SolidModel.empty()
@@ -108,7 +108,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
 
 
 def _set_velocity(state: FluidState, scene: Scene) -> None:
-    """The initial velocity on every face, as the velocity and as what carries it."""
+    """Set velocity and advecting velocity to the initial velocity on every face."""
     assert scene.fluid is not None
     for faces in (state.velocity, state.advecting_velocity):
         for values, component in zip(faces, scene.fluid.velocity, strict=True):
@@ -116,7 +116,7 @@ def _set_velocity(state: FluidState, scene: Scene) -> None:
 
 
 def mouths_of(scene: Scene, model: SolidModel) -> tuple[Mouth, ...]:
-    """The mouths, in the order of the file; none where the fluid is left out."""
+    """The mouths, in the order of the file; none without a fluid."""
     if not scene.has_fluid:
         return ()
     return tuple(

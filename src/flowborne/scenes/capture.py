@@ -17,7 +17,7 @@ from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_human import ClipTable, HumanTable
+from flowborne.scenes.schema_bodies import ClipTable, HumanTable
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
@@ -59,8 +59,7 @@ def _reading(scene: Scene, table: ClipTable) -> Reading:
 
 
 def _words(scene: Scene) -> set[object]:
-    """All that a scene says something of: its keys and values, but for names of the clip's joints,
-    and the joints of an earlier run."""
+    """All keys and values of a scene except clip.mapping, and the joints of an earlier run."""
     found = set[object](earlier_joints(scene))
     left: list[object] = [scene.model_dump(exclude={"clip": {"mapping"}}, exclude_none=True)]
     while left:
@@ -76,7 +75,7 @@ def _words(scene: Scene) -> set[object]:
 
 @lru_cache(maxsize=4)
 def _walk(height: float) -> Capture:
-    """The generated walk of a standard skeleton; made once, though many ask for it."""
+    """The generated walk of a standard skeleton; cached."""
     skeleton = standard_skeleton(height)
     clip = gait_clip(skeleton)
     return Capture(clip, {joint: joint for joint in clip.names}, skeleton)
@@ -153,7 +152,7 @@ def _where_it_begins(
     passage: Passage,
     joints: tuple[str, ...],
 ) -> Array:
-    """(nq,) pose with joints where the clip has them first, but for those that [initial] names."""
+    """(nq,) pose with `joints` at the clip's first pose, except those that [initial] names."""
     once = replace(passage, loop=False, blend=0.0)
     motion = trajectory_of_clip(model, capture.clip, capture.mapping, once, joints=joints)
     q = start.copy()
@@ -165,10 +164,9 @@ def _where_it_begins(
 
 
 def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:
-    """Put the controlled and free joints that the clip has where it begins, in place, but those in
-    initial.
+    """Set controlled and free joints to the clip's first pose, except those that [initial] names.
 
-    q       (nq,) pose from which a blend leads into the clip
+    q       (nq,) pose from which a blend leads into the clip; changed in place
     raises  SceneError as `clip_motion` does
     """
     capture = capture_of(scene)

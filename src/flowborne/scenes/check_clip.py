@@ -8,12 +8,11 @@ import numpy as np
 
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
-from flowborne.scenes.bodies import posed
+from flowborne.scenes.bodies import check_initial, posed
 from flowborne.scenes.capture import capture_of, clip_motion
-from flowborne.scenes.check_bodies import check_initial
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints
-from flowborne.scenes.schema_human import ClipTable
+from flowborne.scenes.schema_bodies import ClipTable
 from flowborne.solids.model import SolidModel
 
 JUMP = np.radians(15.0)

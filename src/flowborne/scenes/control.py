@@ -50,6 +50,11 @@ class ControlTable(Table):
     torque_limit: Positive | None = None
     in_phases: tuple[StrengthInPhaseTable, ...] = ()
 
+    @property
+    def strengths(self) -> list[float]:
+        """Its strength, and those of in_phases."""
+        return [self.strength, *(other.strength for other in self.in_phases)]
+
 
 class ControllerTable(Table):
     """[controller]: how the controlled joints decide.

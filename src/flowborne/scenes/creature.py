@@ -1,4 +1,4 @@
-"""What a creature is to the fluid: its mass and size, and which of its geoms the fluid meets."""
+"""The creature of a scene: its mass and size, and the geoms that displace fluid."""
 
 from __future__ import annotations
 
@@ -25,13 +25,12 @@ class Creature:
     """All that moves at the start of a run; all bodies where nothing does.
 
     mass              kg; kg/m in a slab
-    displaced_mass    kg of fluid in its place, as thick as the grid sees it; None without a fluid
-                      that feels bodies
+    displaced_mass    kg of fluid that it displaces on the grid; None without two-way coupling
     size              (3,) extent along x, y and z, m; (2,) in a slab
-    geoms             that have a volume, of the whole model
-    displacing_geoms  of them those that the fluid meets
+    geoms             number of geoms with a volume
+    displacing_geoms  number of them that displace fluid
     rule              by which these are chosen
-    unmet             moving bodies that have none of them
+    unmet             moving bodies without one
     """
 
     mass: float

@@ -1,8 +1,9 @@
-"""A scene under inspection: where its problems are, and how they are described."""
+"""A scene under inspection: where its problems are, and messages about them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic_core import ErrorDetails
@@ -33,17 +34,12 @@ WHAT = {
 """pydantic's type of error -> what is wrong with the value, and the remedy."""
 
 BOUNDS = {
-    "greater_than": "gt",
-    "greater_than_equal": "ge",
-    "less_than": "lt",
-    "less_than_equal": "le",
+    "greater_than": ("gt", "is not greater than", "larger"),
+    "greater_than_equal": ("ge", "is less than", "larger"),
+    "less_than": ("lt", "is not less than", "smaller"),
+    "less_than_equal": ("le", "is greater than", "smaller"),
 }
-COMPARED = {
-    "greater_than": "is not greater than",
-    "greater_than_equal": "is less than",
-    "less_than": "is not less than",
-    "less_than_equal": "is greater than",
-}
+"""pydantic's type of error -> its key of the bound, what the value is, and the remedy."""
 
 
 def place(file: str, keys: tuple[Key, ...], numbers: dict[str, list[int]] | None = None) -> str:
@@ -83,6 +79,15 @@ def _tables_in(annotation: Any) -> list[type[Table]]:
     return [table for part in get_args(annotation) for table in _tables_in(part)]
 
 
+def _tables_at(keys: tuple[Key, ...]) -> list[type[Table]]:
+    """The tables that may stand at `keys`, from the top of a scene."""
+    tables: list[type[Table]] = [Scene]
+    for key in keys:
+        if isinstance(key, str):
+            tables = [inner for table in tables for inner in tables_of(table, key)]
+    return tables
+
+
 def _is_list_of_tables(key: str) -> bool:
     field = Scene.model_fields.get(key)
     listed = field is not None and get_origin(field.annotation) is tuple
@@ -95,14 +100,7 @@ def _kind_of(value: Any) -> Any:
 
 def _allowed(keys: tuple[Key, ...], raw: Any) -> list[str]:
     """Keys that the table at `keys` may have."""
-    tables: list[type[Table]] = [Scene]
-    value = raw
-    for key in keys:
-        value = _inside(value, key)
-        if isinstance(key, int):
-            continue
-        tables = [inner for table in tables for inner in tables_of(table, key)]
-    kind = _kind_of(value)
+    tables, kind = _tables_at(keys), _kind_of(reduce(_inside, keys, raw))
     fitting = [table for table in tables if kind in _kinds(table)] or tables
     return sorted({name for table in fitting for name in table.model_fields})
 
@@ -151,21 +149,20 @@ def explain(error: ErrorDetails, raw: Any, file: str) -> str:
     if kind == "missing":
         return f"{place(file, keys[:-1])}: key '{keys[-1]}' is missing. Add it."
     if kind == "union_tag_not_found":
-        kinds = [k for table in _choices(keys, raw) for k in _kinds(table)]
+        kinds = [k for table in _tables_at(keys) for k in _kinds(table)]
         return f"{where}: key 'kind' is missing. Give one of: {', '.join(kinds)}."
     if kind in ("union_tag_invalid", "literal_error"):
         known = str(context.get("expected_tags", context.get("expected", "")))
         names = [part.strip(" '") for part in known.replace(" or ", ",").split(",")]
-        own = [table for table in _choices(keys, raw) if issubclass(table, OwnTable)]
+        own = [table for table in _tables_at(keys) if issubclass(table, OwnTable)]
         names += [kind for table in own for kind in table.registry.kinds]
         given = context.get("tag", value)
         return f"{where}: '{given}' is not known{suggestion(str(given), names, 'Give one of')}"
     if kind == "value_error":
         return f"{where} {context['error']}."
     if kind in BOUNDS:
-        bound = context[BOUNDS[kind]]
-        remedy = "Give a larger number" if kind.startswith("greater") else "Give a smaller number"
-        return f"{where}: {_shown(value)} {COMPARED[kind]} {bound:g}. {remedy}."
+        key, compared, remedy = BOUNDS[kind]
+        return f"{where}: {_shown(value)} {compared} {context[key]:g}. Give a {remedy} number."
     if kind == "tuple_type" and isinstance(value, dict) and _is_list_of_tables(str(keys[0])):
         return f"scene {file}: [{keys[0]}] may be there several times. Write [[{keys[0]}]]."
     what = WHAT.get(kind, f"is not right ({error['msg'].lower()}). Correct it")
@@ -177,21 +174,13 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _choices(keys: tuple[Key, ...], raw: Any) -> list[type[Table]]:
-    tables: list[type[Table]] = [Scene]
-    for key in keys:
-        if isinstance(key, str):
-            tables = [inner for table in tables for inner in tables_of(table, key)]
-    return tables
-
-
 @dataclass(frozen=True)
 class Draft:
     """A scene under inspection.
 
-    scene    what could be understood of it
+    scene    its valid parts
     file     name of its file
-    broken   names of the top tables of which something was left out because it was wrong
+    broken   names of the top tables from which wrong parts were left out
     numbers  table -> number that each of its entries has in the file
     """
 

@@ -29,15 +29,6 @@ MOST_BANDS = 1000
 """Bands of dye through a side."""
 
 
-def _check_box(lower: tuple[float, ...], upper: tuple[float, ...]) -> None:
-    """Raise ValueError unless the box has an inside."""
-    for axis, low, high in zip("xyz", lower, upper, strict=False):
-        if high <= low and not (axis == "z" and low == high == 0.0):
-            raise ValueError(
-                f"is a box from {low:g} to {high:g} m in {axis}. Make upper larger than lower"
-            )
-
-
 class BoxTable(Table):
     """A box inside the domain where something holds for a time.
 
@@ -52,7 +43,11 @@ class BoxTable(Table):
 
     @model_validator(mode="after")
     def _check_place(self) -> Self:
-        _check_box(self.lower, self.upper)
+        for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
+            if high <= low and not (axis == "z" and low == high == 0.0):
+                raise ValueError(
+                    f"is a box from {low:g} to {high:g} m in {axis}. Make upper larger than lower"
+                )
         check_interval(self.start, self.stop)
         return self
 
@@ -203,15 +198,13 @@ def check_bands(
 def check_boxes(
     places: Places, sources: Iterable[SourceTable], dyes: Iterable[DyeTable], domain: Domain
 ) -> Iterator[str]:
-    boxes = [(("sources", i), s.lower, s.upper) for i, s in enumerate(sources)]
-    boxes += [
-        (("dye", i), d.lower, d.upper) for i, d in enumerate(dyes) if not isinstance(d, DyeBands)
-    ]
-    for keys, lower, upper in boxes:
-        for axis, low, high in zip("xyz", domain.lower, domain.upper, strict=False):
-            i = "xyz".index(axis)
-            if upper[i] <= low or lower[i] >= high:
+    boxes: list[tuple[str, int, BoxTable]] = [("sources", i, s) for i, s in enumerate(sources)]
+    boxes += [("dye", i, dye) for i, dye in enumerate(dyes) if isinstance(dye, DyeBox)]
+    for key, index, box in boxes:
+        spans = zip("xyz", box.lower, box.upper, domain.lower, domain.upper, strict=False)
+        for axis, low, high, first, last in spans:
+            if high <= first or low >= last:
                 yield (
-                    f"{places.at(*keys)}: the box reaches from {lower[i]:g} to {upper[i]:g} m in "
-                    f"{axis}, outside the domain from {low:g} to {high:g} m. Move it."
+                    f"{places.at(key, index)}: the box reaches from {low:g} to {high:g} m in "
+                    f"{axis}, outside the domain from {first:g} to {last:g} m. Move it."
                 )

@@ -144,15 +144,12 @@ def _whole(path: Path, earlier: Earlier) -> Earlier:
     if not poses:
         raise ValueError(f"{path} has no joint that was controlled")
     alike = all(values.ndim == 2 and len(values) == len(times) for values in poses.values())
-    if not (times.ndim == 1 and alike and all(map(_finite, (times, *poses.values())))):
+    finite = all(np.isfinite(values).all() for values in (times, *poses.values()))
+    if not (times.ndim == 1 and alike and finite):
         raise ValueError(f"{path} does not hold what joints did in a run")
     if len(times) < LEAST or not np.all(np.diff(times) > 0.0):
         raise ValueError(f"{path} has no frame yet, or frames that do not follow each other")
     return earlier
-
-
-def _finite(values: Array) -> bool:
-    return bool(np.isfinite(values).all())
 
 
 def check_earlier(draft: Draft) -> Iterator[str]:

@@ -34,6 +34,11 @@ from flowborne.solids.tissue.surface_file import surface_bytes
 from flowborne.solids.tissue.symmetry import SAME
 from flowborne.tables import FileName, NotNegative, Places, PlainName, Positive, Table, Text
 
+LAWS = {
+    "neo-hookean": Law.STABLE_NEO_HOOKEAN,
+    "st-venant-kirchhoff": Law.SAINT_VENANT_KIRCHHOFF,
+}
+
 
 class FleshTable(Table):
     """[[flesh]]: an elastic body that bones hold, meshed with tetrahedra.
@@ -82,11 +87,9 @@ class FleshTable(Table):
             raise ValueError("has no size of elements. Give it, in m")
         return self
 
-
-LAWS = {
-    "neo-hookean": Law.STABLE_NEO_HOOKEAN,
-    "st-venant-kirchhoff": Law.SAINT_VENANT_KIRCHHOFF,
-}
+    def tissue(self) -> Tissue:
+        """The material."""
+        return Tissue(self.young, self.poisson, self.density, self.damping, LAWS[self.law])
 
 
 def grow(spec: MjSpec, tables: tuple[FleshTable, ...], folder: Path) -> list[Grown]:
@@ -97,21 +100,16 @@ def grow(spec: MjSpec, tables: tuple[FleshTable, ...], folder: Path) -> list[Gro
     """
     meshes = [meshed(spec, table, folder) for table in tables]
     return [
-        add_flesh(spec, table.name, mesh.points, mesh.elements, tissue_of(table), mesh.holders)
+        add_flesh(spec, table.name, mesh.points, mesh.elements, table.tissue(), mesh.holders)
         for table, (mesh, _) in zip(tables, meshes, strict=True)
     ]
 
 
-def tissue_of(table: FleshTable) -> Tissue:
-    """What the flesh of a table is made of."""
-    return Tissue(table.young, table.poisson, table.density, table.damping, LAWS[table.law])
-
-
 def meshed(spec: MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, str]:
-    """The mesh of a flesh around the bones of a model without any, and its recipe.
+    """The mesh of a flesh around the bones of a model without flesh, and its recipe.
 
-    The mesher never makes the same mesh twice, so a file's mesh is taken where its recipe is the
-    same, and within a process a recipe is followed once.
+    The mesher is not deterministic: a file's mesh is used if its recipe is the same, and a process
+    meshes each recipe once.
     raises  ValueError as `grow`
     """
     recipe = _recipe(spec, table, folder)
@@ -126,7 +124,7 @@ def meshed(spec: MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, st
 
 
 _made: dict[str, FleshMesh] = {}
-"""What this process has meshed, by recipe."""
+"""Meshes of this process by recipe."""
 
 
 def _mesh(spec: MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
@@ -138,7 +136,7 @@ def _mesh(spec: MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
 
 
 def _recipe(spec: MjSpec, table: FleshTable, folder: Path) -> str:
-    """What decides a mesh, as JSON: the bones' shapes and places at rest, and how it is made."""
+    """All inputs of a mesh, as JSON: shapes and poses of the bones at rest, and parameters."""
     recipe = {
         "bones": list(table.bones),
         "shapes": digest(spec, table.bones),
@@ -159,7 +157,7 @@ def _read(path: Path, _changed: int) -> FleshMesh:
 def check_flesh(
     places: Places, tables: Sequence[FleshTable], *, slab: bool, has_model: bool
 ) -> Iterator[str]:
-    """What can be said before the flesh is meshed."""
+    """Problems that do not need the mesh."""
     for index, table in enumerate(tables):
         if slab and (table.thickness is not None or table.surface is not None):
             yield (

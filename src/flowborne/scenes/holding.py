@@ -1,4 +1,4 @@
-"""Joints that nothing drives, and those that a scene holds."""
+"""Joints without a drive, and joints that a scene holds."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def driven_dofs(
 
 
 def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> list[str]:
-    """Joints between bodies that nothing drives and that have no stiffness.
+    """Joints between bodies without a drive and without stiffness.
 
-    Joints on the world itself are those that a creature floats or swings on as a whole; joints
-    within a flesh, between bones that hold it, are as stiff as that.
+    Joints on the world are left out, as creatures float or swing on them, and so are joints between
+    bones of the same flesh, which stiffens them.
     """
     mj, moved, limp = model.mj, driven_dofs(scene, model, motions), []
     for j, name in enumerate(model.joint_names):

@@ -28,11 +28,8 @@ def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
     problems = []
     motions = raw.get("motion")
     for index, motion in enumerate(motions if isinstance(motions, list) else []):
-        if (
-            not isinstance(motion, dict)
-            or "file" not in motion
-            or motion.get("kind") != "keyframes"
-        ):
+        keyframed = isinstance(motion, dict) and motion.get("kind") == "keyframes"
+        if not keyframed or "file" not in motion:
             continue
         where = place(file, ("motion", index))
         path, column = motion.pop("file"), motion.pop("column", motion.get("joint"))

@@ -18,8 +18,8 @@ from flowborne.files.given import read_file
 from flowborne.motion.human.skeleton import SIDES
 from flowborne.phrases import suggestion
 from flowborne.runs.run_folder import reading
+from flowborne.scenes.bodies import with_steps
 from flowborne.scenes.check import cross_check
-from flowborne.scenes.contact_steps import with_steps
 from flowborne.scenes.draft import Draft, explain, keys_of
 from flowborne.scenes.keyframe_file import inline_keyframes
 from flowborne.scenes.plugins import load_plugins
@@ -27,9 +27,9 @@ from flowborne.scenes.schema import Scene
 
 
 def join_elbows(raw: dict[str, Any]) -> None:
-    """Name each elbow beside its shoulder wherever joints are named, in a scene as read, in place.
+    """Add the elbow to each list of joints with its shoulder, in a scene as read, in place.
 
-    It is then controlled as strongly, wants what the shoulder wants, and counts in its effort.
+    It then has the strength and the objectives of the shoulder.
     """
     human = raw.get("human")
     if not (isinstance(human, dict) and human.get("elbows") is True):
@@ -113,9 +113,9 @@ def load_scene(
 
 
 def read_scene(path: Path) -> Scene:
-    """The scene of a file that has been checked whole before, as that of a run: read, and no more.
+    """The scene of a file that was checked before, such as that of a run; not checked again.
 
-    raises  RunFolderError when its file alone has anything wrong
+    raises  RunFolderError for a file that is no scene
     """
     with reading(path.parent):
         raw = _read(path)
@@ -155,7 +155,7 @@ def _examine(
 
 
 def _understood(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str]]:
-    """The scene as far as its file alone says, with its plugins loaded, and what is wrong there."""
+    """The scene of a file with its plugins loaded, without its model, and the problems there."""
     raw.setdefault("name", path.stem)
     join_elbows(raw)
     problems = unloaded = load_plugins(raw, path.parent, path.name)
@@ -167,7 +167,7 @@ def _understood(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str
 
 
 def python_of(raw: Mapping[str, Any]) -> list[str]:
-    """The Python that a scene as read names: files of plugins, then functions."""
+    """Python code that a scene as read names: plugin files, then functions."""
     plugins = raw.get("plugins", [])
     named = [f"plugin {name}" for name in plugins] if isinstance(plugins, list) else []
     for key in ("objectives", "wind"):
@@ -243,10 +243,10 @@ def _too_deep(path: Path) -> SceneError:
 
 
 def override(raw: dict[str, Any], key: str, text: str) -> None:
-    """Set one value of a scene file as read; text that is no TOML value is taken as text.
+    """Set one value of a scene file as read; text that is not a TOML value stays text.
 
-    A table that is missing on the way is made; the schema finds keys that are unknown.
-    raises  SceneError when the way leads nowhere
+    Missing tables are added; the schema finds unknown keys.
+    raises  SceneError for a key that leads nowhere
     """
     steps = key.split(".")
     if not all(steps):
@@ -287,9 +287,9 @@ def value_of(text: str) -> Any:
 
 
 def _validate(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str]]:
-    """The scene as far as it can be understood, and what cannot.
+    """The valid parts of a scene, and the problems of the others.
 
-    What is wrong is taken out of a copy of `raw`, so that the rest is checked as well.
+    Wrong parts are taken out of a copy of `raw`, so that the rest is checked as well.
     """
     sound = copy.deepcopy(raw)
     numbers = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,12 +33,11 @@ Array = NDArray[np.float64]
 def export_bvh(run: Path, path: Path) -> str:
     """Write the motion of the run in folder `run` as a BVH file.
 
-    With a clip of its own the file is that clip, frame for frame, over the time that was
-    simulated (a loop: over its first round), in which the joints that did not follow it have the
-    motion that was found for them; all else stays to the letter. The generated walk is written
-    anew, a frame per frame of the run.
+    If the scene's clip has a file, the result is that file over the simulated time (of a loop: the
+    first round) with the same frames and text. Only the joints that did not follow the clip have
+    their simulated motion. The generated walk is written anew, with the frames of the run.
 
-    returns a sentence on joints that moved and are not in the clip's file; empty without any
+    returns a sentence on joints that moved and are not in the clip's file; "" without any
     raises  SceneError when the run has no clip or no motion; OSError when a file is missing or
             cannot be written
     """
@@ -47,7 +46,7 @@ def export_bvh(run: Path, path: Path) -> str:
     capture = capture_of(scene)
     if capture is None or scene.clip is None:
         raise SceneError(
-            f"{run} follows no clip, and there is none to give back. Add [clip] to its scene."
+            f"{run} follows no clip, so there is no skeleton to export. Add [clip] to its scene."
         )
     states = sorted(p for p in folder.states.iterdir() if STATE_NAME.fullmatch(p.name))
     if len(states) < 2:
@@ -119,15 +118,13 @@ def _unplaced(
 def _carried(model: SolidModel, capture: Capture, joint: str) -> list[str]:
     """Joints that the clip has and that hang on one that it lacks."""
     body = _body(model, joint)
-    found = []
-    for name in capture.mapping:
-        if name in model.joint_names:
-            below = int(model.mj.body_parentid[_body(model, name)])
-            while below > 0 and below != body and not _mapped(model, capture, below):
-                below = int(model.mj.body_parentid[below])
-            if below == body:
-                found.append(name)
-    return found
+
+    def nearest(name: str) -> int:
+        bodies = _ancestors(model, name)
+        return next((b for b in bodies if b == body or _mapped(model, capture, b)), 0)
+
+    names = [name for name in capture.mapping if name in model.joint_names]
+    return [name for name in names if nearest(name) == body]
 
 
 def _left_out(file: str, carried: Mapping[str, Sequence[str]]) -> str:
@@ -140,13 +137,10 @@ def _left_out(file: str, carried: Mapping[str, Sequence[str]]) -> str:
 
 
 def _poses(states: list[Path]) -> tuple[Array, Array]:
-    """(n,) s and (n, nq) of all states."""
-    times, q = [], []
-    for state in states:
-        arrays = read_state(state, ("time", "q"))
-        times.append(float(arrays["time"]))
-        q.append(arrays["q"].astype(np.float64))
-    return np.array(times), np.array(q)
+    """(n,) times, s, and (n, nq) positions of all states."""
+    found = [read_state(state, ("time", "q")) for state in states]
+    times = np.array([float(state["time"]) for state in found])
+    return times, np.array([state["q"] for state in found], float)
 
 
 def _frames(scene: Scene, clip: Clip, simulated: float) -> tuple[NDArray[np.int64], int]:
@@ -185,12 +179,17 @@ def _body(model: SolidModel, joint: str) -> int:
 
 def _above(model: SolidModel, capture: Capture, joint: str) -> str | None:
     """The nearest joint above that the clip has too."""
-    body = int(model.mj.body_parentid[_body(model, joint)])
+    bodies = _ancestors(model, joint)
+    return next((name for body in bodies for name in _mapped(model, capture, body)), None)
+
+
+def _ancestors(model: SolidModel, joint: str) -> Iterator[int]:
+    """Bodies above that of a joint, without the world, from the nearest."""
+    parents = model.mj.body_parentid
+    body = int(parents[_body(model, joint)])
     while body > 0:
-        for name in _mapped(model, capture, body):
-            return name
-        body = int(model.mj.body_parentid[body])
-    return None
+        yield body
+        body = int(parents[body])
 
 
 def _mapped(model: SolidModel, capture: Capture, body: int) -> list[str]:

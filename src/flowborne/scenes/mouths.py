@@ -70,13 +70,8 @@ class MouthTable(FactorsTable):
     def _check(self) -> Self:
         if not any(self.direction):
             raise ValueError("has a direction of length 0. Point it out of the body")
-        keyframed = self.times is not None or self.factors is not None
-        given = {
-            "keyframes": keyframed,
-            "a pulse": self.pulse is not None,
-            "a formula": self.factor is not None,
-        }
-        found = [what for what, there in given.items() if there]
+        given = {"keyframes": self.times, "a pulse": self.pulse, "a formula": self.factor}
+        found = [what for what, value in given.items() if value is not None]
         if len(found) > 1:
             raise ValueError(f"has {' and '.join(found)}. Keep one of them")
         return self

@@ -7,12 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.control.rules import RuleFixed
+from flowborne.motion.bvh import STILL
+from flowborne.motion.clip_reading import UPRIGHT, Capture, leg_length, named, standing_axis
+from flowborne.motion.human.clip_skeleton import lost_bones
+from flowborne.motion.human.skeleton import PARENTS
 from flowborne.phrases import listed
 from flowborne.scenes.bodies import own_pose, posed, spec_of
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
-from flowborne.scenes.notes_clip import clip_notes
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_bodies import SolidsTable
 from flowborne.solids.compiler import MjSpec
 from flowborne.solids.geoms import floors
 from flowborne.solids.joint_kinds import HINGE, SLIDE, joint_kind, joint_unit
@@ -23,12 +27,7 @@ from flowborne.solids.options import bodies_with_own_inertia, disabled_parts, re
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Sentences for people, without a full stop."""
-    left_out = not_taken(scene, model)
-    if left_out is not None:
-        yield left_out
-    off = switched_off(scene)
-    if off is not None:
-        yield off
+    yield from _model_file(scene, model)
     if mended := mended_meshes(model.mj):
         yield f"[solids]: open meshes: {mended}"
     if joined := joined_pairs(model.mj):
@@ -90,7 +89,7 @@ def _wide_probes(scene: Scene, model: SolidModel) -> Iterator[str]:
         return
     time = scene.controller.every * scene.frame_time
     for number, table in enumerate(scene.control, start=1):
-        step = min([table.strength, *(other.strength for other in table.in_phases)]) * time
+        step = min(table.strengths) * time
         if table.probe > step:
             unit = "m" if joint_kind(model, table.joints[0]) == SLIDE else "degrees"
             yield (
@@ -100,26 +99,18 @@ def _wide_probes(scene: Scene, model: SolidModel) -> Iterator[str]:
             )
 
 
-def not_taken(scene: Scene, model: SolidModel) -> str | None:
-    """One sentence on what of the model file has no effect, None where all of it has."""
+def _model_file(scene: Scene, model: SolidModel) -> Iterator[str]:
+    """Settings of the model file that have no effect, and parts that it switches off."""
     if scene.model_path is None or scene.solids is None:
-        return None
+        return
     spec, step = spec_of(scene), scene.frame_time / scene.time.steps_per_frame
-    options = replaced_options(spec, scene.gravity, step, bool(floors(model.mj)))
-    said = [*options, *_elements(scene, spec), *_densities(scene, spec)]
-    if not said:
-        return None
-    return f"[solids]: of {scene.model_path.name} these have no effect: {'; '.join(said)}"
-
-
-def switched_off(scene: Scene) -> str | None:
-    """One sentence on what the model file itself switches off, None where it leaves all on."""
-    if scene.model_path is None:
-        return None
-    off = disabled_parts(spec_of(scene))
-    if not off:
-        return None
-    return f"[solids]: {scene.model_path.name} itself switches off its {listed(off)} by <flag>"
+    name, on_floors = scene.model_path.name, bool(floors(model.mj))
+    options = replaced_options(spec, scene.gravity, step, on_floors)
+    unused = [*options, *_elements(scene, spec), *_densities(scene.solids, spec)]
+    if unused:
+        yield f"[solids]: of {name} these have no effect: {'; '.join(unused)}"
+    if off := disabled_parts(spec):
+        yield f"[solids]: {name} itself switches off its {listed(off)} by <flag>"
 
 
 def _elements(scene: Scene, spec: MjSpec) -> Iterator[str]:
@@ -138,10 +129,8 @@ def _elements(scene: Scene, spec: MjSpec) -> Iterator[str]:
         yield f"{len(spec.sensors)} sensor{'s' * (len(spec.sensors) > 1)}"
 
 
-def _densities(scene: Scene, spec: MjSpec) -> Iterator[str]:
-    """Bodies whose own inertia counts, and not the densities of the scene."""
-    assert scene.solids is not None
-    given = scene.solids
+def _densities(given: SolidsTable, spec: MjSpec) -> Iterator[str]:
+    """Densities of the scene for bodies that have their own inertia in the file."""
     own = [
         name
         for name in bodies_with_own_inertia(spec)
@@ -150,4 +139,51 @@ def _densities(scene: Scene, spec: MjSpec) -> Iterator[str]:
     if own:
         yield (
             f"[solids] density for {listed(own)}, whose <inertial> in the file says what they weigh"
+        )
+
+
+def clip_notes(scene: Scene) -> Iterator[str]:
+    """How a clip's file and its person were read, and which parts it lacks."""
+    table, capture = scene.clip, capture_of(scene)
+    if table is None or capture is None or table.file is None:
+        return
+    if capture.note:
+        yield f"[clip]: {table.file} {capture.note}"
+    if capture.skeleton is None or capture.posture is None:
+        return
+    found = []
+    if table.unit == "auto":
+        legs = leg_length(capture.clip, capture.mapping)
+        found.append(f"unit = {named(capture.unit)}, which makes legs of {legs:.2f} m")
+    if table.up == "auto" and capture.up != "y":
+        found.append(f"up = '{capture.up}'")
+    if found:
+        yield f"[clip]: {table.file} is read with {', and '.join(found)}"
+    if capture.held:
+        yield f"[clip]: not in {table.file}, held: {', '.join(capture.held)}"
+    links = [f"{name} turns as '{capture.mapping[name]}'" for name in sorted(capture.links)]
+    if links:
+        yield f"[clip]: {table.file} has joints between the human's: {', '.join(links)}"
+    stray, bone = max(
+        (capture.clip.strays.get(b, (0.0, 0))[0], b) for b in capture.mapping.values()
+    )
+    if stray > STILL:
+        yield (
+            f"[clip]: bones of {table.file} stretch, that to '{bone}' by {2e3 * stray:.3g} mm; "
+            "each has its middle length here"
+        )
+    if capture.posture[2] < UPRIGHT and standing_axis(capture.posture, capture.up) is None:
+        yield f"[clip]: the person of {table.file} lies rather than stands, whichever axis is up"
+    yield from _inserted_bones(table.file, capture)
+
+
+def _inserted_bones(file: str, capture: Capture) -> Iterator[str]:
+    """Bones that are put in between joints of a clip at the same place."""
+    assert capture.skeleton is not None
+    for joint in lost_bones(capture.clip, capture.mapping):
+        bone = capture.skeleton[joint] - capture.skeleton[PARENTS[joint]]
+        yield (
+            f"[clip]: {file} has no bone above '{capture.mapping[joint]}', as BVH files of the CMU "
+            f"database; one of {100.0 * float(np.linalg.norm(bone)):.2g} cm is put in, so that "
+            "head and shoulders are where anatomy has them, higher than in the file"
         )

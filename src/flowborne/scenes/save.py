@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from flowborne.errors import SceneError
 from flowborne.files.given import read_file
@@ -11,9 +12,10 @@ from flowborne.runs.run_folder import OWN_NAMES
 from flowborne.scenes.bodies import bones_of, packages_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.earlier import EARLIER_FILE, earlier_of
-from flowborne.scenes.flesh import FleshTable
+from flowborne.scenes.flesh import FleshTable, meshed
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model_files import ASSETS, gathered
+from flowborne.solids.tissue.mesh_file import ENDING, mesh_bytes
 
 SCENE_FILE = "scene.toml"
 HUMAN_FILE = "human.xml"
@@ -41,46 +43,37 @@ class _Names:
 
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
-    """Everything that the scene is made of: name in its new folder -> content.
+    """All files of the scene: name in its new folder -> content.
 
-    Files keep their names but where two have one, or where a run has a file of that name; included
+    Files keep their names unless two have the same, or a run has a file of that name; included
     models and meshes go to a folder `assets`.
     raises  SceneError when a file of the model is missing
     """
     files: dict[str, bytes] = {}
-    model = scene.model_path
+    changed: dict[str, Any] = {"plugins": tuple(Path(name).name for name in scene.plugins)}
     exported = (table.file for table in scene.output.exports)
-    plugins = tuple(Path(name).name for name in scene.plugins)
-    names = _Names([*OWN_NAMES, SCENE_FILE, HUMAN_FILE, ASSETS, *exported, *plugins])
+    names = _Names([*OWN_NAMES, SCENE_FILE, HUMAN_FILE, ASSETS, *exported, *changed["plugins"]])
     if scene.flesh:
-        tables, files = _flesh_files(scene, names)
-        scene = scene.model_copy(update={"flesh": tables}).in_folder(scene.folder)
-    if model is not None:
+        changed["flesh"], files = _flesh_files(scene, names)
+    if scene.model_path is not None:
         assert scene.solids is not None
-        name = names.name(model.name)
-        files |= _model_files(model, name, packages_of(scene))
-        solids = scene.solids.model_copy(update={"model": name, "packages": ()})
-        scene = scene.model_copy(update={"solids": solids}).in_folder(scene.folder)
-    for name in scene.plugins:
-        files[Path(name).name] = _read(scene.folder / name)
-    scene = scene.model_copy(update={"plugins": plugins}).in_folder(scene.folder)
+        name = names.name(scene.model_path.name)
+        files |= _model_files(scene.model_path, name, packages_of(scene))
+        changed["solids"] = scene.solids.model_copy(update={"model": name, "packages": ()})
+    for name, plugin in zip(changed["plugins"], scene.plugins, strict=True):
+        files[name] = _read(scene.folder / plugin)
     if scene.human is not None:
         files[HUMAN_FILE] = human_of(scene).encode()
     if scene.clip is not None and scene.clip.file is not None:
-        path = scene.folder / scene.clip.file
-        name = names.name(path.name)
-        files[name] = _read(path)
-        scene = scene.model_copy(
-            update={"clip": scene.clip.model_copy(update={"file": name})}
-        ).in_folder(scene.folder)
+        name = names.name(scene.clip.file)
+        files[name] = _read(scene.folder / scene.clip.file)
+        changed["clip"] = scene.clip.model_copy(update={"file": name})
     earlier = earlier_of(scene)
     if earlier is not None and scene.earlier is not None:
         name = names.name(EARLIER_FILE)
         files[name] = earlier.to_bytes()
-        scene = scene.model_copy(
-            update={"earlier": scene.earlier.model_copy(update={"run": name})}
-        ).in_folder(scene.folder)
-    return {SCENE_FILE: scene.to_toml().encode()} | files
+        changed["earlier"] = scene.earlier.model_copy(update={"run": name})
+    return {SCENE_FILE: scene.model_copy(update=changed).to_toml().encode()} | files
 
 
 def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
@@ -92,14 +85,11 @@ def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
         else table
         for table in scene.flesh
     )
-    return scene.model_copy(update={"flesh": tables}).in_folder(scene.folder)
+    return scene.model_copy(update={"flesh": tables})
 
 
 def _flesh_files(scene: Scene, names: _Names) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
     """The flesh's tables and the files that they name: every mesh, and the user's own surfaces."""
-    from flowborne.scenes.flesh import meshed
-    from flowborne.solids.tissue.mesh_file import ENDING, mesh_bytes
-
     spec, files, tables = bones_of(scene), {}, []
     for table in scene.flesh:
         mesh, recipe = meshed(spec, table, scene.folder)

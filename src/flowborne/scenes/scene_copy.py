@@ -1,15 +1,21 @@
-"""The scene as run, with its model, in the run folder."""
+"""The scene in a run folder: written, read to resume the run, and its table [film]."""
 
 from __future__ import annotations
 
 import tomllib
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
+from pydantic import ValidationError
+
+from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
-
-if TYPE_CHECKING:
-    from flowborne.scenes.schema import Scene
+from flowborne.scenes.draft import explain
+from flowborne.scenes.load import load_scene, override
+from flowborne.scenes.save import scene_files, with_meshes_of
+from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_film import FilmTable
 
 
 def with_frames(scene: Scene, frames: int | None) -> Scene:
@@ -20,7 +26,7 @@ def with_frames(scene: Scene, frames: int | None) -> Scene:
 
 
 def write_scene(folder: RunFolder, files: dict[str, bytes]) -> None:
-    """Write what `scene_files` gave; scene.toml comes last, so that it never lacks its model."""
+    """Write the result of `scene_files`, scene.toml last, so that it never lacks its model."""
     names = [name for name in files if name != folder.scene.name]
     folder.mark(names)
     for name in [*names, folder.scene.name]:
@@ -31,13 +37,10 @@ def write_scene(folder: RunFolder, files: dict[str, bytes]) -> None:
 
 
 def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
-    """The scene of an earlier run, which has to be `wanted` but for the number of frames.
+    """The scene of an earlier run, which may differ from `wanted` in the number of frames only.
 
-    raises  RunFolderError when the folder has no scene, or another one: it says what differs
+    raises  RunFolderError when the folder has no scene, or another one, with the differences
     """
-    from flowborne.scenes.load import load_scene
-    from flowborne.scenes.save import scene_files, with_meshes_of
-
     if not folder.scene.exists():
         raise RunFolderError(
             f"{folder.path} has no scene.toml: the run was stopped before it began; "
@@ -80,10 +83,32 @@ def _flat(toml: bytes) -> dict[str, Any]:
 
 
 def _differences(ours: dict[str, Any], theirs: dict[str, Any]) -> list[tuple[str, Any, Any]]:
-    """(key, ours, theirs) wherever the two differ; "absent" where one has none."""
-    keys = list(dict.fromkeys([*ours, *theirs]))
-    return [
-        (key, ours.get(key, "absent"), theirs.get(key, "absent"))
-        for key in keys
-        if ours.get(key, "absent") != theirs.get(key, "absent")
-    ]
+    """(key, ours, theirs) for each difference; "absent" if one has no such key."""
+    rows = [(key, ours.get(key, "absent"), theirs.get(key, "absent")) for key in ours | theirs]
+    return [row for row in rows if row[1] != row[2]]
+
+
+def film_settings(folder: RunFolder, overrides: Mapping[str, str]) -> dict[str, Any]:
+    """The table [film] of a run with every default filled in.
+
+    overrides  dotted key -> TOML text of its new value: {"camera.orbit": "30"}
+    raises     SceneError with every problem there is; RunFolderError when the scene is missing or
+               cut
+    """
+    scene = folder.read_scene()
+    raw = {"film": scene.get("film", {})}
+    for key, text in overrides.items():
+        override(raw["film"], key, text)
+    try:
+        table = FilmTable.model_validate(raw["film"])
+    except ValidationError as error:
+        located = [{**one, "loc": ("film", *one["loc"])} for one in error.errors()]
+        problems = [explain(one, raw, folder.scene.name) for one in located]  # type: ignore[arg-type]
+        raise SceneError(list(dict.fromkeys(problems))) from None
+    dry = scene.get("fluid", {}).get("coupling", "none") == "none"
+    if "field" in overrides and table.field != "none" and dry:
+        raise SceneError(
+            f"scene {folder.scene.name}, [film] field: '{table.field}' is of a fluid, and this run "
+            "has none. Drop it."
+        )
+    return table.model_dump(exclude_none=True)

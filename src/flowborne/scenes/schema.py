@@ -20,13 +20,14 @@ from flowborne.scenes.dye import DyeTable, SourceTable
 from flowborne.scenes.flesh import FleshTable
 from flowborne.scenes.motions import EarlierTable, MotionTable
 from flowborne.scenes.mouths import MouthTable
-from flowborne.scenes.schema_film import FilmTable
-from flowborne.scenes.schema_human import ClipTable, HumanTable
-from flowborne.scenes.schema_solids import (
+from flowborne.scenes.schema_bodies import (
+    ClipTable,
+    HumanTable,
     InitialTable,
     ShapeTable,
     SolidsTable,
 )
+from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.sides import BoundariesTable, InflowSide
 from flowborne.scenes.wind import WindTable
 from flowborne.tables import (
@@ -40,7 +41,6 @@ from flowborne.tables import (
     Table,
     Text,
     Vector,
-    filled,
 )
 
 
@@ -187,7 +187,7 @@ class Scene(Table):
     def _fill_what_depends(cls, data: Any) -> Any:
         """A domain brings a fluid and boundaries with it."""
         if isinstance(data, dict) and "domain" in data:
-            return filled(data, {"fluid": {}, "boundaries": {}})
+            return {"fluid": {}, "boundaries": {}, **data}
         return data
 
     @property

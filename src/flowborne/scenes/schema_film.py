@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import prod
 from typing import Annotated, Literal, Self
 
@@ -15,6 +16,9 @@ MOST_PIXELS = 1 << 26
 """Pixels of a picture: 8192 x 8192."""
 
 BYTES_PER_PIXEL = 4
+
+BACKGROUND = "#[0-9A-Fa-f]{6}|transparent"
+"""Pattern of a background."""
 
 MOST_RATE = 1000.0
 """Pictures in a second of a film."""
@@ -92,14 +96,8 @@ class FilmTable(Table):
                 f"starts at {self.start:g} s and stops at {self.stop:g} s. Let it stop after it "
                 "starts"
             )
-        if self.background is not None and not _is_background(self.background):
+        if self.background is not None and not re.fullmatch(BACKGROUND, self.background):
             raise ValueError(
                 f'has the background \'{self.background}\'. Give "#rrggbb" or "transparent"'
             )
         return self
-
-
-def _is_background(text: str) -> bool:
-    digits = text.removeprefix("#").lower()
-    hexadecimal = len(text) == 7 and len(digits) == 6 and set(digits) <= set("0123456789abcdef")
-    return text == "transparent" or hexadecimal

@@ -6,21 +6,125 @@ value, and after a semicolon a value that would do. A kind of warning is a funct
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 
-from flowborne.coupling.world import Setup
-from flowborne.scenes.notes_clip import lying
+import numpy as np
+
+from flowborne.control.objective_kinds import ObjectiveInputMotionTable
+from flowborne.coupling.world import HYPOTHETICAL, Setup
+from flowborne.motion.clip_reading import UPRIGHT, standing_axis
+from flowborne.motion.tracks import SPEED_SAMPLES
+from flowborne.phrases import listed, rounded_up
+from flowborne.scenes.build import surroundings_of
+from flowborne.scenes.capture import capture_of
+from flowborne.scenes.controller import input_motions
+from flowborne.scenes.holding import undriven
+from flowborne.scenes.motions import ServoPDTable
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn_bodies import (
     bodies_not_met,
     fixed_outside,
     floors_in_fluid,
     implausible_density,
+    lost_in_domain,
     mass_apart,
+    thin_bodies,
 )
-from flowborne.scenes.warn_drives import angles_in_radians, limp_joints, too_slow
-from flowborne.scenes.warn_size import lost_in_domain, thin_bodies
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow
+from flowborne.solids.joint_kinds import SLIDE, joint_kind, joint_unit
+
+LEAST_STRENGTH = 2.0 * math.pi
+"""Degrees/s. Whoever types radians for anything up to a turn a second types less than this; in
+degrees it is a right angle in 14 s."""
+
+GRADIENT_ERROR = 1e-3
+"""Relative error of a gradient that trials are solved for (`coupling.world.HYPOTHETICAL`)."""
+
+LEAST_PROBE = math.degrees(HYPOTHETICAL / GRADIENT_ERROR)
+"""Degrees, 0.57. The pressure of a trial is right to HYPOTHETICAL of itself, and two trials differ
+by about the probe in radians of it: a smaller probe has a gradient worse than GRADIENT_ERROR."""
+
+
+def angles_in_radians(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Strengths and probes of turning joints so small that they are radians by their looks."""
+    for number, table in enumerate(scene.control, start=1):
+        if joint_kind(setup.solid, table.joints[0]) == SLIDE:
+            continue
+        strength = max(table.strengths)
+        if strength < LEAST_STRENGTH * (1.0 - 1e-9):
+            yield (
+                f"[[control]] {number}: a strength of {strength:g} degrees/s takes "
+                f"{90.0 / strength:.3g} s to a right angle; "
+                f"{_meant(strength, LEAST_STRENGTH, 'rad/s', 'degrees/s')}"
+            )
+        if table.probe < LEAST_PROBE * (1.0 - 1e-9):
+            yield (
+                f"[[control]] {number}: a probe of {table.probe:g} degrees is too small for a "
+                f"gradient; {_meant(table.probe, LEAST_PROBE, 'rad', 'degrees')}"
+            )
+
+
+def _meant(value: float, least: float, radians: str, degrees: str) -> str:
+    """The number in degrees, if it was radians, and if not, or if that is no better, the least."""
+    turned = f"{math.degrees(value):.3g}"
+    if float(turned) >= least:
+        return f"{value:g} {radians} are {turned} {degrees}"
+    return f"{rounded_up(least)} {degrees} will do"
+
+
+def too_slow(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Joints that are to be close to a motion which is faster than they can be.
+
+    A target is no farther ahead of its joint than strength lets it be in a decision, and a PD law
+    is 2 / w behind a steady rate: it goes at w / 2 times what the target is ahead.
+    """
+    able, time, model = scene.controller, scene.controller.every * scene.frame_time, setup.solid
+    share = 1.0
+    if isinstance(able.servo, ServoPDTable):
+        share = min(1.0, np.pi * able.servo.frequency * time)
+    times = np.linspace(0.0, scene.time.frames * scene.frame_time, SPEED_SAMPLES)
+    for number, motion in input_motions(scene, surroundings_of(scene, model)).items():
+        table = scene.objectives[number]
+        assert isinstance(table, ObjectiveInputMotionTable)
+        unit = joint_unit(model, table.joint)
+        needed = max(float(np.linalg.norm(motion.velocity(at))) for at in times) / unit
+        for place, control in enumerate(scene.control, start=1):
+            fastest = share * control.strength
+            if table.joint in control.joints and needed > fastest * (1.0 + 1e-9):
+                rate = "m/s" if joint_kind(model, table.joint) == SLIDE else "degrees/s"
+                yield (
+                    f"[[objectives]] {number + 1}: '{table.joint}' is to be close to a motion of "
+                    f"up to {needed:.3g} {rate}, and goes at {fastest:.3g} at most; a strength of "
+                    f"{rounded_up(needed / share)} in [[control]] {place}"
+                    + (" or a larger frequency of its servo" if share < 1.0 else "")
+                    + " lets it follow"
+                )
+
+
+def limp_joints(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Joints between bodies that nothing drives and that have no stiffness; see `undriven`."""
+    limp = undriven(scene, setup.solid, setup.motions)
+    if limp:
+        yield (
+            f"[solids]: nothing drives {listed(limp)}, and no stiffness holds "
+            f"{'it' if len(limp) == 1 else 'them'}; hold = true keeps joints as they start, "
+            "[[motion]] and [[control]] move them, and stiffness in the model makes them springs"
+        )
+
+
+def lying(scene: Scene, setup: Setup) -> Iterator[str]:
+    """A person who would stand with another axis of the file up."""
+    capture = capture_of(scene)
+    if scene.clip is None or capture is None or capture.posture is None:
+        return
+    other = standing_axis(capture.posture, capture.up)
+    if capture.posture[2] < UPRIGHT and other is not None:
+        yield (
+            f"[clip]: with up = '{capture.up}' the person of {scene.clip.file} lies; "
+            f"up = '{other}' makes it stand"
+        )
+
 
 Warn = Callable[[Scene, Setup], Iterator[str]]
 """Warnings of one kind about a scene and what was built of it."""

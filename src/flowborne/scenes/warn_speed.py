@@ -25,28 +25,25 @@ from flowborne.tables import MOST_STEPS
 Array = NDArray[np.float64]
 
 BODY_CELLS = 1.0
-"""Cells that a body may cross in a step: from there on cells lie before it at the start and behind
-it at the end, and what was in them passes through (docs/momentum.md: 9 % of a dye in 100 steps of
-2.4 cells)."""
+"""Cells that a body may cross in a step. A faster body jumps over cells, and their fluid passes
+through it (docs/momentum.md: 9 % of a dye in 100 steps of 2.4 cells)."""
 
 FLOW_CELLS = LASTING[0]
-"""Cells that the undisturbed flow may cross in a step, the axes added up. Up to there the pressure
-and the forces of the last step go along with it; the transport itself is done in substeps."""
+"""Cells that the undisturbed flow may cross in a step, summed over the axes. Below it the pressure
+and the forces of the last step are extrapolated; transport is done in substeps."""
 
 AFTER_CELLS = 1.0
-"""Cells a step that proposed steps lead to: around a body the flow is a few times as fast."""
-
+"""Cells a step with the proposed number of steps: around a body the flow is a few times faster."""
 
 FASTEST_TIMES = 20
-"""Of the SPEED_SAMPLES times those at which all bodies are placed, some ms each with flesh."""
+"""Number of the SPEED_SAMPLES times at which all bodies are posed; each takes ms with flesh."""
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Cells that something crosses in a step.
+    """Number of cells that something crosses in a step, at most.
 
-    who    what crosses them
-    cells  how many, at most
+    who  name of what crosses them
     """
 
     who: str
@@ -54,7 +51,7 @@ class Crossing:
 
 
 def fast_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Bodies that cross more than a cell in a step as they are moved, thrown or driven."""
+    """Bodies that cross more than BODY_CELLS in a step."""
     fluid = setup.fluid
     if fluid is None or fluid.one_way or not setup.solid.ngeom:
         return
@@ -62,8 +59,8 @@ def fast_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def steps_for_bodies(scene: Scene, setup: Setup) -> int:
-    """Steps a frame, as many as the scene has or more, in which no body crosses more than
-    BODY_CELLS; the scene's where MOST_STEPS are too few."""
+    """Steps a frame, at least the scene's, with which no body crosses more than BODY_CELLS in a
+    step; the scene's own if MOST_STEPS are too few."""
     steps, fluid = scene.time.steps_per_frame, setup.fluid
     if fluid is None or fluid.one_way or not setup.solid.ngeom:
         return steps
@@ -82,7 +79,7 @@ def fast_flow(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def _said(scene: Scene, crossing: Callable[[float], Crossing], most: float) -> Iterator[str]:
-    """The warning, if more than `most` cells are crossed in a step, with the steps that mend it."""
+    """The warning if more than `most` cells are crossed in a step, with a sufficient number."""
     count, found = _enough(scene, crossing, most)
     if count == scene.time.steps_per_frame:
         return
@@ -96,8 +93,11 @@ def _said(scene: Scene, crossing: Callable[[float], Crossing], most: float) -> I
 def _enough(
     scene: Scene, crossing: Callable[[float], Crossing], most: float
 ) -> tuple[int, Crossing]:
-    """Steps a frame in which at most AFTER_CELLS are crossed, above MOST_STEPS where that many are
-    too few and the scene's own where these cross no more than `most`; what the scene's cross."""
+    """Steps a frame with which at most AFTER_CELLS are crossed, and what the scene's steps cross.
+
+    The former are the scene's own if these cross no more than `most`, and above MOST_STEPS if that
+    many are too few.
+    """
     count = scene.time.steps_per_frame
     found = crossing(scene.frame_time / count)
     if not found.cells > most * (1.0 + 1e-9):
@@ -110,10 +110,10 @@ def _enough(
 
 
 def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
-    """How far any place of a body goes in a step of dt s, and of which one.
+    """The largest displacement of a point of a body in a step of dt s.
 
-    The bodies are as they start, thrown, or moved by a joint that the controller moves at its
-    strength, or by all prescribed motions at times of the run. Creatures that float recoil.
+    Bodies move with their initial velocities; by one controlled joint at its strength; or by all
+    prescribed motions at times of the run. Floating creatures recoil.
     """
     assert setup.fluid is not None
     model, h = setup.solid, setup.fluid.grid.spacing
@@ -138,15 +138,17 @@ def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
 
 
 def _floating(scene: Scene, setup: Setup) -> list[int]:
-    """Bodies on the world that some joint lets move as nothing drives them."""
+    """Children of the world with a free dof on the world."""
     model = setup.solid
     free = ~driven_dofs(scene, model, setup.motions) & (model.dof_body == model.dof_root)
     return [int(root) for root in np.unique(model.dof_root[free])]
 
 
 def rigid_part(places: Array, way: Array, mass: Array) -> Array:
-    """(n, 3) the displacement as a whole that is in those of places (n, 3), small and of masses
-    (n,): without it they have neither linear nor angular momentum. None where they overflow."""
+    """(n, 3) rigid part of small displacements `way` (n, 3) of points (n, 3) with masses (n,).
+
+    Without it the displacements have neither linear nor angular momentum. 0 where they overflow.
+    """
     if not mass.sum() > 0.0:
         return np.zeros_like(way)
     centre, mean = (np.average(values, axis=0, weights=mass) for values in (places, way))
@@ -165,7 +167,7 @@ def _driven_moves(
     """Positions (nq,) before and after a step, for each controlled joint and for the motions."""
     model = setup.solid
     for table in scene.control:
-        strength = max([table.strength, *(other.strength for other in table.in_phases)])
+        strength = max(table.strengths)
         for joint in table.joints:
             for dof in model.dofs_of(joint):
                 velocity = np.zeros(model.nv)

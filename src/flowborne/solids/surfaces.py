@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flowborne.shapes.round import parts
 from flowborne.shapes.section import Section
 from flowborne.shapes.shape import FINENESS
+from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
@@ -112,3 +113,11 @@ class Outline:
             for g, local in zip(self._geom, self._local, strict=True)
         ]
         return np.concatenate(placed) if placed else np.zeros((0, 3))
+
+
+def geom_boxes(model: SolidModel, q: Array) -> tuple[Array, Array]:
+    """(ngeom, 3) lowest and highest corners of boxes around the geometries at `q` (nq,), m."""
+    pose, reach = kinematics(model, q), model.mj.geom_aabb[model.geom_id]
+    centre = pose.geom_position + np.einsum("gij,gj->gi", pose.geom_rotation, reach[:, :3])
+    half = np.einsum("gij,gj->gi", np.abs(pose.geom_rotation), reach[:, 3:])
+    return centre - half, centre + half
