@@ -1,4 +1,4 @@
-"""Place and velocity of single bodies at a frame's end, force and torque as means over it."""
+"""Position and velocity of single bodies at a frame's end; force and torque, means over it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ UNITS = {
 
 
 class BodyMeasures:
-    """What a history says of the bodies that a scene names.
+    """Columns of a history for the bodies that a scene names.
 
     columns  <body>_<quantity>_<axis>_<unit>, in the order in which they are written
     """
@@ -38,8 +38,8 @@ class BodyMeasures:
         )
 
     def values(self, q: Array, report: Report | None) -> dict[str, float]:
-        """column -> number, at positions q (nq,) to which `report` led; nan where only a step can
-        tell."""
+        """column -> number, at positions q (nq,) after the frame of `report`; without a report nan
+        for what needs a step."""
         named = Named(self._model, q, report)
         numbers = [x for name in self._names for x in _numbers(named.body(name))]
         return dict(zip(self.columns, numbers, strict=True))

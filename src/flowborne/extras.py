@@ -1,4 +1,4 @@
-"""Libraries that come with an extra of flowborne, and what to install where one is missing."""
+"""Optional libraries, and which extra of flowborne to install if one is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbers that a run writes down of every frame."""
+"""Columns of the history, and their values after each frame."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LISTED = 3
 
 
 class Measures:
-    """Which numbers there are for a scene, and what they are now.
+    """Columns of a scene's history and their values.
 
     Columns carry their unit at the end of their name. Positions and velocities hold at the frame's
     end. Forces and torques are means over the frame: the impulse of all its steps over its time;
@@ -95,7 +95,8 @@ class Measures:
         _check_distinct(self.columns)
 
     def values(self, world: World, frame: int, report: FrameReport | None) -> dict[str, float]:
-        """column -> number, in the order of `columns`; nan where only a step can tell."""
+        """column -> number, in the order of `columns`; without a report nan for what needs a
+        step."""
         values: dict[str, float] = dict.fromkeys(self.columns, np.nan)
         values |= {"frame": frame, "time_s": world.time}
         values |= self._joints.values(world.solid.q, world.time, report)

@@ -1,4 +1,4 @@
-"""Parts of one's own: kinds that a user adds, by name, to those that flowborne brings.
+"""Kinds of parts that a user adds, by name, to the built-in ones.
 
 A kind is a dataclass. Its fields are the part's parameters, in a scene the keys of its table; its
 methods are those of the contract. Once registered it is used in Python by its class and in a scene

@@ -1,5 +1,5 @@
-"""Scene files: schema, loading, building a world, prescribed motions, the built-in scenes.
+"""Scene files: tables, loading, checks, warnings and notes, building a world, built-in scenes.
 
-`human` makes the paper's walker; capture, mapping and clip_... lead joints along a clip, and
-motion_out gives the clip back as it came out.
+Joints follow a clip by `capture` and an earlier run by `earlier`; `motion_out` writes the motion of
+a run as BVH.
 """

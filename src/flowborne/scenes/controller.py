@@ -36,18 +36,15 @@ def controller_of(scene: Scene, around: Surroundings, executor: Mapper) -> Contr
     limit: list[float] = []
     in_phases: list[StrengthInPhase] = []
     for table in scene.control:
-        first, units = len(dofs), list[float]()
-        for joint in table.joints:
-            unit = around.unit(joint)
-            for dof in around.dofs([joint]):
-                dofs.append(int(dof))
-                units.append(unit)
-                strength.append(unit * table.strength)
-                probe.append(unit * table.probe)
-                limit.append(math.inf if table.torque_limit is None else table.torque_limit)
+        units = [around.unit(joint) for joint in table.joints for _ in around.dofs([joint])]
+        own = tuple(range(len(dofs), len(dofs) + len(units)))
+        dofs += around.dofs(table.joints).tolist()
+        strength += [unit * table.strength for unit in units]
+        probe += [unit * table.probe for unit in units]
+        limit += [math.inf if table.torque_limit is None else table.torque_limit] * len(units)
         in_phases += [
             StrengthInPhase(
-                tuple(range(first, len(dofs))),
+                own,
                 tuple(unit * other.strength for unit in units),
                 other.phases.build(around),
             )

@@ -1,4 +1,4 @@
-"""What an earlier run decided, as prescribed motions of the next run."""
+"""Joint motions of an earlier run as prescribed motions of the next run."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from flowborne.solids.model import SolidModel
 Array = NDArray[np.float64]
 
 EARLIER_FILE = "earlier.npz"
-"""What a run took from the one before it."""
+"""File in a run folder with the motion from an earlier run."""
 
 TIME = "time"
-"""Name of the times in that file; all others are of joints."""
+"""Name of the times in that file; all other names are of joints."""
 
 LEAST = 2
 """Poses that make a motion."""
@@ -39,7 +39,7 @@ LEAST = 2
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """What joints did in an earlier run.
+    """Motion of joints in an earlier run.
 
     times  (n,) s
     poses  joint -> (n, m) its entries of q in MuJoCo's order, rad and m
@@ -61,7 +61,7 @@ class Earlier:
 
 
 def earlier_of(scene: Scene) -> Earlier | None:
-    """What the joints of the scene's earlier run did; None in a scene without one.
+    """Motion of the joints in the scene's earlier run; None in a scene without one.
 
     raises  SceneError when there is no such run, or it cannot be read
     """
@@ -82,7 +82,7 @@ def earlier_of(scene: Scene) -> Earlier | None:
 
 
 def earlier_joints(scene: Scene) -> tuple[str, ...]:
-    """Names of the joints that do what they did in the earlier run; none without one.
+    """Names of the joints that repeat their motion of the earlier run; none without one.
 
     raises  as `earlier_of`
     """
@@ -91,16 +91,15 @@ def earlier_joints(scene: Scene) -> tuple[str, ...]:
         return ()
     if table.joints is not None:
         return table.joints
-    told = scene.moved_joints()
-    return tuple(joint for joint in earlier.poses if joint not in told)
+    moved = scene.moved_joints()
+    return tuple(joint for joint in earlier.poses if joint not in moved)
 
 
 def earlier_motion(scene: Scene, model: SolidModel) -> TrajectoryClip | None:
     """The motion that the earlier run gives to joints; None without one, or without joints.
 
-    Through the poses of its frames goes a cubic spline. Behind the last one it goes on for a frame:
-    the velocity at the end of a run is that of the middle of the step after it. Then joints stand
-    still.
+    A cubic spline through the poses of its frames, extrapolated by one frame, because the velocity
+    at the end of a run is that of the middle of the next step. After that joints stand still.
     """
     earlier, joints = earlier_of(scene), earlier_joints(scene)
     if earlier is None or not joints:
@@ -119,14 +118,14 @@ def earlier_motion(scene: Scene, model: SolidModel) -> TrajectoryClip | None:
 
 @lru_cache(maxsize=4)
 def _read_file(path: Path, stamp: int) -> Earlier:
-    """A file is read once, though joints, motion and checks all ask for it."""
+    """The motion in a file; cached until the file's time stamp changes."""
     poses = {name: np.asarray(values, float) for name, values in read_arrays(path).items()}
     return _whole(path, Earlier(poses.pop(TIME, np.zeros(0)), poses))
 
 
 @lru_cache(maxsize=4)
 def _read_run(path: Path, stamp: tuple[int, int]) -> Earlier:
-    """What the controlled joints of a run did, and those that it had from an earlier one."""
+    """Motion of the joints that a run controlled, or took from an earlier run."""
     folder = RunFolder(path)
     with reading(path):
         model = read_json(folder.model)
@@ -139,7 +138,7 @@ def _read_run(path: Path, stamp: tuple[int, int]) -> Earlier:
 
 
 def _whole(path: Path, earlier: Earlier) -> Earlier:
-    """What was read, if it is a motion. Raises ValueError when it is not."""
+    """The motion that was read. Raises ValueError if it is incomplete."""
     times, poses = earlier.times, earlier.poses
     if not poses:
         raise ValueError(f"{path} has no joint that was controlled")

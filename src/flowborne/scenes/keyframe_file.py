@@ -1,8 +1,8 @@
 """Keyframes that a scene takes from a CSV file.
 
 The first row names the columns; one is `time` (s), the others are joint positions in degrees or m.
-A motion takes the column with its joint's name, or the one that `column` names. Reading puts the
-numbers into the scene, so that a written scene needs the CSV file no more.
+A motion takes the column with its joint's name, or the one that `column` names. A scene that is
+written contains the numbers, and not the CSV file.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from flowborne.scenes.draft import place
 def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
     """Replace `file` and `column` of every [[motion]] of `raw` by times and values.
 
-    A motion whose file cannot be read gets a table that is beyond reproach, so that the rest of
-    the scene can be checked. returns the problems
+    A motion with an unreadable file gets a valid table, so that the rest can be checked.
+    returns  the problems
     """
     problems = []
     motions = raw.get("motion")

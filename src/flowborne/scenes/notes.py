@@ -1,4 +1,4 @@
-"""What is neither wrong nor implausible in a scene, and worth knowing before it runs."""
+"""Notes on a scene: facts that are neither wrong nor implausible, but useful before it runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Python files that a scene names: they are imported, and what they register can be used there."""
+"""Importing the Python files that a scene names, which register the user's own parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FOLDERS: list[str] = []
 
 
 def load_plugins(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
-    """Import the files that a scene as read names in `plugins`; what is wrong with them.
+    """Import the files that a scene as read names in `plugins`; returns the problems.
 
     A file is a module of its own name, found from the scene's folder: `reach.py` is `reach`.
 

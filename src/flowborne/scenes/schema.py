@@ -110,18 +110,20 @@ class OutputTable(Table):
 Made = TypeVar("Made")
 
 MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
-"""Keys that say what the model of a scene is."""
+"""Keys on which the model of a scene depends."""
 
 
 class Kept:
-    """What is made of a scene once, by the tables that it is made of. It is no part of the scene:
-    all of them are equal, and copies by pickle are empty."""
+    """Cache of one object that is made of a scene, valid while the tables in MODEL are the same.
+
+    It does not take part in comparisons, and copies by pickle are empty.
+    """
 
     def __init__(self) -> None:
         self._made: tuple[Any, Any] | None = None
 
     def get(self, scene: Scene, make: Callable[[Scene], Made]) -> Made:
-        """What `make` makes of the scene's bodies, or has made of the same ones."""
+        """The result of `make`, or that of an earlier call for the same tables."""
         parts = scene.folder, *(getattr(scene, key) for key in MODEL)
         if self._made is None or self._made[0] != parts:
             self._made = parts, make(scene)
@@ -250,10 +252,10 @@ class Scene(Table):
 
     @property
     def can_settle(self) -> bool:
-        """Whether nothing keeps the optimum of the objectives moving.
+        """Whether the optimum of the objectives does not depend on time.
 
-        A clip, an earlier run, a moving joint, a mouth, a plan of several knots, phases, and an
-        objective that asks for a motion each do.
+        It does with a clip, an earlier run, a moving joint, a mouth, a plan of several knots,
+        phases, or an objective with a reference motion.
         """
         moved = self.clip is not None or self.earlier is not None or bool(self.mouths)
         moved |= not all(table.rests for table in self.motion)
@@ -265,8 +267,8 @@ class Scene(Table):
 
     def moved_joints(self) -> dict[str, str]:
         """Joints that [[control]] and [[motion]] move -> which of them does, in words."""
-        told = dict.fromkeys(self.controlled_joints(), "controlled")
-        return told | {table.joint: "moved by a [[motion]]" for table in self.motion}
+        moved = dict.fromkeys(self.controlled_joints(), "controlled")
+        return moved | {table.joint: "moved by a [[motion]]" for table in self.motion}
 
     def scalars(self) -> tuple[str, ...]:
         """Names of the dyes, each once, in the order of the file."""
