@@ -163,6 +163,12 @@ def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ..
                 yield tuple(float(cells[place]) for place in places)
 
 
+def read_history(path: Path, columns: Sequence[str]) -> dict[str, Array]:
+    """Column -> (frames,) numbers of the named columns. Raises ValueError as `history_rows`."""
+    rows = np.array(list(history_rows(path, columns)), float).reshape(-1, len(columns))
+    return dict(zip(columns, rows.T, strict=True))
+
+
 def _lines(file: IO[str]) -> Iterator[str]:
     """The lines of a file, cut at the most bytes that are read of a file."""
     return iter(lambda: file.readline(MOST_BYTES), "")

@@ -76,11 +76,11 @@ class Forces:
 
     def __init__(self, run: Run, side: float) -> None:
         """`side`: smaller side of the view, m."""
-        self._axes = 2 if run.slab else 3
+        self._axes = 2 if run.is_slab else 3
         self._bodies = _drawn_bodies(run)
         self.reach = LARGE_FORCE_LENGTH * side
         self.large = self._large(run)
-        self.unit = "N/m" if run.slab else "N"
+        self.unit = "N/m" if run.is_slab else "N"
 
     def arrows(self, state: State, pixel: float) -> list[tuple[int, Array, Array]]:
         """(body, tail, vector) of the forces that are large enough for an arrow.

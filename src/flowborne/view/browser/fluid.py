@@ -188,19 +188,19 @@ class Fluid:
 
     def show(self, state: State, wanted: Settings) -> None:
         """Show a state by the settings."""
-        if self._run.slab:
+        if self._run.is_slab:
             self._show_slab(state, wanted)
         else:
             self._show_dye(state, wanted.field == "dye")
             self._show_vortices(state, wanted.field == "vorticity")
             self._show_slice(state, wanted)
-        axis, place = (2, 0.0) if self._run.slab else (wanted.axis, wanted.place)
+        axis, place = (2, 0.0) if self._run.is_slab else (wanted.axis, wanted.place)
         speed = self._number("speed").limit if wanted.velocity else 1.0
         self._layer.show_velocity(state, axis, place, speed, wanted.velocity)
 
     def legend(self, wanted: Settings) -> tuple[Legend, Sequence[Scale]]:
         """(name, colour) of what is shown in its own colour, and the colour scales."""
-        if self._run.slab:
+        if self._run.is_slab:
             field = self._slab_field(wanted.field)
             if field is None:
                 return (), ()

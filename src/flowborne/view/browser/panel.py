@@ -230,8 +230,8 @@ class Panel:
         state = ", playing" if timeline.playing else ", newest" if timeline.newest else ""
         self._clock.content = CLOCK.format(
             time=timeline.times[number],
-            frame=int(run.states[number].stem),
-            last=int(run.states[-1].stem),
+            frame=run.frames[number],
+            last=run.frames[-1],
             state=state,
         )
         self._slider_time = self._slider.value = round(float(timeline.time), 4)
@@ -271,10 +271,10 @@ class Panel:
         if run.grid is not None:
             dyes = dyes_of(run)
             fields = [*(["dye"] if dyes else []), "vorticity"]
-            fields += ["speed", "pressure", "none"] if run.slab else ["none"]
+            fields += ["speed", "pressure", "none"] if run.is_slab else ["none"]
             first: str = shot.field if shot.field in fields else "none"
             controls["field"] = gui.add_dropdown("fluid", fields, initial_value=first)
-            if not run.slab:
+            if not run.is_slab:
                 self._add_slice(gui, run, view)
             controls["velocity"] = gui.add_checkbox("velocity arrows", False)
         controls["forces"] = gui.add_checkbox("forces", True)

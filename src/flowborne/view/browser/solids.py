@@ -87,12 +87,12 @@ class SkinMesh:
         if self.mesh.visible:
             points, faces = self._surface(state, vertices)
             self.mesh.vertices = points.astype(np.float32)
-            if self._run.slab:
+            if self._run.is_slab:
                 self.mesh.faces = faces.astype(np.uint32)
 
     def _surface(self, state: State, vertices: Array) -> Mesh:
         """Mesh of the skin with vertices (k, 3) m in a state."""
-        if self._run.slab:
+        if self._run.is_slab:
             return prism(flesh_loops(self._run, state), 0.0, self._high)
         return vertices[self._vertex], self._faces
 
@@ -105,10 +105,10 @@ class Pushes:
 
     def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
         self.scale = Forces(run, side)
-        self._scene, self._slab = scene, run.slab
+        self._scene, self._slab = scene, run.is_slab
         self._pixel, self._high = side / PIXELS, SLAB_THICKNESS * side
         self._outside = None
-        if not run.slab:
+        if not run.is_slab:
             self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
 
     def show(self, state: State, wanted: bool) -> None:
@@ -129,7 +129,7 @@ class Pushes:
 
 def _surfaces(run: Run, side: float) -> list[Mesh]:
     """Vertices (k, 3) m and faces (m, 3) of each geometry in its own frame."""
-    if not run.slab:
+    if not run.is_slab:
         meshes = [mesh_of(geom) for geom in run.geoms]
         return [(np.asarray(m.points, float), m.regular_faces) for m in meshes]
     state, found = run.state(0), []

@@ -41,14 +41,14 @@ def surround(scene: SceneApi, run: Run, view: FilmView) -> None:
         format="png",
     )
     scene.add_frame("/run", show_axes=False)
-    ground = not run.slab and stands(run)
-    _light(scene, run.slab, ground)
+    ground = not run.is_slab and stands(run)
+    _light(scene, run.is_slab, ground)
     if ground:
         _lay_ground(scene, view)
-    if run.grid is not None and not run.slab:
+    if run.grid is not None and not run.is_slab:
         _draw_edges(scene, run.grid)
     if run.grid is not None and not ground and goes_along(view.path, view.side):
-        _mark(scene, run.grid, view, run.slab)
+        _mark(scene, run.grid, view, run.is_slab)
     if run.grid is None and run.wind.any():
         _blow(scene, run, view)
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import socket
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.extras import optional
-from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.view.browser.fluid import Fluid
 from flowborne.view.browser.page import dress, only_own_requests
@@ -23,7 +22,7 @@ from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.solids import Bodies, Pushes, SkinMesh
 from flowborne.view.browser.surroundings import surround
 from flowborne.view.browser.viewpoint import CameraKeys, FilmView
-from flowborne.view.run import Run, state_files
+from flowborne.view.run import Run
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -31,46 +30,30 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
 class GrowingRun(Run):
     """A run that may continue; `grown` reads it again with its new frames.
 
     started  ns, time at which its folder was written first
-    kept     name -> arrays of the states that `every` has read, so that each is read once
     """
 
-    started: int = 0
-    kept: dict[str, list[NDArray[Any]]] = field(default_factory=dict, repr=False)
+    def __init__(self, folder: str | Path) -> None:
+        files = RunFolder.existing(Path(folder))
+        with reading(files.path):
+            self.started = files.model.stat().st_mtime_ns
+        super().__init__(folder)
+        self._kept: dict[str, list[NDArray[Any]]] = {}
 
-    @classmethod
-    def opened(cls, path: Path) -> Self:
-        """The run in folder `path`.
-
-        raises  RunFolderError if it is not a run, has no frame yet, or cannot be read
-        """
-        files = RunFolder.existing(path)
-        if not state_files(files):
-            raise RunFolderError(f"{path} has no frame yet; view it when the run has begun")
-        try:
-            started = files.model.stat().st_mtime_ns
-            return replace(cls.read(path), started=started)
-        except (OSError, KeyError, ValueError) as error:
-            raise RunFolderError(
-                f"{path} cannot be read ({error}); start the run again with --replace"
-            ) from error
-
-    def grown(self) -> Self | None:
+    def grown(self) -> GrowingRun | None:
         """The run with its new frames; None if there are none.
 
         A run that was started again is another one, with another `started`.
         raises  RunFolderError if it cannot be read, for example while it is being replaced
         """
-        files = RunFolder(self.states[0].parent.parent)
-        if len(state_files(files)) == len(self):
+        if len(RunFolder(self.folder).state_files()) == len(self):
             return None
-        new = self.opened(files.path)
+        new = GrowingRun(self.folder)
         if new.continues(self):
-            new.kept.update(self.kept)
+            new._kept = self._kept
         return new
 
     def continues(self, other: GrowingRun) -> bool:
@@ -78,9 +61,9 @@ class GrowingRun(Run):
         return self.started == other.started and len(self) >= len(other)
 
     def every(self, name: str) -> Array:
-        """(n, ...) values of a small array in all states, such as "fluid_force"."""
-        values = self.kept.setdefault(name, [])
-        for path in self.states[len(values) :]:
+        """The same as of any run, but each state is read once."""
+        values = self._kept.setdefault(name, [])
+        for path in self._states[len(values) :]:
             values.append(read_state(path, (name,))[name])
         return np.asarray(values, float)
 
@@ -146,10 +129,10 @@ class Viewer:
         ]
         self._measure()
         self.panel = Panel(server.gui, run, self._view, self.timeline)
-        self._keys = CameraKeys(self.folder, run.slab)
+        self._keys = CameraKeys(self.folder, run.is_slab)
         self._along = np.zeros(3)
         self._shown = None
-        if RunFolder(run.states[0].parent.parent).goes_on():
+        if RunFolder(run.folder).goes_on():
             self.timeline.show_newest()
 
     def _extend(self, run: GrowingRun) -> None:
@@ -197,7 +180,7 @@ def open_viewer(folder: Path, host: str, port: int) -> Viewer:
             host and port cannot be used; ValueError if the shot of the run's scene does not fit it
     """
     viser = optional("viser", "viser", "view", "views in a browser")
-    run = GrowingRun.opened(folder)
+    run = GrowingRun(folder)
     _check_free(host, port)
     with only_own_requests(host):
         server = viser.ViserServer(host=host, port=port, verbose=False)
