@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flowborne.fits import straight_line
 from flowborne.runs.run_folder import RunFolderError
 from flowborne.view import drawing
 from flowborne.view.drawing import drawn_frames
 from flowborne.view.film import make_preview, write_film, write_shot
 from flowborne.view.maps import MapSlab
 from flowborne.view.pictures import Picture
-from flowborne.view.plots import ChainCost, plot_chain_cost, straight_line
+from flowborne.view.plots import ChainCost, plot_chain_cost
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 

@@ -17,7 +17,7 @@ from flowborne.view.fields import (
     field_of,
     full_strength,
     over,
-    vorticity,
+    slab_vorticity,
     vorticity_limit,
 )
 from flowborne.view.layout import Box
@@ -258,7 +258,7 @@ def test_faces_of_cut_cells_carry_no_vorticity(write_run: Write) -> None:
         for side in (slice(None, -1), slice(1, None)):
             part = (slice(None),) * axis + (side,)
             wild[name][part][cut] = 1e3
-    found, expected = vorticity(wild, run.grid), vorticity(state, run.grid)
+    found, expected = slab_vorticity(wild, run.grid), slab_vorticity(state, run.grid)
     np.testing.assert_allclose(found, expected)
     edge = cut & (state["open"] > 0.0)
     assert np.count_nonzero(found[edge[:, :, 0]]) == edge.sum()
@@ -272,7 +272,7 @@ def test_vorticity_of_a_rigid_rotation_is_twice_its_rate(write_run: Write) -> No
     state["velocity_x"] = np.broadcast_to(-1.5 * y[None, :, None], state["velocity_x"].shape)
     state["velocity_y"] = np.broadcast_to(1.5 * x[:, None, None], state["velocity_y"].shape)
     np.testing.assert_allclose(
-        vorticity(state, run.grid)[state["open"][:, :, 0] > 0.5], 3.0, rtol=1e-9
+        slab_vorticity(state, run.grid)[state["open"][:, :, 0] > 0.5], 3.0, rtol=1e-9
     )
 
 

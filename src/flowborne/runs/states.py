@@ -186,7 +186,7 @@ def velocity_gradients(grid: Grid, state: Arrays) -> Array:
     return found
 
 
-def vorticity(grid: Grid, state: Arrays) -> Array:
+def cell_vorticity(grid: Grid, state: Arrays) -> Array:
     """(nx, ny, nz, 3) curl of `cell_velocity`, 1/s."""
     (_, uy, uz), (vx, _, vz), (wx, wy, _) = velocity_gradients(grid, state)
     return np.stack([wy - vz, uz - wx, vx - uy], axis=-1)

@@ -139,13 +139,15 @@ class FieldVorticity:
         if run.grid is None:
             raise ValueError("a run without fluid has no vorticity")
         self.grid = run.grid
-        self.limit = vorticity_limit([vorticity(state, run.grid) for state in run.sampled(SAMPLES)])
+        self.limit = vorticity_limit(
+            [slab_vorticity(state, run.grid) for state in run.sampled(SAMPLES)]
+        )
         self.table = style.vorticity_table(1023)
         colours = over(self.table, background) / 255.0
         self.scale: Scale | None = (colours, -self.limit, self.limit, "vorticity (1/s)")
 
     def image(self, state: State) -> Pixels:
-        share = _refined(vorticity(state, self.grid).T / self.limit)
+        share = _refined(slab_vorticity(state, self.grid).T / self.limit)
         return self.table[_table_rows(share, len(self.table))]
 
 
@@ -202,7 +204,7 @@ def over(image: Pixels, background: str) -> Pixels:
     )
 
 
-def vorticity(state: State, grid: Grid) -> Array:
+def slab_vorticity(state: State, grid: Grid) -> Array:
     """(nx, ny) vorticity about z at the cell centres, 1/s; bodies continue their neighbours.
 
     The corners' values dv/dx - du/dy are averaged; the outermost corners copy their neighbours.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.runs.states import velocity_gradients, vorticity
+from flowborne.runs.states import cell_vorticity, velocity_gradients
 from flowborne.view import style
 from flowborne.view.fields import NUMBERS, FieldNumber, Legend, Scale, dye_colours, dyes_of
 from flowborne.view.run import Run, State
@@ -91,7 +91,7 @@ class SeenVortices:
 
     def sense(self, state: State, toward: Array) -> Array:
         """(nx, ny, nz) sense of rotation seen from `toward` (3,), from -1 (clockwise) to 1."""
-        spin = np.nan_to_num(vorticity(self._grid, state))
+        spin = np.nan_to_num(cell_vorticity(self._grid, state))
         return np.asarray(spin @ toward / np.maximum(np.linalg.norm(spin, axis=-1), 1e-12))
 
 
