@@ -294,3 +294,11 @@ def test_long_names_of_curves_lose_their_middle():
     assert shortened("hinge", 10) == "hinge"
     assert shortened("rx_head_Armature", 10) == "rx_he…ture"
     assert all(len(shortened("a" * n, 7)) == min(n, 7) for n in range(1, 20))
+
+
+def test_forces_of_rounding_have_no_arrow(write_run: Write) -> None:
+    """A body in water at rest has forces of some 1e-11 N from rounding."""
+    run = Run(write_run(force=(2e-11, 5e-12)))
+    picture = Picture(run)
+    assert picture.map.forces.large == 0.0
+    assert picture.map.forces.arrows(run.state(3), 1e-3) == []

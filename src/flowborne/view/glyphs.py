@@ -28,6 +28,10 @@ SHAFT_WIDTH = 5.0
 MIN_FORCE_LENGTH = 3.0
 """Length below which arrows are left out, pixels."""
 
+ROUNDING_SHIFT = 1e-12
+"""A force is rounding if it shifts a cube of fluid as large as the view by less than this share of
+its side during the run."""
+
 CROSS_SPACING = 0.22
 """Maximum distance between crosses, in smaller sides of the view; a round number of metres."""
 
@@ -70,7 +74,7 @@ class Forces:
     """The forces of fluid and winds on the bodies of a run, as arrows of one scale.
 
     reach  m, length of the arrow of a large force
-    large  N (N/m in a slab), size of a large force in the film; 0 if there is none
+    large  N (N/m in a slab), size of a large force in the film; 0 if there is none above rounding
     unit   of `large`
     """
 
@@ -79,7 +83,8 @@ class Forces:
         self._axes = 2 if run.is_slab else 3
         self._bodies = _drawn_bodies(run)
         self.reach = LARGE_FORCE_LENGTH * side
-        self.large = self._large(run)
+        large = self._large(run)
+        self.large = large if large > _rounding(run, side) else 0.0
         self.unit = "N/m" if run.is_slab else "N"
 
     def arrows(self, state: State, pixel: float) -> list[tuple[int, Array, Array]]:
@@ -107,6 +112,16 @@ class Forces:
         sizes = np.linalg.norm(forces, axis=-1).max(axis=1)
         finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         return float(np.percentile(finite, LARGE_FORCE_PERCENTILE)) if finite.size else 0.0
+
+
+def _rounding(run: Run, side: float) -> float:
+    """Force on bodies in a fluid at rest that comes from rounding, N (N/m in a slab).
+
+    See ROUNDING_SHIFT; 0 without fluid. side: smaller side of the view, m.
+    """
+    duration = (len(run) - 1) / run.frames_per_second
+    mass = run.density * side ** (2 if run.is_slab else 3)
+    return 2.0 * ROUNDING_SHIFT * mass * side / duration**2 if duration > 0.0 else 0.0
 
 
 def _drawn_bodies(run: Run) -> tuple[int, ...]:
