@@ -302,3 +302,10 @@ def test_forces_of_rounding_have_no_arrow(write_run: Write) -> None:
     picture = Picture(run)
     assert picture.map.forces.large == 0.0
     assert picture.map.forces.arrows(run.state(3), 1e-3) == []
+
+
+def test_an_image_that_fills_its_map_is_drawn_at_any_size(write_run: Write) -> None:
+    """Rounding once took the shown part beyond the image's edge: 187 (96 / 187) > 96."""
+    run = Run(write_run(field="dye"))
+    shot = replace(run.shot, plots=False, size=(187, 187))
+    assert Picture(run, shot=shot).draw(1).any()

@@ -114,8 +114,10 @@ class MapImage(Artist):
         end = np.minimum(last, [right, top])
         if (end <= begin).any():
             return None
-        share = np.array([columns, rows]) / (last - first)
-        (a, b), (c, d) = (begin - first) * share, (end - first) * share
+        whole = np.array([columns, rows])
+        share = whole / (last - first)
+        # rounding must not take the part beyond the image, which Pillow refuses
+        (a, b), (c, d) = (begin - first) * share, np.minimum((end - first) * share, whole)
         size = end - begin
         box = (int(begin[0]), int(begin[1]), int(size[0]), int(size[1]))
         return box, (float(a), float(rows - d), float(c), float(rows - b))
