@@ -98,7 +98,7 @@ def test_dye_has_its_colour_where_dye_is_and_water_its_own_elsewhere(write_run: 
 
 def test_two_dyes_have_two_colours_and_mix(write_run: Write) -> None:
     run = Run(write_run(dyes=("dye", "smoke")))
-    field = FieldDye(run, ["scalar_dye", "scalar_smoke"])
+    field = FieldDye(run)
     assert field.legend == [("dye", style.DYES[0]), ("smoke", style.DYES[1])]
     state = dict(run.state(0))
     one, nothing = np.ones_like(state["open"]), np.zeros_like(state["open"])

@@ -63,10 +63,8 @@ def field_of(run: Run, shot: Shot) -> Field | None:
     """
     if run.grid is None:
         return None
-    dyes = dyes_of(run)
-    shot.pictured(dyes)
     if shot.field == "dye":
-        return FieldDye(run, dyes)
+        return FieldDye(run)
     if shot.field == "vorticity":
         return FieldVorticity(run, shot.colour)
     return FieldStill() if shot.field == "none" else FieldNumber(run, NUMBERS[shot.field])
@@ -77,13 +75,18 @@ def dyes_of(run: Run) -> list[str]:
     return [name for name in run.state(0) if name.startswith("scalar_")]
 
 
-def dye_colours(
-    run: Run, dyes: Sequence[str], samples: int
-) -> tuple[dict[str, tuple[float, str]], Legend]:
+def dye_colours(run: Run, samples: int) -> tuple[dict[str, tuple[float, str]], Legend]:
     """Array of dye -> (value at full colour, colour), and the legend.
 
     samples  number of frames from which the values are taken
+    raises   ValueError if there is no dye
     """
+    dyes = dyes_of(run)
+    if not dyes:
+        raise ValueError(
+            "the run has no dye to show; draw another field with --set field=vorticity, speed or "
+            "pressure"
+        )
     sampled = run.sampled(samples)
     colours = [style.DYES[n % len(style.DYES)] for n in range(len(dyes))]
     full = [full_strength([state[dye] for state in sampled]) for dye in dyes]
@@ -106,8 +109,8 @@ class FieldDye:
 
     scale: Scale | None = None
 
-    def __init__(self, run: Run, dyes: Sequence[str]) -> None:
-        self._dyes, self.legend = dye_colours(run, dyes, SAMPLES)
+    def __init__(self, run: Run) -> None:
+        self._dyes, self.legend = dye_colours(run, SAMPLES)
 
     def image(self, state: State) -> Pixels:
         known = _in_fluid(state)[:, :, 0]
@@ -189,6 +192,11 @@ class FieldNumber:
         colours = self.colours(_refined(values.T))
         opaque = np.full((*colours.shape[:-1], 1), 255, np.uint8)
         return np.concatenate([colours, opaque], axis=-1)
+
+    def layer(self, state: State, axis: int, cell: float) -> Pixels:
+        """(n, m, 3) colours of the layer of cells normal to `axis` at `cell`, counted in cells."""
+        values = np.moveaxis(self.values(state), axis, 0)
+        return self.colours(values[int(np.clip(cell, 0, len(values) - 1))])
 
     def colours(self, values: Array) -> Pixels:
         """(..., 3) colours of values in the quantity's unit."""

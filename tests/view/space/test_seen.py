@@ -9,8 +9,9 @@ import pytest
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
+from flowborne.view.fields import FieldNumber
 from flowborne.view.shot import Shot
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices, seen_of
+from flowborne.view.space.seen import SeenDye, SeenVortices, seen_of
 
 State = dict[str, np.ndarray]
 
@@ -83,10 +84,10 @@ def test_dye_has_its_colour_and_is_as_dense_as_there_is_of_it(box_of_fluid: Grid
 def test_a_slice_shows_the_layer_where_it_is(box_of_fluid: Grid) -> None:
     state = turning(box_of_fluid, np.array([0.0, 0.0, 2.0]))
     seen = seen_of(shown(box_of_fluid, state), Shot("speed"))
-    assert isinstance(seen, SeenSlice)
+    assert isinstance(seen, FieldNumber)
     assert seen.scale is not None
     assert seen.scale[3] == "speed (m/s)"
-    image = seen.image(state, 1, 5.5).astype(int)
+    image = seen.layer(state, 1, 5.5).astype(int)
     assert image.shape == (12, 8, 3)
     brightness = image.sum(axis=-1)
     assert (np.diff(brightness[6:], axis=0) > 0).all(), "faster away from the axis"

@@ -22,7 +22,6 @@ from flowborne.view.fields import (
     FieldNumber,
     Legend,
     Scale,
-    dyes_of,
     field_of,
     over,
 )
@@ -31,7 +30,7 @@ from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.fluid import VortexSurfaces
 from flowborne.view.space.lighting import scattered
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
+from flowborne.view.space.seen import SeenDye, SeenVortices
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -69,56 +68,6 @@ SPLAT_DEVIATION = 0.6
 
 DYE_DEPTH = 1.6
 """Depth of full dye that transmits 1/e of the light, in cells."""
-
-
-class Layer:
-    """A plane in the scene with an image of the cells and arrows of the velocity."""
-
-    def __init__(self, scene: SceneApi, grid: Grid) -> None:
-        self._scene, self._grid = scene, grid
-
-    def show_image(self, image: Pixels, axis: int, place: float) -> None:
-        """Show colours (n, m, 3) of the cells in a plane normal to an axis at `place`, m.
-
-        Rows are along the later of the other two axes, columns along the earlier one.
-        """
-        first, second = across(axis)
-        low, high = np.array(self._grid.origin), np.array(self._grid.upper)
-        centre = 0.5 * (low + high)
-        centre[axis] = place
-        axes = np.eye(3)[[first, second]]
-        rotation = np.column_stack([*axes, np.cross(*axes)])
-        self._scene.add_image(
-            "/run/slice",
-            enlarged(image),
-            float(high[first] - low[first]),
-            float(high[second] - low[second]),
-            format="jpeg",
-            jpeg_quality=90,
-            cast_shadow=False,
-            receive_shadow=False,
-            wxyz=Rotation.from_matrix(rotation).as_quat(scalar_first=True),
-            position=centre,
-        )
-
-    def hide_image(self) -> None:
-        self._scene.remove_by_name("/run/slice")
-
-    def show_velocity(
-        self, state: State, axis: int, place: float, speed: float, wanted: bool
-    ) -> None:
-        """Show arrows of the velocity in the plane; that of `speed` m/s reaches the next arrow."""
-        mesh = velocity_arrows(self._grid, state, axis, place, speed) if wanted else nothing()
-        show_mesh(
-            self._scene,
-            "/run/velocity",
-            mesh,
-            color=style.rgb(style.TEXT),
-            opacity=0.85,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
 
 
 def across(axis: int) -> tuple[int, int]:
@@ -182,7 +131,6 @@ class Fluid:
         self.grid: Grid = run.grid
         self.toward = toward
         self._scene, self._run = scene, run
-        self._layer = Layer(scene, run.grid)
         self._fields: dict[str, Field | None] = {}
         self._numbers: dict[str, FieldNumber] = {}
 
@@ -194,9 +142,7 @@ class Fluid:
             self._show_dye(state, wanted.field == "dye")
             self._show_vortices(state, wanted.field == "vorticity")
             self._show_slice(state, wanted)
-        axis, place = (2, 0.0) if self._run.is_slab else (wanted.axis, wanted.place)
-        speed = self._number("speed").limit if wanted.velocity else 1.0
-        self._layer.show_velocity(state, axis, place, speed, wanted.velocity)
+        self._show_velocity(state, wanted)
 
     def legend(self, wanted: Settings) -> tuple[Legend, Sequence[Scale]]:
         """(name, colour) of what is shown in its own colour, and the colour scales."""
@@ -216,15 +162,56 @@ class Fluid:
     def _show_slab(self, state: State, wanted: Settings) -> None:
         field = self._slab_field(wanted.field)
         image = np.zeros((1, 1, 4), np.uint8) if field is None else field.image(state)
-        self._layer.show_image(over(image, self._run.shot.colour), 2, 0.0)
+        self._show_image(over(image, self._run.shot.colour), 2, 0.0)
 
     def _show_slice(self, state: State, wanted: Settings) -> None:
         if wanted.slice == "none":
-            self._layer.hide_image()
+            self._scene.remove_by_name("/run/slice")
             return
         cell = (wanted.place - self.grid.origin[wanted.axis]) / self.grid.spacing
-        image = SeenSlice(self._number(wanted.slice)).image(state, wanted.axis, cell)
-        self._layer.show_image(image.swapaxes(0, 1), wanted.axis, wanted.place)
+        image = self._number(wanted.slice).layer(state, wanted.axis, cell)
+        self._show_image(image.swapaxes(0, 1), wanted.axis, wanted.place)
+
+    def _show_image(self, image: Pixels, axis: int, place: float) -> None:
+        """Show colours (n, m, 3) of the cells in a plane normal to an axis at `place`, m.
+
+        Rows are along the later of the other two axes, columns along the earlier one.
+        """
+        first, second = across(axis)
+        low, high = np.array(self.grid.origin), np.array(self.grid.upper)
+        centre = 0.5 * (low + high)
+        centre[axis] = place
+        axes = np.eye(3)[[first, second]]
+        rotation = np.column_stack([*axes, np.cross(*axes)])
+        self._scene.add_image(
+            "/run/slice",
+            enlarged(image),
+            float(high[first] - low[first]),
+            float(high[second] - low[second]),
+            format="jpeg",
+            jpeg_quality=90,
+            cast_shadow=False,
+            receive_shadow=False,
+            wxyz=Rotation.from_matrix(rotation).as_quat(scalar_first=True),
+            position=centre,
+        )
+
+    def _show_velocity(self, state: State, wanted: Settings) -> None:
+        """Show arrows of the velocity in the plane; that of the limit reaches the next arrow."""
+        mesh = nothing()
+        if wanted.velocity:
+            axis, place = (2, 0.0) if self._run.is_slab else (wanted.axis, wanted.place)
+            mesh = velocity_arrows(self.grid, state, axis, place, self._number("speed").limit)
+        show_mesh(
+            self._scene,
+            "/run/velocity",
+            mesh,
+            color=style.rgb(style.TEXT),
+            opacity=0.85,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
 
     def _show_vortices(self, state: State, wanted: bool) -> None:
         """Show one mesh for each sense of rotation."""
@@ -265,7 +252,7 @@ class Fluid:
 
     @cached_property
     def _dye(self) -> SeenDye:
-        return SeenDye(self._run, dyes_of(self._run))
+        return SeenDye(self._run)
 
     @cached_property
     def _vortices(self) -> SeenVortices:

@@ -15,10 +15,11 @@ from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
+from flowborne.view.fields import FieldNumber
 from flowborne.view.run import State
 from flowborne.view.space.camera import Camera
 from flowborne.view.space.lighting import scattered
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
+from flowborne.view.space.seen import Seen, SeenDye, SeenVortices
 from flowborne.view.space.surfaces import LIT
 
 Array = NDArray[np.float64]
@@ -52,9 +53,7 @@ class VisibleFluid(Protocol):
         ...
 
 
-def fluid_in(
-    plotter: pv.Plotter, grid: Grid, seen: SeenDye | SeenVortices | SeenSlice, camera: Camera
-) -> VisibleFluid:
+def fluid_in(plotter: pv.Plotter, grid: Grid, seen: Seen, camera: Camera) -> VisibleFluid:
     """Add the visible quantity of a fluid to a plotter."""
     if isinstance(seen, SeenDye):
         return Smoke(plotter, grid, seen, camera.height)
@@ -204,8 +203,8 @@ class Slice:
     toward  (3,) direction of the camera in the first frame
     """
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenSlice, toward: Array) -> None:
-        self._grid, self._seen = grid, seen
+    def __init__(self, plotter: pv.Plotter, grid: Grid, number: FieldNumber, toward: Array) -> None:
+        self._grid, self._number = grid, number
         self._axis = int(np.argmax(np.abs(toward[:2])))
         first, second = (n for n in range(3) if n != self._axis)
         low, high = np.array(grid.origin), np.array(grid.upper)
@@ -224,7 +223,7 @@ class Slice:
     def show(self, state: State, focus: Array, toward: Array) -> None:
         """Show the slice of a state through `focus` (3,) m."""
         cell = (focus[self._axis] - self._grid.origin[self._axis]) / self._grid.spacing
-        image = self._seen.image(state, self._axis, cell)
+        image = self._number.layer(state, self._axis, cell)
         small = Image.fromarray(np.ascontiguousarray(image.transpose(1, 0, 2)[::-1]))
         large = np.asarray(small.resize(self._pixels, Image.Resampling.BICUBIC))
         self._actor.texture = pv.Texture(large)

@@ -15,7 +15,7 @@ from flowborne.view.space.arrows import Arrows, WindArrows
 from flowborne.view.space.camera import Camera
 from flowborne.view.space.fluid import fluid_in
 from flowborne.view.space.lighting import KEY, LIGHTS
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
+from flowborne.view.space.seen import Seen
 from flowborne.view.space.surfaces import LIT, Outside, SkinSurface, colour_of, mesh_of, pushes
 from flowborne.view.space.surroundings import Ground, Motes, stands
 
@@ -40,7 +40,7 @@ class Stage:
         run: Run,
         camera: Camera,
         forces: Forces,
-        seen: SeenDye | SeenVortices | SeenSlice | None,
+        seen: Seen | None,
         pixel: float,
         shot: Shot,
     ) -> None:
