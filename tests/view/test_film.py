@@ -180,9 +180,9 @@ def test_other_processes_draw_the_same_frames_in_order(
     started: list[list[str]] = []
     start = subprocess.Popen
 
-    def note(command: list[str], **told: object) -> object:
+    def note(command: list[str], **options: object) -> object:
         started.append(command)
-        return start(command, **told)  # type: ignore[call-overload]
+        return start(command, **options)  # type: ignore[call-overload]
 
     monkeypatch.setattr(subprocess, "Popen", note)
     with closing(drawn_frames(run, run.shot, numbers, cores=2)) as together:
@@ -199,8 +199,8 @@ def test_a_film_that_is_given_up_leaves_no_process(
     artists = []
     start = subprocess.Popen
 
-    def note(*told: object, **more: object) -> object:
-        artists.append(start(*told, **more))  # type: ignore[call-overload]
+    def note(*options: object, **more: object) -> object:
+        artists.append(start(*options, **more))  # type: ignore[call-overload]
         return artists[-1]
 
     monkeypatch.setattr(subprocess, "Popen", note)
@@ -221,12 +221,12 @@ def test_a_window_follows_a_body_of_a_slab(write_run: Write) -> None:
     assert y1 - y0 == pytest.approx(4.0 * np.tan(np.radians(15.0)))
     assert x1 - x0 == pytest.approx(2.0 * (y1 - y0))
     assert [0.5 * (x0 + x1), 0.5 * (y0 + y1)] == pytest.approx([0.4, 0.3], abs=0.02)
-    for told, said in (
+    for options, said in (
         ({"follow": "tail"}, "cannot follow body 'tail'; the bodies are world, block"),
         ({"orbit": 5.0}, "a slab is seen from straight above"),
     ):
         with pytest.raises(ValueError, match=said):
-            MapSlab(run, shot_of(camera=told))
+            MapSlab(run, shot_of(camera=options))
 
 
 @pytest.mark.parametrize(("field", "name"), [("speed", "speed (m/s)"), ("pressure", "pressure")])

@@ -196,7 +196,7 @@ class RunFolder:
             return False
         return isinstance(summary, dict) and MARK in summary
 
-    def goes_on(self) -> bool:
+    def is_unfinished(self) -> bool:
         """Whether a run is being written here, or was and has been killed."""
         return self.is_run() and self.read_summary().get("outcome") == RUNNING
 

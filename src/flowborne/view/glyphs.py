@@ -131,7 +131,7 @@ def _drawn_bodies(run: Run) -> tuple[int, ...]:
     return tuple(body for body in drawn if body > 0) or tuple(drawn)
 
 
-def goes_along(path: Array, side: float) -> bool:
+def camera_moves(path: Array, side: float) -> bool:
     """Whether a camera that looks at `path` (frames, n) m moves noticeably; it shows `side` m."""
     return bool(np.ptp(path, axis=0).max() > MIN_CAMERA_PATH * side)
 

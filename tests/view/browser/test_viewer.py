@@ -25,7 +25,7 @@ from flowborne.view import style
 from flowborne.view.browser.fluid import velocity_arrows
 from flowborne.view.browser.page import CSS
 from flowborne.view.browser.panel import room_for
-from flowborne.view.browser.surroundings import surround
+from flowborne.view.browser.surroundings import add_surroundings
 from flowborne.view.browser.viewer import GrowingRun, Viewer, open_viewer
 from flowborne.view.browser.viewpoint import FilmView, Viewpoint, camera_text
 from flowborne.view.framing import windows
@@ -98,7 +98,7 @@ def test_marks_stand_in_the_water_where_the_view_goes_along(viewer: Viewer, slab
     run.is_slab = slab
     assert run.grid is not None
     for path, there in ((view.path, False), (np.outer(np.arange(13.0), [1.0, 0.0, 0.0]), True)):
-        surround(scene, run, replace(view, path=path))
+        add_surroundings(scene, run, replace(view, path=path))
         assert ("/run/marks" in scene._handle_from_node_name) == there
     handle = scene._handle_from_node_name["/run/marks"]
     places = np.asarray(handle.points).reshape(-1, 3)[:, :2]

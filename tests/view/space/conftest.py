@@ -89,7 +89,7 @@ def things(scene_of_things: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 
 @pytest.fixture
 def run_of(tmp_path: Path) -> Callable[..., Run]:
-    """Makes a run of spheres and other geometries that move as told."""
+    """Makes a run of spheres and other geometries that move as options."""
 
     def make(
         geoms: list[tuple[str, tuple[float, float, float]]],
@@ -97,7 +97,7 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
         *,
         accented: tuple[int, ...] = (),
         force: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        **told: object,
+        **options: object,
     ) -> Run:
         """`centres` (frames, n, 3) of the geometries, each of a body of its own."""
         frames, count = np.shape(centres)[:2]
@@ -141,7 +141,7 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
             "frames": tuple(range(frames)),
         }
         run = Run.__new__(Run)
-        vars(run).update(values | told)
+        vars(run).update(values | options)
         return run
 
     return make

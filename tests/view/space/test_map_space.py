@@ -20,7 +20,7 @@ from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
-from flowborne.view.space.surroundings import stands
+from flowborne.view.space.surroundings import stands_on_ground
 
 from .projecting import project
 
@@ -142,10 +142,10 @@ def test_what_stands_on_the_ground_casts_a_shadow_on_it(run_of: Make) -> None:
         lit = pixels[pixel_of(picture, 1, np.array([0.4, 0.2, 0.0]))]
         dark = pixels[pixel_of(picture, 1, np.array([0.12, 0.9, 0.0]))]
     assert lit.sum() > dark.sum() + 40
-    for told in ({"gravity": np.zeros(3)}, {"gravity": -down}, {"gravity": down[[2, 1, 0]]}):
-        expected = not any(told["gravity"])
-        assert stands(run_of([BALL, BALL], centres, **told)) == expected
-    assert not stands(run_of([BALL, BALL], centres + 2.0, gravity=down))
+    for options in ({"gravity": np.zeros(3)}, {"gravity": -down}, {"gravity": down[[2, 1, 0]]}):
+        expected = not any(options["gravity"])
+        assert stands_on_ground(run_of([BALL, BALL], centres, **options)) == expected
+    assert not stands_on_ground(run_of([BALL, BALL], centres + 2.0, gravity=down))
 
 
 def test_dye_glows_where_it_is(run_of: Make, box_of_fluid: Grid) -> None:

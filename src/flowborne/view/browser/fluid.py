@@ -30,7 +30,7 @@ from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.fluid import VortexSurfaces
 from flowborne.view.space.lighting import scattered
-from flowborne.view.space.seen import SeenDye, SeenVortices
+from flowborne.view.space.visible import VisibleDye, VisibleVortices
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -76,8 +76,8 @@ def across(axis: int) -> tuple[int, int]:
     return first, second
 
 
-def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: float) -> Mesh:
-    """Flat arrows of the fluid's velocity in a plane normal to an axis at coordinate `place`, m.
+def velocity_arrows(grid: Grid, state: State, axis: int, coordinate: float, speed: float) -> Mesh:
+    """Flat arrows of the fluid's velocity in a plane normal to an axis at `coordinate`, m.
 
     speed  m/s, of an arrow that reaches the next one; faster ones have the same length
     """
@@ -85,7 +85,7 @@ def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: fl
     shape = [grid.shape[side] for side in sides]
     stride = max(1, round(max(shape) / ARROWS))
     picked = [np.arange(stride // 2, count, stride) for count in shape]
-    layer = int(np.clip((place - grid.origin[axis]) / grid.spacing, 0, grid.shape[axis] - 1))
+    layer = int(np.clip((coordinate - grid.origin[axis]) / grid.spacing, 0, grid.shape[axis] - 1))
     at = np.ix_(*(picked[sides.index(n)] if n in sides else [layer] for n in range(3)))
     velocity = cell_velocity(grid, state)[at][..., list(sides)].reshape(-1, 2).astype(float)
     free = (state["open"][at] > 0.5).ravel() & np.isfinite(velocity).all(axis=1)
@@ -101,7 +101,7 @@ def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: fl
         # on both sides of the image
         for side in (-ARROW_OFFSET, ARROW_OFFSET):
             points = np.empty((7, 3))
-            points[:, list(sides)], points[:, axis] = corners, place + side * spacing
+            points[:, list(sides)], points[:, axis] = corners, coordinate + side * spacing
             meshes.append((points, ARROW))
     return joined(meshes)
 
@@ -134,53 +134,53 @@ class Fluid:
         self._fields: dict[str, Field | None] = {}
         self._numbers: dict[str, FieldNumber] = {}
 
-    def show(self, state: State, wanted: Settings) -> None:
+    def show(self, state: State, settings: Settings) -> None:
         """Show a state by the settings."""
         if self._run.is_slab:
-            self._show_slab(state, wanted)
+            self._show_slab(state, settings)
         else:
-            self._show_dye(state, wanted.field == "dye")
-            self._show_vortices(state, wanted.field == "vorticity")
-            self._show_slice(state, wanted)
-        self._show_velocity(state, wanted)
+            self._show_dye(state, settings.field == "dye")
+            self._show_vortices(state, settings.field == "vorticity")
+            self._show_slice(state, settings)
+        self._show_velocity(state, settings)
 
-    def legend(self, wanted: Settings) -> tuple[Legend, Sequence[Scale]]:
+    def legend(self, settings: Settings) -> tuple[Legend, Sequence[Scale]]:
         """(name, colour) of what is shown in its own colour, and the colour scales."""
         if self._run.is_slab:
-            field = self._slab_field(wanted.field)
+            field = self._slab_field(settings.field)
             if field is None:
                 return (), ()
             return field.legend, () if field.scale is None else (field.scale,)
         names: Legend = ()
-        if wanted.field == "dye":
+        if settings.field == "dye":
             names = self._dye.legend
-        if wanted.field == "vorticity":
+        if settings.field == "vorticity":
             names = self._vortices.legend
-        scale = None if wanted.slice == "none" else self._number(wanted.slice).scale
+        scale = None if settings.slice == "none" else self._number(settings.slice).scale
         return names, () if scale is None else (scale,)
 
-    def _show_slab(self, state: State, wanted: Settings) -> None:
-        field = self._slab_field(wanted.field)
+    def _show_slab(self, state: State, settings: Settings) -> None:
+        field = self._slab_field(settings.field)
         image = np.zeros((1, 1, 4), np.uint8) if field is None else field.image(state)
         self._show_image(over(image, self._run.shot.colour), 2, 0.0)
 
-    def _show_slice(self, state: State, wanted: Settings) -> None:
-        if wanted.slice == "none":
+    def _show_slice(self, state: State, settings: Settings) -> None:
+        if settings.slice == "none":
             self._scene.remove_by_name("/run/slice")
             return
-        cell = (wanted.place - self.grid.origin[wanted.axis]) / self.grid.spacing
-        image = self._number(wanted.slice).layer(state, wanted.axis, cell)
-        self._show_image(image.swapaxes(0, 1), wanted.axis, wanted.place)
+        cell = (settings.coordinate - self.grid.origin[settings.axis]) / self.grid.spacing
+        image = self._number(settings.slice).layer(state, settings.axis, cell)
+        self._show_image(image.swapaxes(0, 1), settings.axis, settings.coordinate)
 
-    def _show_image(self, image: Pixels, axis: int, place: float) -> None:
-        """Show colours (n, m, 3) of the cells in a plane normal to an axis at `place`, m.
+    def _show_image(self, image: Pixels, axis: int, coordinate: float) -> None:
+        """Show colours (n, m, 3) of the cells in a plane normal to an axis at `coordinate`, m.
 
         Rows are along the later of the other two axes, columns along the earlier one.
         """
         first, second = across(axis)
         low, high = np.array(self.grid.origin), np.array(self.grid.upper)
         centre = 0.5 * (low + high)
-        centre[axis] = place
+        centre[axis] = coordinate
         axes = np.eye(3)[[first, second]]
         rotation = np.column_stack([*axes, np.cross(*axes)])
         self._scene.add_image(
@@ -196,12 +196,12 @@ class Fluid:
             position=centre,
         )
 
-    def _show_velocity(self, state: State, wanted: Settings) -> None:
+    def _show_velocity(self, state: State, settings: Settings) -> None:
         """Show arrows of the velocity in the plane; that of the limit reaches the next arrow."""
         mesh = nothing()
-        if wanted.velocity:
-            axis, place = (2, 0.0) if self._run.is_slab else (wanted.axis, wanted.place)
-            mesh = velocity_arrows(self.grid, state, axis, place, self._number("speed").limit)
+        if settings.velocity:
+            plane = (2, 0.0) if self._run.is_slab else (settings.axis, settings.coordinate)
+            mesh = velocity_arrows(self.grid, state, *plane, self._number("speed").limit)
         show_mesh(
             self._scene,
             "/run/velocity",
@@ -213,10 +213,10 @@ class Fluid:
             receive_shadow=False,
         )
 
-    def _show_vortices(self, state: State, wanted: bool) -> None:
+    def _show_vortices(self, state: State, visible: bool) -> None:
         """Show one mesh for each sense of rotation."""
         points, faces, warm = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, bool)
-        if wanted:
+        if visible:
             surface = self._surfaces.of(state, self.toward)
             if surface.n_points:
                 points, faces = surface.points, surface.regular_faces
@@ -235,9 +235,9 @@ class Fluid:
                 receive_shadow=False,
             )
 
-    def _show_dye(self, state: State, wanted: bool) -> None:
+    def _show_dye(self, state: State, visible: bool) -> None:
         """Show a Gaussian for each cell with dye, lit as smoke."""
-        smoke = cloud(self.grid, self._dye, state, self.toward) if wanted else None
+        smoke = cloud(self.grid, self._dye, state, self.toward) if visible else None
         if smoke is None or not len(smoke[0]):
             self._scene.remove_by_name("/run/dye")
             return
@@ -251,12 +251,12 @@ class Fluid:
         )
 
     @cached_property
-    def _dye(self) -> SeenDye:
-        return SeenDye(self._run)
+    def _dye(self) -> VisibleDye:
+        return VisibleDye(self._run)
 
     @cached_property
-    def _vortices(self) -> SeenVortices:
-        return SeenVortices(self._run)
+    def _vortices(self) -> VisibleVortices:
+        return VisibleVortices(self._run)
 
     @cached_property
     def _surfaces(self) -> VortexSurfaces:
@@ -274,7 +274,7 @@ class Fluid:
 
 
 def cloud(
-    grid: Grid, dye: SeenDye, state: State, toward: Array
+    grid: Grid, dye: VisibleDye, state: State, toward: Array
 ) -> tuple[Array, NDArray[np.float32], NDArray[np.float32], float]:
     """Centres (n, 3) m, colours (n, 3) and opacities (n,) of the cells with dye, and their size, m.
 

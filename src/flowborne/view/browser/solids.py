@@ -22,7 +22,7 @@ from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, Skin, State
 from flowborne.view.space.arrows import arrow_mesh
-from flowborne.view.space.surfaces import Outside, colour_of, creased, mesh_of, pushes
+from flowborne.view.space.surfaces import Outside, colour_of, creased, force_arrows, mesh_of
 
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
@@ -97,7 +97,7 @@ class SkinMesh:
         return vertices[self._vertex], self._faces
 
 
-class Pushes:
+class ForceArrows:
     """The forces of fluid and winds on the bodies, as arrows of one scale.
 
     scale  of the arrows
@@ -111,9 +111,9 @@ class Pushes:
         if not run.is_slab:
             self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
 
-    def show(self, state: State, wanted: bool) -> None:
+    def show(self, state: State, visible: bool) -> None:
         """Show the arrows of a state, or none."""
-        mesh = self._mesh(state) if wanted else nothing()
+        mesh = self._mesh(state) if visible else nothing()
         colour = style.rgb(style.FORCE)
         show_mesh(self._scene, "/run/forces", mesh, color=colour, cast_shadow=False)
 
@@ -124,7 +124,7 @@ class Pushes:
             found = self.scale.arrows(state, self._pixel)
             flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]
             return joined([prism([one], self._high, 1.5 * self._high) for one in flat])
-        return arrow_mesh(*pushes(self.scale, self._outside, state, self._pixel), width)
+        return arrow_mesh(*force_arrows(self.scale, self._outside, state, self._pixel), width)
 
 
 def _surfaces(run: Run, side: float) -> list[Mesh]:

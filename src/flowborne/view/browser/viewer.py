@@ -16,11 +16,11 @@ from flowborne.extras import optional
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.view.browser.fluid import Fluid
-from flowborne.view.browser.page import dress, only_own_requests
+from flowborne.view.browser.page import only_own_requests, style_page
 from flowborne.view.browser.panel import Panel, legend_html
 from flowborne.view.browser.settings import Settings, Timeline
-from flowborne.view.browser.solids import Bodies, Pushes, SkinMesh
-from flowborne.view.browser.surroundings import surround
+from flowborne.view.browser.solids import Bodies, ForceArrows, SkinMesh
+from flowborne.view.browser.surroundings import add_surroundings
 from flowborne.view.browser.viewpoint import CameraKeys, FilmView
 from flowborne.view.run import Run
 
@@ -92,12 +92,12 @@ class Viewer:
     def tick(self, seconds: float) -> None:
         """Advance by seconds of real time, and update the scene if anything changed."""
         self.timeline.advance(seconds)
-        self.panel.obey()
+        self.panel.apply_controls()
         timeline, settings = self.timeline, self.panel.settings
-        wanted = (timeline.number, timeline.playing, timeline.newest, settings)
-        if wanted != self._shown:
+        current = (timeline.number, timeline.playing, timeline.newest, settings)
+        if current != self._shown:
             self._show(settings)
-            self._shown = wanted
+            self._shown = current
 
     def look(self) -> None:
         """Read new frames of the run, and the cameras of all clients."""
@@ -115,14 +115,14 @@ class Viewer:
         server = self.server
         server.scene.reset()
         server.gui.reset()
-        dress(server, run.name)
+        style_page(server, run.name)
         self.run, self._view = run, FilmView.of(run)
         self.timeline = Timeline(run.times)
         first, side = self._view.first, self._view.side
         server.initial_camera.position = tuple(first.position)
         server.initial_camera.look_at = tuple(first.target)
         server.initial_camera.fov = float(np.radians(first.lens))
-        surround(server.scene, run, self._view)
+        add_surroundings(server.scene, run, self._view)
         self._bodies = Bodies(server.scene, run, side)
         self._skins = [
             SkinMesh(server.scene, run, skin, str(n), side) for n, skin in enumerate(run.skins)
@@ -132,7 +132,7 @@ class Viewer:
         self._keys = CameraKeys(self.folder, run.is_slab)
         self._along = np.zeros(3)
         self._shown = None
-        if RunFolder(run.folder).goes_on():
+        if RunFolder(run.folder).is_unfinished():
             self.timeline.show_newest()
 
     def _extend(self, run: GrowingRun) -> None:
@@ -148,28 +148,28 @@ class Viewer:
         """Take scales from the frames so far; repeated whenever their number doubles."""
         run, view = self.run, self._view
         self._measured = len(run)
-        self._pushes = Pushes(self.server.scene, run, view.side)
+        self._force_arrows = ForceArrows(self.server.scene, run, view.side)
         toward = view.first.position - view.first.target
         self._fluid = None
         if run.grid is not None:
             self._fluid = Fluid(self.server.scene, run, toward / np.linalg.norm(toward))
 
-    def _show(self, wanted: Settings) -> None:
+    def _show(self, settings: Settings) -> None:
         """Show the current state by the settings."""
         number = self.timeline.number
         state = self.run.state(number)
-        self._along = self._view.path[number] if wanted.follow else np.zeros(3)
-        names, scales = ((), ()) if self._fluid is None else self._fluid.legend(wanted)
+        self._along = self._view.path[number] if settings.follow else np.zeros(3)
+        names, scales = ((), ()) if self._fluid is None else self._fluid.legend(settings)
         with self.server.atomic():
             self.server.scene.add_frame("/run", show_axes=False, position=-self._along)
-            self._bodies.show(state, wanted.bones)
+            self._bodies.show(state, settings.bones)
             for skin in self._skins:
-                skin.show(state, wanted.bones)
-            self._pushes.show(state, wanted.forces)
+                skin.show(state, settings.bones)
+            self._force_arrows.show(state, settings.forces)
             if self._fluid is not None:
-                self._fluid.show(state, wanted)
+                self._fluid.show(state, settings)
             self.panel.show(self.run, number)
-            shown = self._pushes.scale if wanted.forces else None
+            shown = self._force_arrows.scale if settings.forces else None
             self.panel.legend.content = legend_html(names, scales, shown)
 
 

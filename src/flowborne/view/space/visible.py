@@ -21,7 +21,7 @@ VORTEX_SHARE = 0.6
 """Share of the sum of positive Q that is inside the surfaces of vortices."""
 
 
-def seen_of(run: Run, shot: Shot) -> Seen | None:
+def visible_of(run: Run, shot: Shot) -> Visible | None:
     """What `shot` shows of the fluid of `run`; None if nothing is visible.
 
     raises  ValueError if it shows dye and there is none
@@ -29,13 +29,13 @@ def seen_of(run: Run, shot: Shot) -> Seen | None:
     if run.grid is None or shot.field == "none":
         return None
     if shot.field == "dye":
-        return SeenDye(run)
+        return VisibleDye(run)
     if shot.field == "vorticity":
-        return SeenVortices(run)
+        return VisibleVortices(run)
     return FieldNumber(run, NUMBERS[shot.field])
 
 
-class SeenDye:
+class VisibleDye:
     """Dyes, each in its own colour, mixed where they meet.
 
     legend  (name, colour) of each
@@ -58,7 +58,7 @@ class SeenDye:
         return (colour / weight[..., None]).astype(np.float32), density
 
 
-class SeenVortices:
+class VisibleVortices:
     """Vortices: iso-surfaces of Q, inside which rotation exceeds strain.
 
     Q is half of (rotation rate squared - strain rate squared) (Hunt, Wray and Moin 1988). The
@@ -99,5 +99,5 @@ def _level_of(values: Array, share: float) -> float:
     return float(positive[np.searchsorted(np.cumsum(positive), share * positive.sum())])
 
 
-Seen = SeenDye | SeenVortices | FieldNumber
+Visible = VisibleDye | VisibleVortices | FieldNumber
 """What is visible; a number is shown in a plane through the camera's target."""
