@@ -70,18 +70,13 @@ def field_of(run: Run, shot: Shot) -> Field | None:
     return FieldStill() if shot.field == "none" else FieldNumber(run, NUMBERS[shot.field])
 
 
-def dyes_of(run: Run) -> list[str]:
-    """Names of the arrays of a state that hold dye."""
-    return [name for name in run.state(0) if name.startswith("scalar_")]
-
-
 def dye_colours(run: Run, samples: int) -> tuple[dict[str, tuple[float, str]], Legend]:
     """Array of dye -> (value at full colour, colour), and the legend.
 
     samples  number of frames from which the values are taken
     raises   ValueError if there is no dye
     """
-    dyes = dyes_of(run)
+    dyes = [name for name in run.state(0) if name.startswith("scalar_")]
     if not dyes:
         raise ValueError(
             "the run has no dye to show; draw another field with --set field=vorticity, speed or "

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flowborne.view import style
 from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.viewpoint import FilmView
-from flowborne.view.fields import Scale, dyes_of
+from flowborne.view.fields import Scale
 from flowborne.view.glyphs import Forces, round_number
 from flowborne.view.plots import robust_limits, strip_curves
 from flowborne.view.run import Run
@@ -275,8 +275,7 @@ class Panel:
     def _add_shown(self, gui: GuiApi, run: Run, view: FilmView) -> None:
         controls, shot = self._controls, run.shot
         if run.grid is not None:
-            dyes = dyes_of(run)
-            fields = [*(["dye"] if dyes else []), "vorticity"]
+            fields = [*(["dye"] if run.dyes else []), "vorticity"]
             fields += ["speed", "pressure", "none"] if run.is_slab else ["none"]
             first: str = shot.field if shot.field in fields else "none"
             controls["field"] = gui.add_dropdown("fluid", fields, initial_value=first)
