@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 import flowborne as fb
 from flowborne.formats.creature import Creature
-from flowborne.runs.states import cell_velocity, vorticity
+from flowborne.runs.states import cell_velocity, cell_vorticity
 from marked import with_part
 from read_back import (
     Alembic,
@@ -154,7 +154,7 @@ def of_vtkhdf(path: Path, creature: Creature) -> Away:
         if run.grid is None:
             continue
         fields = {"velocity": cell_velocity(run.grid, state)}
-        fields |= {"vorticity": vorticity(run.grid, state).astype(np.float32)}
+        fields |= {"vorticity": cell_vorticity(run.grid, state).astype(np.float32)}
         fields |= {name: state[name] for name in ("pressure", "open")}
         fields |= {dye: state[f"scalar_{dye}"] for dye in run.dyes}
         for name, field in fields.items():

@@ -184,7 +184,7 @@ def simulate(name: str, folder: Path) -> None:
 
 def write_picture(folder: Path, frame: int, path: Path) -> None:
     """A frame of a run as a small WebP."""
-    made = Run.read(folder)
+    made = Run(folder)
     width, height = SIZE
     shot = replace(
         made.shot,

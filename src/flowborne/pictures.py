@@ -8,7 +8,6 @@ from flowborne.view.plots import (
     plot_chain_cost,
     plot_courses,
     plot_forces,
-    straight_line,
 )
 from flowborne.view.run import Run
 
@@ -19,5 +18,4 @@ __all__ = [
     "plot_chain_cost",
     "plot_courses",
     "plot_forces",
-    "straight_line",
 ]

@@ -175,7 +175,7 @@ def test_pictures_show_the_surface_in_place_of_its_pieces(box: Path, tmp_path: P
     """The drawn skin is the surface of the file, where the file's clip has it."""
     frames = rigged.FRAMES - 1
     fb.run(fb.load_scene(box, DRIVEN), tmp_path / "run", frames=frames, film=False)
-    run = Run.read(tmp_path / "run")
+    run = Run(tmp_path / "run")
     assert all(geom.covered for geom in run.geoms)
     (skin,) = run.skins
     exported = GltfSource(tmp_path / "run" / "box.glb")

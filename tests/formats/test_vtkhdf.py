@@ -13,7 +13,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 import flowborne as fb
 from flowborne.formats.creature import Creature
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.states import cell_velocity, vorticity
+from flowborne.runs.states import cell_velocity, cell_vorticity
 
 read_back = pytest.importorskip("read_back", exc_type=ImportError)
 
@@ -54,7 +54,7 @@ def test_fields_are_exact(opened: Opened) -> None:
         assert_allclose(block.GetBounds()[::2], grid.origin)
         assert_allclose(block.GetBounds()[1::2], grid.upper)
         wanted = {"velocity": cell_velocity(grid, state)}
-        wanted |= {"vorticity": vorticity(grid, state).astype(np.float32)}
+        wanted |= {"vorticity": cell_vorticity(grid, state).astype(np.float32)}
         wanted |= {name: state[name] for name in ("pressure", "open")}
         wanted |= {dye: state[f"scalar_{dye}"] for dye in run.dyes}
         assert block.GetCellData().GetNumberOfArrays() == len(wanted)

@@ -31,9 +31,10 @@ def write_run(
 ) -> Path:
     """Run folder with the start and `frames` frames; a block, and a fixed square on its left."""
     (folder / "states").mkdir(parents=True)
-    (folder / "scene.toml").write_text(
-        f'name = "made-up-block"\ndimensions = 2\n[film]\nfield = "{field}"\n'
-    )
+    (folder / "summary.json").write_text(json.dumps({"flowborne": "0", "outcome": "done"}))
+    scene = f'name = "made-up-block"\ndimensions = 2\n[film]\nfield = "{field}"\n'
+    scene += "[fluid]\ndensity = 1000.0\n" if fluid else ""
+    (folder / "scene.toml").write_text(scene)
     (folder / "model.json").write_text(json.dumps(_model(fluid, wind)))
     columns = ["frame", "time_s", "angle_hinge_rad", "target_hinge_rad"]
     columns += ["objective"] if objective else []

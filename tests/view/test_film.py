@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flowborne.fits import straight_line
 from flowborne.runs.run_folder import RunFolderError
 from flowborne.view import drawing
 from flowborne.view.drawing import drawn_frames
 from flowborne.view.film import make_preview, write_film, write_shot
 from flowborne.view.maps import MapSlab
 from flowborne.view.pictures import Picture
-from flowborne.view.plots import ChainCost, plot_chain_cost, straight_line
+from flowborne.view.plots import ChainCost, plot_chain_cost
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 
@@ -35,7 +36,7 @@ def test_film_and_picture_show_every_frame(write_run: Write) -> None:
     seen: list[tuple[int, int]] = []
     make_preview(folder, lambda done, of: seen.append((done, of)))
     assert seen == [(n, 9) for n in range(1, 10)]
-    picture = Picture(Run.read(folder))
+    picture = Picture(Run(folder))
     film = frames_of(folder / "preview.mp4")
     assert film.shape == (9, picture.layout.height, picture.layout.width, 3)
     assert imageio.immeta(folder / "preview.mp4", plugin="FFMPEG")["fps"] == 24.0
@@ -46,7 +47,7 @@ def test_film_and_picture_show_every_frame(write_run: Write) -> None:
     assert np.abs(film[8] - drawn).mean() > np.abs(film[1] - drawn).mean() + 1.0
     still = imageio.imread(folder / "preview.png")
     assert still.shape[:2] == (1.5 * picture.layout.height, 1.5 * picture.layout.width)
-    np.testing.assert_array_equal(still, Picture(Run.read(folder), 1.5).draw(8)[:, :, :3])
+    np.testing.assert_array_equal(still, Picture(Run(folder), 1.5).draw(8)[:, :, :3])
     assert not list(folder.rglob("*.partial"))
 
 
@@ -60,7 +61,7 @@ def test_a_film_that_cannot_be_written_leaves_the_earlier_one(write_run: Write) 
             raise OSError(28, "No space left on device")
 
     with pytest.raises(OSError, match="No space left"):
-        write_film(Run.read(folder), film, fill_up)
+        write_film(Run(folder), film, fill_up)
     assert film.read_bytes() == b"earlier"
     assert not list(folder.rglob("*.partial"))
 
@@ -77,7 +78,7 @@ def test_a_folder_without_frames_says_so(write_run: Write) -> None:
     folder = write_run(frames=1)
     for path in (folder / "states").iterdir():
         path.unlink()
-    with pytest.raises(ValueError, match="has no frame to draw; let the run go on with --resume"):
+    with pytest.raises(RunFolderError, match="has no frame yet; let the run go on with --resume"):
         make_preview(folder)
 
 
@@ -88,7 +89,7 @@ def test_a_body_that_the_run_does_not_have_is_named(write_run: Write) -> None:
         sound, table[key] = table[key], value
         (folder / "model.json").write_text(json.dumps(model))
         with pytest.raises(RunFolderError, match=f"model.json has body {value}, and 2 in all"):
-            Run.read(folder)
+            Run(folder)
         table[key] = sound
 
 
@@ -98,7 +99,7 @@ def test_a_wide_and_a_high_run_have_even_sides(write_run: Write) -> None:
     for shape in ((96, 41, 1), (31, 96, 1)):
         model["grid"]["shape"] = list(shape)
         (folder / "model.json").write_text(json.dumps(model))
-        picture = Picture(Run.read(folder))
+        picture = Picture(Run(folder))
         box = picture.layout.map
         assert picture.layout.width % 2 == picture.layout.height % 2 == 0
         assert box.height / box.width == pytest.approx(shape[1] / shape[0], rel=0.02)
@@ -142,7 +143,7 @@ def test_an_image_that_moves_has_every_frame(write_run: Write, tmp_path: Path) -
         assert (image.n_frames, image.size, image.info["loop"]) == (4, (320, 240), 0)
         for number in range(4):
             image.seek(number)
-            drawn = Picture(Run.read(folder), shot=shot).draw(number).astype(int)
+            drawn = Picture(Run(folder), shot=shot).draw(number).astype(int)
             shown = np.asarray(image.convert("RGBA")).astype(int)
             covered = drawn[..., 3:] / 255  # the colour of what is transparent means nothing
             assert np.abs(shown - drawn)[..., 3].mean() < 4.0
@@ -151,7 +152,7 @@ def test_an_image_that_moves_has_every_frame(write_run: Write, tmp_path: Path) -
 
 @pytest.mark.parametrize("size", [[640, 480], [480, 640], [1280, 720]])
 def test_a_picture_has_the_size_that_is_asked_for(write_run: Write, size: list[int]) -> None:
-    run = Run.read(write_run(frames=1))
+    run = Run(write_run(frames=1))
     for plots in (False, True):
         assert Picture(run, shot=shot_of(size=size, plots=plots)).draw(1).shape[1::-1] == (*size,)
     with pytest.raises(ValueError, match="has no room for its plots"):
@@ -171,7 +172,7 @@ def test_start_stop_and_rate_choose_the_frames() -> None:
 def test_other_processes_draw_the_same_frames_in_order(
     write_run: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = Run.read(write_run(frames=9))
+    run = Run(write_run(frames=9))
     numbers = [*range(10), 3]
     with closing(drawn_frames(run, run.shot, numbers, cores=1)) as alone:
         expected = [frame.copy() for frame in alone]
@@ -179,9 +180,9 @@ def test_other_processes_draw_the_same_frames_in_order(
     started: list[list[str]] = []
     start = subprocess.Popen
 
-    def note(command: list[str], **told: object) -> object:
+    def note(command: list[str], **options: object) -> object:
         started.append(command)
-        return start(command, **told)  # type: ignore[call-overload]
+        return start(command, **options)  # type: ignore[call-overload]
 
     monkeypatch.setattr(subprocess, "Popen", note)
     with closing(drawn_frames(run, run.shot, numbers, cores=2)) as together:
@@ -193,13 +194,13 @@ def test_other_processes_draw_the_same_frames_in_order(
 def test_a_film_that_is_given_up_leaves_no_process(
     write_run: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = Run.read(write_run(frames=9))
+    run = Run(write_run(frames=9))
     monkeypatch.setattr(drawing, "START_TIME", 0.0)
     artists = []
     start = subprocess.Popen
 
-    def note(*told: object, **more: object) -> object:
-        artists.append(start(*told, **more))  # type: ignore[call-overload]
+    def note(*options: object, **more: object) -> object:
+        artists.append(start(*options, **more))  # type: ignore[call-overload]
         return artists[-1]
 
     monkeypatch.setattr(subprocess, "Popen", note)
@@ -212,7 +213,7 @@ def test_a_film_that_is_given_up_leaves_no_process(
 
 
 def test_a_window_follows_a_body_of_a_slab(write_run: Write) -> None:
-    run = Run.read(write_run(frames=4))
+    run = Run(write_run(frames=4))
     whole = MapSlab(run, shot_of())
     assert whole.views[0] == pytest.approx([-1.5, 2.5, -2.0, 2.0])
     near = MapSlab(run, shot_of(camera={"follow": "block", "distance": 2.0, "lens": 30.0}), 0.5)
@@ -220,24 +221,24 @@ def test_a_window_follows_a_body_of_a_slab(write_run: Write) -> None:
     assert y1 - y0 == pytest.approx(4.0 * np.tan(np.radians(15.0)))
     assert x1 - x0 == pytest.approx(2.0 * (y1 - y0))
     assert [0.5 * (x0 + x1), 0.5 * (y0 + y1)] == pytest.approx([0.4, 0.3], abs=0.02)
-    for told, said in (
+    for options, said in (
         ({"follow": "tail"}, "cannot follow body 'tail'; the bodies are world, block"),
         ({"orbit": 5.0}, "a slab is seen from straight above"),
     ):
         with pytest.raises(ValueError, match=said):
-            MapSlab(run, shot_of(camera=told))
+            MapSlab(run, shot_of(camera=options))
 
 
 @pytest.mark.parametrize(("field", "name"), [("speed", "speed (m/s)"), ("pressure", "pressure")])
 def test_speed_and_pressure_have_a_scale(write_run: Write, field: str, name: str) -> None:
-    run = Run.read(write_run(frames=1))
+    run = Run(write_run(frames=1))
     picture = Picture(run, shot=shot_of(field=field))
     assert picture.map.scale is not None
     assert name in picture.map.scale[3]
 
 
 def test_a_field_that_the_run_lacks_is_said(write_run: Write) -> None:
-    run = Run.read(write_run(frames=1, dyes=()))
+    run = Run(write_run(frames=1, dyes=()))
     with pytest.raises(ValueError, match="the run has no dye to show; draw another field"):
         Picture(run)
 
@@ -247,11 +248,11 @@ def test_a_model_that_is_not_that_of_the_states_is_refused(write_run: Write) -> 
     file = folder / "model.json"
     model = json.loads(file.read_text())
     file.write_text(json.dumps(model | {"geoms": model["geoms"] * 2}))
-    run = Run.read(folder)
+    run = Run(folder)
     for draw in (lambda: run.state(0), lambda: run.every("geom_position")):
         with pytest.raises(RunFolderError, match="geometries and its states"):
             draw()
     model["geoms"][0]["body"] = 10**30
     file.write_text(json.dumps(model))
     with pytest.raises(RunFolderError, match="cannot be read"):
-        Run.read(folder)
+        Run(folder)

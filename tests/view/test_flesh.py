@@ -75,7 +75,7 @@ def rgb(colour: str) -> Pixels:
 
 
 def test_flesh_is_drawn_where_its_skin_is(fin: Path) -> None:
-    picture = Picture(Run.read(fin))
+    picture = Picture(Run(fin))
     flesh, water = (pytest.approx(rgb(c), abs=2) for c in (style.FLESH, style.WATER))
     for number, rise in ((0, 0.0), (1, RISE)):
         for x, y in ((0.02, 0.0), (0.3, 0.08), (0.44, -0.08), (0.88, 0.95 * rise)):
@@ -85,7 +85,7 @@ def test_flesh_is_drawn_where_its_skin_is(fin: Path) -> None:
 
 
 def test_the_map_holds_all_of_the_flesh_of_all_frames(fin: Path) -> None:
-    x0, x1, y0, y1 = MapSlab(Run.read(fin), Shot()).views[0]
+    x0, x1, y0, y1 = MapSlab(Run(fin), Shot()).views[0]
     assert x0 < -0.2
     assert x1 > 1.1
     assert y0 < -0.1 - 0.1
@@ -93,7 +93,7 @@ def test_the_map_holds_all_of_the_flesh_of_all_frames(fin: Path) -> None:
 
 
 def test_bones_are_hidden_until_they_are_asked_for(fin: Path) -> None:
-    run = Run.read(fin)
+    run = Run(fin)
     assert colour_at(Picture(run), 0, 0.3, 0.0) == pytest.approx(rgb(style.FLESH), abs=2)
     picture = Picture(run, shot=replace(run.shot, bones=True))
     assert colour_at(picture, 0, 0.3, 0.0) == pytest.approx(rgb(style.ACCENT), abs=2)
@@ -105,10 +105,10 @@ def test_bones_are_hidden_until_they_are_asked_for(fin: Path) -> None:
 def test_a_state_whose_numbers_are_lost_shows_neither_skin_nor_bones(
     fin: Path, tmp_path: Path
 ) -> None:
-    run = Run.read(Path(shutil.copytree(fin, tmp_path / "fin")))
+    run = Run(Path(shutil.copytree(fin, tmp_path / "fin")))
     state = run.state(1)
     state["flesh_vertices"][7] = np.nan
-    np.savez(run.states[1], **state)
+    np.savez(run._states[1], **state)
     assert colour_at(Picture(run), 1, 0.3, 0.0) == pytest.approx(rgb(style.WATER), abs=2)
 
 
@@ -120,12 +120,12 @@ def test_the_command_draws_bones_when_asked_to(fin: Path) -> None:
         assert left.value.code == 0
         stills.append(imageio.imread(fin / "preview.png"))
         film = imageio.imread(fin / "preview.mp4", plugin="FFMPEG")
-        run = Run.read(fin)
+        run = Run(fin)
         shot = replace(run.shot, bones=bool(switch))
         expected = Picture(run, shot=shot).draw(1)[:, :, :3].astype(int)
         assert np.abs(film[1] - expected).mean() < 4.0
     for still, bones in zip(stills, (False, True), strict=True):
-        run = Run.read(fin)
+        run = Run(fin)
         expected = Picture(run, 1.5, replace(run.shot, bones=bones)).draw(1)[:, :, :3]
         np.testing.assert_array_equal(still, expected)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.view.glyphs import crosses, goes_along, motes
+from flowborne.view.glyphs import camera_moves, crosses, motes
 
 
 def test_marks_are_for_cameras_that_move() -> None:
     path = np.outer(np.linspace(0.0, 1.0, 9), [0.5, 0.0, 0.0])
-    assert goes_along(path, 2.0)
-    assert not goes_along(path, 20.0)
+    assert camera_moves(path, 2.0)
+    assert not camera_moves(path, 20.0)
 
 
 def test_crosses_are_a_round_number_of_metres_apart_wherever_one_looks() -> None:

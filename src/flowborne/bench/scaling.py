@@ -9,6 +9,7 @@ import numpy as np
 
 from flowborne import Scene, Simulation, load_scene
 from flowborne.bench.timing import FRAMES, Result, frame_times, in_words, verdict
+from flowborne.fits import straight_line
 from flowborne.machine import cores, kernel_threads
 
 EXECUTORS = ("threads", "processes")
@@ -64,8 +65,6 @@ def compare_workers(scene: Scene, frames: int = FRAMES) -> Result:
 
 def straightness(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     """Largest deviation of the quickest frames of scenes with 1, 2, ... joints from a line."""
-    from flowborne.pictures import straight_line
-
     with ExitStack() as stack:
         simulations = [stack.enter_context(Simulation(scene, 1, "serial")) for scene in scenes]
         times = frame_times(simulations, frames)

@@ -30,7 +30,7 @@ from flowborne.formats.creature import Array, Creature, Integers, has_bodies
 from flowborne.kernels.elastic import STABLE_NEO_HOOKEAN
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
-from flowborne.runs.states import cell_velocity, vorticity
+from flowborne.runs.states import cell_velocity, cell_vorticity
 from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import shape_gradients
 from flowborne.solids.flesh import Flesh
@@ -96,7 +96,7 @@ def _fluid(group: h5py.Group, run: OpenRun, grid: Grid) -> None:
         state = run.state(number)
         values: dict[str, NDArray[Any]] = {
             "velocity": cell_velocity(grid, state),
-            "vorticity": vorticity(grid, state),
+            "vorticity": cell_vorticity(grid, state),
             "pressure": state["pressure"],
             "open": state["open"],
             **{dye: state[f"scalar_{dye}"] for dye in run.dyes},

@@ -154,13 +154,19 @@ def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ..
     with open(path, encoding="utf-8", newline="") as file:
         lines = _lines(file)
         names = _names(lines)
-        places = [names.index(column) for column in columns]
+        indices = [names.index(column) for column in columns]
         for line in lines:
             if line.endswith("\n"):
                 cells = line.rstrip("\n").split(",")
                 if len(cells) != len(names):
                     raise ValueError(f"{path.name} has {len(cells)} numbers in a row")
-                yield tuple(float(cells[place]) for place in places)
+                yield tuple(float(cells[index]) for index in indices)
+
+
+def read_history(path: Path, columns: Sequence[str]) -> dict[str, Array]:
+    """Column -> (frames,) numbers of the named columns. Raises ValueError as `history_rows`."""
+    rows = np.array(list(history_rows(path, columns)), float).reshape(-1, len(columns))
+    return dict(zip(columns, rows.T, strict=True))
 
 
 def _lines(file: IO[str]) -> Iterator[str]:
@@ -259,10 +265,10 @@ def history_arrays(
         if at.name not in found:
             empty = np.full((len(values), *(lengths[key] for key in dimensions)), np.nan)
             found[at.name] = HistoryArray(dimensions, empty, unit_of(column), at.meaning)
-        place = [] if at.joint is None else [joints.index(at.joint)]
-        place += [] if at.body is None else [bodies.index(at.body)]
-        place += [] if at.axis is None else [at.axis]
-        np.moveaxis(found[at.name].values, 0, -1)[tuple(place)] = values
+        index = [] if at.joint is None else [joints.index(at.joint)]
+        index += [] if at.body is None else [bodies.index(at.body)]
+        index += [] if at.axis is None else [at.axis]
+        np.moveaxis(found[at.name].values, 0, -1)[tuple(index)] = values
     return found
 
 

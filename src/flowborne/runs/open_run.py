@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +13,8 @@ from numpy.typing import NDArray
 from flowborne.extras import optional
 from flowborne.files.given import read_json
 from flowborne.fluid.grid import Grid
-from flowborne.runs.history import history_arrays, history_columns, history_rows
-from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
+from flowborne.runs.history import history_arrays, history_columns, read_history
+from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import DYE, StateArray, quantity, read_state
 
 if TYPE_CHECKING:
@@ -37,23 +36,25 @@ class OpenRun:
     dyes               names of the dyes
     frames             frame number of each state, 0 for the start
     frames_per_second  of the run
+    is_slab            whether it is two-dimensional, with forces per metre of depth
+    grid               of the fluid; None without a fluid
     """
 
     def __init__(self, folder: str | Path) -> None:
         files = RunFolder.existing(Path(folder))
         self.folder = files.path
-        self._files = files
         self.scene = files.read_scene()
         with reading(self.folder):
-            self._model = read_json(files.model)
-            names = sorted(p.name for p in files.states.iterdir() if STATE_NAME.fullmatch(p.name))
+            self._model: dict[str, Any] = read_json(files.model)
             self.name = str(self.scene.get("name", files.path.name))
             self.bodies: tuple[str, ...] = tuple(self._model["bodies"])
             self.joints: tuple[str, ...] = tuple(self._model["joints"])
             self.frames_per_second = float(self._model["frames_per_second"])
-        if not names:
+            self.is_slab = bool(self._model["slab"])
+            self.grid = _grid(self._model["grid"])
+            self._states = tuple(files.state_files())
+        if not self._states:
             raise RunFolderError(f"{folder} has no frame yet; let the run go on with --resume")
-        self._states = tuple(files.states / name for name in names)
         self.frames = tuple(int(path.stem) for path in self._states)
 
     def __len__(self) -> int:
@@ -61,24 +62,9 @@ class OpenRun:
         return len(self._states)
 
     @property
-    def is_slab(self) -> bool:
-        """Whether the run is two-dimensional, with forces per metre of depth."""
-        return bool(self._model["slab"])
-
-    @property
     def dyes(self) -> tuple[str, ...]:
         found = (DYE.fullmatch(name) for name in self.arrays)
         return tuple(match[1] for match in found if match)
-
-    @cached_property
-    def grid(self) -> Grid | None:
-        """The fluid's grid; None without a fluid."""
-        entry = self._model["grid"]
-        if entry is None:
-            return None
-        nx, ny, nz = entry["shape"]
-        x, y, z = entry["origin"]
-        return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
 
     @cached_property
     def skin(self) -> NDArray[np.int64] | None:
@@ -90,9 +76,8 @@ class OpenRun:
     def history(self) -> dict[str, Array]:
         """column -> (frames,) numbers of history.csv; the column name ends with the unit."""
         with reading(self.folder):
-            columns = list(history_columns(self._files.history))
-            rows = np.array(list(history_rows(self._files.history, columns)), float)
-            return dict(zip(columns, rows.reshape(-1, len(columns)).T, strict=True))
+            path = RunFolder(self.folder).history
+            return read_history(path, history_columns(path))
 
     @cached_property
     def times(self) -> Array:
@@ -103,9 +88,7 @@ class OpenRun:
     def arrays(self) -> Mapping[str, StateArray]:
         """Name -> array of all states, read lazily; see states.QUANTITIES for shapes and units."""
         names = read_state(self._states[0])
-        return MappingProxyType(
-            {name: StateArray(self._states, name, quantity(name)) for name in names}
-        )
+        return {name: StateArray(self._states, name, quantity(name)) for name in names}
 
     def state(self, number: int) -> dict[str, NDArray[Any]]:
         """Arrays of a state by name, in single precision; negative numbers count from the end.
@@ -150,6 +133,14 @@ class OpenRun:
             self.grid,
             about,
         )
+
+
+def _grid(entry: dict[str, Any] | None) -> Grid | None:
+    if entry is None:
+        return None
+    nx, ny, nz = entry["shape"]
+    x, y, z = entry["origin"]
+    return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
 
 
 def open_run(folder: str | Path) -> OpenRun:

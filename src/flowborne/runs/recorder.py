@@ -170,7 +170,7 @@ def write_model(
             "joint_bodies": joint_bodies[of_bones].tolist(),
             "controlled": controlled,
             "decided": [*taken, *controlled],
-            "places": {name: _places(solid, name) for name in names},
+            "places": {name: _entries(solid, name) for name in names},
             "grid": grid,
             "geoms": _geoms(solid),
             "flesh": None if solid.flesh is None else _flesh(solid.flesh),
@@ -181,10 +181,10 @@ def write_model(
     )
 
 
-def _places(solid: SolidModel, joint: str) -> list[int]:
+def _entries(solid: SolidModel, joint: str) -> list[int]:
     """Begin and end of the entries of q of a joint."""
-    places = solid.positions_of(joint)
-    return [int(places[0]), int(places[-1]) + 1]
+    entries = solid.positions_of(joint)
+    return [int(entries[0]), int(entries[-1]) + 1]
 
 
 def _geoms(solid: SolidModel) -> list[dict[str, Any]]:

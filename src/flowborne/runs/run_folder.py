@@ -196,7 +196,7 @@ class RunFolder:
             return False
         return isinstance(summary, dict) and MARK in summary
 
-    def goes_on(self) -> bool:
+    def is_unfinished(self) -> bool:
         """Whether a run is being written here, or was and has been killed."""
         return self.is_run() and self.read_summary().get("outcome") == RUNNING
 
@@ -266,10 +266,10 @@ class RunFolder:
         return [self.path / name for name in self._names() if (self.path / name).is_file()]
 
     def state_files(self) -> list[Path]:
-        """Files of the existing states, unordered."""
+        """Files of the existing states, in order."""
         if not self.states.is_dir():
             return []
-        return [path for path in self.states.iterdir() if STATE_NAME.fullmatch(path.name)]
+        return sorted(path for path in self.states.iterdir() if STATE_NAME.fullmatch(path.name))
 
     def _is_empty(self) -> bool:
         """Whether only remains of a run that was killed at its start are here."""

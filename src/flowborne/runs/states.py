@@ -118,14 +118,14 @@ def read_state(path: Path, names: Sequence[str] | None = None) -> dict[str, NDAr
     try:
         arrays = read_arrays(path, names)
     except (OSError, ValueError) as error:
-        raise _without(path, error) from error
+        raise _unreadable(path, error) from error
     for name, values in arrays.items():
         if values.dtype.kind not in NUMBERS:
-            raise _without(path, ValueError(f"its '{name}' holds no numbers"))
+            raise _unreadable(path, ValueError(f"its '{name}' holds no numbers"))
     _check_shapes(path, arrays)
     lacking = [] if names else [name for name in IN_EVERY_STATE if name not in arrays]
     if lacking:
-        raise _without(path, ValueError(f"it lacks {', '.join(lacking)}"))
+        raise _unreadable(path, ValueError(f"it lacks {', '.join(lacking)}"))
     return arrays
 
 
@@ -140,7 +140,7 @@ def _check_shapes(path: Path, arrays: Arrays) -> None:
             sizes.setdefault(axis, size) for axis, size in zip(axes, values.shape, strict=False)
         )
         if len(axes) != values.ndim or shape != values.shape:
-            raise _without(
+            raise _unreadable(
                 path,
                 ValueError(f"its '{name}' has the shape {values.shape}, not ({', '.join(axes)})"),
             )
@@ -154,10 +154,10 @@ def check_states(folder: RunFolder, frame: int) -> None:
                 check_file(path, None)
                 zipfile.ZipFile(path).close()
             except (OSError, zipfile.BadZipFile) as error:
-                raise _without(path, error) from error
+                raise _unreadable(path, error) from error
 
 
-def _without(path: Path, error: Exception) -> RunFolderError:
+def _unreadable(path: Path, error: Exception) -> RunFolderError:
     return RunFolderError(
         f"state {path} cannot be read ({said_of(error)}); remove it, and films and exports go on "
         "without its frame"
@@ -186,7 +186,7 @@ def velocity_gradients(grid: Grid, state: Arrays) -> Array:
     return found
 
 
-def vorticity(grid: Grid, state: Arrays) -> Array:
+def cell_vorticity(grid: Grid, state: Arrays) -> Array:
     """(nx, ny, nz, 3) curl of `cell_velocity`, 1/s."""
     (_, uy, uz), (vx, _, vz), (wx, wy, _) = velocity_gradients(grid, state)
     return np.stack([wy - vz, uz - wx, vx - uy], axis=-1)

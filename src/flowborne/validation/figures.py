@@ -248,7 +248,7 @@ def draw_frame(frame: int, path: Path) -> None:
 
     with TemporaryDirectory() as folder:
         run(load_scene(ARMS_SCENE), Path(folder) / "run", frames=frame, film=False)
-        picture = Picture(Run.read(Path(folder) / "run"), scale=1.5)
+        picture = Picture(Run(Path(folder) / "run"), scale=1.5)
         pixels = picture.draw(frame)[:, :, :3].copy()
         picture.close()
     write_atomically(path, lambda file: imageio.imwrite(file, pixels, extension=".png"))

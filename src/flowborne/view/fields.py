@@ -63,27 +63,25 @@ def field_of(run: Run, shot: Shot) -> Field | None:
     """
     if run.grid is None:
         return None
-    dyes = dyes_of(run)
-    shot.pictured(dyes)
     if shot.field == "dye":
-        return FieldDye(run, dyes)
+        return FieldDye(run)
     if shot.field == "vorticity":
         return FieldVorticity(run, shot.colour)
     return FieldStill() if shot.field == "none" else FieldNumber(run, NUMBERS[shot.field])
 
 
-def dyes_of(run: Run) -> list[str]:
-    """Names of the arrays of a state that hold dye."""
-    return [name for name in run.state(0) if name.startswith("scalar_")]
-
-
-def dye_colours(
-    run: Run, dyes: Sequence[str], samples: int
-) -> tuple[dict[str, tuple[float, str]], Legend]:
+def dye_colours(run: Run, samples: int) -> tuple[dict[str, tuple[float, str]], Legend]:
     """Array of dye -> (value at full colour, colour), and the legend.
 
     samples  number of frames from which the values are taken
+    raises   ValueError if there is no dye
     """
+    dyes = [name for name in run.state(0) if name.startswith("scalar_")]
+    if not dyes:
+        raise ValueError(
+            "the run has no dye to show; draw another field with --set field=vorticity, speed or "
+            "pressure"
+        )
     sampled = run.sampled(samples)
     colours = [style.DYES[n % len(style.DYES)] for n in range(len(dyes))]
     full = [full_strength([state[dye] for state in sampled]) for dye in dyes]
@@ -106,8 +104,8 @@ class FieldDye:
 
     scale: Scale | None = None
 
-    def __init__(self, run: Run, dyes: Sequence[str]) -> None:
-        self._dyes, self.legend = dye_colours(run, dyes, SAMPLES)
+    def __init__(self, run: Run) -> None:
+        self._dyes, self.legend = dye_colours(run, SAMPLES)
 
     def image(self, state: State) -> Pixels:
         known = _in_fluid(state)[:, :, 0]
@@ -139,13 +137,15 @@ class FieldVorticity:
         if run.grid is None:
             raise ValueError("a run without fluid has no vorticity")
         self.grid = run.grid
-        self.limit = vorticity_limit([vorticity(state, run.grid) for state in run.sampled(SAMPLES)])
+        self.limit = vorticity_limit(
+            [slab_vorticity(state, run.grid) for state in run.sampled(SAMPLES)]
+        )
         self.table = style.vorticity_table(1023)
         colours = over(self.table, background) / 255.0
         self.scale: Scale | None = (colours, -self.limit, self.limit, "vorticity (1/s)")
 
     def image(self, state: State) -> Pixels:
-        share = _refined(vorticity(state, self.grid).T / self.limit)
+        share = _refined(slab_vorticity(state, self.grid).T / self.limit)
         return self.table[_table_rows(share, len(self.table))]
 
 
@@ -188,6 +188,11 @@ class FieldNumber:
         opaque = np.full((*colours.shape[:-1], 1), 255, np.uint8)
         return np.concatenate([colours, opaque], axis=-1)
 
+    def layer(self, state: State, axis: int, cell: float) -> Pixels:
+        """(n, m, 3) colours of the layer of cells normal to `axis` at `cell`, counted in cells."""
+        values = np.moveaxis(self.values(state), axis, 0)
+        return self.colours(values[int(np.clip(cell, 0, len(values) - 1))])
+
     def colours(self, values: Array) -> Pixels:
         """(..., 3) colours of values in the quantity's unit."""
         share = values / self.limit
@@ -202,7 +207,7 @@ def over(image: Pixels, background: str) -> Pixels:
     )
 
 
-def vorticity(state: State, grid: Grid) -> Array:
+def slab_vorticity(state: State, grid: Grid) -> Array:
     """(nx, ny) vorticity about z at the cell centres, 1/s; bodies continue their neighbours.
 
     The corners' values dv/dx - du/dy are averaged; the outermost corners copy their neighbours.

@@ -45,12 +45,12 @@ def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | No
     folder    of the run; nothing else is read
     progress  called with (frames drawn, total frames)
     shot      what they show; None is the shot of the run's scene
-    raises    ValueError if there is no frame, if there is only one (then only the picture is
-              drawn), if the shot does not fit the run, or if the run has three dimensions and this
-              machine cannot draw them; OSError if a file cannot be written
+    raises    RunFolderError as `Run`; ValueError if there is only one frame (then only the picture
+              is drawn), if the shot does not fit the run, or if the run has three dimensions and
+              this machine cannot draw them; OSError if a file cannot be written
     """
     files = RunFolder(folder)
-    run = Run.read(folder)
+    run = Run(folder)
     shot = run.shot if shot is None else shot
     numbers = shot.frames(run.times, run.frames_per_second)
     # a picture of a given size has that size
@@ -78,7 +78,7 @@ def write_shot(
             f"{path} is neither a film nor an image sequence; end it with one of "
             f"{', '.join(ENDINGS)}"
         )
-    run = Run.read(folder)
+    run = Run(folder)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix.lower() in CODING:
         write_film(run, path, progress, shot)

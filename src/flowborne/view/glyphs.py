@@ -28,6 +28,10 @@ SHAFT_WIDTH = 5.0
 MIN_FORCE_LENGTH = 3.0
 """Length below which arrows are left out, pixels."""
 
+ROUNDING_SHIFT = 1e-12
+"""A force is rounding if it shifts a cube of fluid as large as the view by less than this share of
+its side during the run."""
+
 CROSS_SPACING = 0.22
 """Maximum distance between crosses, in smaller sides of the view; a round number of metres."""
 
@@ -70,17 +74,18 @@ class Forces:
     """The forces of fluid and winds on the bodies of a run, as arrows of one scale.
 
     reach  m, length of the arrow of a large force
-    large  N (N/m in a slab), size of a large force in the film; 0 if there is none
+    large  N (N/m in a slab), size of a large force in the film; 0 if there is none above rounding
     unit   of `large`
     """
 
     def __init__(self, run: Run, side: float) -> None:
         """`side`: smaller side of the view, m."""
-        self._axes = 2 if run.slab else 3
+        self._axes = 2 if run.is_slab else 3
         self._bodies = _drawn_bodies(run)
         self.reach = LARGE_FORCE_LENGTH * side
-        self.large = self._large(run)
-        self.unit = "N/m" if run.slab else "N"
+        large = self._large(run)
+        self.large = large if large > _rounding(run, side) else 0.0
+        self.unit = "N/m" if run.is_slab else "N"
 
     def arrows(self, state: State, pixel: float) -> list[tuple[int, Array, Array]]:
         """(body, tail, vector) of the forces that are large enough for an arrow.
@@ -109,6 +114,16 @@ class Forces:
         return float(np.percentile(finite, LARGE_FORCE_PERCENTILE)) if finite.size else 0.0
 
 
+def _rounding(run: Run, side: float) -> float:
+    """Force on bodies in a fluid at rest that comes from rounding, N (N/m in a slab).
+
+    See ROUNDING_SHIFT; 0 without fluid. side: smaller side of the view, m.
+    """
+    duration = (len(run) - 1) / run.frames_per_second
+    mass = run.density * side ** (2 if run.is_slab else 3)
+    return 2.0 * ROUNDING_SHIFT * mass * side / duration**2 if duration > 0.0 else 0.0
+
+
 def _drawn_bodies(run: Run) -> tuple[int, ...]:
     """Bodies that are drawn; the world is among them only if it is the only one."""
     carrying = () if run.flesh is None else run.flesh.bodies
@@ -116,7 +131,7 @@ def _drawn_bodies(run: Run) -> tuple[int, ...]:
     return tuple(body for body in drawn if body > 0) or tuple(drawn)
 
 
-def goes_along(path: Array, side: float) -> bool:
+def camera_moves(path: Array, side: float) -> bool:
     """Whether a camera that looks at `path` (frames, n) m moves noticeably; it shows `side` m."""
     return bool(np.ptp(path, axis=0).max() > MIN_CAMERA_PATH * side)
 

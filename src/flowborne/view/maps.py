@@ -17,16 +17,18 @@ from PIL import Image
 from flowborne.view import style
 from flowborne.view.fields import Legend, Scale, field_of, over
 from flowborne.view.framing import windows
-from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow, crosses, goes_along
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow, camera_moves, crosses
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.camera import camera_of
 from flowborne.view.space.opengl import off_screen
-from flowborne.view.space.seen import seen_of
+from flowborne.view.space.visible import visible_of
 
 if TYPE_CHECKING:
     from flowborne.view.space.stage import Stage
+
+Array = NDArray[np.float64]
 
 WIND_ROWS = 9
 """Rows of arrows that show a wind, along the map's smaller side."""
@@ -114,8 +116,10 @@ class MapImage(Artist):
         end = np.minimum(last, [right, top])
         if (end <= begin).any():
             return None
-        share = np.array([columns, rows]) / (last - first)
-        (a, b), (c, d) = (begin - first) * share, (end - first) * share
+        whole = np.array([columns, rows])
+        share = whole / (last - first)
+        # rounding must not take the part beyond the image, which Pillow refuses
+        (a, b), (c, d) = (begin - first) * share, np.minimum((end - first) * share, whole)
         size = end - begin
         box = (int(begin[0]), int(begin[1]), int(size[0]), int(size[1]))
         return box, (float(a), float(rows - d), float(c), float(rows - b))
@@ -123,9 +127,6 @@ class MapImage(Artist):
     def _edges(self) -> tuple[int, int, int, int]:
         x0, y0, x1, y1 = (round(edge) for edge in self._axes.bbox.extents)
         return x0, y0, x1, y1
-
-
-Array = NDArray[np.float64]
 
 
 class MapSlab:
@@ -165,7 +166,7 @@ class MapSlab:
             axes.add_collection(self._wind)
             moving.append(self._wind)
         self._marks: LineCollection | None = None
-        if goes_along(self.views, self._side) and not self._shot.transparent:
+        if camera_moves(self.views, self._side) and not self._shot.transparent:
             self._marks = LineCollection([], colors=style.MOTES, linewidths=1.0, animated=True)
             axes.add_collection(self._marks)
             moving.append(self._marks)
@@ -255,9 +256,9 @@ class MapSpace:
         self.camera = camera_of(run, shot, aspect)
         self.width, self.aspect = self.camera.width, self.camera.aspect
         self.forces = Forces(run, min(self.camera.width, self.camera.height))
-        self._seen = seen_of(run, shot)
-        self.legend: Legend = () if self._seen is None else self._seen.legend
-        self.scale: Scale | None = None if self._seen is None else self._seen.scale
+        self._visible = visible_of(run, shot)
+        self.legend: Legend = () if self._visible is None else self._visible.legend
+        self.scale: Scale | None = None if self._visible is None else self._visible.scale
         self._stage: Stage | None = None
 
     def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
@@ -272,7 +273,7 @@ class MapSpace:
 
         pixel = self.width / pixels
         self._stage = Stage(
-            plotter, self.run, self.camera, self.forces, self._seen, pixel, self._shot
+            plotter, self.run, self.camera, self.forces, self._visible, pixel, self._shot
         )
         return [self._image]
 

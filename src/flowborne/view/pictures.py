@@ -58,7 +58,7 @@ class Picture:
         self.run = run
         self.shot = shot = run.shot if shot is None else shot
         curves = strip_curves(run) if shot.plots else []
-        kind = MapSlab if run.slab else MapSpace
+        kind = MapSlab if run.is_slab else MapSpace
         if shot.size is not None:
             self.layout = Layout.sized(shot.size, len(curves), bare=not shot.plots)
             box = self.layout.map

@@ -15,6 +15,7 @@ from matplotlib.ticker import StrMethodFormatter
 from numpy.typing import NDArray
 
 from flowborne.files.atomic import write_atomically
+from flowborne.fits import straight_line
 from flowborne.view import style
 from flowborne.view.run import Run
 
@@ -197,18 +198,6 @@ class ChainCost:
     joints: int
     serial: float
     parallel: float
-
-
-def straight_line(x: Array, y: Array) -> tuple[float, float, float]:
-    """(slope, value at 0, largest relative deviation of y) of the line fitted by least squares.
-
-    raises  ValueError if there are fewer than two different x
-    """
-    if np.unique(x).size < 2:
-        raise ValueError(f"a line needs two different x, and x is {np.asarray(x).tolist()}")
-    slope, start = np.polyfit(x, y, 1)
-    line = slope * np.asarray(x, float) + start
-    return float(slope), float(start), float(np.max(np.abs(np.asarray(y) - line) / np.abs(line)))
 
 
 def plot_chain_cost(rows: Sequence[ChainCost], path: Path) -> None:

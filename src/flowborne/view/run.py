@@ -1,20 +1,18 @@
-"""A run folder, read for drawing."""
+"""A run opened for drawing: the shapes and skins of its bodies in addition to its results."""
 
 from __future__ import annotations
 
 from collections.abc import Sized
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flowborne.files.given import read_json
-from flowborne.fluid.grid import Grid
-from flowborne.runs.history import history_columns, history_rows
-from flowborne.runs.run_folder import STATE_NAME, RunFolder, RunFolderError, reading
-from flowborne.runs.states import read_state
+from flowborne.runs.history import history_columns, read_history
+from flowborne.runs.open_run import OpenRun
+from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.shapes.primitives import shape_of
 from flowborne.shapes.shape import Shape
 from flowborne.solids.skins import skinned
@@ -112,103 +110,71 @@ class CarriedSkin:
         return skinned(self.rest, self.weights, R, t)
 
 
-@dataclass(frozen=True)
-class Run:
-    """The data of a run folder that are the same for all frames; `state` reads one frame.
+class Run(OpenRun):
+    """A run opened for drawing; `history` has only the columns that are plotted.
 
-    name               of the scene
-    bodies             names, the world first
-    accented           numbers of the bodies that controlled joints move
-    controlled         names of the controlled joints
-    grid               of the fluid; None without fluid
-    slab               whether the run is two-dimensional
-    gravity            (3,) m/s^2
-    geoms              drawn geometries, in the order of geom_position
-    frames_per_second  of the film
-    wind               (n, 3) m/s, winds that are drawn if there is no fluid
-    shot               of the scene
-    history            column -> values, a number per frame from frame 1
-    states             files of states/, in order
-    flesh              skin of the flesh; None without flesh
-    carried            skins of the model, in 3D
-    sources            (n, 2, 3) m, lower and upper corners of sources of dye
+    raises  RunFolderError when it is not a run, has no state yet, or a file is missing or damaged
+
+    accented    numbers of the bodies that controlled joints move
+    controlled  names of the controlled joints
+    gravity     (3,) m/s^2
+    density     of the fluid, kg/m^3; 0 without fluid
+    wind        (n, 3) m/s, winds that are drawn if there is no fluid
+    geoms       drawn geometries, in the order of geom_position
+    flesh       skin of the flesh; None without flesh
+    carried     skins of the model, in 3D
+    sources     (n, 2, 3) m, lower and upper corners of sources of dye
+    shot        of the scene
     """
 
-    name: str
-    bodies: tuple[str, ...]
-    accented: frozenset[int]
-    controlled: tuple[str, ...]
-    grid: Grid | None
-    slab: bool
-    gravity: Array
-    geoms: tuple[Geom, ...]
-    frames_per_second: float
-    wind: Array
-    shot: Shot
-    history: dict[str, Array]
-    states: tuple[Path, ...]
-    flesh: Flesh | None = None
-    carried: tuple[CarriedSkin, ...] = ()
-    sources: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
-
-    @classmethod
-    def read(cls, path: Path) -> Self:
-        """The run in folder `path`.
-
-        raises  ValueError if it has no frame; RunFolderError if a file is missing or damaged
-        """
-        folder = RunFolder(path)
-        states = state_files(folder)
-        if not states:
-            raise ValueError(f"{path} has no frame to draw; let the run go on with --resume")
-        with reading(path):
-            return cls._read(folder, states)
-
-    @classmethod
-    def _read(cls, folder: RunFolder, states: tuple[Path, ...]) -> Self:
-        path = folder.path
-        scene = folder.read_scene()
-        model = read_json(folder.model)
-        body_of = dict(zip(model["joints"], model.get("joint_bodies", []), strict=False))
-        geoms = tuple(_geom(entry) for entry in model["geoms"])
-        flesh = _flesh(model.get("flesh"))
-        carried = tuple(_carried(entry) for entry in model.get("skins", ()))
-        bodies = [*body_of.values(), *(geom.body for geom in geoms)]
-        bodies += [body for skin in carried for body in skin.bodies]
-        _check_numbers([*bodies, *(flesh.bodies if flesh else ())], model["bodies"], "body")
-        return cls(
-            name=scene.get("name", path.name),
-            bodies=tuple(model["bodies"]),
-            accented=frozenset(body_of[j] for j in model["controlled"] if j in body_of),
-            controlled=tuple(model["controlled"]),
-            grid=_grid(model["grid"]),
-            slab=bool(model["slab"]),
-            gravity=np.asarray(scene.get("gravity", (0.0, 0.0, 0.0)), float),
-            geoms=geoms,
-            frames_per_second=float(model["frames_per_second"]),
-            wind=np.asarray(model["wind"], float).reshape(-1, 3),
-            shot=Shot.of(scene.get("film", {})),
-            history=_history(folder.history),
-            states=states,
-            flesh=flesh,
-            carried=carried,
-            sources=_sources(scene),
-        )
+    def __init__(self, folder: str | Path) -> None:
+        super().__init__(folder)
+        with reading(self.folder):
+            scene, model = self.scene, self._model
+            body_of = dict(zip(self.joints, model.get("joint_bodies", []), strict=False))
+            self.controlled: tuple[str, ...] = tuple(model["controlled"])
+            self.accented = frozenset(body_of[j] for j in self.controlled if j in body_of)
+            self.gravity = np.asarray(scene.get("gravity", (0.0, 0.0, 0.0)), float)
+            self.density = float(scene.get("fluid", {}).get("density", 0.0))
+            self.wind = np.asarray(model["wind"], float).reshape(-1, 3)
+            self.geoms = tuple(_geom(entry) for entry in model["geoms"])
+            self.flesh = None
+            if self.skin is not None:
+                self.flesh = Flesh(self.skin, tuple(model["flesh"]["bodies"]))
+            self.carried = tuple(_carried(entry) for entry in model.get("skins", ()))
+            self.sources = _sources(scene)
+            self.shot = Shot.of(scene.get("film", {}))
+            self.history = _plotted(RunFolder(self.folder).history)
+            numbers = [*body_of.values(), *(geom.body for geom in self.geoms)]
+            numbers += [body for skin in self.carried for body in skin.bodies]
+            numbers += self.flesh.bodies if self.flesh else ()
+            _check_numbers(numbers, self.bodies, "body")
 
     @property
     def skins(self) -> tuple[Skin, ...]:
         """All deforming surfaces."""
         return self.carried if self.flesh is None else (self.flesh, *self.carried)
 
-    def __len__(self) -> int:
-        """Number of frames that can be drawn, including the initial state."""
-        return len(self.states)
-
     def state(self, number: int) -> State:
-        """Arrays of the `number`-th state; negative numbers count from the end."""
-        arrays = read_state(self.states[number])
+        arrays = super().state(number)
         self._check_geoms(arrays["geom_position"])
         return arrays
+
+    def every(self, name: str) -> Array:
+        values = super().every(name)
+        if name in ("geom_position", "geom_rotation"):
+            self._check_geoms(values[0])
+        return values
+
+    def sampled(self, most: int) -> list[State]:
+        """At most `most` states at even intervals, including the last one."""
+        picks = np.unique(np.linspace(len(self) - 1, 0, min(most, len(self))).round().astype(int))
+        return [self.state(int(pick)) for pick in picks]
+
+    def row(self, number: int) -> int | None:
+        """Row of the history of the `number`-th state; None for the initial one."""
+        rows = np.flatnonzero(self.history["frame"] == self.frames[number])
+        return int(rows[0]) if rows.size else None
 
     def _check_geoms(self, positions: Array) -> None:
         """Raise RunFolderError unless there is a position of each geometry."""
@@ -217,44 +183,6 @@ class Run:
                 f"model.json of the run has {len(self.geoms)} geometries and its states "
                 f"{len(positions)}; start the run again with --replace"
             )
-
-    def sampled(self, most: int) -> list[State]:
-        """At most `most` states at even intervals, including the last one."""
-        picks = np.unique(np.linspace(len(self) - 1, 0, min(most, len(self))).round().astype(int))
-        return [self.state(int(pick)) for pick in picks]
-
-    def every(self, name: str) -> Array:
-        """(n, ...) values of a small array in all states, such as "fluid_force"."""
-        values = np.asarray([read_state(path, (name,))[name] for path in self.states], float)
-        if name in ("geom_position", "geom_rotation"):
-            self._check_geoms(values[0])
-        return values
-
-    @property
-    def times(self) -> Array:
-        """(n,) times of all states, s."""
-        return self.every("time")
-
-    def row(self, number: int) -> int | None:
-        """Row of the history of the `number`-th state; None for the initial one."""
-        frame = int(self.states[number].stem)
-        rows = np.flatnonzero(self.history["frame"] == frame)
-        return int(rows[0]) if rows.size else None
-
-
-def state_files(folder: RunFolder) -> tuple[Path, ...]:
-    """Files of the states of a run, in order."""
-    if not folder.states.is_dir():
-        return ()
-    return tuple(sorted(p for p in folder.states.iterdir() if STATE_NAME.fullmatch(p.name)))
-
-
-def _grid(entry: dict[str, Any] | None) -> Grid | None:
-    if entry is None:
-        return None
-    nx, ny, nz = entry["shape"]
-    x, y, z = entry["origin"]
-    return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
 
 
 def _check_numbers(numbers: ArrayLike, of: Sized, what: str) -> None:
@@ -276,12 +204,6 @@ def _geom(entry: dict[str, Any]) -> Geom:
     return Geom(shape, int(entry["body"]), rgba, covered)
 
 
-def _flesh(entry: dict[str, Any] | None) -> Flesh | None:
-    if entry is None:
-        return None
-    return Flesh(np.asarray(entry["triangles"], np.int64), tuple(entry["bodies"]))
-
-
 def _carried(entry: dict[str, Any]) -> CarriedSkin:
     _check_numbers(entry["triangles"], entry["vertices"], "vertex")
     return CarriedSkin(
@@ -301,7 +223,7 @@ def _sources(scene: dict[str, Any]) -> Array:
     return np.array([box for box in boxes if len(box[0]) == 3], float).reshape(-1, 2, 3)
 
 
-def _history(path: Path) -> dict[str, Array]:
+def _plotted(path: Path) -> dict[str, Array]:
     """The plotted columns that the run has.
 
     raises  ValueError for a history without frames or times
@@ -311,5 +233,4 @@ def _history(path: Path) -> dict[str, Array]:
     for name in required:
         if name not in columns:
             raise ValueError(f"{path.name} has no column '{name}'")
-    rows = np.array(list(history_rows(path, columns)), float).reshape(-1, len(columns))
-    return dict(zip(columns, rows.T, strict=True))
+    return read_history(path, columns)

@@ -111,11 +111,3 @@ class Shot:
                 f"the camera cannot follow body '{name}'; the bodies are {', '.join(bodies)}"
             )
         return list(bodies).index(name)
-
-    def pictured(self, dyes: Sequence[str]) -> None:
-        """Raise ValueError if it shows dye and there are no dyes."""
-        if self.field == "dye" and not dyes:
-            raise ValueError(
-                "the run has no dye to show; draw another field with --set field=vorticity, speed "
-                "or pressure"
-            )

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from flowborne.runs.run_folder import RunFolder
 from flowborne.view.browser.page import is_own, only_own_requests
 from flowborne.view.browser.viewer import open_viewer
 
@@ -57,7 +56,6 @@ def port(write_run: Callable[..., Path]) -> Iterator[int]:
         found.bind(("127.0.0.1", 0))
         free = int(found.getsockname()[1])
     folder = write_run(frames=1)
-    RunFolder(folder).write_summary({"outcome": "done"})
     viewer = open_viewer(folder, "127.0.0.1", free)
     yield free
     viewer.server.stop()

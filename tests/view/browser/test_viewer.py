@@ -25,7 +25,7 @@ from flowborne.view import style
 from flowborne.view.browser.fluid import velocity_arrows
 from flowborne.view.browser.page import CSS
 from flowborne.view.browser.panel import room_for
-from flowborne.view.browser.surroundings import surround
+from flowborne.view.browser.surroundings import add_surroundings
 from flowborne.view.browser.viewer import GrowingRun, Viewer, open_viewer
 from flowborne.view.browser.viewpoint import FilmView, Viewpoint, camera_text
 from flowborne.view.framing import windows
@@ -41,9 +41,7 @@ Write = Callable[..., Path]
 @pytest.fixture
 def folder(write_run: Write) -> Path:
     """Folder of a block in a stream, 12 frames."""
-    path = write_run(frames=12)
-    RunFolder(path).write_summary({"outcome": "done"})
-    return path
+    return write_run(frames=12)
 
 
 def free_port() -> int:
@@ -96,10 +94,11 @@ def test_numbers_at_an_axis_have_room(low: float, high: float, longest: str) -> 
 
 @pytest.mark.parametrize("slab", [True, False])
 def test_marks_stand_in_the_water_where_the_view_goes_along(viewer: Viewer, slab: bool) -> None:
-    scene, run, view = viewer.server.scene, replace(viewer.run, slab=slab), viewer._view
+    scene, run, view = viewer.server.scene, viewer.run, viewer._view
+    run.is_slab = slab
     assert run.grid is not None
     for path, there in ((view.path, False), (np.outer(np.arange(13.0), [1.0, 0.0, 0.0]), True)):
-        surround(scene, run, replace(view, path=path))
+        add_surroundings(scene, run, replace(view, path=path))
         assert ("/run/marks" in scene._handle_from_node_name) == there
     handle = scene._handle_from_node_name["/run/marks"]
     places = np.asarray(handle.points).reshape(-1, 3)[:, :2]
@@ -177,7 +176,7 @@ def test_run_that_goes_on_is_seen_at_its_newest_frame(folder: Path) -> None:
 
 
 def test_states_are_read_once(folder: Path) -> None:
-    run = GrowingRun.opened(folder)
+    run = GrowingRun(folder)
     assert run.grown() is None
     first = run.every("geom_position")
     (folder / "states" / "000005.npz").write_bytes(b"")
@@ -194,7 +193,7 @@ def test_fields_of_a_slab(viewer: Viewer) -> None:
 
 
 def test_velocity_arrows_point_along_the_velocity(folder: Path) -> None:
-    run = Run.read(folder)
+    run = Run(folder)
     assert run.grid is not None
     state = run.state(3)
     vertices, _faces = velocity_arrows(run.grid, state, 2, 0.0, 1.0)
@@ -207,7 +206,7 @@ def test_velocity_arrows_point_along_the_velocity(folder: Path) -> None:
 
 
 def test_camera_of_a_slab_gives_the_same_film(folder: Path) -> None:
-    run = Run.read(folder)
+    run = Run(folder)
     view = FilmView.of(run)
     keys = tomllib.loads(camera_text("run", view.first, True).split("```")[1][4:])["film"]
     shot = Shot.of(FilmTable.model_validate(keys).model_dump(exclude_none=True))
@@ -239,7 +238,7 @@ def test_folder_with_nothing_to_view(
 ) -> None:
     spoil(folder)
     with pytest.raises(RunFolderError, match=said):
-        GrowingRun.opened(folder)
+        GrowingRun(folder)
 
 
 def test_port_in_use_is_said(folder: Path) -> None:

@@ -89,7 +89,7 @@ def things(scene_of_things: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 
 @pytest.fixture
 def run_of(tmp_path: Path) -> Callable[..., Run]:
-    """Makes a run of spheres and other geometries that move as told."""
+    """Makes a run of spheres and other geometries that move as options."""
 
     def make(
         geoms: list[tuple[str, tuple[float, float, float]]],
@@ -97,7 +97,7 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
         *,
         accented: tuple[int, ...] = (),
         force: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        **told: object,
+        **options: object,
     ) -> Run:
         """`centres` (frames, n, 3) of the geometries, each of a body of its own."""
         frames, count = np.shape(centres)[:2]
@@ -123,7 +123,8 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
             "accented": frozenset(accented),
             "controlled": (),
             "grid": None,
-            "slab": False,
+            "is_slab": False,
+            "density": 0.0,
             "gravity": np.zeros(3),
             "geoms": tuple(
                 Geom(shape_of(kind, np.array(size), None), n + 1, plain)
@@ -133,9 +134,15 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
             "wind": np.zeros((0, 3)),
             "shot": Shot(field="none"),
             "history": {"frame": np.arange(1.0, frames), "time_s": np.arange(1.0, frames) / 24.0},
-            "states": tuple(paths),
+            "flesh": None,
+            "carried": (),
+            "sources": np.zeros((0, 2, 3)),
+            "_states": tuple(paths),
+            "frames": tuple(range(frames)),
         }
-        return Run(**values | told)  # type: ignore[arg-type]
+        run = Run.__new__(Run)
+        vars(run).update(values | options)
+        return run
 
     return make
 

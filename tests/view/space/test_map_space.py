@@ -20,7 +20,7 @@ from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
-from flowborne.view.space.surroundings import stands
+from flowborne.view.space.surroundings import stands_on_ground
 
 from .projecting import project
 
@@ -88,7 +88,7 @@ def test_the_accented_body_stands_where_its_projection_says(run_of: Make) -> Non
 
 
 def test_a_body_has_the_models_colour_where_it_gives_one(things: Path) -> None:
-    with closing(Picture(Run.read(things))) as picture:
+    with closing(Picture(Run(things))) as picture:
         pixels = drawn(picture, 2)
         state = picture.run.state(2)
         kinds = [geom.shape.kind for geom in picture.run.geoms]
@@ -142,10 +142,10 @@ def test_what_stands_on_the_ground_casts_a_shadow_on_it(run_of: Make) -> None:
         lit = pixels[pixel_of(picture, 1, np.array([0.4, 0.2, 0.0]))]
         dark = pixels[pixel_of(picture, 1, np.array([0.12, 0.9, 0.0]))]
     assert lit.sum() > dark.sum() + 40
-    for told in ({"gravity": np.zeros(3)}, {"gravity": -down}, {"gravity": down[[2, 1, 0]]}):
-        expected = not any(told["gravity"])
-        assert stands(run_of([BALL, BALL], centres, **told)) == expected
-    assert not stands(run_of([BALL, BALL], centres + 2.0, gravity=down))
+    for options in ({"gravity": np.zeros(3)}, {"gravity": -down}, {"gravity": down[[2, 1, 0]]}):
+        expected = not any(options["gravity"])
+        assert stands_on_ground(run_of([BALL, BALL], centres, **options)) == expected
+    assert not stands_on_ground(run_of([BALL, BALL], centres + 2.0, gravity=down))
 
 
 def test_dye_glows_where_it_is(run_of: Make, box_of_fluid: Grid) -> None:
@@ -158,7 +158,7 @@ def test_dye_glows_where_it_is(run_of: Make, box_of_fluid: Grid) -> None:
     )
     dye = np.zeros(box_of_fluid.shape, np.float32)
     dye[8:11, 3:7, 4:7] = 1.0
-    for path in run.states:
+    for path in run._states:
         with np.load(path) as file:
             arrays = dict(file)
         fluid = {"open": np.ones_like(dye), "scalar_dye": dye}
@@ -187,7 +187,7 @@ def test_a_run_in_space_leaves_a_picture_and_a_film(scene_of_things: Path, tmp_p
     assert result.outcome is RunOutcome.DONE
     assert "film" not in result.message
     still = imageio.imread(tmp_path / "run" / "preview.png")
-    with closing(Picture(Run.read(tmp_path / "run"))) as picture:
+    with closing(Picture(Run(tmp_path / "run"))) as picture:
         film = imageio.imread(tmp_path / "run" / "preview.mp4", plugin="FFMPEG")
         assert film.shape == (4, picture.layout.height, picture.layout.width, 3)
         for number in (3, 0):
@@ -211,6 +211,6 @@ def test_a_run_in_fluid_is_drawn(scene_of_things: Path, tmp_path: Path) -> None:
     )
     flowborne.run(scene, tmp_path / "run", workers=1, frames=2, film=False)
     make_preview(tmp_path / "run")
-    with closing(Picture(Run.read(tmp_path / "run"))) as picture:
+    with closing(Picture(Run(tmp_path / "run"))) as picture:
         assert len(picture.map.legend) == 2
         assert np.ptp(drawn(picture, 2).reshape(-1, 3), axis=0).min() > 100

@@ -39,11 +39,11 @@ def test_a_run_is_whole_without_its_film(scene_of_things: Path, tmp_path: Path) 
 def test_the_command_says_what_is_missing(things: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(["film", str(things)])
-    told = capsys.readouterr()
-    assert (stopped.value.code, told.out) == (2, "")
-    assert told.err.startswith("flowborne: three dimensions cannot be drawn without OpenGL")
-    assert MISSING in told.err
-    assert told.err.count("\n") == 1
+    options = capsys.readouterr()
+    assert (stopped.value.code, options.out) == (2, "")
+    assert options.err.startswith("flowborne: three dimensions cannot be drawn without OpenGL")
+    assert MISSING in options.err
+    assert options.err.count("\n") == 1
 
 
 def test_a_renderer_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,8 +33,15 @@ from flowborne.view.run import Flesh, Geom, Run
 from flowborne.view.space.camera import FILLED, camera_of
 from flowborne.view.space.lighting import KEY
 from flowborne.view.space.opengl import off_screen
-from flowborne.view.space.surfaces import Outside, SkinSurface, creased, mesh_of, normals, way_out
-from flowborne.view.space.surroundings import stands
+from flowborne.view.space.surfaces import (
+    Outside,
+    SkinSurface,
+    creased,
+    exit_distance,
+    mesh_of,
+    normals,
+)
+from flowborne.view.space.surroundings import stands_on_ground
 
 from .projecting import project
 
@@ -81,15 +88,16 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ball_of_flesh(run_of: Make) -> Callable[..., Run]:
     """Makes a run of a ball that lies on the ground and of flesh, wherever that is."""
 
-    def make(vertices: np.ndarray, triangles: np.ndarray, **told: object) -> Run:
+    def make(vertices: np.ndarray, triangles: np.ndarray, **options: object) -> Run:
         """`vertices` (frames, k, 3) of flesh."""
-        run = run_of([BALL], np.full((len(vertices), 1, 3), [0.0, 0.0, 0.1]), **told)
-        for path, places in zip(run.states, vertices, strict=True):
+        run = run_of([BALL], np.full((len(vertices), 1, 3), [0.0, 0.0, 0.1]), **options)
+        for path, places in zip(run._states, vertices, strict=True):
             with np.load(path) as file:
                 arrays = dict(file)
             np.savez(path, **arrays, flesh_vertices=places.astype(np.float32))
         geoms = tuple(replace(geom, covered=True) for geom in run.geoms)
-        return replace(run, geoms=geoms, flesh=Flesh(triangles, (1,)))
+        vars(run).update(geoms=geoms, flesh=Flesh(triangles, (1,)))
+        return run
 
     return make
 
@@ -194,11 +202,12 @@ def test_flesh_alone_may_stand_on_the_ground(ball_of_flesh: Make) -> None:
     for height, expected in ((0.3, True), (1.0, False), (0.0, False)):
         lifted = np.array([places, places]) + np.array([0.0, 0.0, height])
         run = ball_of_flesh(lifted, triangles, gravity=np.array([0.0, 0.0, -9.81]))
-        assert stands(replace(run, geoms=())) == expected
+        run.geoms = ()
+        assert stands_on_ground(run) == expected
 
 
 def test_bones_are_hidden_until_they_are_asked_for(arm: Path) -> None:
-    run = Run.read(arm)
+    run = Run(arm)
     lower = run.state(2)["geom_position"][1].astype(float)
     loose = run.state(2)["flesh_vertices"].astype(float)
     assert [geom.covered for geom in run.geoms] == [True, True]
@@ -217,7 +226,7 @@ def test_bones_are_hidden_until_they_are_asked_for(arm: Path) -> None:
 
 
 def test_arrows_of_forces_start_on_the_skin(arm: Path) -> None:
-    run = Run.read(arm)
+    run = Run(arm)
     assert run.flesh is not None
     assert run.flesh.bodies == (1, 2)
     state = run.state(2)
@@ -277,11 +286,11 @@ def test_the_way_out_ends_where_the_line_first_leaves_the_skin() -> None:
     corners = corners if volume > 0.0 else corners[:, ::-1]
     across = np.array([1.0, 0.0, 0.0])
     inside = np.array([-1.0, 1e-3, 2e-3])
-    assert way_out(inside, across, corners) == pytest.approx(0.3, rel=0.02)
-    assert way_out(inside, -across, corners) == pytest.approx(0.3, rel=0.02)
-    assert way_out(inside - across, across, corners) == 0.0
-    assert way_out(inside + across, across, corners) == 0.0
-    assert way_out(inside, across, corners[:0]) == 0.0
+    assert exit_distance(inside, across, corners) == pytest.approx(0.3, rel=0.02)
+    assert exit_distance(inside, -across, corners) == pytest.approx(0.3, rel=0.02)
+    assert exit_distance(inside - across, across, corners) == 0.0
+    assert exit_distance(inside + across, across, corners) == 0.0
+    assert exit_distance(inside, across, corners[:0]) == 0.0
 
 
 def test_a_part_of_a_body_outside_flesh_still_counts() -> None:

@@ -22,7 +22,6 @@ from flowborne.view.fields import (
     FieldNumber,
     Legend,
     Scale,
-    dyes_of,
     field_of,
     over,
 )
@@ -31,7 +30,7 @@ from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.fluid import VortexSurfaces
 from flowborne.view.space.lighting import scattered
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
+from flowborne.view.space.visible import VisibleDye, VisibleVortices
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -71,64 +70,14 @@ DYE_DEPTH = 1.6
 """Depth of full dye that transmits 1/e of the light, in cells."""
 
 
-class Layer:
-    """A plane in the scene with an image of the cells and arrows of the velocity."""
-
-    def __init__(self, scene: SceneApi, grid: Grid) -> None:
-        self._scene, self._grid = scene, grid
-
-    def show_image(self, image: Pixels, axis: int, place: float) -> None:
-        """Show colours (n, m, 3) of the cells in a plane normal to an axis at `place`, m.
-
-        Rows are along the later of the other two axes, columns along the earlier one.
-        """
-        first, second = across(axis)
-        low, high = np.array(self._grid.origin), np.array(self._grid.upper)
-        centre = 0.5 * (low + high)
-        centre[axis] = place
-        axes = np.eye(3)[[first, second]]
-        rotation = np.column_stack([*axes, np.cross(*axes)])
-        self._scene.add_image(
-            "/run/slice",
-            enlarged(image),
-            float(high[first] - low[first]),
-            float(high[second] - low[second]),
-            format="jpeg",
-            jpeg_quality=90,
-            cast_shadow=False,
-            receive_shadow=False,
-            wxyz=Rotation.from_matrix(rotation).as_quat(scalar_first=True),
-            position=centre,
-        )
-
-    def hide_image(self) -> None:
-        self._scene.remove_by_name("/run/slice")
-
-    def show_velocity(
-        self, state: State, axis: int, place: float, speed: float, wanted: bool
-    ) -> None:
-        """Show arrows of the velocity in the plane; that of `speed` m/s reaches the next arrow."""
-        mesh = velocity_arrows(self._grid, state, axis, place, speed) if wanted else nothing()
-        show_mesh(
-            self._scene,
-            "/run/velocity",
-            mesh,
-            color=style.rgb(style.TEXT),
-            opacity=0.85,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-
-
 def across(axis: int) -> tuple[int, int]:
     """The other two axes."""
     first, second = (n for n in range(3) if n != axis)
     return first, second
 
 
-def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: float) -> Mesh:
-    """Flat arrows of the fluid's velocity in a plane normal to an axis at coordinate `place`, m.
+def velocity_arrows(grid: Grid, state: State, axis: int, coordinate: float, speed: float) -> Mesh:
+    """Flat arrows of the fluid's velocity in a plane normal to an axis at `coordinate`, m.
 
     speed  m/s, of an arrow that reaches the next one; faster ones have the same length
     """
@@ -136,7 +85,7 @@ def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: fl
     shape = [grid.shape[side] for side in sides]
     stride = max(1, round(max(shape) / ARROWS))
     picked = [np.arange(stride // 2, count, stride) for count in shape]
-    layer = int(np.clip((place - grid.origin[axis]) / grid.spacing, 0, grid.shape[axis] - 1))
+    layer = int(np.clip((coordinate - grid.origin[axis]) / grid.spacing, 0, grid.shape[axis] - 1))
     at = np.ix_(*(picked[sides.index(n)] if n in sides else [layer] for n in range(3)))
     velocity = cell_velocity(grid, state)[at][..., list(sides)].reshape(-1, 2).astype(float)
     free = (state["open"][at] > 0.5).ravel() & np.isfinite(velocity).all(axis=1)
@@ -152,7 +101,7 @@ def velocity_arrows(grid: Grid, state: State, axis: int, place: float, speed: fl
         # on both sides of the image
         for side in (-ARROW_OFFSET, ARROW_OFFSET):
             points = np.empty((7, 3))
-            points[:, list(sides)], points[:, axis] = corners, place + side * spacing
+            points[:, list(sides)], points[:, axis] = corners, coordinate + side * spacing
             meshes.append((points, ARROW))
     return joined(meshes)
 
@@ -182,54 +131,92 @@ class Fluid:
         self.grid: Grid = run.grid
         self.toward = toward
         self._scene, self._run = scene, run
-        self._layer = Layer(scene, run.grid)
         self._fields: dict[str, Field | None] = {}
         self._numbers: dict[str, FieldNumber] = {}
 
-    def show(self, state: State, wanted: Settings) -> None:
+    def show(self, state: State, settings: Settings) -> None:
         """Show a state by the settings."""
-        if self._run.slab:
-            self._show_slab(state, wanted)
+        if self._run.is_slab:
+            self._show_slab(state, settings)
         else:
-            self._show_dye(state, wanted.field == "dye")
-            self._show_vortices(state, wanted.field == "vorticity")
-            self._show_slice(state, wanted)
-        axis, place = (2, 0.0) if self._run.slab else (wanted.axis, wanted.place)
-        speed = self._number("speed").limit if wanted.velocity else 1.0
-        self._layer.show_velocity(state, axis, place, speed, wanted.velocity)
+            self._show_dye(state, settings.field == "dye")
+            self._show_vortices(state, settings.field == "vorticity")
+            self._show_slice(state, settings)
+        self._show_velocity(state, settings)
 
-    def legend(self, wanted: Settings) -> tuple[Legend, Sequence[Scale]]:
+    def legend(self, settings: Settings) -> tuple[Legend, Sequence[Scale]]:
         """(name, colour) of what is shown in its own colour, and the colour scales."""
-        if self._run.slab:
-            field = self._slab_field(wanted.field)
+        if self._run.is_slab:
+            field = self._slab_field(settings.field)
             if field is None:
                 return (), ()
             return field.legend, () if field.scale is None else (field.scale,)
         names: Legend = ()
-        if wanted.field == "dye":
+        if settings.field == "dye":
             names = self._dye.legend
-        if wanted.field == "vorticity":
+        if settings.field == "vorticity":
             names = self._vortices.legend
-        scale = None if wanted.slice == "none" else self._number(wanted.slice).scale
+        scale = None if settings.slice == "none" else self._number(settings.slice).scale
         return names, () if scale is None else (scale,)
 
-    def _show_slab(self, state: State, wanted: Settings) -> None:
-        field = self._slab_field(wanted.field)
+    def _show_slab(self, state: State, settings: Settings) -> None:
+        field = self._slab_field(settings.field)
         image = np.zeros((1, 1, 4), np.uint8) if field is None else field.image(state)
-        self._layer.show_image(over(image, self._run.shot.colour), 2, 0.0)
+        self._show_image(over(image, self._run.shot.colour), 2, 0.0)
 
-    def _show_slice(self, state: State, wanted: Settings) -> None:
-        if wanted.slice == "none":
-            self._layer.hide_image()
+    def _show_slice(self, state: State, settings: Settings) -> None:
+        if settings.slice == "none":
+            self._scene.remove_by_name("/run/slice")
             return
-        cell = (wanted.place - self.grid.origin[wanted.axis]) / self.grid.spacing
-        image = SeenSlice(self._number(wanted.slice)).image(state, wanted.axis, cell)
-        self._layer.show_image(image.swapaxes(0, 1), wanted.axis, wanted.place)
+        cell = (settings.coordinate - self.grid.origin[settings.axis]) / self.grid.spacing
+        image = self._number(settings.slice).layer(state, settings.axis, cell)
+        self._show_image(image.swapaxes(0, 1), settings.axis, settings.coordinate)
 
-    def _show_vortices(self, state: State, wanted: bool) -> None:
+    def _show_image(self, image: Pixels, axis: int, coordinate: float) -> None:
+        """Show colours (n, m, 3) of the cells in a plane normal to an axis at `coordinate`, m.
+
+        Rows are along the later of the other two axes, columns along the earlier one.
+        """
+        first, second = across(axis)
+        low, high = np.array(self.grid.origin), np.array(self.grid.upper)
+        centre = 0.5 * (low + high)
+        centre[axis] = coordinate
+        axes = np.eye(3)[[first, second]]
+        rotation = np.column_stack([*axes, np.cross(*axes)])
+        self._scene.add_image(
+            "/run/slice",
+            enlarged(image),
+            float(high[first] - low[first]),
+            float(high[second] - low[second]),
+            format="jpeg",
+            jpeg_quality=90,
+            cast_shadow=False,
+            receive_shadow=False,
+            wxyz=Rotation.from_matrix(rotation).as_quat(scalar_first=True),
+            position=centre,
+        )
+
+    def _show_velocity(self, state: State, settings: Settings) -> None:
+        """Show arrows of the velocity in the plane; that of the limit reaches the next arrow."""
+        mesh = nothing()
+        if settings.velocity:
+            plane = (2, 0.0) if self._run.is_slab else (settings.axis, settings.coordinate)
+            mesh = velocity_arrows(self.grid, state, *plane, self._number("speed").limit)
+        show_mesh(
+            self._scene,
+            "/run/velocity",
+            mesh,
+            color=style.rgb(style.TEXT),
+            opacity=0.85,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def _show_vortices(self, state: State, visible: bool) -> None:
         """Show one mesh for each sense of rotation."""
         points, faces, warm = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, bool)
-        if wanted:
+        if visible:
             surface = self._surfaces.of(state, self.toward)
             if surface.n_points:
                 points, faces = surface.points, surface.regular_faces
@@ -248,9 +235,9 @@ class Fluid:
                 receive_shadow=False,
             )
 
-    def _show_dye(self, state: State, wanted: bool) -> None:
+    def _show_dye(self, state: State, visible: bool) -> None:
         """Show a Gaussian for each cell with dye, lit as smoke."""
-        smoke = cloud(self.grid, self._dye, state, self.toward) if wanted else None
+        smoke = cloud(self.grid, self._dye, state, self.toward) if visible else None
         if smoke is None or not len(smoke[0]):
             self._scene.remove_by_name("/run/dye")
             return
@@ -264,12 +251,12 @@ class Fluid:
         )
 
     @cached_property
-    def _dye(self) -> SeenDye:
-        return SeenDye(self._run, dyes_of(self._run))
+    def _dye(self) -> VisibleDye:
+        return VisibleDye(self._run)
 
     @cached_property
-    def _vortices(self) -> SeenVortices:
-        return SeenVortices(self._run)
+    def _vortices(self) -> VisibleVortices:
+        return VisibleVortices(self._run)
 
     @cached_property
     def _surfaces(self) -> VortexSurfaces:
@@ -287,7 +274,7 @@ class Fluid:
 
 
 def cloud(
-    grid: Grid, dye: SeenDye, state: State, toward: Array
+    grid: Grid, dye: VisibleDye, state: State, toward: Array
 ) -> tuple[Array, NDArray[np.float32], NDArray[np.float32], float]:
     """Centres (n, 3) m, colours (n, 3) and opacities (n,) of the cells with dye, and their size, m.
 

@@ -26,7 +26,7 @@ CSS = (
 requires 4.5:1."""
 
 
-def dress(server: ViserServer, name: str) -> None:
+def style_page(server: ViserServer, name: str) -> None:
     """Set the title of all open and future pages to the name of a run, and their style."""
     from viser import _messages
 

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from flowborne.view import style
 from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.viewpoint import FilmView
-from flowborne.view.fields import Scale, dyes_of
+from flowborne.view.fields import Scale
 from flowborne.view.glyphs import Forces, round_number
 from flowborne.view.plots import robust_limits, strip_curves
 from flowborne.view.run import Run
 
 if TYPE_CHECKING:
     from viser import GuiApi
+
+Array = NDArray[np.float64]
 
 COLOUR_STOPS = 24
 """Number of colours in the bar of a scale."""
@@ -45,6 +47,13 @@ PACES = {"1/8": 0.125, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0}
 """Name of a pace -> seconds of the run per second."""
 
 AXES = "xyz"
+
+CLOCK = (
+    '<div style="padding:8px 12px 2px;display:flex;justify-content:space-between;'
+    'font-variant-numeric:tabular-nums"><b style="font-size:17px">t = {time:.3f} s</b>'
+    '<span style="align-self:end">frame {frame} of {last}{state}</span></div>'
+)
+"""HTML of the time of a state."""
 
 
 def legend_html(
@@ -96,9 +105,6 @@ def _force(forces: Forces) -> str:
 
 def _number(value: float) -> str:
     return f"{value:.2g}".replace("-", "−")
-
-
-Array = NDArray[np.float64]
 
 
 class Curves:
@@ -214,11 +220,11 @@ class Panel:
             values["axis"] = AXES.index(values["axis"])
         return Settings(**values)
 
-    def obey(self) -> None:
+    def apply_controls(self) -> None:
         """Apply pace and slider to the timeline; hide the controls of a slice if there is none."""
         if "slice" in self._controls:
             sliced = self._controls["slice"].value != "none" or self._controls["velocity"].value
-            self._controls["axis"].visible = self._controls["place"].visible = sliced
+            self._controls["axis"].visible = self._controls["coordinate"].visible = sliced
         self._timeline.pace = PACES[self._pace.value]
         if self._slider.value != self._slider_time:
             self._timeline.seek(self._slider.value)
@@ -230,8 +236,8 @@ class Panel:
         state = ", playing" if timeline.playing else ", newest" if timeline.newest else ""
         self._clock.content = CLOCK.format(
             time=timeline.times[number],
-            frame=int(run.states[number].stem),
-            last=int(run.states[-1].stem),
+            frame=run.frames[number],
+            last=run.frames[-1],
             state=state,
         )
         self._slider_time = self._slider.value = round(float(timeline.time), 4)
@@ -269,12 +275,11 @@ class Panel:
     def _add_shown(self, gui: GuiApi, run: Run, view: FilmView) -> None:
         controls, shot = self._controls, run.shot
         if run.grid is not None:
-            dyes = dyes_of(run)
-            fields = [*(["dye"] if dyes else []), "vorticity"]
-            fields += ["speed", "pressure", "none"] if run.slab else ["none"]
+            fields = [*(["dye"] if run.dyes else []), "vorticity"]
+            fields += ["speed", "pressure", "none"] if run.is_slab else ["none"]
             first: str = shot.field if shot.field in fields else "none"
             controls["field"] = gui.add_dropdown("fluid", fields, initial_value=first)
-            if not run.slab:
+            if not run.is_slab:
                 self._add_slice(gui, run, view)
             controls["velocity"] = gui.add_checkbox("velocity arrows", False)
         controls["forces"] = gui.add_checkbox("forces", True)
@@ -294,25 +299,17 @@ class Panel:
         controls["slice"] = gui.add_dropdown("slice", kinds, initial_value=first)
         across = gui.add_dropdown("across", list(AXES), initial_value=AXES[axis])
         low, high, h = run.grid.origin, run.grid.upper, run.grid.spacing
-        place: Any = gui.add_slider(
+        coordinate: Any = gui.add_slider(
             "at (m)",
             low[axis] + 0.5 * h,
             high[axis] - 0.5 * h,
             h,
             float(np.clip(view.first.target[axis], low[axis] + 0.5 * h, high[axis] - 0.5 * h)),
         )
-        controls["axis"], controls["place"] = across, place
+        controls["axis"], controls["coordinate"] = across, coordinate
 
         @across.on_update
         def _(_: Any) -> None:
             n = AXES.index(across.value)
-            place.min, place.max = low[n] + 0.5 * h, high[n] - 0.5 * h
-            place.value = float(np.clip(view.first.target[n], place.min, place.max))
-
-
-CLOCK = (
-    '<div style="padding:8px 12px 2px;display:flex;justify-content:space-between;'
-    'font-variant-numeric:tabular-nums"><b style="font-size:17px">t = {time:.3f} s</b>'
-    '<span style="align-self:end">frame {frame} of {last}{state}</span></div>'
-)
-"""HTML of the time of a state."""
+            coordinate.min, coordinate.max = low[n] + 0.5 * h, high[n] - 0.5 * h
+            coordinate.value = float(np.clip(view.first.target[n], coordinate.min, coordinate.max))

@@ -7,32 +7,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Settings:
     """What is shown of a state.
 
-    field     "dye", "vorticity" or "none"; of a slab also "speed" and "pressure"
-    slice     "speed", "pressure" or "none", in space
-    axis      number of the axis normal to the slice
-    place     coordinate of the slice on that axis, m
-    velocity  whether the velocity is shown, in 3D in the slice
-    bones     whether flesh is transparent to show its bones
-    forces    whether the forces on the bodies are shown
-    follow    whether the view follows the bodies
+    field       "dye", "vorticity" or "none"; of a slab also "speed" and "pressure"
+    slice       "speed", "pressure" or "none", in space
+    axis        number of the axis normal to the slice
+    coordinate  coordinate of the slice on that axis, m
+    velocity    whether the velocity is shown, in 3D in the slice
+    bones       whether flesh is transparent to show its bones
+    forces      whether the forces on the bodies are shown
+    follow      whether the view follows the bodies
     """
 
     field: str = "none"
     slice: str = "none"
     axis: int = 1
-    place: float = 0.0
+    coordinate: float = 0.0
     velocity: bool = False
     bones: bool = False
     forces: bool = True
     follow: bool = True
-
-
-Array = NDArray[np.float64]
 
 
 class Timeline:

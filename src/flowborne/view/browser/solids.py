@@ -22,7 +22,7 @@ from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, Skin, State
 from flowborne.view.space.arrows import arrow_mesh
-from flowborne.view.space.surfaces import Outside, colour_of, creased, mesh_of, pushes
+from flowborne.view.space.surfaces import Outside, colour_of, creased, force_arrows, mesh_of
 
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
@@ -87,17 +87,17 @@ class SkinMesh:
         if self.mesh.visible:
             points, faces = self._surface(state, vertices)
             self.mesh.vertices = points.astype(np.float32)
-            if self._run.slab:
+            if self._run.is_slab:
                 self.mesh.faces = faces.astype(np.uint32)
 
     def _surface(self, state: State, vertices: Array) -> Mesh:
         """Mesh of the skin with vertices (k, 3) m in a state."""
-        if self._run.slab:
+        if self._run.is_slab:
             return prism(flesh_loops(self._run, state), 0.0, self._high)
         return vertices[self._vertex], self._faces
 
 
-class Pushes:
+class ForceArrows:
     """The forces of fluid and winds on the bodies, as arrows of one scale.
 
     scale  of the arrows
@@ -105,15 +105,15 @@ class Pushes:
 
     def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
         self.scale = Forces(run, side)
-        self._scene, self._slab = scene, run.slab
+        self._scene, self._slab = scene, run.is_slab
         self._pixel, self._high = side / PIXELS, SLAB_THICKNESS * side
         self._outside = None
-        if not run.slab:
+        if not run.is_slab:
             self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
 
-    def show(self, state: State, wanted: bool) -> None:
+    def show(self, state: State, visible: bool) -> None:
         """Show the arrows of a state, or none."""
-        mesh = self._mesh(state) if wanted else nothing()
+        mesh = self._mesh(state) if visible else nothing()
         colour = style.rgb(style.FORCE)
         show_mesh(self._scene, "/run/forces", mesh, color=colour, cast_shadow=False)
 
@@ -124,12 +124,12 @@ class Pushes:
             found = self.scale.arrows(state, self._pixel)
             flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]
             return joined([prism([one], self._high, 1.5 * self._high) for one in flat])
-        return arrow_mesh(*pushes(self.scale, self._outside, state, self._pixel), width)
+        return arrow_mesh(*force_arrows(self.scale, self._outside, state, self._pixel), width)
 
 
 def _surfaces(run: Run, side: float) -> list[Mesh]:
     """Vertices (k, 3) m and faces (m, 3) of each geometry in its own frame."""
-    if not run.slab:
+    if not run.is_slab:
         meshes = [mesh_of(geom) for geom in run.geoms]
         return [(np.asarray(m.points, float), m.regular_faces) for m in meshes]
     state, found = run.state(0), []

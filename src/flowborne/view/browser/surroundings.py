@@ -11,11 +11,11 @@ from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.browser.meshes import add_mesh
 from flowborne.view.browser.viewpoint import FilmView
-from flowborne.view.glyphs import crosses, goes_along, motes, round_number
+from flowborne.view.glyphs import camera_moves, crosses, motes, round_number
 from flowborne.view.run import Run
 from flowborne.view.space.arrows import arrow_mesh
 from flowborne.view.space.lighting import LIGHTS
-from flowborne.view.space.surroundings import SQUARE, stands
+from flowborne.view.space.surroundings import SQUARE, stands_on_ground
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -33,7 +33,7 @@ ABOVE = ((0.25, 0.45, -1.0), 0.75, "#ffffff")
 """Direction, strength and colour of the light on a slab, which is seen from above."""
 
 
-def surround(scene: SceneApi, run: Run, view: FilmView) -> None:
+def add_surroundings(scene: SceneApi, run: Run, view: FilmView) -> None:
     """Add everything to the scene that does not change with time."""
     scene.set_up_direction(view.up)
     scene.set_background_image(
@@ -41,19 +41,19 @@ def surround(scene: SceneApi, run: Run, view: FilmView) -> None:
         format="png",
     )
     scene.add_frame("/run", show_axes=False)
-    ground = not run.slab and stands(run)
-    _light(scene, run.slab, ground)
+    ground = not run.is_slab and stands_on_ground(run)
+    _add_lights(scene, run.is_slab, ground)
     if ground:
-        _lay_ground(scene, view)
-    if run.grid is not None and not run.slab:
-        _draw_edges(scene, run.grid)
-    if run.grid is not None and not ground and goes_along(view.path, view.side):
-        _mark(scene, run.grid, view, run.slab)
+        _add_ground(scene, view)
+    if run.grid is not None and not run.is_slab:
+        _add_edges(scene, run.grid)
+    if run.grid is not None and not ground and camera_moves(view.path, view.side):
+        _add_marks(scene, run.grid, view, run.is_slab)
     if run.grid is None and run.wind.any():
-        _blow(scene, run, view)
+        _add_wind(scene, run, view)
 
 
-def _light(scene: SceneApi, slab: bool, shadows: bool) -> None:
+def _add_lights(scene: SceneApi, slab: bool, shadows: bool) -> None:
     scene.configure_default_lights(False)
     scene.configure_environment_map(None)
     scene.add_light_ambient("/lights/ambient", intensity=AMBIENT)
@@ -69,7 +69,7 @@ def _light(scene: SceneApi, slab: bool, shadows: bool) -> None:
         )
 
 
-def _lay_ground(scene: SceneApi, view: FilmView) -> None:
+def _add_ground(scene: SceneApi, view: FilmView) -> None:
     """Add a floor with squares of a round number of metres that fades out."""
     square = round_number(SQUARE * view.side)
     scene.add_grid(
@@ -88,7 +88,7 @@ def _lay_ground(scene: SceneApi, view: FilmView) -> None:
     )
 
 
-def _mark(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
+def _add_marks(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
     """Add marks that are fixed in the water, to show that the view moves."""
     low, high = np.array(grid.origin), np.array(grid.upper)
     if slab:
@@ -114,7 +114,7 @@ def _mark(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
     )
 
 
-def _draw_edges(scene: SceneApi, grid: Grid) -> None:
+def _add_edges(scene: SceneApi, grid: Grid) -> None:
     """Add the edges of the fluid's domain."""
     corners = np.array(list(product(*zip(grid.origin, grid.upper, strict=True))))
     ends = [(a, b) for a, b in combinations(corners, 2) if np.count_nonzero(a != b) == 1]
@@ -127,7 +127,7 @@ def _draw_edges(scene: SceneApi, grid: Grid) -> None:
     )
 
 
-def _blow(scene: SceneApi, run: Run, view: FilmView) -> None:
+def _add_wind(scene: SceneApi, run: Run, view: FilmView) -> None:
     """Add a fixed arrow along the wind, upwind of the camera's first target, with its speed."""
     wind = run.wind.sum(axis=0)
     speed = float(np.linalg.norm(wind))
@@ -136,5 +136,5 @@ def _blow(scene: SceneApi, run: Run, view: FilmView) -> None:
     mesh = arrow_mesh(tail[None], vector[None], 0.012 * view.side)
     colour = style.rgb(style.CURVES[1])
     add_mesh(scene, "/wind", mesh, color=colour, cast_shadow=False, receive_shadow=False)
-    place = tail + 0.5 * vector + 0.04 * view.side * np.eye(3)["xyz".index(view.up[1])]
-    scene.add_label("/wind/speed", f"wind {speed:.3g} m/s", position=place)
+    label_position = tail + 0.5 * vector + 0.04 * view.side * np.eye(3)["xyz".index(view.up[1])]
+    scene.add_label("/wind/speed", f"wind {speed:.3g} m/s", position=label_position)

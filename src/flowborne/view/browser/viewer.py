@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import socket
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.extras import optional
-from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.view.browser.fluid import Fluid
-from flowborne.view.browser.page import dress, only_own_requests
+from flowborne.view.browser.page import only_own_requests, style_page
 from flowborne.view.browser.panel import Panel, legend_html
 from flowborne.view.browser.settings import Settings, Timeline
-from flowborne.view.browser.solids import Bodies, Pushes, SkinMesh
-from flowborne.view.browser.surroundings import surround
+from flowborne.view.browser.solids import Bodies, ForceArrows, SkinMesh
+from flowborne.view.browser.surroundings import add_surroundings
 from flowborne.view.browser.viewpoint import CameraKeys, FilmView
-from flowborne.view.run import Run, state_files
+from flowborne.view.run import Run
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -31,46 +30,30 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
 class GrowingRun(Run):
     """A run that may continue; `grown` reads it again with its new frames.
 
     started  ns, time at which its folder was written first
-    kept     name -> arrays of the states that `every` has read, so that each is read once
     """
 
-    started: int = 0
-    kept: dict[str, list[NDArray[Any]]] = field(default_factory=dict, repr=False)
+    def __init__(self, folder: str | Path) -> None:
+        files = RunFolder.existing(Path(folder))
+        with reading(files.path):
+            self.started = files.model.stat().st_mtime_ns
+        super().__init__(folder)
+        self._kept: dict[str, list[NDArray[Any]]] = {}
 
-    @classmethod
-    def opened(cls, path: Path) -> Self:
-        """The run in folder `path`.
-
-        raises  RunFolderError if it is not a run, has no frame yet, or cannot be read
-        """
-        files = RunFolder.existing(path)
-        if not state_files(files):
-            raise RunFolderError(f"{path} has no frame yet; view it when the run has begun")
-        try:
-            started = files.model.stat().st_mtime_ns
-            return replace(cls.read(path), started=started)
-        except (OSError, KeyError, ValueError) as error:
-            raise RunFolderError(
-                f"{path} cannot be read ({error}); start the run again with --replace"
-            ) from error
-
-    def grown(self) -> Self | None:
+    def grown(self) -> GrowingRun | None:
         """The run with its new frames; None if there are none.
 
         A run that was started again is another one, with another `started`.
         raises  RunFolderError if it cannot be read, for example while it is being replaced
         """
-        files = RunFolder(self.states[0].parent.parent)
-        if len(state_files(files)) == len(self):
+        if len(RunFolder(self.folder).state_files()) == len(self):
             return None
-        new = self.opened(files.path)
+        new = GrowingRun(self.folder)
         if new.continues(self):
-            new.kept.update(self.kept)
+            new._kept = self._kept
         return new
 
     def continues(self, other: GrowingRun) -> bool:
@@ -78,9 +61,9 @@ class GrowingRun(Run):
         return self.started == other.started and len(self) >= len(other)
 
     def every(self, name: str) -> Array:
-        """(n, ...) values of a small array in all states, such as "fluid_force"."""
-        values = self.kept.setdefault(name, [])
-        for path in self.states[len(values) :]:
+        """The same as of any run, but each state is read once."""
+        values = self._kept.setdefault(name, [])
+        for path in self._states[len(values) :]:
             values.append(read_state(path, (name,))[name])
         return np.asarray(values, float)
 
@@ -109,12 +92,12 @@ class Viewer:
     def tick(self, seconds: float) -> None:
         """Advance by seconds of real time, and update the scene if anything changed."""
         self.timeline.advance(seconds)
-        self.panel.obey()
+        self.panel.apply_controls()
         timeline, settings = self.timeline, self.panel.settings
-        wanted = (timeline.number, timeline.playing, timeline.newest, settings)
-        if wanted != self._shown:
+        current = (timeline.number, timeline.playing, timeline.newest, settings)
+        if current != self._shown:
             self._show(settings)
-            self._shown = wanted
+            self._shown = current
 
     def look(self) -> None:
         """Read new frames of the run, and the cameras of all clients."""
@@ -132,24 +115,24 @@ class Viewer:
         server = self.server
         server.scene.reset()
         server.gui.reset()
-        dress(server, run.name)
+        style_page(server, run.name)
         self.run, self._view = run, FilmView.of(run)
         self.timeline = Timeline(run.times)
         first, side = self._view.first, self._view.side
         server.initial_camera.position = tuple(first.position)
         server.initial_camera.look_at = tuple(first.target)
         server.initial_camera.fov = float(np.radians(first.lens))
-        surround(server.scene, run, self._view)
+        add_surroundings(server.scene, run, self._view)
         self._bodies = Bodies(server.scene, run, side)
         self._skins = [
             SkinMesh(server.scene, run, skin, str(n), side) for n, skin in enumerate(run.skins)
         ]
         self._measure()
         self.panel = Panel(server.gui, run, self._view, self.timeline)
-        self._keys = CameraKeys(self.folder, run.slab)
+        self._keys = CameraKeys(self.folder, run.is_slab)
         self._along = np.zeros(3)
         self._shown = None
-        if RunFolder(run.states[0].parent.parent).goes_on():
+        if RunFolder(run.folder).is_unfinished():
             self.timeline.show_newest()
 
     def _extend(self, run: GrowingRun) -> None:
@@ -165,28 +148,28 @@ class Viewer:
         """Take scales from the frames so far; repeated whenever their number doubles."""
         run, view = self.run, self._view
         self._measured = len(run)
-        self._pushes = Pushes(self.server.scene, run, view.side)
+        self._force_arrows = ForceArrows(self.server.scene, run, view.side)
         toward = view.first.position - view.first.target
         self._fluid = None
         if run.grid is not None:
             self._fluid = Fluid(self.server.scene, run, toward / np.linalg.norm(toward))
 
-    def _show(self, wanted: Settings) -> None:
+    def _show(self, settings: Settings) -> None:
         """Show the current state by the settings."""
         number = self.timeline.number
         state = self.run.state(number)
-        self._along = self._view.path[number] if wanted.follow else np.zeros(3)
-        names, scales = ((), ()) if self._fluid is None else self._fluid.legend(wanted)
+        self._along = self._view.path[number] if settings.follow else np.zeros(3)
+        names, scales = ((), ()) if self._fluid is None else self._fluid.legend(settings)
         with self.server.atomic():
             self.server.scene.add_frame("/run", show_axes=False, position=-self._along)
-            self._bodies.show(state, wanted.bones)
+            self._bodies.show(state, settings.bones)
             for skin in self._skins:
-                skin.show(state, wanted.bones)
-            self._pushes.show(state, wanted.forces)
+                skin.show(state, settings.bones)
+            self._force_arrows.show(state, settings.forces)
             if self._fluid is not None:
-                self._fluid.show(state, wanted)
+                self._fluid.show(state, settings)
             self.panel.show(self.run, number)
-            shown = self._pushes.scale if wanted.forces else None
+            shown = self._force_arrows.scale if settings.forces else None
             self.panel.legend.content = legend_html(names, scales, shown)
 
 
@@ -197,7 +180,7 @@ def open_viewer(folder: Path, host: str, port: int) -> Viewer:
             host and port cannot be used; ValueError if the shot of the run's scene does not fit it
     """
     viser = optional("viser", "viser", "view", "views in a browser")
-    run = GrowingRun.opened(folder)
+    run = GrowingRun(folder)
     _check_free(host, port)
     with only_own_requests(host):
         server = viser.ViserServer(host=host, port=port, verbose=False)

@@ -72,7 +72,7 @@ class FilmView:
     def of(cls, run: Run) -> FilmView:
         """raises  ValueError if its camera follows a body that does not exist"""
         lens = run.shot.camera.lens
-        if run.slab:
+        if run.is_slab:
             views = windows(run, Outlines(run), run.shot, ASPECT)
             path = np.column_stack([views[:, :2].mean(axis=1), views[:, 2:].mean(axis=1)])
             path = np.pad(path, ((0, 0), (0, 1)))

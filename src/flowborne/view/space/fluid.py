@@ -15,11 +15,12 @@ from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
+from flowborne.view.fields import FieldNumber
 from flowborne.view.run import State
 from flowborne.view.space.camera import Camera
 from flowborne.view.space.lighting import scattered
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
 from flowborne.view.space.surfaces import LIT
+from flowborne.view.space.visible import Visible, VisibleDye, VisibleVortices
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -44,7 +45,7 @@ SLICE_PIXELS = 1024
 """Longer side of the image of a slice."""
 
 
-class VisibleFluid(Protocol):
+class DrawnFluid(Protocol):
     """The fluid in a plotter."""
 
     def show(self, state: State, focus: Array, toward: Array) -> None:
@@ -52,21 +53,19 @@ class VisibleFluid(Protocol):
         ...
 
 
-def fluid_in(
-    plotter: pv.Plotter, grid: Grid, seen: SeenDye | SeenVortices | SeenSlice, camera: Camera
-) -> VisibleFluid:
+def fluid_in(plotter: pv.Plotter, grid: Grid, visible: Visible, camera: Camera) -> DrawnFluid:
     """Add the visible quantity of a fluid to a plotter."""
-    if isinstance(seen, SeenDye):
-        return Smoke(plotter, grid, seen, camera.height)
-    if isinstance(seen, SeenVortices):
-        return Vortices(plotter, grid, seen)
-    return Slice(plotter, grid, seen, camera.axes(0)[2])
+    if isinstance(visible, VisibleDye):
+        return Smoke(plotter, grid, visible, camera.height)
+    if isinstance(visible, VisibleVortices):
+        return Vortices(plotter, grid, visible)
+    return Slice(plotter, grid, visible, camera.axes(0)[2])
 
 
 class Smoke:
     """A cloud of dye in a plotter."""
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, dye: SeenDye, height: float) -> None:
+    def __init__(self, plotter: pv.Plotter, grid: Grid, dye: VisibleDye, height: float) -> None:
         """`height`: of the view, m."""
         self._grid, self._dye = grid, dye
         self._depth = max(
@@ -146,8 +145,10 @@ class VortexSurfaces:
     max_fine  points up to which they are found on a grid twice as fine
     """
 
-    def __init__(self, grid: Grid, seen: SeenVortices, max_fine: int = MAX_FINE_POINTS) -> None:
-        self._seen = seen
+    def __init__(
+        self, grid: Grid, vortices: VisibleVortices, max_fine: int = MAX_FINE_POINTS
+    ) -> None:
+        self._vortices = vortices
         self._finer = 2 if 8 * np.prod(grid.shape) <= max_fine else 1
         h = grid.spacing / self._finer
         self._image = pv.ImageData(
@@ -159,21 +160,21 @@ class VortexSurfaces:
     def of(self, state: State, toward: Array) -> pv.PolyData:
         """Triangles; "sense" of their vertices is -1 (clockwise seen from `toward` (3,)) to 1."""
         for name, values, order in (
-            ("q", self._seen.q(state), 3),
-            ("sense", self._seen.sense(state, toward), 1),
+            ("q", self._vortices.q(state), 3),
+            ("sense", self._vortices.sense(state, toward), 1),
         ):
             fine = values.astype(np.float32)
             if self._finer > 1:
                 fine = zoom(fine, self._finer, order=order, grid_mode=True, mode="nearest")
             self._image.point_data[name] = fine.ravel(order="F")
-        return self._image.contour([self._seen.level], scalars="q")
+        return self._image.contour([self._vortices.level], scalars="q")
 
 
 class Vortices:
     """Surfaces of vortices in a plotter."""
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenVortices) -> None:
-        self._surfaces = VortexSurfaces(grid, seen)
+    def __init__(self, plotter: pv.Plotter, grid: Grid, vortices: VisibleVortices) -> None:
+        self._surfaces = VortexSurfaces(grid, vortices)
         self._plotter = plotter
         self._actor: pv.Actor | None = None
 
@@ -204,8 +205,8 @@ class Slice:
     toward  (3,) direction of the camera in the first frame
     """
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, seen: SeenSlice, toward: Array) -> None:
-        self._grid, self._seen = grid, seen
+    def __init__(self, plotter: pv.Plotter, grid: Grid, number: FieldNumber, toward: Array) -> None:
+        self._grid, self._number = grid, number
         self._axis = int(np.argmax(np.abs(toward[:2])))
         first, second = (n for n in range(3) if n != self._axis)
         low, high = np.array(grid.origin), np.array(grid.upper)
@@ -224,7 +225,7 @@ class Slice:
     def show(self, state: State, focus: Array, toward: Array) -> None:
         """Show the slice of a state through `focus` (3,) m."""
         cell = (focus[self._axis] - self._grid.origin[self._axis]) / self._grid.spacing
-        image = self._seen.image(state, self._axis, cell)
+        image = self._number.layer(state, self._axis, cell)
         small = Image.fromarray(np.ascontiguousarray(image.transpose(1, 0, 2)[::-1]))
         large = np.asarray(small.resize(self._pixels, Image.Resampling.BICUBIC))
         self._actor.texture = pv.Texture(large)

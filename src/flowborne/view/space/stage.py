@@ -8,16 +8,23 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
-from flowborne.view.glyphs import SHAFT_WIDTH, Forces, goes_along
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves
 from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows, WindArrows
 from flowborne.view.space.camera import Camera
 from flowborne.view.space.fluid import fluid_in
 from flowborne.view.space.lighting import KEY, LIGHTS
-from flowborne.view.space.seen import SeenDye, SeenSlice, SeenVortices
-from flowborne.view.space.surfaces import LIT, Outside, SkinSurface, colour_of, mesh_of, pushes
-from flowborne.view.space.surroundings import Ground, Motes, stands
+from flowborne.view.space.surfaces import (
+    LIT,
+    Outside,
+    SkinSurface,
+    colour_of,
+    force_arrows,
+    mesh_of,
+)
+from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground
+from flowborne.view.space.visible import Visible
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -29,9 +36,9 @@ MULTI_SAMPLES = 8
 class Stage:
     """Scene of a run in a plotter, which it owns from then on.
 
-    seen   visible quantity of the fluid, if any
-    pixel  m, size of a pixel of the film
-    shot   background, and whether flesh is transparent to show its bones
+    visible  quantity of the fluid, if any
+    pixel    m, size of a pixel of the film
+    shot     background, and whether flesh is transparent to show its bones
     """
 
     def __init__(
@@ -40,7 +47,7 @@ class Stage:
         run: Run,
         camera: Camera,
         forces: Forces,
-        seen: SeenDye | SeenVortices | SeenSlice | None,
+        visible: Visible | None,
         pixel: float,
         shot: Shot,
     ) -> None:
@@ -61,10 +68,10 @@ class Stage:
         self._outside = Outside(run.geoms, meshes, run.skins)
         self._arrows = Arrows(plotter, max(len(run.bodies), 1), style.FORCE, 0.35)
         self._ground = self._wind = self._motes = None
-        if stands(run):
+        if stands_on_ground(run):
             behind = None if shot.transparent else shot.colour
             self._ground = Ground(plotter, camera.height, np.array(KEY), behind)
-        elif goes_along(camera.focus, camera.height) and not shot.transparent:
+        elif camera_moves(camera.focus, camera.height) and not shot.transparent:
             self._motes = Motes(plotter, camera.height, run.grid)
         self._edges: list[tuple[Array, pv.Actor]] = []
         if run.grid is not None:
@@ -72,8 +79,8 @@ class Stage:
         elif run.wind.any():
             self._wind = WindArrows(plotter, run, camera, 0.0 if self._ground else -np.inf)
         self._fluid = None
-        if run.grid is not None and seen is not None:
-            self._fluid = fluid_in(plotter, run.grid, seen, camera)
+        if run.grid is not None and visible is not None:
+            self._fluid = fluid_in(plotter, run.grid, visible, camera)
 
     def image(self, number: int, state: State) -> Pixels:
         """(height, width, 3 or 4) picture of the `number`-th state, lowest row first."""
@@ -96,7 +103,7 @@ class Stage:
             self._fluid.show(state, focus, toward)
         for facing, edge in self._edges:
             edge.visibility = bool((facing @ toward < 0.0).any())
-        shown = pushes(self._forces, self._outside, state, self._pixel)
+        shown = force_arrows(self._forces, self._outside, state, self._pixel)
         self._arrows.show(*shown, SHAFT_WIDTH * self._pixel)
         self._look(number)
         return self._cut_out() if self._shot.transparent else self._render(self._shot.colour)

@@ -16,6 +16,9 @@ from flowborne.view import style
 from flowborne.view.glyphs import Forces
 from flowborne.view.run import Geom, Skin, State
 
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
 SHARP = 35.0
 """Angle between two faces above which their edge is sharp, degrees."""
 
@@ -51,10 +54,6 @@ def colour_of(geom: Geom, accented: frozenset[int]) -> tuple[NDArray[np.float64]
     plain = tuple(rgba) == UNCOLOURED or geom.body == 0 or geom.body in accented
     colour = style.rgb(style.body_colour(geom.body, accented)) if plain else rgba[:3]
     return colour, float(geom.rgba[3])
-
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class SkinSurface:
@@ -129,7 +128,7 @@ def _area_normals(corners: Array) -> Array:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def way_out(start: Array, along: Array, corners: Array) -> float:
+def exit_distance(start: Array, along: Array, corners: Array) -> float:
     """Distance along a unit vector `along` (3,) from `start` (3,) to the exit of a closed skin, m.
 
     Its triangles have corners (m, 3, 3) m. The distance is 0 from a start outside (Moeller and
@@ -177,7 +176,7 @@ class Outside:
         Of several the farthest counts; it is 0 from a start outside. `around` is that of the state.
         """
         along = vector / np.linalg.norm(vector)
-        farthest = max((way_out(start, along, corners) for corners in around), default=0.0)
+        farthest = max((exit_distance(start, along, corners) for corners in around), default=0.0)
         for part in self._parts.get(body, ()):
             rotation, position = state["geom_rotation"][part], state["geom_position"][part]
             normals, heights = self._planes[part]
@@ -188,7 +187,9 @@ class Outside:
         return farthest
 
 
-def pushes(forces: Forces, outside: Outside, state: State, pixel: float) -> tuple[Array, Array]:
+def force_arrows(
+    forces: Forces, outside: Outside, state: State, pixel: float
+) -> tuple[Array, Array]:
     """Tails, on the surfaces of the bodies, and vectors (n, 3) of the arrows of forces, m.
 
     pixel  size of a pixel, m

@@ -47,7 +47,7 @@ MOTE_SIZE = 3.0
 """Size of a mote, pixels."""
 
 
-def stands(run: Run) -> bool:
+def stands_on_ground(run: Run) -> bool:
     """Whether the bodies stand on z = 0: gravity is downward or 0, and they come down to it."""
     if run.gravity[:2].any() or run.gravity[2] > 0.0 or not (run.geoms or run.flesh):
         return False

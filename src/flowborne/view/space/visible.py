@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.runs.states import velocity_gradients, vorticity
+from flowborne.runs.states import cell_vorticity, velocity_gradients
 from flowborne.view import style
-from flowborne.view.fields import NUMBERS, FieldNumber, Legend, Scale, dye_colours, dyes_of
+from flowborne.view.fields import NUMBERS, FieldNumber, Legend, Scale, dye_colours
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 
@@ -23,23 +21,21 @@ VORTEX_SHARE = 0.6
 """Share of the sum of positive Q that is inside the surfaces of vortices."""
 
 
-def seen_of(run: Run, shot: Shot) -> SeenDye | SeenVortices | SeenSlice | None:
+def visible_of(run: Run, shot: Shot) -> Visible | None:
     """What `shot` shows of the fluid of `run`; None if nothing is visible.
 
     raises  ValueError if it shows dye and there is none
     """
     if run.grid is None or shot.field == "none":
         return None
-    dyes = dyes_of(run)
-    shot.pictured(dyes)
     if shot.field == "dye":
-        return SeenDye(run, dyes)
+        return VisibleDye(run)
     if shot.field == "vorticity":
-        return SeenVortices(run)
-    return SeenSlice(FieldNumber(run, NUMBERS[shot.field]))
+        return VisibleVortices(run)
+    return FieldNumber(run, NUMBERS[shot.field])
 
 
-class SeenDye:
+class VisibleDye:
     """Dyes, each in its own colour, mixed where they meet.
 
     legend  (name, colour) of each
@@ -47,8 +43,8 @@ class SeenDye:
 
     scale: Scale | None = None
 
-    def __init__(self, run: Run, dyes: Sequence[str]) -> None:
-        self._dyes, self.legend = dye_colours(run, dyes, SAMPLES)
+    def __init__(self, run: Run) -> None:
+        self._dyes, self.legend = dye_colours(run, SAMPLES)
 
     def smoke(self, state: State) -> tuple[Single, Single]:
         """Colours (nx, ny, nz, 3) and densities (nx, ny, nz) of the cells, from 0 to 1."""
@@ -62,7 +58,7 @@ class SeenDye:
         return (colour / weight[..., None]).astype(np.float32), density
 
 
-class SeenVortices:
+class VisibleVortices:
     """Vortices: iso-surfaces of Q, inside which rotation exceeds strain.
 
     Q is half of (rotation rate squared - strain rate squared) (Hunt, Wray and Moin 1988). The
@@ -91,24 +87,8 @@ class SeenVortices:
 
     def sense(self, state: State, toward: Array) -> Array:
         """(nx, ny, nz) sense of rotation seen from `toward` (3,), from -1 (clockwise) to 1."""
-        spin = np.nan_to_num(vorticity(self._grid, state))
+        spin = np.nan_to_num(cell_vorticity(self._grid, state))
         return np.asarray(spin @ toward / np.maximum(np.linalg.norm(spin, axis=-1), 1e-12))
-
-
-class SeenSlice:
-    """Speed or pressure in a plane through the camera's target."""
-
-    legend: Legend = ()
-
-    def __init__(self, number: FieldNumber) -> None:
-        self._number = number
-        self.scale = number.scale
-
-    def image(self, state: State, axis: int, cell: float) -> NDArray[np.uint8]:
-        """(n, m, 3) colours of the layer of cells normal to `axis` at `cell`, counted in cells."""
-        values = np.moveaxis(self._number.values(state), axis, 0)
-        layer = int(np.clip(cell, 0, len(values) - 1))
-        return self._number.colours(values[layer])
 
 
 def _level_of(values: Array, share: float) -> float:
@@ -117,3 +97,7 @@ def _level_of(values: Array, share: float) -> float:
     if not positive.size:
         return 0.0
     return float(positive[np.searchsorted(np.cumsum(positive), share * positive.sum())])
+
+
+Visible = VisibleDye | VisibleVortices | FieldNumber
+"""What is visible; a number is shown in a plane through the camera's target."""
