@@ -6,21 +6,19 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.distance import distances
 from flowborne.shapes.section import Section
 from flowborne.shapes.thickness import thin_parts
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Mesh = tuple[Array, Integers]
 """Vertices (k, 3) and faces (m, 3), outward by the right-hand rule."""
 
 ENDLESS = 1e30
 """Half extent of a shape along an axis on which it has no ends, m."""
 
-FINENESS = 8
+PATCHES_ACROSS = 8
 """A shape's longest side is divided into this many patches at least."""
 
 AROUND = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)], np.float64) - 1.0

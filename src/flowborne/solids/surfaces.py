@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.round import parts
 from flowborne.shapes.section import Section
-from flowborne.shapes.shape import FINENESS
+from flowborne.shapes.shape import PATCHES_ACROSS
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 SLAB_ARC = 64
 """Patches around a circle in a slab."""
@@ -31,7 +29,7 @@ class Patches:
     screw   (n, 6) normal n and centre x n
     """
 
-    body: NDArray[np.int64]
+    body: Integers
     centre: Array
     normal: Array
     area: Array
@@ -75,7 +73,7 @@ def _surfaces(model: SolidModel) -> Patches:
 def _outline(section: Section) -> tuple[Array, Array]:
     """Centres and outward length vectors of a cross-section's outline, in its geometry's frame."""
     segments = section.outline(SLAB_ARC)
-    longest = float(np.ptp(segments.reshape(-1, 3), axis=0).max()) / FINENESS
+    longest = float(np.ptp(segments.reshape(-1, 3), axis=0).max()) / PATCHES_ACROSS
     up = np.cross(section.axes[0], section.axes[1])
     centres, vectors = [], []
     for start, end in segments:
@@ -98,7 +96,7 @@ class Outline:
         self._local = [shape.outermost() for shape in model.geom_shape]
         self._geom = model.geom_id
         counts = [len(points) for points in self._local]
-        self.body: NDArray[np.int64] = np.repeat(model.geom_body, counts)
+        self.body: Integers = np.repeat(model.geom_body, counts)
         shared = np.bincount(self.body, minlength=model.nbody)[self.body]
         self.mass: Array = model.body_mass[self.body] / shared
 
