@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
@@ -20,8 +21,6 @@ from flowborne.solids.mjcf import NOTHING, Given
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 from flowborne.solvers.cholesky import Ordering
-
-Array = NDArray[np.float64]
 
 FREE, BALL, SLIDE, HINGE = (
     int(mujoco.mjtJoint.mjJNT_FREE),
@@ -64,7 +63,7 @@ class SolidModel:
     body_mass      (nbody + nodes,) kg; nodes of flesh come after the bodies
     subtree_mass   (nbody + nodes,) kg, of the body and all below
     volume         (nbody,) displaced volume, m^3 (area in a slab); overlaps of geometries of a
-                   body count once, see displaced.united and geoms.said_to_displace. 0 for the
+                   body count once, see displaced.united and geoms.declared_volume. 0 for the
                    world and for bones in flesh
     centroid       (nbody, 3) centroid of that volume in the body's frame, m
     geom_id        (ngeom,) MuJoCo's number
@@ -200,7 +199,7 @@ class SolidModel:
         return np.ascontiguousarray(self.moves[on, : len(on)].T & (on[:, None] != on))
 
     @cached_property
-    def scalar_dofs(self) -> NDArray[np.int64]:
+    def scalar_dofs(self) -> Integers:
         """(k,) dofs of hinges and slides, ascending."""
         return np.flatnonzero(self.dof_position >= 0)
 
@@ -213,19 +212,19 @@ class SolidModel:
             for j in np.flatnonzero((mj.jnt_type == BALL) & (mj.jnt_limited != 0))
         )
 
-    def indices_of(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
+    def indices_of(self, dofs: Integers) -> Integers:
         """(m,) indices in q of the joints of `dofs`, ascending."""
         named = np.zeros(self.mj.njnt, bool)
         named[self._joint_of_dof[dofs]] = True
         return named[self._joint_of_index].nonzero()[0]
 
-    def dofs_of(self, joint: str) -> NDArray[np.int64]:
+    def dofs_of(self, joint: str) -> Integers:
         """Dofs of a joint. Raises ValueError for an unknown name."""
         j = self.joint(joint)
         first = int(self.mj.jnt_dofadr[j])
         return np.arange(first, first + len(SUFFIXES[int(self.mj.jnt_type[j])]))
 
-    def positions_of(self, joint: str) -> NDArray[np.int64]:
+    def positions_of(self, joint: str) -> Integers:
         """Indices in q of a joint: 7 for a free joint, 4 for a ball, else 1."""
         j = self.joint(joint)
         first = int(self.mj.jnt_qposadr[j])
@@ -259,7 +258,7 @@ class SolidModel:
         self._joint_of_index = np.repeat(np.arange(mj.njnt), widths)
         self._joint_of_dof = np.array(mj.dof_jntid, dtype=np.int64)
         names: list[str] = []
-        self.dof_position: NDArray[np.int64] = np.full(self.nv, -1)
+        self.dof_position: Integers = np.full(self.nv, -1)
         self.dof_range: Array = np.tile([-np.inf, np.inf], (self.nv, 1))
         for j, name in enumerate(self.joint_names):
             kind, first = int(mj.jnt_type[j]), int(mj.jnt_dofadr[j])
@@ -269,8 +268,8 @@ class SolidModel:
                 if mj.jnt_limited[j]:
                     self.dof_range[first] = mj.jnt_range[j]
         self.dof_names = tuple(names)
-        self.dof_body: NDArray[np.int64] = np.array(mj.dof_bodyid, dtype=np.int64)
-        self.dof_root: NDArray[np.int64] = mj.body_rootid[self.dof_body].astype(np.int64)
+        self.dof_body: Integers = np.array(mj.dof_bodyid, dtype=np.int64)
+        self.dof_root: Integers = mj.body_rootid[self.dof_body].astype(np.int64)
         self.moves: NDArray[np.bool_] = np.zeros((self.nbody, self.nv), bool)
         for body in range(1, self.nbody):
             self.moves[body] = self.moves[mj.body_parentid[body]] | (self.dof_body == body)
@@ -283,24 +282,25 @@ class SolidModel:
     def _set_geoms(self) -> None:
         mj = self.mj
         chosen = geoms.displacing_geoms(mj)
-        self.geom_id: NDArray[np.int64] = np.array(chosen, dtype=np.int64)
+        self.geom_id: Integers = np.array(chosen, dtype=np.int64)
         self.ngeom = len(chosen)
         names = _names(mj, mujoco.mjtObj.mjOBJ_GEOM, mj.ngeom)
         self.geom_names = tuple(names[g] for g in chosen)
         self.geom_shape = tuple(geoms.geom_shape(mj, g, self._own) for g in chosen)
         self.geom_size: Array = np.array(mj.geom_size[self.geom_id])
-        self.geom_body: NDArray[np.int64] = mj.geom_bodyid[self.geom_id].astype(np.int64)
+        self.geom_body: Integers = mj.geom_bodyid[self.geom_id].astype(np.int64)
         self.geom_offset: Array = np.array(mj.geom_pos[self.geom_id])
-        self.geom_rotation: Array = _rotations(mj.geom_quat[self.geom_id])
+        rotations = [geoms.rotation_of(mj.geom_quat[g]) for g in chosen]
+        self.geom_rotation: Array = np.array(rotations).reshape(-1, 3, 3)
         self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
         self.geom_covered: NDArray[np.bool_] = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
             _, _, position, rotation = geoms.rest_poses(mj)
-            places = [
+            landmarks = [
                 position[g] + shape.landmarks() @ rotation[g].T
                 for shape, g in zip(self.geom_shape, self.geom_id, strict=True)
             ]
-            self.geom_covered = covered(places, self.flesh.rest, self.flesh.surface)
+            self.geom_covered = covered(landmarks, self.flesh.rest, self.flesh.surface)
 
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
@@ -312,7 +312,7 @@ class SolidModel:
                 for g in np.flatnonzero((self.geom_body == body) & ~self.geom_covered)
             ]
             if solids and body > 0:
-                given = None if self.slab else geoms.said_to_displace(self.mj, body)
+                given = None if self.slab else geoms.declared_volume(self.mj, body)
                 if given is not None:
                     self.volume[body], self.centroid[body] = given
                     continue
@@ -327,12 +327,9 @@ class SolidModel:
             volume, centre = cut.area, cut.centroid
         else:
             volume, centre = shape.volume, shape.centroid
-        middle = position + rotation @ self.mj.geom_aabb[g, :3]
-        half = np.abs(rotation) @ self.mj.geom_aabb[g, 3:]
+        box = geoms.box_of(self.mj, g, position, rotation)
         centroid = position + rotation @ centre
-        return displaced.Solid(
-            shape, position, rotation, middle - half, middle + half, volume, centroid
-        )
+        return displaced.Solid(shape, position, rotation, *box, volume, centroid)
 
 
 def _bones(mj: mujoco.MjModel, grown: Sequence[Grown]) -> int:
@@ -354,13 +351,6 @@ def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
     if name not in numbers:
         raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(numbers)}.")
     return numbers[name]
-
-
-def _rotations(quaternions: Array) -> Array:
-    rotations = np.empty((len(quaternions), 9))
-    for row, quaternion in zip(rotations, quaternions, strict=True):
-        mujoco.mju_quat2Mat(row, quaternion)
-    return rotations.reshape(-1, 3, 3)
 
 
 def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
