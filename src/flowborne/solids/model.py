@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
-from flowborne.solids.displaced import covered
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.geoms import own_by_mesh
 from flowborne.solids.mjcf import NOTHING, Given
@@ -296,11 +296,10 @@ class SolidModel:
         self.geom_covered: NDArray[np.bool_] = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
             _, _, position, rotation = geoms.rest_poses(mj)
-            landmarks = [
-                position[g] + shape.landmarks() @ rotation[g].T
-                for shape, g in zip(self.geom_shape, self.geom_id, strict=True)
-            ]
-            self.geom_covered = covered(landmarks, self.flesh.rest, self.flesh.surface)
+            for n, (shape, g) in enumerate(zip(self.geom_shape, chosen, strict=True)):
+                points = position[g] + shape.landmarks() @ rotation[g].T
+                outside = distances_to_mesh(points, self.flesh.rest, self.flesh.surface)
+                self.geom_covered[n] = (outside < 0.0).all()
 
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
