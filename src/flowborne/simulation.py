@@ -308,7 +308,7 @@ def trouble(world: World, report: StepReport) -> str | None:
     flesh = world.setup.solid.flesh
     torn = None if flesh is None else inversion(flesh, solid.q)
     if torn is not None and len(torn.elements) > TORN * torn.of:
-        return torn.sentence
+        return torn.sentence()
     if fluid is None or properties is None:
         return None
     grid = properties.grid

@@ -250,8 +250,8 @@ def test_inverted_elements_are_found_and_named() -> None:
     np.testing.assert_array_equal(found.elements, np.flatnonzero(ratios <= 0.0))
     assert len(found.elements) > 1
     assert found.ratio == ratios.min() < 0.0
-    assert found.sentence.startswith(f"{len(found.elements)} of {len(ratios)} elements")
-    assert "'arm' at (" in found.sentence
+    assert found.sentence().startswith(f"{len(found.elements)} of {len(ratios)} elements")
+    assert "'arm' at (" in found.sentence()
 
 
 @pytest.mark.parametrize("law", list(Law))

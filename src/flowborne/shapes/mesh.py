@@ -16,7 +16,7 @@ from flowborne.kernels.thickness import way_inward
 from flowborne.shapes.section import Section, cross
 from flowborne.shapes.shape import (
     DIRECTIONS,
-    PATCHES_ACROSS,
+    FINENESS,
     Array,
     Integers,
     Mesh,
@@ -130,7 +130,7 @@ class ShapeMesh(Shape):
     def patches(self) -> tuple[Array, Array]:
         import trimesh  # takes 0.1 s, and only meshes need it
 
-        longest = float(np.ptp(self.vertices, axis=0).max()) / PATCHES_ACROSS
+        longest = float(np.ptp(self.vertices, axis=0).max()) / FINENESS
         vertices, faces = trimesh.remesh.subdivide_to_size(
             self.vertices, self.faces, longest, max_iter=20
         )

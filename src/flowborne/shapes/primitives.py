@@ -24,7 +24,7 @@ from flowborne.shapes.shape import (
     AROUND,
     DIRECTIONS,
     ENDLESS,
-    PATCHES_ACROSS,
+    FINENESS,
     Array,
     Mesh,
     Primitive,
@@ -101,7 +101,7 @@ class ShapeSphere(Primitive):
 
     def patches(self) -> tuple[Array, Array]:
         radius = float(self.size[0])
-        return revolved(capsule_profile(radius, 0.0, 2.0 * radius / PATCHES_ACROSS, ARC))
+        return revolved(capsule_profile(radius, 0.0, 2.0 * radius / FINENESS, ARC))
 
     def triangles(self) -> Mesh:
         return swept_triangles(capsule_profile(self.size[0], 0.0, np.inf, 2 * ARC))
@@ -143,7 +143,7 @@ class ShapeCapsule(Primitive):
 
     def patches(self) -> tuple[Array, Array]:
         radius, half_length = (float(s) for s in self.size[:2])
-        longest = 2.0 * (radius + half_length) / PATCHES_ACROSS
+        longest = 2.0 * (radius + half_length) / FINENESS
         return revolved(capsule_profile(radius, half_length, longest, ARC))
 
     def triangles(self) -> Mesh:
@@ -184,7 +184,7 @@ class ShapeCylinder(Primitive):
 
     def patches(self) -> tuple[Array, Array]:
         radius, half_length = (float(s) for s in self.size[:2])
-        longest = 2.0 * max(radius, half_length) / PATCHES_ACROSS
+        longest = 2.0 * max(radius, half_length) / FINENESS
         return revolved(cylinder_profile(radius, half_length, longest))
 
     def triangles(self) -> Mesh:
@@ -255,7 +255,7 @@ class ShapeBox(Triaxial):
 
     def patches(self) -> tuple[Array, Array]:
         half = self.size
-        longest = 2.0 * float(half.max()) / PATCHES_ACROSS
+        longest = 2.0 * float(half.max()) / FINENESS
         centres, vectors = [], []
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3

@@ -18,7 +18,7 @@ Mesh = tuple[Array, Integers]
 ENDLESS = 1e30
 """Half extent of a shape along an axis on which it has no ends, m."""
 
-PATCHES_ACROSS = 8
+FINENESS = 8
 """A shape's longest side is divided into this many patches at least."""
 
 AROUND = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)], np.float64) - 1.0

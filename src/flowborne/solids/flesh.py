@@ -264,13 +264,20 @@ class Inversion:
     elements  (k,) numbers of the elements, ascending
     of        number of all elements
     ratio     the smallest det F
-    sentence  a message for the user, without a full stop
+    worst     where it is, in words
     """
 
     elements: Integers
     of: int
     ratio: float
-    sentence: str
+    worst: str
+
+    def sentence(self) -> str:
+        """A message for the user, without a full stop."""
+        return (
+            f"{len(self.elements)} of {self.of} elements of flesh are inside out, the worst "
+            f"{self.worst}. Take shorter steps, stiffen the flesh, or give it larger elements there"
+        )
 
 
 def inversion(flesh: Flesh, q: Array) -> Inversion | None:
@@ -282,9 +289,5 @@ def inversion(flesh: Flesh, q: Array) -> Inversion | None:
     worst = int(wrong[np.argmin(ratios[wrong])])
     ratio, name = float(ratios[worst]), flesh.names[int(flesh.of_element[worst])]
     middle = flesh.vertices(q)[flesh.elements[worst]].mean(axis=0)
-    sentence = (
-        f"{len(wrong)} of {len(ratios)} elements of flesh are inside out, the worst in '{name}' at "
-        f"{location(middle)} with det F = {ratio:.3g} (element {worst}). Take shorter steps, "
-        "stiffen the flesh, or give it larger elements there"
-    )
-    return Inversion(wrong, len(ratios), ratio, sentence)
+    where = f"in '{name}' at {location(middle)} with det F = {ratio:.3g} (element {worst})"
+    return Inversion(wrong, len(ratios), ratio, where)

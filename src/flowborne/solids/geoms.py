@@ -19,7 +19,7 @@ HIDDEN_GROUP = 3
 """Geometries in this group and above collide but displace no fluid (MuJoCo's convention)."""
 
 DISPLACED = "displaced by "
-"""Prefix of the name of a body's <numeric>, see `declared_volume`."""
+"""Prefix of the name of a body's <numeric>, see `said_to_displace`."""
 
 CONTACT_ONLY = ("plane", "hfield")
 
@@ -131,7 +131,7 @@ def rest_poses(mj: mujoco.MjModel) -> tuple[Array, Array, Array, Array]:
     )
 
 
-def declared_volume(mj: mujoco.MjModel, body: int) -> tuple[float, Array] | None:
+def said_to_displace(mj: mujoco.MjModel, body: int) -> tuple[float, Array] | None:
     """Volume, m^3, and (3,) centre in the frame of a body, m, from the model; None if not given.
 
     The model gives them, where bodies overlap, as a <numeric> of four numbers. Its name is

@@ -63,7 +63,7 @@ class SolidModel:
     body_mass      (nbody + nodes,) kg; nodes of flesh come after the bodies
     subtree_mass   (nbody + nodes,) kg, of the body and all below
     volume         (nbody,) displaced volume, m^3 (area in a slab); overlaps of geometries of a
-                   body count once, see displaced.united and geoms.declared_volume. 0 for the
+                   body count once, see displaced.united and geoms.said_to_displace. 0 for the
                    world and for bones in flesh
     centroid       (nbody, 3) centroid of that volume in the body's frame, m
     geom_id        (ngeom,) MuJoCo's number
@@ -311,7 +311,7 @@ class SolidModel:
                 for g in np.flatnonzero((self.geom_body == body) & ~self.geom_covered)
             ]
             if solids and body > 0:
-                given = None if self.slab else geoms.declared_volume(self.mj, body)
+                given = None if self.slab else geoms.said_to_displace(self.mj, body)
                 if given is not None:
                     self.volume[body], self.centroid[body] = given
                     continue

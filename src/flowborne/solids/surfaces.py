@@ -11,7 +11,7 @@ import numpy as np
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.round import parts
 from flowborne.shapes.section import Section
-from flowborne.shapes.shape import PATCHES_ACROSS
+from flowborne.shapes.shape import FINENESS
 from flowborne.solids.model import SolidModel
 
 SLAB_ARC = 64
@@ -73,7 +73,7 @@ def _surfaces(model: SolidModel) -> Patches:
 def _outline(section: Section) -> tuple[Array, Array]:
     """Centres and outward length vectors of a cross-section's outline, in its geometry's frame."""
     segments = section.outline(SLAB_ARC)
-    longest = float(np.ptp(segments.reshape(-1, 3), axis=0).max()) / PATCHES_ACROSS
+    longest = float(np.ptp(segments.reshape(-1, 3), axis=0).max()) / FINENESS
     up = np.cross(section.axes[0], section.axes[1])
     centres, vectors = [], []
     for start, end in segments:
