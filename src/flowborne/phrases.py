@@ -30,6 +30,11 @@ def and_more(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
 
 
+def location(point: Iterable[float]) -> str:
+    """A point (3,) in m: "(0.1, 2, -3) m"."""
+    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
+
+
 def rounded_up(value: float) -> str:
     """A number of three digits, no smaller than `value` up to its ninth digit."""
     return _rounded(value, ROUND_CEILING)

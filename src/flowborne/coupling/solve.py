@@ -204,7 +204,7 @@ def solve_together(
         if changed is None and tolerance <= fluid.tolerance:
             break
         if changed is not None:
-            if not changed.answers_as(driven):
+            if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
                 smooth, viscous, smoothed = diffuse(
                     world, velocity, mass, cut, jets, pose, changed, dt

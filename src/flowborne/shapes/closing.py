@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from flowborne.shapes.mesh import welded
 from flowborne.shapes.shape import Array, Integers, Mesh
+from flowborne.shapes.thickness import outward
 
 SMALL_HOLE = 0.05
 """Largest hole, relative to the size of the surface, that is closed by default: open seams, the
@@ -42,9 +43,7 @@ def hull(mesh: Mesh) -> Mesh | None:
         found = ConvexHull(points)
     except QhullError:
         return None
-    corners = points[found.simplices]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = (normal * found.equations[:, :3]).sum(axis=1) < 0.0
+    inward = (outward(points[found.simplices]) * found.equations[:, :3]).sum(axis=1) < 0.0
     faces = np.where(inward[:, None], found.simplices[:, ::-1], found.simplices)
     used, number = np.unique(faces, return_inverse=True)
     return points[used], number.reshape(-1, 3)

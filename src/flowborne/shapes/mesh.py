@@ -25,16 +25,16 @@ from flowborne.shapes.shape import (
     lattice,
     unit,
 )
-from flowborne.shapes.thickness import thin_parts, thinnest
+from flowborne.shapes.thickness import outward, split_quads, thin_parts, thinnest
 
-UNDETERMINED = 0.02
+UNDETERMINED_BELOW = 0.02
 """Largest mean square of the normals along a direction for which they do not determine the motion
 of a vertex along it: all normals are within about 8 degrees of the plane across."""
 
-SMOOTH = np.cos(np.pi / 4.0)
+SMOOTH_COSINE = np.cos(np.pi / 4.0)
 """Cosine of the largest angle between triangles of one smooth sheet."""
 
-SHEET_FINENESS = 2.0
+SHEET_SAMPLES_PER_CELL = 2.0
 """Samples of the distance to sheets per cell of the grid along an axis."""
 
 SHEET_BAND = 2.5
@@ -111,10 +111,8 @@ class ShapeMesh(Shape):
         level = self.vertices @ z + height
         edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]]
         above = level[edges] >= 0.0
-        rising, falling = (
-            edges[~above[..., 0] & above[..., 1]],
-            edges[above[..., 0] & ~above[..., 1]],
-        )
+        rising = edges[~above[..., 0] & above[..., 1]]
+        falling = edges[above[..., 0] & ~above[..., 1]]
         if len(rising) == 0:
             raise ValueError("misses the plane z = 0")
         ends = np.stack([rising, falling], axis=1)
@@ -137,8 +135,7 @@ class ShapeMesh(Shape):
             self.vertices, self.faces, longest, max_iter=20
         )
         corners = vertices[faces]
-        sides = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        return corners.mean(axis=1), 0.5 * np.cross(*sides)
+        return corners.mean(axis=1), 0.5 * outward(corners)
 
     def triangles(self) -> Mesh:
         return self.vertices, self.faces
@@ -167,16 +164,10 @@ class ShapeMesh(Shape):
         section = self.section(rotation, height)
         points, number = np.unique(section.segments.reshape(-1, 2), axis=0, return_inverse=True)
         start, end = number.reshape(-1, 2).T
-        ring, rise = (
-            section.centre + points @ section.axes,
-            np.ptp(points, axis=0).max() * rotation[2],
-        )
-        above = len(points)
-        sides = [
-            np.stack([start, end, end + above], axis=1),
-            np.stack([start, end + above, start + above], axis=1),
-        ]
-        return ShapePrism(np.concatenate([ring - rise, ring + rise]), np.concatenate(sides))
+        ring = section.centre + points @ section.axes
+        rise = np.ptp(points, axis=0).max() * rotation[2]
+        sides = split_quads(start, end, end + len(points), start + len(points))
+        return ShapePrism(np.concatenate([ring - rise, ring + rise]), sides)
 
 
 class ShapePrism(ShapeMesh):
@@ -216,7 +207,7 @@ class ShapeThickened(ShapeMesh):
 
     def samples(self, spacing: float) -> Samples:
         """Distances to the sheets alone."""
-        pitch = spacing / SHEET_FINENESS
+        pitch = spacing / SHEET_SAMPLES_PER_CELL
         corner, counts = lattice(self.reach, pitch, BAND * spacing)
         values = np.full(counts, BAND * spacing)
         lower_to_sheets(values, corner, pitch, *self._sheets(), self.half, SHEET_BAND * spacing)
@@ -229,16 +220,15 @@ class ShapeThickened(ShapeMesh):
     def _sheets(self) -> tuple[Array, Array, Array, Array, Integers, Integers, Integers]:
         """The triangles in the middle of thin parts, as `lower_to_sheets` takes them."""
         corners = self.vertices[self.faces[self._thin]]
-        first, second, third = np.moveaxis(self.vertices[self.faces], 1, 0)
-        normals = unit(np.cross(second - first, third - first))
+        normals = unit(outward(self.vertices[self.faces]))
         normal = normals[self._thin]
         middle = corners - 0.5 * self._way[self._thin, None, None] * normal[:, None]
         edge = np.roll(corners, -1, axis=1) - corners
         across = unit(np.cross(edge, normal[:, None]))
-        beside = neighbours(self.faces)[self._thin]
-        smooth = np.einsum("ted,td->te", normals[beside], normal) > SMOOTH
-        ends = np.maximum(self.half - 0.5 * self._way[beside], 0.0)
-        limit = np.where(smooth & self._thin[beside], np.inf, ends)
+        adjacent = neighbours(self.faces)[self._thin]
+        smooth = np.einsum("ted,td->te", normals[adjacent], normal) > SMOOTH_COSINE
+        ends = np.maximum(self.half - 0.5 * self._way[adjacent], 0.0)
+        limit = np.where(smooth & self._thin[adjacent], np.inf, ends)
         number = self.faces[self._thin]
         limited = np.flatnonzero(np.isfinite(limit))
         ends_at = np.concatenate([number.ravel(), np.roll(number, -1, axis=1).ravel()])
@@ -253,20 +243,20 @@ def neighbours(faces: Integers) -> Integers:
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
     order = np.lexsort(edges.T)
     same = np.flatnonzero((edges[order[1:]] == edges[order[:-1]]).all(axis=1))
-    beside = np.repeat(np.arange(len(faces)), 3)
+    found = np.repeat(np.arange(len(faces)), 3)
     one, other = order[same], order[same + 1]
-    beside[one], beside[other] = other // 3, one // 3
-    return beside.reshape(-1, 3)
+    found[one], found[other] = other // 3, one // 3
+    return found.reshape(-1, 3)
 
 
 def welded(vertices: Array, faces: Integers) -> Mesh:
     """The surface without duplicate vertices and without triangles that this collapses."""
-    places, number = np.unique(vertices, axis=0, return_inverse=True)
-    if len(places) == len(vertices):
+    distinct, number = np.unique(vertices, axis=0, return_inverse=True)
+    if len(distinct) == len(vertices):
         return vertices, faces
     joined = number.ravel()[faces]
     whole = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
-    return places, joined[whole]
+    return distinct, joined[whole]
 
 
 def offsets(vertices: Array, faces: Integers, distance: Array) -> Array:
@@ -277,7 +267,7 @@ def offsets(vertices: Array, faces: Integers, distance: Array) -> Array:
     vertex moves farther than the corner of a cube.
     """
     corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = outward(corners)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     matrix, rhs = np.zeros((len(vertices), 3, 3)), np.zeros((len(vertices), 3))
     weight, most = np.zeros(len(vertices)), np.zeros(len(vertices))
@@ -290,7 +280,7 @@ def offsets(vertices: Array, faces: Integers, distance: Array) -> Array:
         np.add.at(weight, faces[:, k], angle)
         np.maximum.at(most, faces[:, k], distance)
     value, vector = np.linalg.eigh(matrix / weight[:, None, None])
-    known = value > UNDETERMINED
+    known = value > UNDETERMINED_BELOW
     part = np.einsum("vij,vi->vj", vector, rhs / weight[:, None])
     part = np.where(known, part / np.where(known, value, 1.0), 0.0)
     moved = np.einsum("vij,vj->vi", vector, part)

@@ -15,10 +15,10 @@ from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Array, Integers, Mesh, Samples, Shape, lattice, lattice_points
 
-ACROSS = 48
+SAMPLES_ACROSS = 48
 """Samples along the longest side of a geometry for its triangles."""
 
-FINER = 2.0
+SAMPLES_PER_CELL = 2.0
 """Samples of a distance for the fluid, per cell of its grid along an axis."""
 
 
@@ -97,7 +97,7 @@ class ShapeOwn(ShapeMesh):
         return own_distance(self.geometry, local) - self.offset
 
     def samples(self, spacing: float) -> Samples:
-        pitch = spacing / FINER
+        pitch = spacing / SAMPLES_PER_CELL
         corner, counts = lattice(self.reach, pitch, BAND * spacing)
         found = self.distance(lattice_points(corner, pitch, counts)).reshape(counts)
         return Samples(corner, pitch, allow_for_curvature(found, pitch))
@@ -149,7 +149,7 @@ def triangulated(geometry: OwnGeometry) -> Mesh:
         half = np.asarray(geometry.half_extents(), dtype=np.float64)
     if half.shape != (3,) or not (np.isfinite(half).all() and half.min() > 0.0):
         raise PartError(f"{what} has the half extents {half}: give three positive ones in m")
-    pitch = 2.0 * half.max() / ACROSS
+    pitch = 2.0 * half.max() / SAMPLES_ACROSS
     corner, counts = lattice(half, pitch, pitch)
     points = lattice_points(corner, pitch, counts)
     distance = own_distance(geometry, points)

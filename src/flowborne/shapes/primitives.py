@@ -94,19 +94,17 @@ class ShapeSphere(Primitive):
     def section(self, rotation: Array, height: float) -> Section:
         x, y, z = rotation
         radius = chord(self.size[0], height)
-        none = np.zeros((0, 2, 2))
-        return Section("ellipse", (radius, radius), -height * z, np.stack([x, y]), none)
+        return Section("ellipse", (radius, radius), -height * z, np.stack([x, y]))
 
     def interval(self, o: Array, d: Array) -> tuple[Array, Array]:
         return in_unit_ball(o / self.size[0], d / self.size[0])
 
     def patches(self) -> tuple[Array, Array]:
         radius = float(self.size[0])
-        profile = capsule_profile(radius, 0.0, 2.0 * radius / FINENESS, ARC)
-        return revolved(profile, np.ones(3))
+        return revolved(capsule_profile(radius, 0.0, 2.0 * radius / FINENESS, ARC))
 
     def triangles(self) -> Mesh:
-        return swept_triangles(capsule_profile(self.size[0], 0.0, np.inf, 2 * ARC), np.ones(3))
+        return swept_triangles(capsule_profile(self.size[0], 0.0, np.inf, 2 * ARC))
 
     def landmarks(self) -> Array:
         return np.asarray(self.size[0] * DIRECTIONS)
@@ -146,11 +144,10 @@ class ShapeCapsule(Primitive):
     def patches(self) -> tuple[Array, Array]:
         radius, half_length = (float(s) for s in self.size[:2])
         longest = 2.0 * (radius + half_length) / FINENESS
-        return revolved(capsule_profile(radius, half_length, longest, ARC), np.ones(3))
+        return revolved(capsule_profile(radius, half_length, longest, ARC))
 
     def triangles(self) -> Mesh:
-        profile = capsule_profile(self.size[0], self.size[1], np.inf, 2 * ARC)
-        return swept_triangles(profile, np.ones(3))
+        return swept_triangles(capsule_profile(self.size[0], self.size[1], np.inf, 2 * ARC))
 
     def landmarks(self) -> Array:
         return np.asarray(self.size[0] * DIRECTIONS + np.sign(AROUND) * [0.0, 0.0, self.size[1]])
@@ -188,10 +185,10 @@ class ShapeCylinder(Primitive):
     def patches(self) -> tuple[Array, Array]:
         radius, half_length = (float(s) for s in self.size[:2])
         longest = 2.0 * max(radius, half_length) / FINENESS
-        return revolved(cylinder_profile(radius, half_length, longest), np.ones(3))
+        return revolved(cylinder_profile(radius, half_length, longest))
 
     def triangles(self) -> Mesh:
-        return swept_triangles(cylinder_profile(self.size[0], self.size[1], np.inf), np.ones(3))
+        return swept_triangles(cylinder_profile(self.size[0], self.size[1], np.inf))
 
     def landmarks(self) -> Array:
         across = np.linalg.norm(AROUND[:, :2], axis=1, keepdims=True)
@@ -230,8 +227,7 @@ class Triaxial(Primitive):
         first, second = (k + 1) % 3, (k + 2) % 3
         axes = np.stack([np.eye(3)[first], np.sign(z[k]) * np.eye(3)[second]])
         half = self.cut(k, height)
-        extents = float(half[first]), float(half[second])
-        return Section(self.family, extents, -height * z, axes, np.zeros((0, 2, 2)))
+        return Section(self.family, (float(half[first]), float(half[second])), -height * z, axes)
 
     def endless(self, rotation: Array, height: float) -> Shape:
         size = self.size.copy()

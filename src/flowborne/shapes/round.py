@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.shapes.section import ALIGNED, Section, chord
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.shapes.section import ALIGNED_SINE, Section, chord
+from flowborne.shapes.thickness import split_quads
 
 ARC = 32
 """Patches around a circle, and sides of a drawn circle."""
@@ -48,7 +46,7 @@ def cylinder_profile(radius: float, half_length: float, longest: float) -> Array
     )
 
 
-def revolved(profile: Array, scale: Array) -> tuple[Array, Array]:
+def revolved(profile: Array, scale: Array | float = 1.0) -> tuple[Array, Array]:
     """Patches (see `Shape.patches`) of a profile rotated about z, scaled by `scale` (3,)."""
     angle = 2.0 * np.pi * np.arange(ARC + 1) / ARC
     angle[-1] = 0.0
@@ -71,7 +69,7 @@ def _quads(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
     return (a + c + (1.0 - share) * b + share * d) / 3.0, vector
 
 
-def swept_triangles(profile: Array, scale: Array) -> tuple[Array, Integers]:
+def swept_triangles(profile: Array, scale: Array | float = 1.0) -> tuple[Array, Integers]:
     """Closed surface of a profile from pole to pole, rotated about z, scaled by `scale` (3,)."""
     angle = 2.0 * np.pi * np.arange(ARC) / ARC
     radius, height = profile[1:-1].T
@@ -81,14 +79,13 @@ def swept_triangles(profile: Array, scale: Array) -> tuple[Array, Integers]:
     rings[..., 2] = height[:, None]
     poles = np.array([[0.0, 0.0, profile[0, 1]], [0.0, 0.0, profile[-1, 1]]])
     number = np.arange(len(radius) * ARC).reshape(-1, ARC)
-    beside = np.roll(number, -1, axis=1)
-    a, b, c, d = number[:-1], beside[:-1], beside[1:], number[1:]
+    next_one = np.roll(number, -1, axis=1)
+    a, b, c, d = number[:-1], next_one[:-1], next_one[1:], number[1:]
     low, high = np.full(ARC, rings.size // 3), np.full(ARC, rings.size // 3 + 1)
     faces = [
-        np.stack([low, beside[0], number[0]], axis=1),
-        np.stack([a, b, c], axis=-1).reshape(-1, 3),
-        np.stack([a, c, d], axis=-1).reshape(-1, 3),
-        np.stack([high, number[-1], beside[-1]], axis=1),
+        np.stack([low, next_one[0], number[0]], axis=1),
+        split_quads(a.ravel(), b.ravel(), c.ravel(), d.ravel()),
+        np.stack([high, number[-1], next_one[-1]], axis=1),
     ]
     return np.concatenate([rings.reshape(-1, 3), poles]) * scale, np.concatenate(faces)
 
@@ -100,17 +97,16 @@ def section_of_rod(family: str, size: Array, z: Array, height: float) -> Section
     z     (3,) the world's z in its frame
     """
     radius, half_length = float(size[0]), float(size[1])
-    foot, none = -height * z, np.zeros((0, 2, 2))
-    if np.hypot(z[0], z[1]) <= ALIGNED:
+    foot = -height * z
+    if np.hypot(z[0], z[1]) <= ALIGNED_SINE:
         beyond = max(abs(height) - half_length, 0.0)
         if family == "rectangle" and beyond > 0.0:
             raise ValueError("misses the plane z = 0")
         cut = chord(radius, beyond)
         axes = np.array([[1.0, 0.0, 0.0], [0.0, np.sign(z[2]), 0.0]])
-        return Section("ellipse", (cut, cut), foot, axes, none)
-    if abs(z[2]) > ALIGNED:
+        return Section("ellipse", (cut, cut), foot, axes)
+    if abs(z[2]) > ALIGNED_SINE:
         raise ValueError("has no local axis along z")
     cut = chord(radius, height)
     along = np.array([0.0, 0.0, 1.0])
-    axes = np.stack([along, np.cross(z, along)])
-    return Section(family, (half_length, cut), foot, axes, none)
+    return Section(family, (half_length, cut), foot, np.stack([along, np.cross(z, along)]))

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.shapes.thickness import thin_parts
+from flowborne.kernels.arrays import Array
+from flowborne.shapes.thickness import split_quads, thin_parts
 
-Array = NDArray[np.float64]
 TIP_ARC = 64
 """Sides of round outlines in the search for tips."""
 
-ALIGNED = 1e-6
+ALIGNED_SINE = 1e-6
 """Largest sine of the angle between a local axis and the z axis that counts as 0."""
 
 
@@ -33,7 +32,7 @@ class Section:
     half: tuple[float, float]
     centre: Array
     axes: Array
-    segments: Array
+    segments: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     @property
     def area(self) -> float:
@@ -87,8 +86,7 @@ class Section:
         """Length of its tips along the outline, where no disc of diameter `width` m fits in, m."""
         start, end = np.moveaxis(self.outline(TIP_ARC), 1, 0)
         rise, first = 0.5 * width * np.cross(*self.axes), np.arange(len(start))
-        a, b, c, d = (first + k * len(start) for k in range(4))
-        sides = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        sides = split_quads(*(first + k * len(start) for k in range(4)))
         return thin_parts(np.concatenate([start, end, end + rise, start + rise]), sides, width)
 
     def _corners(self, arc: int) -> Array:
@@ -118,6 +116,6 @@ def chord(radius: float, height: float) -> float:
 def upright_axis(z: Array) -> int:
     """Index of the local axis along the world's z, given as local components `z`."""
     k = int(np.argmax(np.abs(z)))
-    if np.hypot(z[(k + 1) % 3], z[(k + 2) % 3]) > ALIGNED:
+    if np.hypot(z[(k + 1) % 3], z[(k + 2) % 3]) > ALIGNED_SINE:
         raise ValueError("has no local axis along z")
     return k

@@ -6,14 +6,12 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.distance import distances
 from flowborne.shapes.section import Section
 from flowborne.shapes.thickness import thin_parts
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Mesh = tuple[Array, Integers]
 """Vertices (k, 3) and faces (m, 3), outward by the right-hand rule."""
 

@@ -6,26 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.thickness import Cells, any_within, by_cells, way_inward
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+RIM_SHARE = 0.05
+"""Share of the area of a surface that may be thinner: around rims, where both sides meet."""
 
-RIMS = 0.05
-"""Part of the area of a surface that may be thinner: around rims, where both sides meet."""
+CLEARANCE = 0.95
+"""Least distance of the surface from the centre of a ball that fits, in radii; facets are flat."""
 
-FITTING = 0.95
-"""Part of its radius by which a ball must clear the surface to fit; facets are flat."""
-
-BALLS = 1.0, 0.05
-"""Balls that must fit, in widths: the centre of the large one may lie beyond a thin part."""
+BALL_DIAMETERS = 1.0, 0.05
+"""Balls that must fit, in widths; the centre of the large one may lie beyond a thin part."""
 
 MOST_FACETS = 1e5
 """Approximate number of pieces of a surface in the search for tips."""
 
 
-def thinnest(vertices: Array, triangles: Indices, slab: bool, way: Array | None = None) -> float:
-    """Thickness in m that a closed surface has everywhere except at its `RIMS`.
+def thinnest(vertices: Array, triangles: Integers, slab: bool, way: Array | None = None) -> float:
+    """Thickness in m that a closed surface has everywhere except on `RIM_SHARE` of its area.
 
     vertices, triangles  (n, 3) m; (k, 3) outward
     slab                 whether its faces across z are cuts and do not count
@@ -38,12 +36,12 @@ def thinnest(vertices: Array, triangles: Indices, slab: bool, way: Array | None 
     way = way_inward(vertices, triangles) if way is None else way
     order = np.argsort(way)
     part = np.cumsum(area[order]) / area.sum()
-    return float(way[order][np.searchsorted(part, RIMS)])
+    return float(way[order][np.searchsorted(part, RIM_SHARE)])
 
 
 def thin_parts(
     vertices: Array,
-    triangles: Indices,
+    triangles: Integers,
     width: float,
     thickened: NDArray[np.bool_] | None = None,
 ) -> float:
@@ -68,7 +66,7 @@ def thin_parts(
     edge = max(edge, float(side_lengths(facets).max()))
     cells = by_cells(vertices, triangles)
     fits = np.ones(len(facets), bool)
-    for part in BALLS:
+    for part in BALL_DIAMETERS:
         fits[fits] = ball_fits(facets[fits], vertices, triangles, cells, part * width)
     if not fits.any() and not len(sure):
         return 0.0
@@ -78,7 +76,7 @@ def thin_parts(
 
 
 def ball_fits(
-    facets: Array, vertices: Array, triangles: Indices, cells: Cells, width: float
+    facets: Array, vertices: Array, triangles: Integers, cells: Cells, width: float
 ) -> NDArray[np.bool_]:
     """(k,) whether a ball of diameter `width` m beneath the middle of a facet clears the surface.
 
@@ -89,7 +87,7 @@ def ball_fits(
     normal = outward(facets)
     length = np.linalg.norm(normal, axis=1)[:, None]
     centre = facets.mean(axis=1) - 0.5 * width * normal / np.maximum(length, np.finfo(float).tiny)
-    return ~any_within(centre, 0.5 * width * FITTING, vertices, triangles, cells)
+    return ~any_within(centre, 0.5 * width * CLEARANCE, vertices, triangles, cells)
 
 
 def divided(facets: Array, longest: float) -> Array:
@@ -115,7 +113,7 @@ def side_lengths(facets: Array) -> Array:
     return np.asarray(np.linalg.norm(np.roll(facets, -1, axis=1) - facets, axis=2))
 
 
-def sides(vertices: Array, triangles: Indices) -> Indices:
+def sides(vertices: Array, triangles: Integers) -> Integers:
     """(m, 3) triangles of the surface of a body in a slab, without its cuts across z."""
     return triangles[~across(outward(vertices[triangles]))]
 
@@ -123,6 +121,11 @@ def sides(vertices: Array, triangles: Indices) -> Indices:
 def across(normal: Array) -> NDArray[np.bool_]:
     """(k,) whether triangles of normals (k, 3) lie across z."""
     return np.asarray(np.abs(normal[:, 2]) > 0.5 * np.linalg.norm(normal, axis=1))
+
+
+def split_quads(a: Integers, b: Integers, c: Integers, d: Integers) -> Integers:
+    """(2 k, 3) triangles a b c, then a c d, of quadrangles with corners (k,) in order."""
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def outward(facets: Array) -> Array:

@@ -13,13 +13,13 @@ from mujoco import MjModel, MjSpec
 STDERR = 2
 """File descriptor that Qhull writes to, past Python's `sys.stderr`."""
 
-LEAST = 1e-6
+NEGLIGIBLE = 1e-6
 """kg and kg m^2 that a body without mass may be given: negligible for any real body."""
 
 REMEDIES = (
     {"balanceinertia": True},
-    {"boundmass": LEAST, "boundinertia": LEAST},
-    {"balanceinertia": True, "boundmass": LEAST, "boundinertia": LEAST},
+    {"boundmass": NEGLIGIBLE, "boundinertia": NEGLIGIBLE},
+    {"balanceinertia": True, "boundmass": NEGLIGIBLE, "boundinertia": NEGLIGIBLE},
 )
 """Attributes of the compiler element that correct inertias, in the order of trial."""
 

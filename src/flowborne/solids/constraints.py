@@ -6,14 +6,11 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import Scratch
-
-Array = NDArray[np.float64]
-Zones = NDArray[np.int64]
 
 OFF, ACTIVE, PUSHED_UP, PUSHED_DOWN = 0, 1, 2, 3
 """Zone of a row, numbered as mjtConstraintState: no force, a force linear in the acceleration, or
@@ -46,10 +43,10 @@ class Rows:
     D: Array
     aref: Array
     friction: Array
-    kind: NDArray[np.int64]
-    contact: NDArray[np.int64]
+    kind: Integers
+    contact: Integers
 
-    def zones(self, acceleration: Array, present: Zones) -> Zones:
+    def zones(self, acceleration: Array, present: Integers) -> Integers:
         """(k,) zone of each row at an acceleration (nv,); a tie keeps the present zone."""
         motion = self.J @ acceleration
         slip = motion - self.aref
@@ -62,17 +59,17 @@ class Rows:
         tie = (np.abs(np.abs(slip) - edge) <= margin) & (self.kind != TWO_SIDED)
         return np.where(tie, present, zones)
 
-    def pushing(self, zones: Zones) -> int:
+    def pushing(self, zones: Integers) -> int:
         """Number of contacts with an active row."""
         active = self.contact[zones == ACTIVE]
         return int(np.unique(active[active >= 0]).size)
 
-    def force(self, acceleration: Array, zones: Zones) -> Array:
+    def force(self, acceleration: Array, zones: Integers) -> Array:
         """(k,) force along the direction of each row at an acceleration (nv,), for given zones."""
         spring = self.D * (self.aref - self.J @ acceleration)
         return np.where(zones == ACTIVE, spring, FRICTION_SIGN[zones] * self.friction)
 
-    def acting(self, zones: Zones) -> tuple[Array, Array, Array]:
+    def acting(self, zones: Integers) -> tuple[Array, Array, Array]:
         """J and D of the active rows, and the force (nv,) of all rows at zero acceleration."""
         on = zones == ACTIVE
         J, D = self.J[on], self.D[on]
@@ -80,7 +77,7 @@ class Rows:
         return J, D, J.T @ (D * self.aref[on]) + self.J.T @ slipping
 
 
-def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:
+def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Integers]:
     """Constraint rows and their zones in MuJoCo's solution; call it after mj_forward.
 
     Contacts without friction have one row for any condim.
@@ -106,7 +103,7 @@ def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Zones]:
     return merge_frictionless(rows, data.efc_state.astype(np.int64), s)
 
 
-def merge_frictionless(rows: Rows, zones: Zones, s: Scratch) -> tuple[Rows, Zones]:
+def merge_frictionless(rows: Rows, zones: Integers, s: Scratch) -> tuple[Rows, Integers]:
     """Replace the pyramid of each frictionless contact by one row along its normal.
 
     MuJoCo gives such a contact the friction mjMINMU = 1e-5. The edges of its pyramid are then
@@ -131,12 +128,6 @@ def merge_frictionless(rows: Rows, zones: Zones, s: Scratch) -> tuple[Rows, Zone
     D[edge[first]] *= 2.0 * contacts.mu[rows.contact[first[edge[first]]]] ** 2
     active = np.zeros(len(first), bool)
     np.logical_or.at(active, group, zones == ACTIVE)
-    merged = Rows(
-        mean @ rows.J,
-        D,
-        mean @ rows.aref,
-        rows.friction[first],
-        rows.kind[first],
-        rows.contact[first],
-    )
+    same = rows.friction[first], rows.kind[first], rows.contact[first]
+    merged = Rows(mean @ rows.J, D, mean @ rows.aref, *same)
     return merged, np.where(edge[first], np.where(active, ACTIVE, OFF), zones[first])

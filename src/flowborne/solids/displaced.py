@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.shape import Shape
 
-Array = NDArray[np.float64]
+LINES_PER_SIDE = 200
+"""Lines along each side of the quadrature of a shared volume."""
 
-COLUMNS = 200
-"""Columns along each side of the quadrature of a shared volume."""
-
-SLAB_COLUMNS = 4000
-"""Columns of the quadrature of a shared cross-section."""
+SLAB_LINES = 4000
+"""Lines of the quadrature of a shared cross-section."""
 
 
 @dataclass(frozen=True)
@@ -82,19 +79,19 @@ def _shared_region(solids: list[Solid]) -> tuple[Array, Array] | None:
 def _lines(low: Array, high: Array, slab: bool) -> tuple[Array, Array, float]:
     """Origins (n, 3), direction (3,) and weight of the lines through the region."""
     if slab:
-        step = (high[0] - low[0]) / SLAB_COLUMNS
-        x = low[0] + step * (np.arange(SLAB_COLUMNS) + 0.5)
+        step = (high[0] - low[0]) / SLAB_LINES
+        x = low[0] + step * (np.arange(SLAB_LINES) + 0.5)
         zero = np.zeros_like(x)
         return np.stack([x, zero, zero], axis=1), np.array([0.0, 1.0, 0.0]), float(step)
-    step = (high - low) / COLUMNS
-    ticks = np.arange(COLUMNS) + 0.5
+    step = (high - low) / LINES_PER_SIDE
+    ticks = np.arange(LINES_PER_SIDE) + 0.5
     x, y = np.meshgrid(low[0] + step[0] * ticks, low[1] + step[1] * ticks, indexing="ij")
     origins = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
     return origins, np.array([0.0, 0.0, 1.0]), float(step[0] * step[1])
 
 
 def _excess(
-    crossings: list[tuple[NDArray[np.int64], Array, Array]], origins: Array, direction: Array
+    crossings: list[tuple[Integers, Array, Array]], origins: Array, direction: Array
 ) -> tuple[float, Array]:
     """Length along all lines counted more than once, and its first moment (3,)."""
     line = np.concatenate([c[0] for c in crossings])
@@ -106,23 +103,3 @@ def _excess(
     length = surplus * (at[1:] - at[:-1])
     middle = origins[line[:-1]] + 0.5 * (at[1:] + at[:-1])[:, None] * direction
     return float(length.sum()), np.asarray((length[:, None] * middle).sum(axis=0))
-
-
-def winding(point: Array, vertices: Array, triangles: NDArray[np.int64]) -> float:
-    """Winding number of a closed surface around a point (van Oosterom and Strackee 1983)."""
-    u, v, w = np.moveaxis((vertices - point)[triangles], 1, 0)
-    lengths = [np.sqrt(np.einsum("td,td->t", x, x)) for x in (u, v, w)]
-    below = lengths[0] * lengths[1] * lengths[2]
-    for (a, b), c in zip(((u, v), (v, w), (w, u)), (2, 0, 1), strict=True):
-        below = below + np.einsum("td,td->t", a, b) * lengths[c]
-    triple = np.einsum("td,td->t", u, np.cross(v, w))
-    return float(np.arctan2(triple, below).sum()) / (2.0 * np.pi)
-
-
-def covered(
-    geoms: Sequence[Array], vertices: Array, triangles: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """(n,) whether all points (k, 3) of each geometry lie inside a closed surface."""
-    return np.array(
-        [all(winding(point, vertices, triangles) > 0.5 for point in geom) for geom in geoms], bool
-    )

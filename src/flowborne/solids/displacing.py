@@ -17,6 +17,7 @@ from fnmatch import fnmatchcase
 import mujoco
 import numpy as np
 
+from flowborne.phrases import listed
 from flowborne.shapes.closing import is_closed
 from flowborne.solids.geoms import (
     HIDDEN_GROUP,
@@ -27,10 +28,10 @@ from flowborne.solids.geoms import (
     solid_geoms,
 )
 
-DRAWN = HIDDEN_GROUP - 1
+DRAWN_GROUP = HIDDEN_GROUP - 1
 """Group for geoms that displace fluid but were not drawn."""
 
-DECORATION = 0.5
+DECORATION_SHARE = 0.5
 """Drawn geoms with less than this part of the volume of colliding geoms are decoration (eyes)."""
 
 
@@ -56,9 +57,6 @@ class Displace:
 
 
 BY_RULE = Displace()
-
-MOST_LISTED = 12
-"""Most names that a message lists."""
 
 
 def chosen_geoms(spec: mujoco.MjSpec, mj: mujoco.MjModel, displace: Displace) -> set[int]:
@@ -87,7 +85,7 @@ def write_groups(spec: mujoco.MjSpec, chosen: set[int]) -> bool:
     lowest, highest = spec.compiler.inertiagrouprange
     changed = False
     for geom in spec.geoms:
-        group = min(geom.group, DRAWN) if geom.id in chosen else max(geom.group, HIDDEN_GROUP)
+        group = min(geom.group, DRAWN_GROUP) if geom.id in chosen else max(geom.group, HIDDEN_GROUP)
         if not lowest <= geom.group <= highest:
             geom.mass, changed = 0.0, True
         if group != geom.group:
@@ -100,12 +98,8 @@ def _found(values: Mapping[int, str], pattern: str, what: str) -> set[int]:
     """Geoms with a value that matches a pattern. Raises ValueError without any."""
     found = {g for g, value in values.items() if fnmatchcase(value, pattern)}
     if not found:
-        known = list(dict.fromkeys(values.values()))
-        more = f" and {len(known) - MOST_LISTED} more" if len(known) > MOST_LISTED else ""
-        raise ValueError(
-            f"no geom with a volume has the {what} '{pattern}'. There are: "
-            f"{', '.join(known[:MOST_LISTED]) or 'none'}{more}."
-        )
+        known = listed(list(dict.fromkeys(values.values()))) or "none"
+        raise ValueError(f"no geom with a volume has the {what} '{pattern}'. There are: {known}.")
     return found
 
 
@@ -130,7 +124,7 @@ def _of_body(mj: mujoco.MjModel, geoms: Sequence[int]) -> Sequence[int]:
     volume, other = _volume(mj, drawn), _volume(mj, colliding)
     if np.isnan(volume):
         return drawn if np.isnan(other) else colliding
-    return colliding if volume < DECORATION * other else drawn
+    return colliding if volume < DECORATION_SHARE * other else drawn
 
 
 def _drawn_and_colliding(mj: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[int], list[int]]:

@@ -1,33 +1,23 @@
-"""The bodies of a step with driven dofs: bones alone, or bones and flesh.
-
-Bones alone are a dense system (`prescribed`), bones and flesh a sparse one (`flesh_solve`); both
-have the same methods.
-"""
+"""The bodies of a step with driven dofs: a dense system of bones alone (`prescribed`), or a sparse
+one of bones and flesh (`flesh_solve`)."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.flesh_dynamics import assemble_flesh
-from flowborne.solids.flesh_solve import PrescribedFlesh, prescribe_flesh
+from flowborne.solids.flesh_solve import prescribe_flesh
 from flowborne.solids.model import SolidModel
-from flowborne.solids.prescribed import PrescribedSystem, prescribe
+from flowborne.solids.prescribed import Driven, Mask, prescribe
 from flowborne.solids.state import SolidState
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LIMIT_TOLERANCE = 1e-9
 """Relative excess of a drive over its limit, or of a dof over its velocity, that is ignored."""
 
 SIMULTANEOUS_TURNS = 6
 """Turns in which all wrong drives change; after them only one changes per turn."""
-
-
-Driven = PrescribedSystem | PrescribedFlesh
-"""The bodies of a step, some of whose dofs are driven; never changed after they are made."""
 
 
 def drive(
@@ -59,11 +49,11 @@ def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) 
     """The bodies with the drives that a solution implies; None when they do not change.
 
     A drive either keeps its dof at `hold` with a force within its limit, or pushes with its limit
-    towards a velocity that the dof does not reach. A drive that needs more is released; one whose
-    dof passes `hold` is prescribed again. In the first turn, released drives push from the velocity
-    before the step towards `hold`, because the force that a drive needs while the others reach
-    their velocities says little about its direction. This is a linear complementarity problem of a
-    positive definite matrix. Changing only the first wrong drive always terminates (Murty 1974);
+    towards a velocity that the dof does not reach. A drive that needs more is released; it is
+    prescribed again when its dof passes `hold`. In the first turn, released drives push from the
+    velocity before the step towards `hold`: the force that a drive needs while the others reach
+    their velocities is a poor guide to its direction. This is a linear complementarity problem with
+    a positive definite matrix. Changing only the first wrong drive always terminates (Murty 1974);
     changing all wrong drives usually takes fewer turns.
 
     limit     (nv,) largest |generalised force| of each drive, inf for none

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from flowborne.solids.constraints import Rows, Zones, rows_of
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.constraints import Rows, rows_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import Halfway, halfway
-from flowborne.solids.scratch import Scratch, scratch, twists_about_origin
+from flowborne.solids.scratch import Scratch, posed, scratch, twists_about_origin
 from flowborne.solids.state import SolidState
-
-Array = NDArray[np.float64]
 
 CORIOLIS_TOLERANCE = 1e-13
 """Impulses of Coriolis forces are converged to this share of the momentum."""
@@ -87,7 +88,7 @@ class Kinematics:
 
 
 @dataclass(frozen=True)
-class System:
+class System(ABC):
     """The equations of motion of a step, A (v+ - v) = dt b, written A v+ = impulse.
 
     A        (nv, nv) symmetric positive definite
@@ -104,16 +105,28 @@ class System:
     dt: float
     v: Array
     rows: Rows | None
-    zones: Zones
+    zones: Integers
     halfway: Halfway | None
     own: Array
+
+    @abstractmethod
+    def updated(self, v_plus: Array) -> Self | None:
+        """System with the contacts, limits and Coriolis forces at `v_plus` (nv,), or None if equal.
+
+        Repeated solves are Newton's method on a piecewise quadratic function, and a fixed-point
+        iteration for the Coriolis forces; the caller bounds the number of turns.
+        """
+
+    @abstractmethod
+    def pushed(self, force: Array) -> Self:
+        """System with an additional generalised force (nv,)."""
 
     @property
     def contacts(self) -> int:
         """Number of contacts with an active row."""
         return 0 if self.rows is None else self.rows.pushing(self.zones)
 
-    def zones_at(self, v: Array) -> Zones:
+    def zones_at(self, v: Array) -> Integers:
         """(k,) zones of the rows for a velocity (nv,) after the step."""
         if self.rows is None:
             return self.zones
@@ -133,7 +146,7 @@ class SolidSystem(System):
     """The system of bones alone; A and impulse contain the constraint rows.
 
     smooth  (A, r) without the rows
-    at      (nv,) velocity whose zones these are
+    at      (nv,) velocity at which the zones were found
     turns   number of updates
     """
 
@@ -143,13 +156,8 @@ class SolidSystem(System):
     turns: int = 0
 
     def updated(self, v_plus: Array) -> SolidSystem | None:
-        """System with the contacts, limits and Coriolis forces at `v_plus` (nv,), or None if equal.
-
-        Repeated solves are Newton's method on a piecewise quadratic function, and a fixed-point
-        iteration for the Coriolis forces. After FULL_NEWTON_STEPS the zones are those at the
-        minimum of the function between the last point and `v_plus`, so that the iteration does not
-        cycle. The caller bounds the number of turns.
-        """
+        """As `System.updated`; after FULL_NEWTON_STEPS the zones are those at the minimum of the
+        function between the last point and `v_plus`, so that the iteration does not cycle."""
         zones, at = self.zones_at(v_plus), v_plus
         settled = np.array_equal(zones, self.zones)
         if self.rows is not None and not settled and self.turns >= FULL_NEWTON_STEPS:
@@ -182,11 +190,10 @@ class SolidSystem(System):
         return self.at + high * along
 
     def pushed(self, force: Array) -> SolidSystem:
-        """System with an additional generalised force (nv,)."""
         A, impulse = self.smooth
         return self._with(self.zones, A, impulse + self.dt * force)
 
-    def _with(self, zones: Zones, A: Array, impulse: Array) -> SolidSystem:
+    def _with(self, zones: Integers, A: Array, impulse: Array) -> SolidSystem:
         full = _with_rows(A, impulse, self.v, self.dt, self.rows, zones)
         return replace(self, A=full[0], impulse=full[1], smooth=(A, impulse), zones=zones)
 
@@ -199,8 +206,7 @@ def no_flesh(nv: int) -> csr_array:
 
 def kinematics(model: SolidModel, q: Array) -> Kinematics:
     """Poses and Jacobians at positions (nq,)."""
-    s = scratch(model)
-    s.place(q)
+    s = posed(model, q)
     bodies, flesh = model.nbody, model.flesh
     return Kinematics(
         s.xpos[:bodies].copy(),
@@ -281,7 +287,7 @@ def centred(implicit: Array, stiff: Array, dt: float) -> Array:
 
 
 def _with_rows(
-    A: Array, impulse: Array, v: Array, dt: float, rows: Rows | None, zones: Zones
+    A: Array, impulse: Array, v: Array, dt: float, rows: Rows | None, zones: Integers
 ) -> tuple[Array, Array]:
     """A and impulse with the rows in the given zones."""
     if rows is None:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.elastic import (
     Elements,
     add_stiffness,
@@ -23,10 +23,6 @@ from flowborne.kernels.elastic import (
     volume_ratios,
 )
 from flowborne.solids.elements import shape_gradients
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 
 FULL_RATIO = 12.0
 """Largest lambda over mu that is fully integrated, that of Poisson's ratio 0.46: the bending of one
@@ -44,9 +40,9 @@ class Elasticity:
     """
 
     rest: Array
-    elements: Indices
+    elements: Integers
     moduli: Array
-    laws: Indices
+    laws: Integers
 
     def forces(self, positions: Array) -> Array:
         """(n, 3) forces on nodes at `positions` (n, 3), N."""
@@ -86,7 +82,7 @@ class Elasticity:
         )
 
     @cached_property
-    def _pattern(self) -> tuple[Indices, Indices, Indices, Indices]:
+    def _pattern(self) -> tuple[Integers, Integers, Integers, Integers]:
         """Columns and row starts of the matrix, and `slot` and `stride` of `add_stiffness`."""
         count, k = len(self.rest), self.elements.shape[1]
         row, column = np.repeat(self.elements, k, axis=1), np.tile(self.elements, (1, k))

@@ -7,12 +7,11 @@ L_i (2 L_i - 1) at corners, 4 L_i L_j between them (Zienkiewicz and Taylor, sect
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.shapes.thickness import split_quads
 
 EDGES = {
     3: np.array([[0, 1], [0, 2], [1, 2]]),
@@ -39,7 +38,7 @@ CENTRAL = {3: 2.0 / 3.0, 4: 0.25 + 0.15 * np.sqrt(5.0)}
 """Largest barycentric coordinate of each quadrature point; one point per corner, second order."""
 
 
-def measures(points: Array, simplices: Indices) -> Array:
+def measures(points: Array, simplices: Integers) -> Array:
     """(m,) signed volumes (m^3) of tetrahedra (m, 4) or areas (m^2) of triangles (m, 3) in the
     plane z = 0, of points (n, 3)."""
     corners = points[simplices]
@@ -49,14 +48,14 @@ def measures(points: Array, simplices: Indices) -> Array:
     return np.asarray(np.linalg.det(sides) / 6.0)
 
 
-def oriented(points: Array, simplices: Indices) -> Indices:
+def oriented(points: Array, simplices: Integers) -> Integers:
     """The simplices, with two corners exchanged in those of negative measure."""
     left = measures(points, simplices) < 0.0
     swapped = np.concatenate([simplices[:, :-2], simplices[:, :-3:-1]], axis=1)
     return np.where(left[:, None], swapped, simplices)
 
 
-def with_middles(count: int, simplices: Indices) -> tuple[Indices, Indices]:
+def with_middles(count: int, simplices: Integers) -> tuple[Integers, Integers]:
     """Quadratic elements of simplices of `count` points.
 
     returns  (e, 2) ends of the edges; their middles follow the points in the list of nodes.
@@ -68,18 +67,18 @@ def with_middles(count: int, simplices: Indices) -> tuple[Indices, Indices]:
     return edges, np.concatenate([simplices, middles], axis=1)
 
 
-def parts(elements: Indices) -> Indices:
+def parts(elements: Integers) -> Integers:
     """Linear simplices of the nodes, element after element."""
     split = PARTS[elements.shape[1]]
     return np.asarray(elements[:, split].reshape(-1, split.shape[1]))
 
 
-def corners(elements: Indices) -> Indices:
+def corners(elements: Integers) -> Integers:
     """(m, 3) or (m, 4) the corners of quadratic elements."""
     return np.asarray(elements[:, : 3 if elements.shape[1] == 6 else 4])
 
 
-def lumped(points: Array, elements: Indices) -> Array:
+def lumped(points: Array, elements: Integers) -> Array:
     """(n,) volume (m^3, m^2 of triangles) of each node (n, 3)."""
     volume, own = measures(points, corners(elements)), CORNER[elements.shape[1]]
     at_corners = corners(elements).shape[1]
@@ -89,7 +88,7 @@ def lumped(points: Array, elements: Indices) -> Array:
     return np.asarray(found, dtype=np.float64)
 
 
-def shape_gradients(points: Array, elements: Indices) -> tuple[Array, Array]:
+def shape_gradients(points: Array, elements: Integers) -> tuple[Array, Array]:
     """Gradients (m, q + 1, k, 3) of the shape functions at q quadrature points and at the centroid,
     1/m; volume (m,) of the elements, m^3, or m^2 of triangles."""
     simplices = corners(elements)
@@ -110,29 +109,36 @@ def shape_gradients(points: Array, elements: Indices) -> tuple[Array, Array]:
     return np.concatenate([at_corners, between], axis=2), measures(points, simplices)
 
 
-def prism(triangles: Indices, count: int) -> Indices:
+def prism(triangles: Integers, count: int) -> Integers:
     """(k, 3) outward surface of a prism over triangles (m, 3) of `count` nodes.
 
     Its vertices are the nodes at the lower end, then those at the upper end.
     """
-    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, at, shared = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
-    a, b = sides[np.sort(at[shared == 1])].T
-    walls = [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
-    return np.concatenate([triangles[:, ::-1], triangles + count, *walls])
+    a, b = unshared(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)).T
+    walls = split_quads(a, b, b + count, a + count)
+    return np.concatenate([triangles[:, ::-1], triangles + count, walls])
 
 
-def surface_of(elements: Indices) -> Indices:
+def surface_of(elements: Integers) -> Integers:
     """(k, 3) outward faces of right-handed tetrahedra (m, 4) that belong to only one of them."""
     corners = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-    faces = elements[:, corners].reshape(-1, 3)
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
+    return unshared(elements[:, corners].reshape(-1, 3))
+
+
+def unshared(faces: Integers) -> Integers:
+    """The faces, or edges, (k, n) that have the corners of no other one, in their order."""
+    corners = np.sort(faces, axis=1)
+    _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
     return np.asarray(faces[np.sort(first[count == 1])])
 
 
-def outer_surface(points: Array, elements: Indices) -> Indices:
+def connected(count: int, one: Integers, other: Integers) -> Integers:
+    """(count,) number of the connected part of each item; `one` and `other` (k,) are linked."""
+    links = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
+def outer_surface(points: Array, elements: Integers) -> Integers:
     """(k, 3) outward triangles around tetrahedra (m, 4) of points (n, 3), without those of holes.
 
     Enclosed space, mostly bones, counts as inside. A sheet is a set of triangles connected by
@@ -145,7 +151,6 @@ def outer_surface(points: Array, elements: Indices) -> Indices:
     by_edge = np.argsort(edge, kind="stable")
     of_two = around[edge[by_edge]] == 2  # an edge along which sheets touch has four triangles
     one, other = (by_edge[of_two] // 3).reshape(-1, 2).T
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    sheet = connected_components(graph, directed=False)[1]
+    sheet = connected(count, one, other)
     enclosed = np.bincount(sheet, np.linalg.det(points[triangles]))
     return np.asarray(triangles[enclosed[sheet] > 0.0])

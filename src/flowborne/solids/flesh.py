@@ -18,15 +18,14 @@ from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vst
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.phrases import location
 from flowborne.shapes.thickness import thinnest
 from flowborne.solids.elasticity import Elasticity
-from flowborne.solids.elements import EDGES, measures, outer_surface, parts, prism
+from flowborne.solids.elements import measures, outer_surface, parts, prism, with_middles
 from flowborne.solids.geoms import rest_poses
-from flowborne.solids.scratch import Compiled, Scratch, cross, scratch, twists_about_origin
+from flowborne.solids.scratch import Compiled, Scratch, cross, posed, twists_about_origin
 from flowborne.solids.tissue.growth import Grown
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class Jointed(Compiled, Protocol):
@@ -34,7 +33,7 @@ class Jointed(Compiled, Protocol):
 
     slab: bool
     nv: int
-    dof_root: Indices
+    dof_root: Integers
 
 
 @dataclass(frozen=True)
@@ -60,32 +59,28 @@ class Flesh:
 
     model: Jointed
     names: tuple[str, ...]
-    body: Indices
+    body: Integers
     offset: Array
     weights: csr_array
     lift: Array
     rest: Array
-    elements: Indices
-    surface: Indices
-    of_surface: Indices
-    of_element: Indices
+    elements: Integers
+    surface: Integers
+    of_surface: Integers
+    of_element: Integers
     dofs: NDArray[np.bool_]
-    moved: Indices
+    moved: Integers
     carried: Array
     elasticity: Elasticity
     damping: float
 
     def vertices(self, q: Array) -> Array:
         """(n, 3) positions of the vertices at q (nq,), m."""
-        s = scratch(self.model)
-        s.place(q)
-        return self.placed(s)
+        return self.placed(posed(self.model, q))
 
     def jacobian(self, q: Array) -> csr_array:
         """(3n, nv) sparse, from v to the velocities of the vertices, x y z of each in turn."""
-        s = scratch(self.model)
-        s.place(q)
-        return self.moving(s)
+        return self.moving(posed(self.model, q))
 
     def placed(self, s: Scratch) -> Array:
         """(n, 3) the vertices at the pose in `s`, m."""
@@ -97,14 +92,14 @@ class Flesh:
 
     def nodes(self, s: Scratch) -> Array:
         """(np, 3) the nodes at the pose in `s`, m."""
-        return _placed(s.xpos, s.xmat.reshape(-1, 3, 3), self.body, self.offset)
+        rotation = s.xmat.reshape(-1, 3, 3)[self.body]
+        return np.asarray(s.xpos[self.body] + np.einsum("nij,nj->ni", rotation, self.offset))
 
     def moving_nodes(self, s: Scratch) -> csr_array:
         """(3np, nv) from v to the velocities of the nodes at the pose in `s`."""
-        places = self.nodes(s)
         twists = twists_about_origin(s.cdof, s.subtree_com[self.model.dof_root])
         node, dof = self.moved
-        velocity = twists[dof, :3] + cross(twists[dof, 3:], places[node])
+        velocity = twists[dof, :3] + cross(twists[dof, 3:], self.nodes(s)[node])
         entry = self._entries
         data = velocity.ravel()[entry.data]
         moving = csr_array((data, entry.indices, entry.indptr), shape=entry.shape, copy=True)
@@ -136,7 +131,7 @@ class Flesh:
         return spread
 
     @cached_property
-    def places(self) -> NDArray[np.bool_]:
+    def positions(self) -> NDArray[np.bool_]:
         """(nq,) the entries of q that belong to nodes of flesh."""
         mj = self.model.mj
         own = np.zeros(mj.nq, bool)
@@ -149,7 +144,7 @@ class Flesh:
         return tuple(thinnest(self.rest, skin, self.model.slab) for skin in self.skins)
 
     @property
-    def skins(self) -> list[Indices]:
+    def skins(self) -> list[Integers]:
         """(m, 3) triangles of each flesh, outward."""
         return [self.surface[self.of_surface == f] for f in range(len(self.names))]
 
@@ -164,9 +159,7 @@ class Flesh:
 
     def volume_ratios(self, q: Array) -> Array:
         """(m,) least det F of each element, negative when inside out, at positions q (nq,)."""
-        s = scratch(self.model)
-        s.place(q)
-        return self.elasticity.volume_ratios(self.nodes(s))
+        return self.elasticity.volume_ratios(self.nodes(posed(self.model, q)))
 
 
 def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
@@ -217,56 +210,47 @@ def points_of_flesh(mj: mujoco.MjModel, grown: Sequence[Grown]) -> NDArray[np.bo
     return own
 
 
-def bodies_of(mj: mujoco.MjModel, grown: Grown) -> Indices:
+def bodies_of(mj: mujoco.MjModel, grown: Grown) -> Integers:
     """(n,) MuJoCo's numbers of the bodies that nodes are, or are fixed to."""
     number = {name: mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name) for name in grown.bodies}
     return np.array([number[name] for name in grown.bodies], np.int64)
 
 
-def _placed(position: Array, rotation: Array, body: Indices, offset: Array) -> Array:
-    return np.asarray(position[body] + np.einsum("nij,nj->ni", rotation[body], offset))
-
-
-def _moved(mj: mujoco.MjModel, body: Indices) -> Indices:
+def _moved(mj: mujoco.MjModel, body: Integers) -> Integers:
     """(2, k) pairs of a node, fixed to `body` (np,), and a dof that moves it."""
     chains: list[list[int]] = [[]]
     for b in range(1, mj.nbody):
-        first = int(mj.body_dofadr[b])
-        chains.append(
-            chains[mj.body_parentid[b]] + [first + n for n in range(int(mj.body_dofnum[b]))]
-        )
+        first, count = int(mj.body_dofadr[b]), int(mj.body_dofnum[b])
+        chains.append([*chains[mj.body_parentid[b]], *range(first, first + count)])
     pairs = [(point, dof) for point, b in enumerate(body) for dof in chains[b]]
     return np.array(pairs, np.int64).reshape(-1, 2).T
 
 
-def _carried(bones: int, rest: Array, simplices: Indices, bone: Indices) -> Array:
+def _carried(bones: int, rest: Array, simplices: Integers, bone: Integers) -> Array:
     """(np, bones) share of each bone in the motion of a node, harmonic along the edges.
 
     bone  (np,) bone that holds the node, -1 for none; nodes that are connected to no bone belong to
           the world
     """
-    pairs = EDGES[simplices.shape[1]]
-    edges = np.unique(np.sort(simplices[:, pairs].reshape(-1, 2), axis=1), axis=0)
-    strength = 1.0 / np.square(rest[edges[:, 0]] - rest[edges[:, 1]]).sum(axis=1)
     count = len(rest)
-    links = coo_array((strength, (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
+    one, other = with_middles(count, simplices)[0].T
+    strength = 1.0 / np.square(rest[one] - rest[other]).sum(axis=1)
+    links = coo_array((strength, (one, other)), shape=(count, count)).tocsr()
     links = links + links.T
     laplacian = csr_array(diags_array(links.sum(axis=1)) - links)
     held, free = np.flatnonzero(bone >= 0), np.flatnonzero(bone < 0)
     share = np.zeros((len(bone), bones))
     share[held, bone[held]] = 1.0
-    if free.size and held.size:
-        _, label = connected_components(laplacian, directed=False)
-        loose = free[~np.isin(label[free], label[held])]
-        share[loose, 0] = 1.0
-        free = np.setdiff1d(free, loose)
-        given = np.setdiff1d(np.arange(len(bone)), free)
+    _, label = connected_components(laplacian, directed=False)
+    loose = free[~np.isin(label[free], label[held])]
+    share[loose, 0] = 1.0
+    free = np.setdiff1d(free, loose)
+    if free.size:
+        given = np.setdiff1d(np.arange(count), free)
         right = -(laplacian[free][:, given] @ share[given])
         found = spsolve(laplacian[free][:, free].tocsc(), right)
         share[free] = np.clip(np.asarray(found).reshape(len(free), bones), 0.0, 1.0)
         share[free] /= share[free].sum(axis=1, keepdims=True)
-    elif free.size:
-        share[free, 0] = 1.0
     return share
 
 
@@ -279,27 +263,20 @@ class Inversion:
 
     elements  (k,) numbers of the elements, ascending
     of        number of all elements
-    worst     number of the element with the smallest det F
-    ratio     its det F
-    place     (3,) its middle, m
-    name      name of its flesh
+    ratio     the smallest det F
+    worst     where it is, in words
     """
 
-    elements: NDArray[np.int64]
+    elements: Integers
     of: int
-    worst: int
     ratio: float
-    place: Array
-    name: str
+    worst: str
 
     def sentence(self) -> str:
         """A message for the user, without a full stop."""
-        place = ", ".join(f"{x:.4g}" for x in self.place)
         return (
-            f"{len(self.elements)} of {self.of} elements of flesh are inside out, "
-            f"the worst in '{self.name}' at ({place}) m with det F = {self.ratio:.3g} (element "
-            f"{self.worst}). Take shorter steps, stiffen the flesh, or give it larger elements "
-            "there"
+            f"{len(self.elements)} of {self.of} elements of flesh are inside out, the worst "
+            f"{self.worst}. Take shorter steps, stiffen the flesh, or give it larger elements there"
         )
 
 
@@ -310,6 +287,7 @@ def inversion(flesh: Flesh, q: Array) -> Inversion | None:
     if wrong.size == 0:
         return None
     worst = int(wrong[np.argmin(ratios[wrong])])
+    ratio, name = float(ratios[worst]), flesh.names[int(flesh.of_element[worst])]
     middle = flesh.vertices(q)[flesh.elements[worst]].mean(axis=0)
-    name = flesh.names[int(flesh.of_element[worst])]
-    return Inversion(wrong, len(ratios), worst, float(ratios[worst]), middle, name)
+    where = f"in '{name}' at {location(middle)} with det F = {ratio:.3g} (element {worst})"
+    return Inversion(wrong, len(ratios), ratio, where)

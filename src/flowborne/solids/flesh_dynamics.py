@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, dia_array
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.constraints import rows_of
 from flowborne.solids.dynamics import System, centred
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway
 from flowborne.solids.scratch import Scratch, scratch
 from flowborne.solids.state import SolidState
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -49,18 +48,12 @@ class FleshSystem(System):
         return J, D, J.T @ (D * (J @ self.v)) + self.dt * force
 
     def updated(self, v_plus: Array) -> FleshSystem | None:
-        """System with the contacts, limits and Coriolis forces at `v_plus` (nv,), or None if equal.
-
-        Repeated solves are Newton's method on a piecewise quadratic function, and a fixed-point
-        iteration for the Coriolis forces; the caller bounds the number of turns.
-        """
         zones, (own, same) = self.zones_at(v_plus), self.own_at(v_plus)
         if same and np.array_equal(zones, self.zones):
             return None
         return replace(self, zones=zones, own=own, impulse=self.impulse + own - self.own)
 
     def pushed(self, force: Array) -> FleshSystem:
-        """System with an additional generalised force (nv,)."""
         return replace(self, impulse=self.impulse + self.dt * force)
 
 
@@ -121,10 +114,10 @@ def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_arra
 def _flesh(model: SolidModel, s: Scratch) -> tuple[csr_array, Array]:
     """K (nv, nv) and the forces (nv,) of flesh at the pose in `s`."""
     assert model.flesh is not None
-    places, J = model.flesh.nodes(s), model.flesh.moving_nodes(s)
-    elasticity = model.flesh.elasticity
-    K = J.T @ (elasticity.stiffness(places) @ J)
-    return csr_array(K), J.T @ elasticity.forces(places).ravel()
+    flesh = model.flesh
+    nodes, J = flesh.nodes(s), flesh.moving_nodes(s)
+    K = J.T @ (flesh.elasticity.stiffness(nodes) @ J)
+    return csr_array(K), J.T @ flesh.elasticity.forces(nodes).ravel()
 
 
 def sparse_mass(model: SolidModel, s: Scratch) -> csr_array:
@@ -159,5 +152,5 @@ def _diagonal(values: Array) -> dia_array:
     return dia_array((values, 0), shape=(len(values), len(values)))
 
 
-def _starts(counts: NDArray[np.int32]) -> NDArray[np.int64]:
+def _starts(counts: NDArray[np.int32]) -> Integers:
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])

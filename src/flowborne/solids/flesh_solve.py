@@ -25,30 +25,27 @@ damping ratio of a vibration of n steps per period is DAMPED_SHARE (2 pi / n)^5 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.sparse import coo_array, csc_array, csr_array
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import FleshSystem
 from flowborne.solids.model import SolidModel
+from flowborne.solids.prescribed import Driven, Mask
 from flowborne.solvers.answers import SparseAnswer
 from flowborne.solvers.cholesky import Cholesky, Ordering, cholesky, ordering_of
 from flowborne.solvers.mobility import Mobility, factored_mobility
-
-Array = NDArray[np.float64]
-
-Mask = NDArray[np.bool_]
 
 DAMPED_SHARE, DAMPING_ORDER = 0.25, 3
 """Share that a step takes from unresolved vibrations, and how sharply it selects them."""
 
 
-def ordered(model: SolidModel, free: NDArray[np.int64]) -> Ordering:
+def ordered(model: SolidModel, free: Integers) -> Ordering:
     """Elimination order of A (see `flesh_dynamics`) for the free dofs (nf,), valid for all poses.
 
     It is computed once per model and set of free dofs.
@@ -98,70 +95,42 @@ def tendons(model: SolidModel) -> csr_array:
     return csr_array((values, mj.ten_J_colind[: len(values)], start), (mj.ntendon, model.nv))
 
 
-def _ones(row: NDArray[np.int64], column: NDArray[np.int64], shape: tuple[int, int]) -> csr_array:
+def _ones(row: Integers, column: Integers, shape: tuple[int, int]) -> csr_array:
     return coo_array((np.ones(len(row)), (row, column)), shape=shape).tocsr()
 
 
 @dataclass(frozen=True)
-class PrescribedFlesh:
-    """The response of bones and flesh to impulses when some dofs are prescribed.
+class PrescribedFlesh(Driven):
+    """The response of bones and flesh.
 
-    system      the system it was made from
-    prescribed  (nv,) dofs that end the step with velocity `hold`
-    hold        (nv,) rad/s or m/s; entries of free dofs are not used
-    velocity    (nv,) v*, velocity after the step without an impulse
-    free        (nf,) the free dofs
-    factor      of A_FF
-    rows        Y_F (nf, k) and the factor of D^-1 + J Y, for the active rows
-    limited     (nv,) dofs with a drive at its limit; they are free, and `push` acts on them
-    push        (nv,) generalised force of limited drives, already in `system`
-    turns       number of changes of the drives
+    free    (nf,) the free dofs
+    factor  of A_FF
+    rows    Y_F (nf, k) and the factor of D^-1 + J Y, for the active rows
     """
 
     system: FleshSystem
-    prescribed: Mask
-    hold: Array
-    velocity: Array
-    free: NDArray[np.int64]
+    free: Integers
     factor: Cholesky
     rows: tuple[Array, Any]
-    limited: Mask
-    push: Array
-    turns: int = 0
 
     def answer(self, impulse: Array) -> Array:
         """B_FF^-1 of generalised impulses (nv,) or (nv, k), zero on prescribed dofs."""
         change = np.zeros_like(impulse)
-        if not impulse.any():
-            return change
-        change[self.free] = _solve(self.factor, self.rows, impulse[self.free])
+        if impulse.any():
+            change[self.free] = _solve(self.factor, self.rows, impulse[self.free])
         return change
 
-    def after(self, impulse: Array) -> Array:
-        """(nv,) velocity after the step with a generalised impulse (nv,), such as the fluid's."""
-        return self.velocity + self.answer(impulse)
-
     def actuator(self, v_plus: Array, impulse: Array) -> Array:
-        """(nv,) generalised force that the drives supplied; zero on dofs without a drive."""
         left = _remaining(self.system, v_plus) + impulse
         return np.where(self.prescribed, -left / self.system.dt, self.push)
 
-    def updated(self, v_plus: Array) -> PrescribedFlesh | None:
-        """With the contacts and limits at `v_plus`; None when they do not change."""
-        system = self.system.updated(v_plus)
-        if system is None:
-            return None
-        return _solved(replace(self, system=system))
-
     def mobility(self, pose: Kinematics) -> Mobility:
-        """The motion caused by a unit impulse: M = T B_FF^-1 T^T."""
         T = csr_array(pose.jacobian[:, self.free])
         return factored_mobility(
             T, self.factor, self._constraints(), T @ self._soft(pose.twist_rows)
         )
 
     def answering(self, pose: Kinematics, drag: csr_array) -> SparseAnswer:
-        """The response of bones and flesh to a drag (k, k), kg."""
         J, D, _ = self.system.acting()
         held = csr_array(J[:, self.free])
         B = self.system.A[self.free][:, self.free] + held.T @ (D[:, None] * held)
@@ -187,52 +156,38 @@ class PrescribedFlesh:
         share, axes = np.linalg.eigh(0.5 * (block + block.T))
         return np.asarray(answers @ (axes / np.sqrt(np.maximum(share, np.finfo(float).tiny))))
 
-    def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> PrescribedFlesh:
-        """With other prescribed dofs, and other drives at their limits."""
-        system = self.system.pushed(push - self.push)
-        free, factor = _factored(system, prescribed)
-        return _solved(
-            replace(
-                self,
-                system=system,
-                prescribed=prescribed,
-                free=free,
-                factor=factor,
-                limited=limited,
-                push=push,
-                turns=self.turns + 1,
-            )
-        )
-
-    def answers_as(self, other: object) -> bool:
-        """Whether both respond equally to any impulse."""
+    def same_mobility(self, other: Driven) -> bool:
         if not isinstance(other, PrescribedFlesh) or self.factor is not other.factor:
             return False
         return np.array_equal(self.system.zones, other.system.zones)
 
+    def solved(self) -> Self:
+        system, free, factor = self.system, np.flatnonzero(~self.prescribed), self.factor
+        if not np.array_equal(free, self.free):
+            factor = factored(system, free)
+        J, D, _ = system.acting()
+        Y = factor.solve(J[:, free].T) if len(D) else np.zeros((len(free), 0))
+        rows = Y, cho_factor(np.diag(1.0 / D) + J[:, free] @ Y, lower=True) if len(D) else None
+        velocity = np.where(self.prescribed, self.hold, 0.0)
+        velocity[free] = _solve(factor, rows, _remaining(system, velocity)[free])
+        return replace(self, velocity=velocity, free=free, factor=factor, rows=rows)
+
 
 def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> PrescribedFlesh:
     """Prescribe dofs (nv,) to end the step with velocities `hold` (nv,), exactly."""
-    free, factor = _factored(system, prescribed)
+    zero, none, free = np.zeros(len(hold)), np.zeros(len(hold), bool), np.flatnonzero(~prescribed)
+    factor = factored(system, free)
     system = _damped(system, free, factor)
-    none = np.zeros(len(hold))
-    rows = np.zeros((len(free), 0)), None
-    return _solved(
-        PrescribedFlesh(
-            system,
-            prescribed.copy(),
-            hold.copy(),
-            none,
-            free,
-            factor,
-            rows,
-            np.zeros(len(hold), bool),
-            none,
-        )
-    )
+    given, rows = (prescribed.copy(), hold.copy()), (np.zeros((len(free), 0)), None)
+    return PrescribedFlesh(system, *given, zero, none, zero, 0, free, factor, rows).solved()
 
 
-def _damped(system: FleshSystem, free: NDArray[np.int64], factor: Cholesky) -> FleshSystem:
+def factored(system: FleshSystem, free: Integers) -> Cholesky:
+    """The factor of A_FF for the free dofs (nf,)."""
+    return cholesky(system.A, free, ordered(system.model, free))
+
+
+def _damped(system: FleshSystem, free: Integers, factor: Cholesky) -> FleshSystem:
     """With the impulse that damps unresolved vibrations."""
     v = system.v
     for _ in range(DAMPING_ORDER - 1):
@@ -240,22 +195,6 @@ def _damped(system: FleshSystem, free: NDArray[np.int64], factor: Cholesky) -> F
         kept[free] = factor.solve((system.elastic @ v)[free])
         v = kept
     return replace(system, impulse=system.impulse - DAMPED_SHARE * (system.elastic @ v))
-
-
-def _factored(system: FleshSystem, prescribed: Mask) -> tuple[NDArray[np.int64], Cholesky]:
-    free = np.flatnonzero(~prescribed)
-    return free, cholesky(system.A, free, ordered(system.model, free))
-
-
-def _solved(driven: PrescribedFlesh) -> PrescribedFlesh:
-    """With the active rows of its system, and the velocity v* for them."""
-    system, free, factor = driven.system, driven.free, driven.factor
-    J, D, _ = system.acting()
-    Y = factor.solve(J[:, free].T) if len(D) else np.zeros((len(free), 0))
-    rows = Y, cho_factor(np.diag(1.0 / D) + J[:, free] @ Y, lower=True) if len(D) else None
-    velocity = np.where(driven.prescribed, driven.hold, 0.0)
-    velocity[free] = _solve(factor, rows, _remaining(system, velocity)[free])
-    return replace(driven, velocity=velocity, rows=rows)
 
 
 def _remaining(system: FleshSystem, v_plus: Array) -> Array:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import mass_matrix
+from flowborne.solids.momentum import mass_matrix, mass_times
 from flowborne.solids.prescribed import symmetric_inverse
-from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState
-
-Array = NDArray[np.float64]
 
 
 def follow(model: SolidModel, q: Array, change: Array) -> Array:
@@ -40,13 +37,13 @@ def posed_flesh(model: SolidModel, q: Array) -> Array:
     carried = np.einsum("bij,bnj->bni", rotation, flesh.rest - rest.body_position[:, None])
     carried += now.body_position[:, None]
     return model.integrate(
-        np.where(flesh.places, model.rest().q, q),
+        np.where(flesh.positions, model.rest().q, q),
         flesh.of_vertices(np.einsum("nb,bni->ni", flesh.carried, carried) - flesh.rest),
         1.0,
     )
 
 
-def follow_each(model: SolidModel, q: Array) -> tuple[NDArray[np.int64], Array]:
+def follow_each(model: SolidModel, q: Array) -> tuple[Integers, Array]:
     """The dofs (k,) of bones, and (nv, k) the velocities of all dofs for unit velocity of each."""
     if model.flesh is None:
         return np.arange(model.nv), np.eye(model.nv)
@@ -63,7 +60,7 @@ def _followed(model: SolidModel, pose: Kinematics, change: Array) -> Array:
     return np.where(model.flesh.dofs, model.flesh.of_vertices(moving), change)
 
 
-def outboard_dofs(model: SolidModel, dofs: int | NDArray[np.int64]) -> NDArray[np.int64]:
+def outboard_dofs(model: SolidModel, dofs: int | Integers) -> Integers:
     """Dofs of all joints on the descendants of the bodies that `dofs` move."""
     return model.outboard[np.atleast_1d(dofs)].any(axis=0).nonzero()[0]
 
@@ -71,7 +68,7 @@ def outboard_dofs(model: SolidModel, dofs: int | NDArray[np.int64]) -> NDArray[n
 def rigidify(
     model: SolidModel,
     state: SolidState,
-    dofs: NDArray[np.int64],
+    dofs: Integers,
     fixed: NDArray[np.bool_] | None = None,
 ) -> SolidState:
     """State in which the joints `dofs` do not move, by impulses at these joints only.
@@ -109,12 +106,5 @@ def carried_mass(model: SolidModel, q: Array) -> Array:
     if model.flesh is None:
         return mass_matrix(model, q)
     _, following = follow_each(model, q)
-    s = scratch(model)
-    s.place(q)
-    mujoco.mj_makeM(s.mj, s.data)
-    moved = np.empty(model.nv)
-    columns = []
-    for column in np.ascontiguousarray(following.T):
-        mujoco.mj_mulM(s.mj, s.data, moved, column)
-        columns.append(following.T @ moved)
-    return np.stack(columns, axis=1)
+    moved = mass_times(model, q, np.ascontiguousarray(following.T))
+    return np.stack([following.T @ column for column in moved], axis=1)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.shapes.own import OwnGeometry, PlacedShape, ShapeOwn, triangulated
 from flowborne.shapes.primitives import shape_of
 from flowborne.shapes.shape import Mesh, Shape
@@ -15,25 +15,11 @@ from flowborne.shapes.shape import Mesh, Shape
 Own = dict[str, OwnGeometry]
 """Name of a mesh of the model -> the user's geometry that it represents."""
 
-Array = NDArray[np.float64]
-
 HIDDEN_GROUP = 3
 """Geometries in this group and above collide but displace no fluid (MuJoCo's convention)."""
 
 DISPLACED = "displaced by "
 """Prefix of the name of a body's <numeric>, see `said_to_displace`."""
-
-KINDS = {
-    mujoco.mjtGeom.mjGEOM_PLANE: "plane",
-    mujoco.mjtGeom.mjGEOM_HFIELD: "hfield",
-    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
-    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
-    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-    mujoco.mjtGeom.mjGEOM_BOX: "box",
-    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
-    mujoco.mjtGeom.mjGEOM_SDF: "sdf",
-}
 
 CONTACT_ONLY = ("plane", "hfield")
 
@@ -67,19 +53,23 @@ def add_shapes(spec: mujoco.MjSpec, shapes: Sequence[PlacedShape]) -> None:
             geom.density, geom.mass = one.density, np.nan
 
 
-def own_shape(mj: mujoco.MjModel, mesh: int, geometry: OwnGeometry, triangles: Mesh) -> ShapeOwn:
-    """The user's geometry in the frame of the mesh that represents it.
+def rotation_of(quaternion: Array) -> Array:
+    """(3, 3) rotation of a unit quaternion (4,) with its real part first."""
+    entries = np.empty(9)
+    mujoco.mju_quat2Mat(entries, quaternion)
+    return entries.reshape(3, 3)
 
-    MuJoCo moves the vertices of a mesh to its centre of mass and along its principal axes.
-    """
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, mj.mesh_quat[mesh])
-    return ShapeOwn(geometry, np.array(mj.mesh_pos[mesh]), turn.reshape(3, 3), *triangles)
+
+def box_of(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> tuple[Array, Array]:
+    """(3,) lowest and highest corner of a box around a geometry at a pose, m."""
+    middle, half = mj.geom_aabb[geom].reshape(2, 3)
+    centre, reach = position + rotation @ middle, np.abs(rotation) @ half
+    return centre - reach, centre + reach
 
 
 def kind_of(mj: mujoco.MjModel, geom: int) -> str:
     """Type of a geometry as MJCF spells it."""
-    return KINDS[mujoco.mjtGeom(int(mj.geom_type[geom]))]
+    return mujoco.mjtGeom(int(mj.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
 
 
 def floors(mj: mujoco.MjModel) -> list[int]:
@@ -120,13 +110,17 @@ def mesh_of(mj: mujoco.MjModel, geom: int) -> Mesh | None:
 
 
 def geom_shape(mj: mujoco.MjModel, geom: int, own: Own = NONE) -> Shape:
-    """A geometry that displaces fluid, in its own frame; `own` are the user's geometries."""
+    """A geometry that displaces fluid, in its own frame; `own` are the user's geometries.
+
+    MuJoCo moves the vertices of a mesh to its centre of mass and along its principal axes.
+    """
     mesh = mesh_of(mj, geom)
     if mesh is not None:
         number = int(mj.geom_dataid[geom])
         geometry = own.get(element_name(mj, mujoco.mjtObj.mjOBJ_MESH, number))
         if geometry is not None:
-            return own_shape(mj, number, geometry, mesh)
+            centre, rotation = np.array(mj.mesh_pos[number]), rotation_of(mj.mesh_quat[number])
+            return ShapeOwn(geometry, centre, rotation, *mesh)
     return shape_of(kind_of(mj, geom), mj.geom_size[geom], mesh)
 
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from flowborne.shapes.closing import SMALL_HOLE, closed, hull, is_closed, open_edges
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.geoms import element_name, floors, mesh_of
+from flowborne.solids.geoms import element_name, floors, mesh_of, rotation_of
 
 MENDED = "(mended)"
 """Suffix of the names of changed meshes, and name of the text that lists them."""
 
-LEFT_OUT = "overlap at rest: "
+EXCLUDED = "overlap at rest: "
 """Prefix of the names of <exclude> elements made here; the names of both bodies follow."""
 
 ROTATIONAL = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
@@ -70,27 +70,22 @@ def mended_meshes(mj: mujoco.MjModel) -> str:
 
 def _open(mj: mujoco.MjModel, geoms: Iterable[int]) -> dict[int, tuple[Mesh, str]]:
     """Number of each open mesh of the geometries -> the mesh, and a body that has it."""
-    found: dict[int, tuple[Mesh, str]] = {}
-    closed_ones = set[int]()
+    first: dict[int, int] = {}
     for geom in geoms:
-        number = int(mj.geom_dataid[geom])
+        first.setdefault(int(mj.geom_dataid[geom]), geom)
+    found = {}
+    for number, geom in first.items():
         mesh = mesh_of(mj, geom)
-        if mesh is None or number in found or number in closed_ones:
-            continue
-        if is_closed(mesh):
-            closed_ones.add(number)
-            continue
-        body = element_name(mj, mujoco.mjtObj.mjOBJ_BODY, int(mj.geom_bodyid[geom]))
-        found[number] = mesh, body
+        if mesh is not None and not is_closed(mesh):
+            body = element_name(mj, mujoco.mjtObj.mjOBJ_BODY, int(mj.geom_bodyid[geom]))
+            found[number] = mesh, body
     return found
 
 
 def _replace(spec: mujoco.MjSpec, mj: mujoco.MjModel, number: int, mesh: Mesh) -> None:
     """Give the geometries of a mesh another one, in the frame to which MuJoCo has moved it."""
     vertices, faces = mesh
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, mj.mesh_quat[number])
-    placed = vertices @ turn.reshape(3, 3).T + mj.mesh_pos[number]
+    placed = vertices @ rotation_of(mj.mesh_quat[number]).T + mj.mesh_pos[number]
     own = element_name(mj, mujoco.mjtObj.mjOBJ_MESH, number)
     added = spec.add_mesh(name=f"{own} {MENDED}")
     added.uservert, added.userface = placed.ravel(), faces.ravel().astype(np.int32)
@@ -122,7 +117,7 @@ def exclude_joined(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> bool:
         for body, name in zip((base, other), names, strict=True):
             bodies[body].name = name  # <exclude> refers to bodies by name
         spec.add_exclude(
-            name=LEFT_OUT + " and ".join(names), bodyname1=names[0], bodyname2=names[1]
+            name=EXCLUDED + " and ".join(names), bodyname1=names[0], bodyname2=names[1]
         )
         excluded = True
     return excluded
@@ -141,4 +136,4 @@ def joined_pairs(mj: mujoco.MjModel) -> list[str]:
     names = [
         mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_EXCLUDE, number) for number in range(mj.nexclude)
     ]
-    return [name.removeprefix(LEFT_OUT) for name in names if name and name.startswith(LEFT_OUT)]
+    return [name.removeprefix(EXCLUDED) for name in names if name and name.startswith(EXCLUDED)]

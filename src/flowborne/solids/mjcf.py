@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids.compiler import compiled_quietly, refusal, unreadable
@@ -28,10 +28,8 @@ from flowborne.solids.geoms import (
     rest_poses,
 )
 from flowborne.solids.mending import exclude_joined, mend_meshes
-from flowborne.solids.model_checks import impossible, misgiven, too_large
+from flowborne.solids.model_checks import too_large, wrong_model_values, wrong_spec_values
 from flowborne.solids.model_files import ModelFiles, gathered, parsed
-
-Array = NDArray[np.float64]
 
 ARENA = 1 << 26
 """Bytes of MuJoCo's working memory without the pairs of bodies; by default it grows with the square
@@ -91,7 +89,7 @@ def bones_of(
     """The spec and the model of an MJCF file or text, as `compiled`, without flesh."""
     where = _named(source)
     spec = read_spec(source, given.packages)
-    wrong = next(misgiven(spec), None)
+    wrong = next(wrong_spec_values(spec), None)
     if wrong is not None:
         raise ValueError(f"{where}: {wrong}")
     _set_options(spec, gravity)
@@ -238,14 +236,14 @@ def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> No
 
 
 def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
-    wrong = next(impossible(mj), None)
+    wrong = next(wrong_model_values(mj), None)
     if wrong is not None:
         raise ValueError(f"{where}: {wrong}")
     if mj.nflex:
         raise ValueError(
             f"{where}: flex '{element_name(mj, mujoco.mjtObj.mjOBJ_FLEX, 0)}' is not simulated, as "
-            "MuJoCo's flexes lock in bending and the fluid does not see them. Remove it from the "
-            "model, and describe the flesh by a [[flesh]] table of the scene."
+            "MuJoCo's flexes lock in bending and the fluid does not act on them. Remove it from "
+            "the model, and describe the flesh by a [[flesh]] table of the scene."
         )
     for geom in displacing_geoms(mj):
         if kind_of(mj, geom) == "sdf":
@@ -270,12 +268,6 @@ def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array
         ) from error
 
 
-def _lower(spec: mujoco.MjSpec, height: float) -> None:
-    """Move everything in the world down by `height` m."""
-    for part in (*spec.worldbody.bodies, *spec.worldbody.geoms, *spec.worldbody.sites):
-        part.pos[2] -= height
-
-
 def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
     """Give each body of `spec` the mass, centre and inertia per unit depth of its sections.
 
@@ -285,8 +277,9 @@ def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
     body_position, body_rotation, geom_position, geom_rotation = rest_poses(mj)
     heights = np.unique(body_position[1:, 2].round(9))
     if heights.size == 1:
-        height = float(body_position[1, 2])
-        _lower(spec, height)
+        height, world = float(body_position[1, 2]), spec.worldbody
+        for part in (*world.bodies, *world.geoms, *world.sites):
+            part.pos[2] -= height
         body_position[1:, 2] -= height
         geom_position[:, 2] -= height
     off = np.flatnonzero(np.abs(body_position[:, 2]) > 1e-9)
@@ -302,11 +295,9 @@ def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
             continue
         mass, moment, parts = 0.0, np.zeros(3), []
         for geom in spec.geoms:
-            if geom.parent.id != body.id:
-                continue
             g = geom.id
             weightless = geom.mass == 0.0 or (np.isnan(geom.mass) and geom.density == 0.0)
-            if kind_of(mj, g) in CONTACT_ONLY or weightless:
+            if geom.parent.id != body.id or weightless or kind_of(mj, g) in CONTACT_ONLY:
                 continue
             cut = slab_section(mj, g, geom_position[g], geom_rotation[g])
             m = geom.density * cut.area if np.isnan(geom.mass) else geom.mass

@@ -10,18 +10,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
-from flowborne.solids.displaced import covered
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.geoms import own_by_mesh
 from flowborne.solids.mjcf import NOTHING, Given
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 from flowborne.solvers.cholesky import Ordering
-
-Array = NDArray[np.float64]
 
 FREE, BALL, SLIDE, HINGE = (
     int(mujoco.mjtJoint.mjJNT_FREE),
@@ -210,7 +209,7 @@ class SolidModel:
         return np.ascontiguousarray(self.moves[on, : len(on)].T & (on[:, None] != on))
 
     @cached_property
-    def scalar_dofs(self) -> NDArray[np.int64]:
+    def scalar_dofs(self) -> Integers:
         """(k,) dofs of hinges and slides, ascending."""
         return np.flatnonzero(self.dof_position >= 0)
 
@@ -223,19 +222,19 @@ class SolidModel:
             for j in np.flatnonzero((mj.jnt_type == BALL) & (mj.jnt_limited != 0))
         )
 
-    def indices_of(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
+    def indices_of(self, dofs: Integers) -> Integers:
         """(m,) indices in q of the joints of `dofs`, ascending."""
         named = np.zeros(self.mj.njnt, bool)
         named[self._joint_of_dof[dofs]] = True
         return named[self._joint_of_index].nonzero()[0]
 
-    def dofs_of(self, joint: str) -> NDArray[np.int64]:
+    def dofs_of(self, joint: str) -> Integers:
         """Dofs of a joint. Raises ValueError for an unknown name."""
         j = self.joint(joint)
         first = int(self.mj.jnt_dofadr[j])
         return np.arange(first, first + len(SUFFIXES[int(self.mj.jnt_type[j])]))
 
-    def positions_of(self, joint: str) -> NDArray[np.int64]:
+    def positions_of(self, joint: str) -> Integers:
         """Indices in q of a joint: 7 for a free joint, 4 for a ball, else 1."""
         j = self.joint(joint)
         first = int(self.mj.jnt_qposadr[j])
@@ -269,7 +268,7 @@ class SolidModel:
         self._joint_of_index = np.repeat(np.arange(mj.njnt), widths)
         self._joint_of_dof = np.array(mj.dof_jntid, dtype=np.int64)
         names: list[str] = []
-        self.dof_position: NDArray[np.int64] = np.full(self.nv, -1)
+        self.dof_position: Integers = np.full(self.nv, -1)
         self.dof_range: Array = np.tile([-np.inf, np.inf], (self.nv, 1))
         for j, name in enumerate(self.joint_names):
             kind, first = int(mj.jnt_type[j]), int(mj.jnt_dofadr[j])
@@ -279,8 +278,8 @@ class SolidModel:
                 if mj.jnt_limited[j]:
                     self.dof_range[first] = mj.jnt_range[j]
         self.dof_names = tuple(names)
-        self.dof_body: NDArray[np.int64] = np.array(mj.dof_bodyid, dtype=np.int64)
-        self.dof_root: NDArray[np.int64] = mj.body_rootid[self.dof_body].astype(np.int64)
+        self.dof_body: Integers = np.array(mj.dof_bodyid, dtype=np.int64)
+        self.dof_root: Integers = mj.body_rootid[self.dof_body].astype(np.int64)
         self.moves: NDArray[np.bool_] = np.zeros((self.nbody, self.nv), bool)
         for body in range(1, self.nbody):
             self.moves[body] = self.moves[mj.body_parentid[body]] | (self.dof_body == body)
@@ -293,24 +292,24 @@ class SolidModel:
     def _set_geoms(self) -> None:
         mj = self.mj
         chosen = geoms.displacing_geoms(mj)
-        self.geom_id: NDArray[np.int64] = np.array(chosen, dtype=np.int64)
+        self.geom_id: Integers = np.array(chosen, dtype=np.int64)
         self.ngeom = len(chosen)
         names = _names(mj, mujoco.mjtObj.mjOBJ_GEOM, mj.ngeom)
         self.geom_names = tuple(names[g] for g in chosen)
         self.geom_shape = tuple(geoms.geom_shape(mj, g, self._own) for g in chosen)
         self.geom_size: Array = np.array(mj.geom_size[self.geom_id])
-        self.geom_body: NDArray[np.int64] = mj.geom_bodyid[self.geom_id].astype(np.int64)
+        self.geom_body: Integers = mj.geom_bodyid[self.geom_id].astype(np.int64)
         self.geom_offset: Array = np.array(mj.geom_pos[self.geom_id])
-        self.geom_rotation: Array = _rotations(mj.geom_quat[self.geom_id])
+        rotations = [geoms.rotation_of(mj.geom_quat[g]) for g in chosen]
+        self.geom_rotation: Array = np.array(rotations).reshape(-1, 3, 3)
         self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
         self.geom_covered: NDArray[np.bool_] = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
             _, _, position, rotation = geoms.rest_poses(mj)
-            places = [
-                position[g] + shape.landmarks() @ rotation[g].T
-                for shape, g in zip(self.geom_shape, self.geom_id, strict=True)
-            ]
-            self.geom_covered = covered(places, self.flesh.rest, self.flesh.surface)
+            for n, (shape, g) in enumerate(zip(self.geom_shape, chosen, strict=True)):
+                points = position[g] + shape.landmarks() @ rotation[g].T
+                outside = distances_to_mesh(points, self.flesh.rest, self.flesh.surface)
+                self.geom_covered[n] = (outside < 0.0).all()
 
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
@@ -337,12 +336,9 @@ class SolidModel:
             volume, centre = cut.area, cut.centroid
         else:
             volume, centre = shape.volume, shape.centroid
-        middle = position + rotation @ self.mj.geom_aabb[g, :3]
-        half = np.abs(rotation) @ self.mj.geom_aabb[g, 3:]
+        box = geoms.box_of(self.mj, g, position, rotation)
         centroid = position + rotation @ centre
-        return displaced.Solid(
-            shape, position, rotation, middle - half, middle + half, volume, centroid
-        )
+        return displaced.Solid(shape, position, rotation, *box, volume, centroid)
 
 
 def _bones(mj: mujoco.MjModel, grown: Sequence[Grown]) -> int:
@@ -364,13 +360,6 @@ def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
     if name not in numbers:
         raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(numbers)}.")
     return numbers[name]
-
-
-def _rotations(quaternions: Array) -> Array:
-    rotations = np.empty((len(quaternions), 9))
-    for row, quaternion in zip(rotations, quaternions, strict=True):
-        mujoco.mju_quat2Mat(row, quaternion)
-    return rotations.reshape(-1, 3, 3)
 
 
 def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:

@@ -37,36 +37,23 @@ UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "
 NUMBER = 8
 """Bytes of a number."""
 
-OBJ = mujoco.mjtObj
+FINITE = (
+    ("body", "body", ("pos", "quat", "ipos", "iquat")),
+    ("geom", "geom", ("pos", "quat", "size", "margin", "gap")),
+    ("joint", "jnt", ("pos", "axis", "range")),
+    ("tendon", "tendon", ("range", "lengthspring")),
+    ("equality", "eq", ("data", "solref", "solimp")),
+)
+"""Element in MJCF, its prefix in MuJoCo's model, and attributes that may have any finite value."""
 
-FINITE = {
-    OBJ.mjOBJ_BODY: ("pos", "quat", "ipos", "iquat"),
-    OBJ.mjOBJ_GEOM: ("pos", "quat", "size", "margin", "gap"),
-    OBJ.mjOBJ_JOINT: ("pos", "axis", "range"),
-    OBJ.mjOBJ_TENDON: ("range", "lengthspring"),
-    OBJ.mjOBJ_EQUALITY: ("data", "solref", "solimp"),
-}
-"""Kind of an element -> attributes that may have any finite value."""
-
-NOT_NEGATIVE = {
-    OBJ.mjOBJ_BODY: ("mass", "inertia"),
-    OBJ.mjOBJ_GEOM: ("friction",),
-    OBJ.mjOBJ_JOINT: ("stiffness",),
-    OBJ.mjOBJ_TENDON: ("stiffness", "damping", "frictionloss", "armature"),
-}
-"""Kind of an element -> attributes that must be 0 or more."""
-
-OF_DOFS = ("damping", "armature", "frictionloss")
-"""Attributes of joints that MuJoCo stores per degree of freedom, 0 or more."""
-
-PREFIX = {
-    OBJ.mjOBJ_BODY: ("body", "body"),
-    OBJ.mjOBJ_GEOM: ("geom", "geom"),
-    OBJ.mjOBJ_JOINT: ("jnt", "joint"),
-    OBJ.mjOBJ_TENDON: ("tendon", "tendon"),
-    OBJ.mjOBJ_EQUALITY: ("eq", "equality"),
-}
-"""Kind of an element -> its name in the model's arrays and in MJCF."""
+NOT_NEGATIVE = (
+    ("body", "body", ("mass", "inertia")),
+    ("geom", "geom", ("friction",)),
+    ("joint", "jnt", ("stiffness",)),
+    ("tendon", "tendon", ("stiffness", "damping", "frictionloss", "armature")),
+    ("joint", "dof", ("damping", "armature", "frictionloss")),
+)
+"""The same for attributes that must be 0 or more; MuJoCo has some of joints per dof."""
 
 
 def check_kind(root: Element, suffix: str) -> None:
@@ -153,7 +140,7 @@ def _bytes(text: str) -> int:
     return _whole(text[:-1]) * UNITS[letter] if letter in UNITS else _whole(text)
 
 
-def misgiven(spec: mujoco.MjSpec) -> Iterator[str]:
+def wrong_spec_values(spec: mujoco.MjSpec) -> Iterator[str]:
     """Sentences about wrong numbers that compiling, or a density from the scene, would hide."""
     for geom in spec.geoms:
         for attribute in ("density", "mass"):
@@ -172,36 +159,20 @@ def misgiven(spec: mujoco.MjSpec) -> Iterator[str]:
                 )
 
 
-def impossible(mj: mujoco.MjModel) -> Iterator[str]:
+def wrong_model_values(mj: mujoco.MjModel) -> Iterator[str]:
     """Sentences about wrong numbers of a compiled model, element by element."""
-    for table, least in ((FINITE, -np.inf), (NOT_NEGATIVE, 0.0)):
-        for kind, attributes in table.items():
-            for attribute in attributes:
-                values = getattr(mj, f"{PREFIX[kind][0]}_{attribute}")
-                rows = values.reshape(len(values), -1 if values.size else 1)
-                wrong = ~_possible(rows, least)
-                for element in np.flatnonzero(wrong.any(axis=1)):
-                    value = rows[element, wrong[element]][0]
-                    yield _wrong(mj, kind, int(element), attribute, value, least)
-    for attribute in OF_DOFS:
-        values = getattr(mj, f"dof_{attribute}")
-        for dof in np.flatnonzero(~_possible(values, 0.0)):
-            joint = mj.dof_jntid[dof]
-            yield _wrong(mj, OBJ.mjOBJ_JOINT, joint, attribute, values[dof], 0.0)
+    allowed = (FINITE, -np.inf, "a finite number"), (NOT_NEGATIVE, 0.0, "a number of 0 or more")
+    for table, least, wanted in allowed:
+        for kind, prefix, attribute in ((k, p, a) for k, p, some in table for a in some):
+            values = getattr(mj, f"{prefix}_{attribute}")
+            rows = values.reshape(len(values), -1 if values.size else 1)
+            wrong = ~_possible(rows, least)
+            for row in np.flatnonzero(wrong.any(axis=1)):
+                element = int(mj.dof_jntid[row] if prefix == "dof" else row)
+                name = mujoco.mj_id2name(mj, mujoco.mju_str2Type(kind), element) or str(element)
+                value = rows[row, wrong[row]][0]
+                yield f"{kind} '{name}' has {attribute} {value:g}. Give {wanted}."
 
 
 def _possible(values: np.ndarray, least: float) -> np.ndarray:
     return np.isfinite(values) & (values >= least)
-
-
-def _wrong(
-    mj: mujoco.MjModel,
-    kind: mujoco.mjtObj,
-    element: int,
-    attribute: str,
-    value: float,
-    least: float,
-) -> str:
-    name = mujoco.mj_id2name(mj, kind, element) or str(element)
-    wanted = "a number of 0 or more" if least == 0.0 else "a finite number"
-    return f"{PREFIX[kind][1]} '{name}' has {attribute} {value:g}. Give {wanted}."

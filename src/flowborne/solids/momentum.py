@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.momentum import about_origin, momentum_impulse
 from flowborne.solids.model import SolidModel
-from flowborne.solids.scratch import Scratch, scratch
+from flowborne.solids.scratch import Scratch, posed, scratch
 from flowborne.solids.state import SolidState
-
-Array = NDArray[np.float64]
 
 MOST_MOMENTA = 4
 """Half-way momenta of a model that a thread caches."""
@@ -73,25 +71,29 @@ def halfway_momentum(model: SolidModel, state: SolidState, dt: float) -> Array:
 
 def mass_matrix(model: SolidModel, q: Array) -> Array:
     """(nv, nv) joint space mass matrix, armature included."""
-    s = scratch(model)
-    s.place(q)
+    s = posed(model, q)
     mujoco.mj_makeM(s.mj, s.data)
     return s.mass_matrix().copy()
 
 
+def mass_times(model: SolidModel, q: Array, velocities: Array) -> Array:
+    """(k, nv) the mass matrix at q (nq,), without storing it, times each velocity (k, nv)."""
+    s = posed(model, q)
+    mujoco.mj_makeM(s.mj, s.data)
+    result = np.empty(velocities.shape)
+    for row, velocity in zip(result, velocities, strict=True):
+        mujoco.mj_mulM(s.mj, s.data, row, velocity)
+    return result
+
+
 def kinetic_energy(model: SolidModel, state: SolidState) -> float:
     """Kinetic energy, J; joint armature included."""
-    s, impulse = scratch(model), np.empty(model.nv)
-    s.place(state.q)
-    mujoco.mj_makeM(s.mj, s.data)
-    mujoco.mj_mulM(s.mj, s.data, impulse, state.v)
-    return float(0.5 * state.v @ impulse)
+    return float(0.5 * state.v @ mass_times(model, state.q, state.v[None])[0])
 
 
 def potential_energy(model: SolidModel, state: SolidState) -> float:
     """Energy in gravity and in springs of joints and tendons, J."""
-    s = scratch(model)
-    s.place(state.q)
+    s = posed(model, state.q)
     mujoco.mj_tendon(s.mj, s.data)
     mujoco.mj_energyPos(s.mj, s.data)
     return float(s.data.energy[0])

@@ -4,11 +4,15 @@ Partial inverse dynamics: with P the prescribed dofs and F the free ones,
 
     v+_P = hold        v+_F = A_FF^-1 (r_F + impulse_F - A_FP hold)
     tau dt = A v+ - r - impulse      on P
+
+`Driven` is the contract of bones alone, here, and of bones and flesh, in `flesh_solve`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +20,12 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.sparse import csr_array
 
 from flowborne.errors import BreakdownError
-from flowborne.solids.dynamics import Kinematics, SolidSystem, assemble
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.dynamics import Kinematics, SolidSystem, System, assemble
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-from flowborne.solvers.answers import DenseAnswer
+from flowborne.solvers.answers import Answering, DenseAnswer
 from flowborne.solvers.mobility import Mobility, dense_mobility
-
-Array = NDArray[np.float64]
 
 Mask = NDArray[np.bool_]
 
@@ -31,64 +34,111 @@ MOST_ROUNDS = 50
 
 
 @dataclass(frozen=True)
-class PrescribedSystem:
-    """The response of bones to an impulse when some dofs are prescribed.
+class Driven(ABC):
+    """The response of bodies to an impulse in a step when some dofs are driven.
 
-    system      the system it was made from
+    system      the equations of motion
     prescribed  (nv,) dofs that end the step with velocity `hold`
     hold        (nv,) rad/s or m/s; entries of free dofs are not used
-    inverse     (nv, nv) A_FF^-1, zero in rows and columns of prescribed dofs; symmetric
     velocity    (nv,) v*, velocity after the step without an impulse
     limited     (nv,) dofs with a drive at its limit; they are free, and `push` acts on them
     push        (nv,) generalised force of limited drives, already in `system`
     turns       number of changes of the drives
     """
 
-    system: SolidSystem
+    system: System
     prescribed: Mask
     hold: Array
-    inverse: Array
     velocity: Array
     limited: Mask
-    push: Array = field(repr=False)
-    turns: int = 0
+    push: Array
+    turns: int
+
+    @abstractmethod
+    def answer(self, impulse: Array) -> Array:
+        """(nv,) change of velocity by a generalised impulse (nv,); zero on prescribed dofs."""
+
+    @abstractmethod
+    def actuator(self, v_plus: Array, impulse: Array) -> Array:
+        """(nv,) generalised force that the drives supplied; zero on dofs without a drive."""
+
+    @abstractmethod
+    def mobility(self, pose: Kinematics) -> Mobility:
+        """The motion caused by a unit impulse: M = T A^-1 T^T."""
+
+    @abstractmethod
+    def answering(self, pose: Kinematics, drag: csr_array) -> Answering:
+        """The response of the bodies to a drag (k, k), kg."""
+
+    @abstractmethod
+    def same_mobility(self, other: Driven) -> bool:
+        """Whether both respond equally to any impulse."""
+
+    @abstractmethod
+    def solved(self) -> Self:
+        """The same with `velocity`, and what `answer` uses, for the other fields."""
 
     def after(self, impulse: Array) -> Array:
         """(nv,) velocity after the step with a generalised impulse (nv,), such as the fluid's."""
-        return np.asarray(self.velocity + self.inverse @ impulse)
+        return self.velocity + self.answer(impulse)
+
+    def updated(self, v_plus: Array) -> Self | None:
+        """With the contacts and limits at `v_plus`; None when they do not change."""
+        system = self.system.updated(v_plus)
+        return None if system is None else replace(self, system=system).solved()
+
+    def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> Self:
+        """With other prescribed dofs, and other drives at their limits."""
+        return replace(
+            self,
+            system=self.system.pushed(push - self.push),
+            prescribed=prescribed,
+            limited=limited,
+            push=push,
+            turns=self.turns + 1,
+        ).solved()
+
+
+@dataclass(frozen=True)
+class PrescribedSystem(Driven):
+    """The response of bones alone.
+
+    inverse  (nv, nv) A_FF^-1, zero in rows and columns of prescribed dofs; symmetric
+    """
+
+    system: SolidSystem
+    inverse: Array
+
+    def answer(self, impulse: Array) -> Array:
+        return np.asarray(self.inverse @ impulse)
 
     def actuator(self, v_plus: Array, impulse: Array) -> Array:
-        """(nv,) generalised force that the drives supplied; zero on dofs without a drive."""
         s = self.system
         needed = (s.A @ v_plus - s.impulse - impulse) / s.dt
         return np.where(self.prescribed, needed, self.push)
 
-    def updated(self, v_plus: Array) -> PrescribedSystem | None:
-        """With the contacts and limits at `v_plus`; None when they do not change."""
-        system = self.system.updated(v_plus)
-        if system is None:
-            return None
-        return _solved(system, self.prescribed, self.hold, self.limited, self.push, self.turns)
-
-    def redriven(self, prescribed: Mask, limited: Mask, push: Array) -> PrescribedSystem:
-        """With other prescribed dofs, and other drives at their limits."""
-        system = self.system.pushed(push - self.push)
-        return _solved(system, prescribed, self.hold, limited, push, self.turns + 1)
-
-    def answers_as(self, other: object) -> bool:
-        """Whether both respond equally to any impulse."""
-        return isinstance(other, PrescribedSystem) and np.array_equal(self.inverse, other.inverse)
-
     def mobility(self, pose: Kinematics) -> Mobility:
-        """The motion caused by a unit impulse: M = T A^-1 T^T."""
         return dense_mobility(self._response(pose))
 
     def answering(self, pose: Kinematics, drag: csr_array) -> DenseAnswer:
-        """The response of the bodies to a drag (k, k), kg."""
         return DenseAnswer(self._response(pose), drag.toarray())
 
     def _response(self, pose: Kinematics) -> Array:
         return np.asarray(pose.twist_rows @ self.inverse @ pose.twist_rows.T)
+
+    def same_mobility(self, other: Driven) -> bool:
+        return isinstance(other, PrescribedSystem) and np.array_equal(self.inverse, other.inverse)
+
+    def solved(self) -> Self:
+        system, free = self.system, (~self.prescribed).nonzero()[0]
+        velocity = np.where(self.prescribed, self.hold, 0.0)
+        inverse = np.zeros(system.A.shape)
+        if free.size:
+            across = np.ix_(free, free)
+            block = symmetric_inverse(system.A[across])
+            inverse[across] = block
+            velocity[free] = block @ (system.impulse[free] - system.A[free] @ velocity)
+        return replace(self, inverse=inverse, velocity=velocity)
 
 
 def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedSystem:
@@ -96,24 +146,9 @@ def prescribe(system: SolidSystem, prescribed: Mask, hold: Array) -> PrescribedS
 
     raises  BreakdownError when the matrix of the free dofs is not positive definite
     """
-    none = np.zeros(len(hold), bool)
-    return _solved(system, prescribed, hold, none, np.zeros(len(hold)))
-
-
-def _solved(
-    system: SolidSystem, prescribed: Mask, hold: Array, limited: Mask, push: Array, turns: int = 0
-) -> PrescribedSystem:
-    free = (~prescribed).nonzero()[0]
-    velocity = np.where(prescribed, hold, 0.0)
-    inverse = np.zeros(system.A.shape)
-    if free.size:
-        across = np.ix_(free, free)
-        block = symmetric_inverse(system.A[across])
-        inverse[across] = block
-        velocity[free] = block @ (system.impulse[free] - system.A[free] @ velocity)
-    return PrescribedSystem(
-        system, prescribed.copy(), hold.copy(), inverse, velocity, limited, push, turns
-    )
+    zero, none, inverse = np.zeros(len(hold)), np.zeros(len(hold), bool), np.zeros(system.A.shape)
+    given = prescribed.copy(), hold.copy()
+    return PrescribedSystem(system, *given, zero, none, zero, turns=0, inverse=inverse).solved()
 
 
 def symmetric_inverse(matrix: Array) -> Array:
@@ -139,7 +174,7 @@ def holding(
     state: SolidState,
     applied: Array,
     dt: float,
-    dofs: NDArray[np.int64] | None = None,
+    dofs: Integers | None = None,
 ) -> Array:
     """Generalised force that keeps the present velocities of `dofs` against every other force.
 

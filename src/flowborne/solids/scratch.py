@@ -14,11 +14,10 @@ from typing import Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.momentum import about_origin
 
-Array = NDArray[np.float64]
 # MuJoCo would write a file of warnings about its own solution into the working folder
 mujoco.set_mju_user_warning(logging.getLogger(__name__).debug)
 
@@ -71,16 +70,12 @@ class Scratch:
 
     def forward(self, q: Array, v: Array, applied: Array) -> None:
         """Compute everything up to the acceleration, with constraints."""
-        self.q[:] = q
-        self.v[:] = v
-        self.applied[:] = applied
+        self.q[:], self.v[:], self.applied[:] = q, v, applied
         mujoco.mj_forward(self.mj, self.data)
 
     def smooth_forces(self, q: Array, v: Array, applied: Array) -> None:
         """Compute everything up to the forces, without solving for constraint forces."""
-        self.q[:] = q
-        self.v[:] = v
-        self.applied[:] = applied
+        self.q[:], self.v[:], self.applied[:] = q, v, applied
         mujoco.mj_fwdPosition(self.mj, self.data)
         mujoco.mj_fwdVelocity(self.mj, self.data)
         mujoco.mj_fwdActuation(self.mj, self.data)
@@ -107,6 +102,13 @@ def scratch(model: Compiled) -> Scratch:
     if found is None:
         found = known[model] = Scratch(model)
     return found
+
+
+def posed(model: Compiled, q: Array) -> Scratch:
+    """This thread's working memory for `model`, with all poses at `q`."""
+    s = scratch(model)
+    s.place(q)
+    return s
 
 
 def cross(a: Array, b: Array) -> Array:

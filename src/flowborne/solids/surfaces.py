@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.round import parts
 from flowborne.shapes.section import Section
 from flowborne.shapes.shape import FINENESS
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 SLAB_ARC = 64
 """Patches around a circle in a slab."""
@@ -32,7 +30,7 @@ class Patches:
     screw   (n, 6) normal n and centre x n
     """
 
-    body: NDArray[np.int64]
+    body: Integers
     centre: Array
     normal: Array
     area: Array
@@ -99,7 +97,7 @@ class Outline:
         self._local = [shape.outermost() for shape in model.geom_shape]
         self._geom = model.geom_id
         counts = [len(points) for points in self._local]
-        self.body: NDArray[np.int64] = np.repeat(model.geom_body, counts)
+        self.body: Integers = np.repeat(model.geom_body, counts)
         shared = np.bincount(self.body, minlength=model.nbody)[self.body]
         self.mass: Array = model.body_mass[self.body] / shared
 

@@ -6,16 +6,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.wind import places, pushed
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import cross
 from flowborne.solids.surfaces import surfaces
-
-Array = NDArray[np.float64]
-Bodies = NDArray[np.int64]
 
 
 class Wind(Protocol):
@@ -44,7 +41,7 @@ class WindFaces:
 
     u is the wind relative to the face, n its outward normal. Every face counts, windward and
     leeward, as in the paper: the force on a thin plate across the wind is 2 rho U^2 per area.
-    Bodies do not shelter each other.
+    Integers do not shelter each other.
 
     velocity  (3,) m/s, or a field in space and time
     density   rho, kg/m^3 (per unit depth in a slab)

@@ -30,7 +30,7 @@ from flowborne.solids.tissue.mesh import (
     surface_mesh,
 )
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh, recipe_of
-from flowborne.solids.tissue.mesher import run_apart
+from flowborne.solids.tissue.mesh_run import run_apart
 
 Array = NDArray[np.float64]
 
@@ -229,7 +229,7 @@ def test_the_mesher_gets_no_longer_edges_than_the_flesh_has_room_for(
         asked.append(float(np.load(Path(folder) / mesh_run.SURFACES)["size"]))
         return "stopped"
 
-    monkeypatch.setattr("flowborne.solids.tissue.mesher.run_apart", stop)
+    monkeypatch.setattr("flowborne.solids.tissue.mesh.run_apart", stop)
     with pytest.raises(ValueError, match="stopped"):
         skin_mesh(mujoco.MjSpec.from_string(BALL), ["ball"], 0.25, 1e12)
     assert asked == [pytest.approx(1.5 * np.sqrt(3.0), rel=0.02)]

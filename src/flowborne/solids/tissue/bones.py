@@ -8,21 +8,20 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.extras import flesh_library
+from flowborne.kernels.arrays import Array
 from flowborne.phrases import suggestion
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.geoms import (
+    box_of,
     displacing_geoms,
     element_name,
     geom_shape,
     rest_poses,
 )
-
-Array = NDArray[np.float64]
 
 MOST_SAMPLES = 2_000_000
 """Most samples of a lattice; a finer lattice is made coarser."""
@@ -153,18 +152,9 @@ def digest(spec: mujoco.MjSpec, names: Sequence[str]) -> str:
 
 def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: Array) -> Part:
     shape = geom_shape(mj, geom)
-    middle, half = mj.geom_aabb[geom].reshape(2, 3)
-    centre, reach = position + rotation @ middle, np.abs(rotation) @ half
-    return Part(
-        bone,
-        shape,
-        position,
-        rotation,
-        centre - reach,
-        centre + reach,
-        half,
-        shape.triangles() if isinstance(shape, ShapeMesh) else None,
-    )
+    box, half = box_of(mj, geom, position, rotation), mj.geom_aabb[geom, 3:]
+    surface = shape.triangles() if isinstance(shape, ShapeMesh) else None
+    return Part(bone, shape, position, rotation, *box, half, surface)
 
 
 def finest(bones: Bones, level: float) -> float:

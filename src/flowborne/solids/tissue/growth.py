@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels import elastic
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.phrases import location
 from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.elements import lumped, measures, with_middles
+from flowborne.solids.geoms import rest_poses, rotation_of
 from flowborne.solids.mjcf import ARENA
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 WORLD = "world"
 
@@ -81,7 +81,7 @@ class Grown:
 
     name: str
     nodes: Array
-    elements: Indices
+    elements: Integers
     bodies: tuple[str, ...]
     free: NDArray[np.bool_]
     tissue: Tissue
@@ -91,7 +91,7 @@ def add_flesh(
     spec: mujoco.MjSpec,
     name: str,
     points: Array,
-    simplices: Indices,
+    simplices: Integers,
     tissue: Tissue,
     holders: Sequence[str],
 ) -> Grown:
@@ -107,12 +107,10 @@ def add_flesh(
     volume = measures(points, simplices)
     if not volume.min() > 0.0:
         worst = int(volume.argmin())
-        place = ", ".join(f"{x:.4g}" for x in points[simplices[worst]].mean(axis=0))
-        said = f"volume {volume[worst]:g} m^3"
-        if simplices.shape[1] == 3:
-            said = f"area {volume[worst]:g} m^2"
+        middle, slab = points[simplices[worst]].mean(axis=0), simplices.shape[1] == 3
         raise ValueError(
-            f"flesh '{name}': element {worst} at ({place}) m has the {said}. "
+            f"flesh '{name}': element {worst} at {location(middle)} has the "
+            f"{'area' if slab else 'volume'} {volume[worst]:g} m^{2 if slab else 3}. "
             "Order its corners right-handed, or leave it out."
         )
     edges, elements = with_middles(len(points), simplices)
@@ -144,8 +142,7 @@ def _frames(
 ) -> dict[str, tuple[Array, Array]]:
     """Position and rotation at rest of the bodies that hold flesh."""
     mj = compiled_quietly(spec.copy())
-    data = mujoco.MjData(mj)
-    mujoco.mj_kinematics(mj, data)
+    position, rotation, _, _ = rest_poses(mj)
     frames = {}
     for holder in {h for h in holders if h}:
         body = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, holder)
@@ -153,12 +150,12 @@ def _frames(
             raise ValueError(
                 f"flesh '{name}': there is no body '{holder}' to hold it. Name a body of the model."
             )
-        frames[holder] = (data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy())
+        frames[holder] = position[body], rotation[body]
     return frames
 
 
 def _free_nodes(
-    some: Indices, nodes: Array, mass: Array, inertia: Array, axes: str
+    some: Integers, nodes: Array, mass: Array, inertia: Array, axes: str
 ) -> mujoco.MjSpec:
     """A model of some nodes of flesh that slide along some axes, named by their numbers."""
     spec = mujoco.MjSpec()
@@ -177,13 +174,11 @@ def _load(spec: mujoco.MjSpec, holder: str, offsets: Array, mass: Array, inertia
     """Add the mass of held nodes, at `offsets` (n, 3) in the frame of a bone, to the bone."""
     mj = compiled_quietly(spec.copy())
     b = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, holder)
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, mj.body_iquat[b])
-    axes = turn.reshape(3, 3)
+    axes = rotation_of(mj.body_iquat[b])
     masses = np.append(mass, mj.body_mass[b])
-    places = np.concatenate([offsets, mj.body_ipos[b][None]])
-    centre = masses @ places / masses.sum()
-    arms = places - centre
+    centres = np.concatenate([offsets, mj.body_ipos[b][None]])
+    centre = masses @ centres / masses.sum()
+    arms = centres - centre
     about = np.eye(3) * (masses @ (arms**2).sum(axis=1) + inertia.sum()) - (arms.T * masses) @ arms
     about += axes @ np.diag(mj.body_inertia[b]) @ axes.T
     body = spec.body(holder)

@@ -1,21 +1,22 @@
-"""Flesh as a mesh: which tetrahedra are elastic, and which points a bone holds."""
+"""Flesh as a mesh: its tetrahedra, which of them are elastic, and which points a bone holds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from flowborne.phrases import rounded_up
+from flowborne.extras import check_mesher
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.jit import numba_thread_count
+from flowborne.phrases import location, rounded_up
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.elements import outer_surface, with_middles
+from flowborne.solids.elements import connected, oriented, outer_surface, with_middles
 from flowborne.solids.tissue.bones import (
     MOST_SAMPLES,
     Bones,
@@ -24,12 +25,9 @@ from flowborne.solids.tissue.bones import (
     finest,
     signed_distance,
 )
-from flowborne.solids.tissue.mesher import tetrahedra_within
-from flowborne.solids.tissue.surface_file import check_covers, place, read_surface
+from flowborne.solids.tissue.mesh_run import SURFACES, TETRAHEDRA, run_apart
+from flowborne.solids.tissue.surface_file import check_covers, read_surface
 from flowborne.solids.tissue.symmetry import Chamber, chamber_of
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 FIDELITY = 0.1
 """Largest distance of a face from the surface that it follows, in edges."""
@@ -80,7 +78,7 @@ class FleshMesh:
     """
 
     points: Array
-    elements: Indices
+    elements: Integers
     holders: tuple[str, ...]
 
 
@@ -188,7 +186,7 @@ def _fleshed(
 
 def _meshed(
     hollow: Mesh, outside: Mesh, bones: Bones, chamber: Chamber, size: float, tolerance: float
-) -> tuple[Array, Indices, float]:
+) -> tuple[Array, Integers, float]:
     """Points and right-handed tetrahedra between the surfaces, and the tolerance used.
 
     Where walls meet, the chamber is a wedge. The mesher may drop the part of its tip that is within
@@ -212,6 +210,39 @@ def _meshed(
     )
 
 
+def tetrahedra_within(surface: Mesh, size: float, tolerance: float) -> tuple[Array, Integers]:
+    """Points (n, 3) and right-handed tetrahedra (m, 4) of the inside of a surface.
+
+    surface    closed and outward; for a hollow body it has parts that point into the hollow
+    size       length of edges, m; shorter where the curvature or size of the surface requires it
+    tolerance  largest distance of faces of the tetrahedra from the surface, m
+    raises     ValueError when the mesher fails
+    source     fTetWild: Hu, Schneider, Wang, Zorin and Panozzo 2020
+
+    Two runs give different meshes of the same quality, even on one thread.
+    """
+    check_mesher()
+    points, triangles = surface
+    across = float(np.linalg.norm(np.ptp(points, axis=0)))
+    with TemporaryDirectory(prefix="flowborne-flesh-") as folder:
+        np.savez(
+            Path(folder) / SURFACES,
+            points=points,
+            triangles=triangles.astype(np.int32),
+            size=min(size, across),  # the mesher's box exceeds the surface by it
+            tolerance=tolerance / across,
+            threads=numba_thread_count(),
+        )
+        why = run_apart(folder, TETRAHEDRA, "mesh")
+        if why is not None:
+            raise ValueError(
+                f"the flesh cannot be meshed with edges of {size:g} m: {why}. Try another size."
+            )
+        with np.load(Path(folder) / TETRAHEDRA) as mesh:
+            points, tetrahedra = mesh["points"], mesh["tetrahedra"].astype(np.int64)
+    return points, oriented(points, tetrahedra)
+
+
 def _hollow(outside: Mesh, inside: Mesh) -> Mesh:
     """The surface of the space between two surfaces.
 
@@ -220,13 +251,6 @@ def _hollow(outside: Mesh, inside: Mesh) -> Mesh:
     """
     inward = inside[1][:, ::-1] + len(outside[0])
     return np.concatenate([outside[0], inside[0]]), np.concatenate([outside[1], inward])
-
-
-def _connected(cells: Indices, count: int) -> Indices:
-    """(count,) number of the connected part of a mesh for each point."""
-    pairs = np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel()
-    links = coo_array((np.ones(pairs[0].size), pairs), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def _holders(bones: Bones, points: Array, tolerance: float, joint: float) -> tuple[str, ...]:
@@ -252,11 +276,12 @@ def _check_held(mesh: FleshMesh, bones: Bones, size: float) -> None:
             f"bone '{idle[0]}' holds no point of flesh that has edges of {size:g} m. "
             "Make the size smaller, or leave the bone out."
         )
-    parts = _connected(mesh.elements, len(mesh.points))
+    first = np.repeat(mesh.elements[:, 0], mesh.elements.shape[1] - 1)
+    parts = connected(len(mesh.points), first, mesh.elements[:, 1:].ravel())
     held = np.array([bool(name) for name in mesh.holders])
     loose = ~np.isin(parts, parts[held])
     if loose.any():
         raise ValueError(
-            f"the flesh about {place(mesh.points[loose].mean(axis=0))} touches no bone. "
+            f"the flesh about {location(mesh.points[loose].mean(axis=0))} touches no bone. "
             "Join it to the rest, or remove it."
         )

@@ -20,8 +20,7 @@ from flowborne.extras import optional
 from flowborne.files.arrays import read_arrays
 from flowborne.files.given import read_file
 from flowborne.solids.tissue.mesh import FleshMesh
-from flowborne.solids.tissue.mesh_run import READ
-from flowborne.solids.tissue.mesher import run_apart
+from flowborne.solids.tissue.mesh_run import READ, run_apart
 
 HOLDER, BONES, RECIPE = "holder", "bones", "recipe"
 

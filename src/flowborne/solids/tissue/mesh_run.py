@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import signal
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,21 @@ PR_SET_PDEATHSIG = 1
 
 MEMORY = 8 << 30
 """Most bytes that VTK may allocate for a file."""
+
+
+def run_apart(folder: str, made: str, job: str, *arguments: str) -> str | None:
+    """Run a job of this module in a folder; return why it did not make the file `made`, or None.
+
+    The process may crash; fTetWild may also exit with 0 before there is a mesh.
+    """
+    # -P: no module of this folder hides one of Python's
+    command = [sys.executable, "-P", str(Path(__file__).resolve()), job, *arguments]
+    run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if run.returncode == 0 and (Path(folder) / made).is_file():
+        return None
+    output = [line.strip() for line in (run.stdout + run.stderr).splitlines() if line.strip()]
+    crashed = run.returncode < 0 or not output
+    return f"it ended with {run.returncode}" if crashed else output[-1].rstrip(".")
 
 
 def end_with_parent() -> None:

@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from trimesh.exchange.load import mesh_formats
 
 from flowborne.extras import flesh_library
 from flowborne.files.given import read_file
+from flowborne.phrases import location
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.tissue.bones import Bones, contour, signed_distance
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-Array = NDArray[np.float64]
 
-SAME = 1e-7
+MERGE_DISTANCE = 1e-7
 """Closer points, relative to the size of the surface, are merged: STL repeats its corners."""
 
 
@@ -84,14 +83,9 @@ def check_covers(path: Path, surface: Mesh, bones: Bones, pitch: float, toleranc
         bone = bones.names[int(bones.distances(points[worst : worst + 1]).argmin())]
         raise ValueError(
             f"flesh file {path}: bone '{bone}' sticks {outside[worst]:.2g} m out of its flesh at "
-            f"{place(points[worst])}. Widen the surface there, or move it: it is taken in the "
+            f"{location(points[worst])}. Widen the surface there, or move it: it is taken in the "
             "model's units and world axes, at rest."
         )
-
-
-def place(point: Array) -> str:
-    """A point (3,) for messages: "(0.1, 2, -3) m"."""
-    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
 
 
 def _triangles(path: Path, content: bytes) -> pv.PolyData:
@@ -115,7 +109,7 @@ def _triangles(path: Path, content: bytes) -> pv.PolyData:
         )
     pyvista = flesh_library()
     surface = pyvista.PolyData.from_regular_faces(read.vertices, read.faces)
-    return surface.clean(tolerance=SAME)
+    return surface.clean(tolerance=MERGE_DISTANCE)
 
 
 def _edges(surface: pv.PolyData, **kind: bool) -> pv.PolyData:
@@ -128,4 +122,4 @@ def _edges(surface: pv.PolyData, **kind: bool) -> pv.PolyData:
 
 def _middle(edges: pv.PolyData) -> str:
     """The middle of the first edge, for messages."""
-    return place(np.asarray(edges.points)[edges.lines[1:3]].mean(axis=0))
+    return location(np.asarray(edges.points)[edges.lines[1:3]].mean(axis=0))

@@ -15,23 +15,21 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from flowborne.extras import flesh_library
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import surface_of
 from flowborne.solids.tissue.bones import Bones, signed_distance
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 SAME = 0.01
 """Largest distance between a shape and its mirror image, in tolerances of the faces."""
 
-PARALLEL = 1e-3
+PARALLEL_TOLERANCE = 1e-3
 """Unit vectors that differ by less are equal: files give coordinates with few digits."""
 
-MIRRORED = [2, 1, 0, 3]
+MIRRORED_CORNERS = [2, 1, 0, 3]
 """Corners of the image of an element: right-handed, and with `elements.PARTS` mirrored."""
 
-APART = np.array([0.55, 0.72, 0.42])
+INSIDE_DIRECTION = np.array([0.55, 0.72, 0.42])
 """A direction in no likely mirror plane; the chamber that contains it is meshed."""
 
 
@@ -60,11 +58,11 @@ class Chamber:
     def unfold(
         self,
         points: Array,
-        elements: Indices,
+        elements: Integers,
         wanted: NDArray[np.bool_],
         surface: Mesh,
         tolerance: float,
-    ) -> tuple[Array, Indices]:
+    ) -> tuple[Array, Integers]:
         """Points and right-handed tetrahedra of all images, joined at the walls.
 
         points     (n, 3) m
@@ -86,10 +84,10 @@ class Chamber:
         first = np.unique(point, return_index=True)[1]
         unfolded = point[:, elements[wanted]]
         turned = np.linalg.det(self.images) < 0.0
-        unfolded[turned] = unfolded[turned][..., MIRRORED]
+        unfolded[turned] = unfolded[turned][..., MIRRORED_CORNERS]
         return images.reshape(-1, 3)[first], unfolded.reshape(-1, 4)
 
-    def _joined(self, on_wall: NDArray[np.bool_], count: int) -> Indices:
+    def _joined(self, on_wall: NDArray[np.bool_], count: int) -> Integers:
         """(g, count) numbers of the images of points; two images share the points on the wall
         between them."""
         numbers = np.arange(len(self.images) * count).reshape(-1, count)
@@ -102,7 +100,7 @@ class Chamber:
         return np.asarray(connected_components(graph, directed=False)[1]).reshape(-1, count)
 
     def _on_walls(
-        self, points: Array, elements: Indices, surface: Mesh, tolerance: float
+        self, points: Array, elements: Integers, surface: Mesh, tolerance: float
     ) -> NDArray[np.bool_]:
         """(k, n) for each wall, the points of faces that lie in it.
 
@@ -146,14 +144,14 @@ def chamber_of(bones: Bones, skin: Array, tolerance: float, surface: Mesh | None
     whole = [n for n in normals if all(_among(reflection(n) @ m, normals) for m in normals)]
     if len(whole) < len(normals):  # the tolerance accepted some of the planes only
         whole = normals[:1]
-    inward = np.array([n if n @ APART > 0.0 else -n for n in whole]).reshape(-1, 3)
+    inward = np.array([n if n @ INSIDE_DIRECTION > 0.0 else -n for n in whole]).reshape(-1, 3)
     walls = np.array([n for n in inward if _next_to(n, inward)]).reshape(-1, 3)
     return Chamber(middle, walls, _generated(inward))
 
 
 def _among(normal: Array, normals: list[Array]) -> bool:
     """Whether a plane is in a list, by unit normals."""
-    return any(np.abs(np.abs(normal @ n) - 1.0) < PARALLEL**2 for n in normals)
+    return any(np.abs(np.abs(normal @ n) - 1.0) < PARALLEL_TOLERANCE**2 for n in normals)
 
 
 def _is_mirror(
@@ -173,8 +171,8 @@ def _is_mirror(
 
 
 def _next_to(normal: Array, inward: Array) -> bool:
-    """Whether a plane is a wall: no other plane lies between APART and its image."""
-    return int((inward @ (reflection(normal) @ APART) < 0.0).sum()) == 1
+    """Whether a plane is a wall: no other plane lies between INSIDE_DIRECTION and its image."""
+    return int((inward @ (reflection(normal) @ INSIDE_DIRECTION) < 0.0).sum()) == 1
 
 
 def _generated(normals: Array) -> Array:
@@ -186,6 +184,6 @@ def _generated(normals: Array) -> Array:
     for image in images:
         for normal in normals:
             product = image @ reflection(normal)
-            if all(np.abs(product - known).max() > 10.0 * PARALLEL for known in images):
+            if all(np.abs(product - known).max() > 10.0 * PARALLEL_TOLERANCE for known in images):
                 images.append(product)
     return np.array(images)
