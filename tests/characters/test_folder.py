@@ -122,7 +122,7 @@ def test_clip_has_the_angles_of_the_file(box: Path) -> None:
     clip = read_bvh(box.with_suffix(".bvh"))
     assert clip.names == ("handle", "tail")
     assert clip.frame_time == pytest.approx(1.0 / rigged.RATE, rel=1e-6)
-    _, world = clip.places()
+    _, world = clip.poses()
     tail, trunk = (Rotation.from_quat(world[:, joint], scalar_first=True) for joint in (1, 0))
     still = rigged.TURNS[1].inv() * rigged.TURNS[2]
     own = turns["tail"] * still.inv()

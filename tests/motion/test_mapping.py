@@ -7,7 +7,7 @@ import pytest
 
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
-from flowborne.motion.mapping import JOINTS, NEEDED, SIDED, families, mapping_of
+from flowborne.motion.mapping import JOINTS, REQUIRED, SIDED, families, mapping_of
 
 
 def clip_of(
@@ -314,7 +314,7 @@ def test_strange_names_work_with_a_table_alone() -> None:
     names = tuple(f"bone{n}" for n in range(len(PERSON.names)))
     strange = clip_with(names, PERSON.parents.tolist())
     known = mapping_of(PERSON, {})
-    table = {joint: names[PERSON.names.index(known[joint])] for joint in NEEDED}
+    table = {joint: names[PERSON.names.index(known[joint])] for joint in REQUIRED}
     mapping = mapping_of(strange, table)
     assert table.items() <= mapping.items()
     assert mapping["thorax"] == names[PERSON.names.index("Spine2")], "by its place"

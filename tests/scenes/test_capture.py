@@ -211,7 +211,7 @@ FAULTS: dict[str, tuple[str, dict[str, str], dict[str, str], str]] = {
         "",
         {"unit = 0.01": "unit = 0.01\nstart = 9.0"},
         {},
-        "is to go from 9 s to 1.0",
+        "but start is 9 s and stop 1.0",
     ),
     "a joint that is controlled and follows": (
         CONTROL,

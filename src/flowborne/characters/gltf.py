@@ -157,7 +157,7 @@ class GltfSource:
         try:
             world = self._worlds(times, curves)[:, self._joints]
         except ValueError as error:  # a spline of quaternions goes through 0
-            raise SceneError(f"{where} has a rotation that is none. Export it anew.") from error
+            raise SceneError(f"{where} has a rotation that is none. Export it again.") from error
         step = float(times[-1] - times[0]) / (len(times) - 1) or 1.0
         return Action(step, *placed(world, where))
 

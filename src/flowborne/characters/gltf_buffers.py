@@ -246,4 +246,4 @@ def within(number: int, things: Any, where: str, what: str) -> None:
 
 def wrong(said: str) -> SceneError:
     """The error of a file that contradicts itself."""
-    return SceneError(f"{said}. Export it anew.")
+    return SceneError(f"{said}. Export it again.")

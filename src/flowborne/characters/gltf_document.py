@@ -184,15 +184,15 @@ def read_document(path: Path) -> tuple[Document, list[memoryview]]:
         first = error.errors()[0]
         value = "" if first["type"] == "missing" else f", not {repr(first['input'])[:60]}"
         raise SceneError(
-            f"{path.name}, {_place(first['loc'])}: {first['msg']}{value}. Export it anew."
+            f"{path.name}, {_place(first['loc'])}: {first['msg']}{value}. Export it again."
         ) from None
     except RecursionError:
         raise SceneError(
-            f"{path.name}: its JSON is nested hundreds deep. Export it anew."
+            f"{path.name}: its JSON is nested hundreds deep. Export it again."
         ) from None
     except ValueError as error:
         raise SceneError(
-            f"{path.name} cannot be read as glTF: {str(error)[:100]}. Export it anew."
+            f"{path.name} cannot be read as glTF: {str(error)[:100]}. Export it again."
         ) from None
     return document, _buffers(path, document, binary)
 
@@ -225,12 +225,12 @@ def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
         if start + 8 + length > len(data):
             raise SceneError(
                 f"{name} cannot be read as glTF: a chunk of {length} bytes at byte {start} ends "
-                f"after the file, which has {len(data)}. Export it anew."
+                f"after the file, which has {len(data)}. Export it again."
             )
         found.setdefault(kind, data[start + 8 : start + 8 + length])
         start += 8 + length
     if JSON_CHUNK not in found:
-        raise SceneError(f"{name} cannot be read as glTF: it has no JSON chunk. Export it anew.")
+        raise SceneError(f"{name} cannot be read as glTF: it has no JSON chunk. Export it again.")
     return found[JSON_CHUNK], found.get(BINARY_CHUNK)
 
 
@@ -249,11 +249,11 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
         elif number == 0 and binary is not None:
             data = binary
         else:
-            raise SceneError(f"{where} has neither a uri nor a binary chunk. Export it anew.")
+            raise SceneError(f"{where} has neither a uri nor a binary chunk. Export it again.")
         if len(data) < buffer.byte_length:
             raise SceneError(
                 f"{where} has {len(data)} bytes, and its byteLength is {buffer.byte_length}. "
-                "Export it anew."
+                "Export it again."
             )
         found.append(memoryview(data)[: buffer.byte_length])
     return found
@@ -266,7 +266,7 @@ def _from_uri(path: Path, uri: str, where: str) -> bytes:
             return embedded(uri)
         except ValueError as error:
             raise SceneError(
-                f"{where}: its data uri cannot be read ({error}). Export it anew."
+                f"{where}: its data uri cannot be read ({error}). Export it again."
             ) from None
     file = path.parent / inside(uri, path.parent, where)
     return _bounded(file, f"{where}, {uri[:100]!r},")

@@ -104,7 +104,7 @@ def check_frames(frames: float, step: float, nodes: int, where: str) -> None:
     if not KEY_INTERVALS[0] <= step <= KEY_INTERVALS[1]:
         raise SceneError(
             f"{where} has a key every {step:.3g} s, and {KEY_INTERVALS[0]:g} to "
-            f"{KEY_INTERVALS[1]:g} s can be. Sample it anew before exporting."
+            f"{KEY_INTERVALS[1]:g} s can be. Sample it again before exporting."
         )
     if frames * nodes > MAX_POSES:
         raise SceneError(

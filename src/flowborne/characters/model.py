@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from flowborne.characters.division import Division
 from flowborne.characters.rig import Action, Array, Integers, Rig, Surface
 from flowborne.motion.clip import Clip
-from flowborne.motion.clip_curves import CLOSED
+from flowborne.motion.clip_curves import MAX_CYCLE_MISMATCH
 from flowborne.motion.quaternions import angle, inverse, product
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.geoms import DISPLACED
@@ -223,7 +223,7 @@ def clip_of(rig: Rig, division: Division, pose: Action) -> tuple[Clip, float]:
         rotations=local,
         translation=pose.position[:, division.leader] + turn[:, 0] @ handle,
     )
-    away = np.linalg.norm(clip.places()[0][:, 1:] - pose.position[:, joints[1:]], axis=2)
+    away = np.linalg.norm(clip.poses()[0][:, 1:] - pose.position[:, joints[1:]], axis=2)
     return clip, float(away.max(initial=0.0))
 
 
@@ -237,7 +237,7 @@ def as_cycle(clip: Clip) -> Clip | None:
     apart = angle(product(inverse(clip.rotations[0]), clip.rotations[-1])).max()
     if clip.frames < 3 or apart > steps:
         return None
-    if apart < CLOSED:
+    if apart < MAX_CYCLE_MISMATCH:
         return clip
     place, step = clip.translation, clip.translation[-1] - clip.translation[-2]
     gap = np.linalg.norm(place[0] - place[-1])

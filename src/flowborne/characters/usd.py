@@ -69,7 +69,7 @@ class UsdSource:
         self._skeleton = skeletons[0]
         self._query = self._cache.GetSkelQuery(self._skeleton)
         if not self._query:
-            raise SceneError(f"{path.name}: its skeleton is damaged. Export it anew.")
+            raise SceneError(f"{path.name}: its skeleton is damaged. Export it again.")
         check_size(len(self._query.GetJointOrder()), 0, path.name)
         check_topology(self._query, path.name)
         self._animations = [UsdSkel.Animation(p) for p in prims if p.IsA(UsdSkel.Animation)]
@@ -176,7 +176,7 @@ class UsdSource:
             poses = query.ComputeJointLocalTransforms(time * rate)
             if len(poses or ()) != len(joints):
                 raise SceneError(
-                    f"{where} has not a pose for each of its {len(joints)} joints. Export it anew."
+                    f"{where} has not a pose for each of its {len(joints)} joints. Export it again."
                 )
             local[frame, known] = _matrices(poses)[own]
         world, into = local.copy(), self._to_world(self._skeleton.GetPrim())
@@ -202,7 +202,7 @@ class UsdSource:
         own = target.GetJointOrder()
         if lost := [str(joint) for joint in own or () if str(joint) not in order]:
             raise SceneError(
-                f"{where} names joint '{lost[0]}', which is not in the skeleton. Export it anew."
+                f"{where} names joint '{lost[0]}', which is not in the skeleton. Export it again."
             )
         number = np.array([order.index(str(joint)) for joint in own] if own else range(len(order)))
         check_influences(indices, shares, count * width, len(number), where)

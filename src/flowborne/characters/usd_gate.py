@@ -91,7 +91,7 @@ def probe(path: Path) -> None:
         ) from None
     if done.returncode:
         raise SceneError(
-            f"{path.name} cannot be read as USD: it ends the program that reads it. Export it anew."
+            f"{path.name} cannot be read as USD: reading it crashes the process. Export it again."
         )
 
 
@@ -227,8 +227,8 @@ def _named_files(layer: Sdf.Layer) -> list[str]:
 
 
 def _unreadable(where: str) -> SceneError:
-    return SceneError(f"{where} cannot be read as USD. Export it anew.")
+    return SceneError(f"{where} cannot be read as USD. Export it again.")
 
 
 def _wrong(said: str) -> SceneError:
-    return SceneError(f"{said}. Export it anew.")
+    return SceneError(f"{said}. Export it again.")

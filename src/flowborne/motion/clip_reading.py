@@ -15,25 +15,25 @@ from flowborne.motion.bvh import TO_WORLD, check_rigid, clip_of
 from flowborne.motion.bvh_file import BvhFile, load_bvh
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.clip_skeleton import between, skeleton_of
-from flowborne.motion.human.posture import counted_from, posture_of
+from flowborne.motion.human.posture import posture_of, relative_to_pose
 from flowborne.motion.human.segments import Sex
 from flowborne.motion.human.skeleton import PARENTS, Skeleton
-from flowborne.motion.human.soles import on_the_floor
+from flowborne.motion.human.soles import with_soles_on_floor
 from flowborne.motion.mapping import JOINTS, mapping_of
 from flowborne.phrases import suggestion
 
 Array = NDArray[np.float64]
 
-SHORTEST, LONGEST = 0.2, 2.0
+MIN_LEG_LENGTH, MAX_LEG_LENGTH = 0.2, 2.0
 """m from hip to ankle: of a small child, of a giant."""
 
-LIKELY = (0.65, 1.1)
+ADULT_LEG_LENGTHS = (0.65, 1.1)
 """m from hip to ankle, of grown people."""
 
-USUAL = 0.856
+STANDARD_LEG_LENGTH = 0.856
 """m from hip to ankle, of the standard skeleton."""
 
-UPRIGHT = 0.5
+MIN_STANDING_COSINE = 0.5
 """Least cosine of the angle between a standing person and the vertical."""
 
 UNITS = {
@@ -45,7 +45,7 @@ UNITS = {
     1.0: "m",
 }
 
-STRETCH = 0.02
+MAX_PERSON_STRETCH = 0.02
 """Largest stretch of the bones of a person in a file, m; joints get their mean position."""
 
 
@@ -73,12 +73,12 @@ def likely_unit(length: float) -> float:
         raise SceneError(
             "its legs have no length from hip to ankle. Correct the mapping or the file."
         )
-    low, high = LIKELY
+    low, high = ADULT_LEG_LENGTHS
     known = next((unit for unit in UNITS if low <= length * unit <= high), None)
-    return float(f"{USUAL / length:.3g}") if known is None else known
+    return float(f"{STANDARD_LEG_LENGTH / length:.3g}") if known is None else known
 
 
-def named(unit: float) -> str:
+def unit_text(unit: float) -> str:
     """A unit with its name, if it has one: "0.01 (cm)"."""
     return f"{unit:g}" + (f" ({UNITS[unit]})" if unit in UNITS else "")
 
@@ -89,10 +89,10 @@ def check_scale(length: float, unit: float) -> None:
     length  from hip to ankle, in the file's unit
     unit    m per length of the file
     """
-    if not SHORTEST <= length * unit <= LONGEST:
+    if not MIN_LEG_LENGTH <= length * unit <= MAX_LEG_LENGTH:
         raise SceneError(
             f"with unit = {unit:g} its legs are {length * unit:.3g} m long from hip to ankle. "
-            f"Set unit = {named(likely_unit(length))}, or leave it out."
+            f"Set unit = {unit_text(likely_unit(length))}, or leave it out."
         )
 
 
@@ -105,7 +105,7 @@ def standing_axis(up: Array, read_as: str) -> str | None:
     """
     in_file = TO_WORLD[read_as].T @ up
     along = {axis: float((world @ in_file)[2]) for axis, world in TO_WORLD.items()}
-    standing = [axis for axis, cosine in along.items() if cosine >= UPRIGHT]
+    standing = [axis for axis, cosine in along.items() if cosine >= MIN_STANDING_COSINE]
     return max(standing, key=lambda axis: (axis == "y", along[axis]), default=None)
 
 
@@ -201,14 +201,14 @@ def _person(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
     up = how.up or standing_axis(posture_of(raw, mapping).up, "y") or "y"
     clip = clip_of(bvh, unit, up, how.skip, mapping["root"])
     lines = {bone for joint in mapping.values() for bone in _above(clip, joint)}
-    check_rigid(bvh, clip, sorted(lines), STRETCH)
+    check_rigid(bvh, clip, sorted(lines), MAX_PERSON_STRETCH)
     posture = posture_of(clip, mapping)
-    clip = counted_from(clip, posture.rest)
+    clip = relative_to_pose(clip, posture.rest)
     skeleton = skeleton_of(clip, mapping, between(clip, mapping))
     links = {link.name: link.bone for links in skeleton.links.values() for link in links}
     height = clip.translation[:, 2]
     if how.floor == "soles":
-        clip = on_the_floor(clip, mapping, skeleton, how.mass, how.sex)
+        clip = with_soles_on_floor(clip, mapping, skeleton, how.mass, how.sex)
     return Capture(
         clip,
         mapping | links,
@@ -231,7 +231,7 @@ def _above(clip: Clip, joint: str) -> Iterator[str]:
         number = int(clip.parents[number])
 
 
-def with_still(found: Capture, joints: tuple[str, ...]) -> Capture:
+def with_held_joints(found: Capture, joints: tuple[str, ...]) -> Capture:
     """The capture with the joints that its file lacks, at rest."""
     clip, names = found.clip, dict(found.mapping)
     assert found.skeleton is not None

@@ -148,7 +148,7 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., Dual], int, float]] = {
 RESERVED = ("t", "pi", *FUNCTIONS)
 """Names that a constant must not have."""
 
-MOST_LETTERS = 80
+MAX_SHOWN = 80
 """Letters of a formula in a message."""
 
 GRAMMAR = (
@@ -184,7 +184,7 @@ class Formula:
         object.__setattr__(self, "_tree", tree)
 
     def __str__(self) -> str:
-        return f"formula '{shorten(self.text, MOST_LETTERS)}'"
+        return f"formula '{shorten(self.text, MAX_SHOWN)}'"
 
     def names(self) -> set[str]:
         """Constants that it uses."""

@@ -23,13 +23,13 @@ JOINTS = (*CENTRAL, *(f"{side}_{joint}" for side in SIDES for joint in SIDED))
 """Joints of the human."""
 
 LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")
-NEEDED = ("root", *(f"{side}_{joint}" for side in SIDES for joint in LIMBS))
+REQUIRED = ("root", *(f"{side}_{joint}" for side in SIDES for joint in LIMBS))
 """Joints without which a clip is no person's."""
 
 HEAD, NECK = ("head", "skullbase"), ("neck", "neck1", "neck01", "necklower", "lowerneck")
 """Names of the head's joint, or else of one in the neck, in any family."""
 
-WORDS = {"left": "left", "right": "right", "l": "left", "r": "right"}
+SIDE_WORDS = {"left": "left", "right": "right", "l": "left", "r": "right"}
 """Part of a joint's name -> the side that it stands for."""
 
 FILLERS = {"jnt", "bone"}
@@ -107,7 +107,7 @@ def mapping_of(clip: Clip, table: Mapping[str, str]) -> dict[str, str]:
         raise SceneError(problems)
     spelled = [_spelled(name) for name in clip.names]
     mapping = {**_limbs(spelled), **table}
-    missing = [joint for joint in NEEDED[1:] if joint not in mapping]
+    missing = [joint for joint in REQUIRED[1:] if joint not in mapping]
     if missing:
         raise SceneError(
             f"mapping: no joint of the clip is known for {', '.join(missing)} (looked for: "
@@ -135,10 +135,10 @@ def _spelled(name: str) -> Spelled:
     words = [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", bare)]
     while words and words[-1] in FILLERS:
         words.pop()
-    side = next((WORDS[word] for word in words if word in WORDS), "")
+    side = next((SIDE_WORDS[word] for word in words if word in SIDE_WORDS), "")
     short = any(word in ("l", "r") for word in words)
     if side:
-        words.remove(next(word for word in words if word in WORDS))
+        words.remove(next(word for word in words if word in SIDE_WORDS))
     else:
         side, short, words = _run_together(words)
     starts, at = set(), 0
@@ -153,7 +153,7 @@ def _run_together(words: list[str]) -> tuple[str, bool, list[str]]:
     """Side, whether it is one letter, and the rest of a name such as "lfemur" or "hipleft"."""
     known = {name for family in families() for names in family.names.values() for name in names}
     whole = "".join(words)
-    for word, side in WORDS.items():
+    for word, side in SIDE_WORDS.items():
         if whole.startswith(word) and whole[len(word) :] in known:
             return side, len(word) == 1, [whole[len(word) :]]
         if len(word) > 1 and whole.endswith(word) and whole[: -len(word)] in known:

@@ -83,20 +83,20 @@ NAMES = tuple(joint for _, joint, _ in BODIES)
 
 LEG = ("hip", "knee", "ankle", "toes")
 
-LATER = {"left": 0.5, "right": 0.0}
+PHASE_LAG = {"left": 0.5, "right": 0.0}
 """Of a cycle, how much later a side does the same."""
 
 SHOULDER, SHOULDER_SWING, ELBOW, ELBOW_SWING = np.radians([-8.0, 16.0, 32.5, 12.5])
 """Mean and amplitude of flexion: from 24 degrees back, where the heel of the same side strikes, to
 8 forward, and an elbow bent by 20 to 45 (Perry 1992, Gait Analysis, chapter 8)."""
 
-FLAT = np.radians(4.0)
+FLAT_TOE_TILT = np.radians(4.0)
 """Tilts of the foot around level over which the toes begin to bend."""
 
-LIFTED = np.radians(25.0)
+TOE_EXTENSION = np.radians(25.0)
 """Extension of the toes in swing and at heel strike (Perry 1992, chapter 4)."""
 
-SUPPORT = 0.003
+SUPPORT_HEIGHT = 0.003
 """m: what is so much higher than the lowest point of the soles carries 1 / e of what that does."""
 
 SAMPLES = 1024
@@ -121,7 +121,7 @@ def gait_clip(skeleton: Skeleton, cycle: float = CYCLE) -> Clip:
     stays upright: the lower back compensates the tilt of the pelvis. Toes stay flat on the floor
     while the heel lifts. The root moves such that the soles touch the ground and do not slide;
     where the support passes from one point of the soles to another, their heights and speeds are
-    mixed over `SUPPORT`, so that the root moves smoothly.
+    mixed over `SUPPORT_HEIGHT`, so that the root moves smoothly.
 
     skeleton  upright at rest, arms down, feet forward
     cycle     s
@@ -150,9 +150,9 @@ def leg_turns(phase: Array) -> Array:
     phase = phase % 1.0
     hip, knee, ankle = (curve(column)(phase) for column in (HIP, KNEE, ANKLE))
     pitch = pelvis_tilt(phase) - hip + knee - ankle
-    flat = 0.5 * (pitch + np.hypot(pitch, FLAT))
+    flat = 0.5 * (pitch + np.hypot(pitch, FLAT_TOE_TILT))
     swing = _rise(phase, 0.54, 0.74) + 1.0 - _rise(phase, 0.02, 0.1)
-    return np.array([-hip, knee, -ankle, -(flat + (LIFTED - flat) * swing)])
+    return np.array([-hip, knee, -ankle, -(flat + (TOE_EXTENSION - flat) * swing)])
 
 
 def _rise(phase: Array, start: float, end: float) -> Array:
@@ -167,7 +167,7 @@ def joint_turns(phase: Array) -> dict[str, Array]:
     turns = {joint: np.zeros(len(phase)) for joint in NAMES}
     turns["root"], turns["lower_back"] = tilt, -tilt
     for side in SIDES:
-        own = phase - LATER[side]
+        own = phase - PHASE_LAG[side]
         turns |= {f"{side}_{name}": turn for name, turn in zip(LEG, leg_turns(own), strict=True)}
         swing = np.cos(2.0 * np.pi * own)
         turns[f"{side}_shoulder"] = -(SHOULDER - SHOULDER_SWING * swing)
@@ -179,7 +179,7 @@ def root_path(skeleton: Skeleton, phase: Array) -> Array:
     """(n, 3) m, place of the root at phases (n,) from 0 on, by what carries it."""
     instants = np.arange(SAMPLES) / SAMPLES
     x, z = _soles(skeleton, instants)
-    weight = np.exp(-(z - z.min(axis=1, keepdims=True)) / SUPPORT)
+    weight = np.exp(-(z - z.min(axis=1, keepdims=True)) / SUPPORT_HEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
     speed = -(weight * _rate(x)).sum(axis=1)
     height = -(weight * z).sum(axis=1)
@@ -209,7 +209,7 @@ def _soles(skeleton: Skeleton, phase: Array) -> tuple[Array, Array]:
 
 def _sole(skeleton: Skeleton, side: str, phase: Array) -> Array:
     """(2, 4, n) x and z of the points of one sole, from the root, m."""
-    turns = leg_turns(phase - LATER[side])
+    turns = leg_turns(phase - PHASE_LAG[side])
     angles = np.cumsum([pelvis_tilt(phase), *turns], axis=0)
     names = ("root", *(f"{side}_{name}" for name in LEG))
     places = [skeleton[name] for name in names]

@@ -11,7 +11,7 @@ from flowborne.motion.human.skeleton import SIDES, Array, Skeleton
 
 Sex = Literal["male", "female"]
 
-MOST_SPREAD = 0.95
+MAX_SPREAD = 0.95
 """Largest part of a segment's inertia from the distances of its bodies, in any direction."""
 
 
@@ -178,7 +178,7 @@ def _of_segment(segment: str, skeleton: Skeleton, mass: float, sex: Sex) -> dict
     away = middle - weight @ middle
     inward = np.linalg.inv(np.linalg.cholesky(whole))
     spread = float(np.linalg.eigvalsh(inward @ (away.T * weight) @ away @ inward.T)[-1])
-    away *= min(1.0, np.sqrt(MOST_SPREAD / max(spread, MOST_SPREAD)))
+    away *= min(1.0, np.sqrt(MAX_SPREAD / max(spread, MAX_SPREAD)))
     rest = whole - (away.T * weight) @ away
     tensor = np.trace(rest) * np.eye(3) - rest
     kilograms = figures.mass * mass
