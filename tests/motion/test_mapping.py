@@ -7,7 +7,8 @@ import pytest
 
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
-from flowborne.motion.mapping import JOINTS, REQUIRED, SIDED, families, mapping_of
+from flowborne.motion.human.skeleton import JOINTS
+from flowborne.motion.mapping import REQUIRED, SIDED, families, mapping_of
 
 
 def clip_of(
@@ -345,7 +346,7 @@ def test_missing_limbs_are_told_with_the_names_that_were_looked_for() -> None:
 
 
 def test_a_table_against_the_tree_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"'LeftUpLeg' for left_knee does not hang on 'LeftLeg'"):
+    with pytest.raises(SceneError, match=r"'LeftUpLeg' for left_knee is not below 'LeftLeg'"):
         mapping_of(PERSON, {"left_hip": "LeftLeg", "left_knee": "LeftUpLeg"})
 
 
