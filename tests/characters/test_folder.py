@@ -70,7 +70,7 @@ def box(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     (rigged.write_glb if request.param == "glb" else rigged.write_usd)(path)
     made = fb.import_character(path, folder / "scene", density=900.0)
     assert "2 bodies of 4 joints, 0.24 m^3, 216 kg" in made.notes
-    assert "rigid with the joint above them: trunk, tail_tip" in made.notes
+    assert "rigid with their parent joint: trunk, tail_tip" in made.notes
     return made.scene
 
 
@@ -233,7 +233,7 @@ def test_command_says_what_it_made(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "clip 'Swim 1': 13 frames in 0.5 s; its joints are at most" in text
     code, text = said("--clip", "Swim 1")
     assert code == 2
-    assert "box.toml already, which may have been edited. Name another folder" in text
+    assert "box.toml already exists and may have been edited. Name another folder" in text
 
 
 def test_mistakes_in_an_import_are_told(tmp_path: Path) -> None:

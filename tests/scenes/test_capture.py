@@ -383,7 +383,7 @@ def test_limbs_on_a_line_are_refused(write: Write) -> None:
     path.with_name("walk.bvh").write_text("\n".join(lines) + "\n")
     (problem,) = check_scene(path)
     assert problem == (
-        "scene stroll.toml, [clip]: its hips, shoulders and ankles lie on a line. "
+        "scene stroll.toml, [clip]: its hips, shoulders and ankles are on one line. "
         "Correct the mapping or the file."
     )
 

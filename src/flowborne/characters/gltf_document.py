@@ -173,7 +173,7 @@ class Document(_Table):
 def read_document(path: Path) -> tuple[Document, list[memoryview]]:
     """The tables of a .glb or .gltf file, and the bytes of its buffers.
 
-    raises  SceneError when it is too large, cut, no glTF, or has a buffer outside its folder
+    raises  SceneError when it is too large, truncated, not glTF, or has a buffer outside its folder
     """
     data, binary = _bounded(path, path.name), None
     if data[:4] == b"glTF":
@@ -210,7 +210,7 @@ def _bounded(path: Path, shown: str) -> bytes:
         ) from None
     if len(data) > MAX_FILE_BYTES:
         raise SceneError(
-            f"{shown} has more than {MAX_FILE_BYTES / 2**30:g} GB, which is the most. Export fewer "
+            f"{shown} is larger than the maximum of {MAX_FILE_BYTES / 2**30:g} GB. Export fewer "
             "meshes and clips."
         )
     return data
@@ -238,8 +238,8 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
     asked = sum(buffer.byte_length for buffer in document.buffers)
     if asked > MAX_FILE_BYTES:
         raise SceneError(
-            f"{path.name}: its buffers ask for {asked / 2**30:.3g} GB, and "
-            f"{MAX_FILE_BYTES / 2**30:g} GB is the most. Export fewer meshes and clips."
+            f"{path.name}: its buffers need {asked / 2**30:.3g} GB; the maximum is "
+            f"{MAX_FILE_BYTES / 2**30:g} GB. Export fewer meshes and clips."
         )
     found = []
     for number, buffer in enumerate(document.buffers):
@@ -260,7 +260,7 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
 
 
 def _from_uri(path: Path, uri: str, where: str) -> bytes:
-    """The content of a data uri, or of the file in the folder of `path` that a uri names."""
+    """The content of a data URI, or of the file in the folder of `path` that a URI names."""
     if uri[:5].lower() == "data:":
         try:
             return embedded(uri)
@@ -305,13 +305,13 @@ def inside(uri: str, folder: Path, where: str) -> Path:
         leaves = True
     if leaves:
         raise SceneError(
-            f"{where} names {uri[:100]!r}, which is not in the folder of the file. Put what it "
-            "names beside the file, or export the character as one file."
+            f"{where} names {uri[:100]!r}, which is not in the folder of the file. Put it "
+            "there, or export the character as one file."
         )
     return relative
 
 
 def _place(keys: tuple[int | str, ...]) -> str:
-    """accessors[3].count of ("accessors", 3, "count")."""
+    """A path in the document: ("accessors", 3, "count") -> accessors[3].count."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
     return text.lstrip(".") or "document"
