@@ -224,7 +224,7 @@ def test_command_says_what_it_made(tmp_path: Path, capsys: pytest.CaptureFixture
 
     code, text = said()
     assert (code, text.count("\n")) == (2, 1)
-    assert "box.glb has 2 clips. Name one by --clip: Swim 0, Swim 1." in text
+    assert "box.glb has 2 clips. Name one with --clip: Swim 0, Swim 1." in text
     code, text = said("--density", "0")
     assert (code, text) == (2, "flowborne: --density is 0; give kg/m^3 above 0\n")
     code, text = said("--clip", "Swim 1")
