@@ -70,7 +70,7 @@ def box(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     (rigged.write_glb if request.param == "glb" else rigged.write_usd)(path)
     made = fb.import_character(path, folder / "scene", density=900.0)
     assert "2 bodies of 4 joints, 0.24 m^3, 216 kg" in made.notes
-    assert "rigid with the joint above them: trunk, tail_tip" in made.notes
+    assert "rigid with their parent joint: trunk, tail_tip" in made.notes
     return made.scene
 
 
@@ -122,7 +122,7 @@ def test_clip_has_the_angles_of_the_file(box: Path) -> None:
     clip = read_bvh(box.with_suffix(".bvh"))
     assert clip.names == ("handle", "tail")
     assert clip.frame_time == pytest.approx(1.0 / rigged.RATE, rel=1e-6)
-    _, world = clip.places()
+    _, world = clip.poses()
     tail, trunk = (Rotation.from_quat(world[:, joint], scalar_first=True) for joint in (1, 0))
     still = rigged.TURNS[1].inv() * rigged.TURNS[2]
     own = turns["tail"] * still.inv()
@@ -224,7 +224,7 @@ def test_command_says_what_it_made(tmp_path: Path, capsys: pytest.CaptureFixture
 
     code, text = said()
     assert (code, text.count("\n")) == (2, 1)
-    assert "box.glb has 2 clips. Name one by --clip: Swim 0, Swim 1." in text
+    assert "box.glb has 2 clips. Name one with --clip: Swim 0, Swim 1." in text
     code, text = said("--density", "0")
     assert (code, text) == (2, "flowborne: --density is 0; give kg/m^3 above 0\n")
     code, text = said("--clip", "Swim 1")
@@ -233,7 +233,7 @@ def test_command_says_what_it_made(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "clip 'Swim 1': 13 frames in 0.5 s; its joints are at most" in text
     code, text = said("--clip", "Swim 1")
     assert code == 2
-    assert "box.toml already, which may have been edited. Name another folder" in text
+    assert "box.toml already exists and may have been edited. Name another folder" in text
 
 
 def test_mistakes_in_an_import_are_told(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_what_is_wrong_with_a_file_is_one_message(
         ("cat.fbx", r"cat\.fbx: \.fbx .* Make a \.glb of it, in Blender .*'cat\.glb'"),
         ("cat.max", r"cat\.max is none of \.glb, \.gltf, \.usd"),
         ("cat.glb", r"there is no file .*cat\.glb\. Correct its name"),
-        ("cut.glb", r"cut\.glb cannot be read as glTF: it has no JSON chunk. Export it anew"),
+        ("cut.glb", r"cut\.glb cannot be read as glTF: it has no JSON chunk. Export it again"),
         ("cut.usda", r"cut\.usda cannot be read as USD"),
     ):
         with pytest.raises(SceneError, match=said):
@@ -107,11 +107,11 @@ def test_what_is_wrong_with_a_file_is_one_message(
     source = read_source(tmp_path / "box.glb")
     with pytest.raises(SceneError, match=r"has no clip 'Swin'\. It has: Swim 0, Swim 1\."):
         clip_number(source, "Swin", "box.glb")
-    with pytest.raises(SceneError, match=r"2 clips\. Name one by --clip: Swim 0, Swim 1\."):
+    with pytest.raises(SceneError, match=r"2 clips\. Name one with --clip: Swim 0, Swim 1\."):
         clip_number(source, None, "box.glb")
     assert clip_number(source, "Swim 1", "box.glb") == 1
     rigged.write_glb(tmp_path / "still.glb", clips=0)
-    with pytest.raises(SceneError, match=r"has no clip\. Name a file that has one"):
+    with pytest.raises(SceneError, match=r"has no clip\. Name a file with clips"):
         clip_number(read_source(tmp_path / "still.glb"), None, "still.glb")
     monkeypatch.setitem(sys.modules, "pxr.Usd", None)
     with pytest.raises(SceneError, match=r"are read by .*flowborne\[usd\]"):

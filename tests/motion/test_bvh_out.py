@@ -151,7 +151,7 @@ def test_real_clip_through_angles_found_anew(
     clip = read_bvh(MOCAP / name)
     write_bvh(path, MOCAP / name, own_rotations(clip))
     assert_allclose(load_bvh(path).values, load_bvh(MOCAP / name).values, atol=1e-12)
-    monkeypatch.setattr(bvh, "SAME", -1.0)  # no frame keeps its own numbers
+    monkeypatch.setattr(bvh, "MIN_ROTATION_CHANGE", -1.0)  # no frame keeps its own numbers
     write_bvh(path, MOCAP / name, own_rotations(clip))
     assert np.rad2deg(largest_difference(clip, read_bvh(path))) < 1e-4
 

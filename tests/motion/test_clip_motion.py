@@ -18,7 +18,7 @@ from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
-from flowborne.motion.clip_motion import MOST_CACHED, TrajectoryClip
+from flowborne.motion.clip_motion import MAX_CACHED_TIMES, TrajectoryClip
 from flowborne.motion.quaternions import about, angle, inverse, product
 from flowborne.solids.model import SolidModel
 
@@ -60,10 +60,10 @@ def root(prescribed: TrajectoryClip, time: float) -> tuple[np.ndarray, np.ndarra
     return position[:3], product(position[3:7], inverse(rest))
 
 
-def test_bodies_that_are_turned_at_rest_stand_as_the_clip_does() -> None:
+def test_bodies_rotated_at_rest_follow_the_clip() -> None:
     prescribed = motion()
     data = mujoco.MjData(MODEL.mj)
-    places, rotations = WANDER.places()
+    places, rotations = WANDER.poses()
     rest = dict(zip(("pelvis", "thigh", "shank", "foot", "waist", "head"), REST, strict=True))
     for frame in range(WANDER.frames):
         data.qpos[:] = whole(prescribed, frame * WANDER.frame_time)
@@ -217,7 +217,7 @@ def test_seam_of_an_open_clip_keeps_to_ground_and_heading() -> None:
     assert max(steps) < 2.2  # the clip itself goes at 1.3 to 1.6 m/s
 
 
-def test_a_seam_follows_what_its_message_says() -> None:
+def test_the_blend_that_the_message_proposes_is_long_enough() -> None:
     with pytest.raises(SceneError) as refused:
         motion(loop=True, blend=0.02)
     said = str(refused.value)
@@ -238,6 +238,13 @@ def test_low_pass_halves_the_power_at_its_frequency_and_does_not_lag() -> None:
         assert_allclose(found, expected, atol=0.01)
 
 
+def test_before_the_start_joints_rest_with_and_without_a_blend() -> None:
+    for name in ("plain", "looped"):
+        m = MOTIONS[name]
+        assert np.array_equal(m.position(-1.0), m.position(0.0))
+        assert not m.velocity(-1.0).any()
+
+
 def test_motion_fits_the_contract_and_survives_pickling() -> None:
     prescribed: Trajectory = MOTIONS["looped"]
     again = pickle.loads(pickle.dumps(prescribed))
@@ -251,24 +258,24 @@ def test_motion_fits_the_contract_and_survives_pickling() -> None:
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "stop": ({"stop": 2.5}, r"it lasts 2 s, and is to go from 0 s to 2\.5 s"),
-    "start": ({"start": 1.0, "stop": 1.0}, r"from 1 s to 1 s"),
-    "negative": ({"start": -0.1}, r"from -0\.1 s to 2 s"),
+    "stop": ({"stop": 2.5}, r"it lasts 2 s, but start is 0 s and stop 2\.5 s"),
+    "start": ({"start": 1.0, "stop": 1.0}, r"start is 1 s and stop 1 s"),
+    "negative": ({"start": -0.1}, r"start is -0\.1 s and stop 2 s"),
     "blend": ({"blend": 1.5}, r"blend 1\.5 s is more than half of the 2 s"),
-    "open loop": ({"loop": True}, r"without a blend, and joint '\w+' ends [\d.]+ rad or m"),
+    "open loop": ({"loop": True}, r"without a blend, but joint '\w+' ends [\d.]+ rad or m"),
     "seam": (
         {"loop": True, "blend": 0.01},
-        r"where it begins again, joint '\w+' moves \d+ times as fast as anywhere else in it, as "
-        r"a blend of 0\.01 s joins ends that differ\. Make blend 0\.\d+ s or longer, or set stop",
+        r"where it starts again, joint '\w+' moves \d+ times as fast as anywhere else, because a "
+        r"blend of 0\.01 s joins different ends\. Make blend 0\.\d+ s or longer, or set stop",
     ),
     "low-pass": ({"smooth": 25.0}, r"smooth 25 Hz is not between 0 and 24\.1 Hz.* 60 frames"),
     "unknown": ({"joints": ["ancle"]}, r"'ancle' is not in the model; did you mean 'ankle'"),
-    "unmapped": ({"joints": ["waist"]}, r"'waist' is to follow the clip and is mapped to none"),
+    "unmapped": ({"joints": ["waist"]}, r"'waist' follows the clip, but is not mapped"),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_does_not_fit_the_clip_is_told(case: str) -> None:
+def test_invalid_passage_is_refused(case: str) -> None:
     options, message = WRONG[case]
     with pytest.raises(SceneError, match=message):
         motion(**options)
@@ -277,14 +284,14 @@ def test_what_does_not_fit_the_clip_is_told(case: str) -> None:
 @pytest.mark.parametrize(
     ("joints", "message"),
     [
-        ('<joint name="hip" type="slide"/>', "joint 'hip' slides"),
+        ('<joint name="hip" type="slide"/>', "joint 'hip' is a slide"),
         (
             '<joint name="hip"/><joint name="knee" axis="0 1 0"/>',
-            "'hip' and 'knee' are of one body",
+            "'hip' and 'knee' belong to one body",
         ),
     ],
 )
-def test_joints_that_cannot_follow_are_told(joints: str, message: str) -> None:
+def test_joints_that_cannot_follow_are_refused(joints: str, message: str) -> None:
     body = f'<body name="b">{joints}<geom size="0.1"/></body>'
     other = SolidModel.from_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     with pytest.raises(SceneError, match=message):
@@ -313,11 +320,11 @@ def test_real_clip_keeps_its_feet_on_the_ground() -> None:
     assert max(heights) < 0.3
 
 
-def test_what_a_motion_remembers_is_what_it_would_find_again() -> None:
+def test_cached_motion_equals_a_fresh_one() -> None:
     prescribed = motion(loop=True, blend=0.5)
-    times = np.linspace(0.0, 5.0, 2 * MOST_CACHED)
+    times = np.linspace(0.0, 5.0, 2 * MAX_CACHED_TIMES)
     fresh = {}
-    for time in times[:: MOST_CACHED // 8]:
+    for time in times[:: MAX_CACHED_TIMES // 8]:
         other = motion(loop=True, blend=0.5)
         fresh[time] = other.position(time), other.velocity(time)
     for _ in range(2):

@@ -15,8 +15,7 @@ from flowborne.motion.inflow import (
     FactorKeyframes,
     FactorRamp,
     FactorSteady,
-    ProfileParabolic,
-    ProfileUniform,
+    InflowProfile,
     even_bands,
 )
 from flowborne.motion.tracks import Curve
@@ -28,7 +27,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
 def test_parabola_has_the_mean_velocity_that_was_given(
     low: float, width: float, mean: float
 ) -> None:
-    profile = ProfileParabolic((mean, 0.0, 0.0), ((1, low, low + width),), FactorSteady())
+    profile = InflowProfile((mean, 0.0, 0.0), FactorSteady(), ((1, low, low + width),))
     y = low + 0.5 * width * (1.0 + NODES)
     u, v, w = profile(np.zeros(3), y, np.zeros(3), 0.0)
     assert 0.5 * (WEIGHTS @ u) == pytest.approx(mean, abs=1e-12)
@@ -37,7 +36,7 @@ def test_parabola_has_the_mean_velocity_that_was_given(
 
 
 def test_parabola_in_three_dimensions_keeps_the_mean_and_vanishes_at_the_edges() -> None:
-    profile = ProfileParabolic((0.0, 2.0, 0.0), ((0, 0.0, 1.0), (2, -1.0, 3.0)), FactorSteady())
+    profile = InflowProfile((0.0, 2.0, 0.0), FactorSteady(), ((0, 0.0, 1.0), (2, -1.0, 3.0)))
     x = 0.5 + 0.5 * NODES[:, None]
     z = 1.0 + 2.0 * NODES[None, :]
     _, v, _ = profile(x, np.zeros((1, 1)), z, 0.0)
@@ -50,7 +49,7 @@ def test_parabola_on_a_grid_has_its_mean_to_second_order() -> None:
     errors = []
     for n in (8, 16, 32):
         grid = Grid.slab(n, n, 1.0 / n, (0.0, 0.0))
-        profile = ProfileParabolic((1.0, 0.0, 0.0), ((1, 0.0, 1.0),), FactorSteady())
+        profile = InflowProfile((1.0, 0.0, 0.0), FactorSteady(), ((1, 0.0, 1.0),))
         _, y, _ = grid.face_coordinates(0)
         errors.append(profile(np.zeros(n), y, np.zeros(n), 0.0)[0].mean() - 1.0)
     assert_allclose(errors, [0.5 / n**2 for n in (8, 16, 32)], rtol=1e-9)
@@ -60,7 +59,7 @@ def test_ramp_rises_smoothly_from_rest() -> None:
     ramp = FactorRamp(2.0)
     assert [ramp.at(t) for t in (-1.0, 0.0, 1.0, 2.0, 5.0)] == pytest.approx([0, 0, 0.5, 1, 1])
     assert ramp.at(1e-4) < 1e-7
-    profile = ProfileUniform((2.0, 1.0, 0.0), ramp)
+    profile = InflowProfile((2.0, 1.0, 0.0), ramp)
     u, v, _ = profile(np.zeros((1, 4)), np.zeros((1, 4)), np.zeros((1, 4)), 1.0)
     assert u.shape == (1, 4)
     assert_allclose(u, 1.0)

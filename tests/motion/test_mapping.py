@@ -7,7 +7,8 @@ import pytest
 
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
-from flowborne.motion.mapping import JOINTS, NEEDED, SIDED, families, mapping_of
+from flowborne.motion.human.skeleton import JOINTS
+from flowborne.motion.mapping import REQUIRED, SIDED, families, mapping_of
 
 
 def clip_of(
@@ -314,7 +315,7 @@ def test_strange_names_work_with_a_table_alone() -> None:
     names = tuple(f"bone{n}" for n in range(len(PERSON.names)))
     strange = clip_with(names, PERSON.parents.tolist())
     known = mapping_of(PERSON, {})
-    table = {joint: names[PERSON.names.index(known[joint])] for joint in NEEDED}
+    table = {joint: names[PERSON.names.index(known[joint])] for joint in REQUIRED}
     mapping = mapping_of(strange, table)
     assert table.items() <= mapping.items()
     assert mapping["thorax"] == names[PERSON.names.index("Spine2")], "by its place"
@@ -345,7 +346,7 @@ def test_missing_limbs_are_told_with_the_names_that_were_looked_for() -> None:
 
 
 def test_a_table_against_the_tree_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"'LeftUpLeg' for left_knee does not hang on 'LeftLeg'"):
+    with pytest.raises(SceneError, match=r"'LeftUpLeg' for left_knee is not below 'LeftLeg'"):
         mapping_of(PERSON, {"left_hip": "LeftLeg", "left_knee": "LeftUpLeg"})
 
 

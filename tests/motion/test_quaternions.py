@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from flowborne.motion.quaternions import about, angle, continuous, inverse, product, turned, twist
+from flowborne.motion.quaternions import about, angle, continuous, inverse, product, rotated, twist
 
 RNG = np.random.default_rng(1)
 P, Q = Rotation.random(20, random_state=2), Rotation.random(20, random_state=3)
@@ -23,11 +23,11 @@ def test_one_quaternion_goes_with_many() -> None:
     assert_allclose(product(p, q[0])[7], product(p[7], q[0]), atol=1e-15)
 
 
-def test_turned_vectors() -> None:
+def test_rotated_vectors() -> None:
     vectors = RNG.normal(size=(20, 3))
-    assert_allclose(turned(p, vectors), P.apply(vectors), atol=1e-14)
-    assert_allclose(turned(p, vectors[0]), P.apply(vectors[0]), atol=1e-14)
-    assert_allclose(turned(p[0], vectors), P[0].apply(vectors), atol=1e-14)
+    assert_allclose(rotated(p, vectors), P.apply(vectors), atol=1e-14)
+    assert_allclose(rotated(p, vectors[0]), P.apply(vectors[0]), atol=1e-14)
+    assert_allclose(rotated(p[0], vectors), P[0].apply(vectors), atol=1e-14)
 
 
 def test_inverse_and_angle() -> None:

@@ -46,7 +46,7 @@ def rig(trunk: str, neck: str, leg: str, arm: str, sides: Sequence[str], way: Wa
     for the side, and a joint is where the human's of the same part is, or between two of them."""
     rng = np.random.default_rng(way.seed)
     skeleton, clip = standard_skeleton(), gait_clip(standard_skeleton())
-    _, rotations = clip.places(np.array(FRAMES))
+    _, rotations = clip.poses(np.array(FRAMES))
     own = {
         joint: Rotation.from_quat(rotations[:, n], scalar_first=True)
         for n, joint in enumerate(clip.names)

@@ -211,7 +211,7 @@ FAULTS: dict[str, tuple[str, dict[str, str], dict[str, str], str]] = {
         "",
         {"unit = 0.01": "unit = 0.01\nstart = 9.0"},
         {},
-        "is to go from 9 s to 1.0",
+        "but start is 9 s and stop 1.0",
     ),
     "a joint that is controlled and follows": (
         CONTROL,
@@ -383,7 +383,7 @@ def test_limbs_on_a_line_are_refused(write: Write) -> None:
     path.with_name("walk.bvh").write_text("\n".join(lines) + "\n")
     (problem,) = check_scene(path)
     assert problem == (
-        "scene stroll.toml, [clip]: its hips, shoulders and ankles lie on a line. "
+        "scene stroll.toml, [clip]: its hips, shoulders and ankles are on one line. "
         "Correct the mapping or the file."
     )
 

@@ -1,12 +1,12 @@
 """The joints of a character that become bodies, and the closed piece of the surface of each.
 
-The surface is closed first. A point lies beyond a joint where that joint and all below it have more
-than half of the weight, and belongs to the last joint beyond which it lies. Weights are linear in a
-triangle, so triangles are cut at these lines. The regions beyond two joints are nested or disjoint,
-so that every rim lies between two bodies only. Both sides close it by the same fan about its
-middle: the pieces fill the whole. As rigid pieces turn, a crack would open between them, and fluid
-would enter it a hundred times as fast as they move. The shapes in the fluid therefore have a dome
-about the joint instead of the fan, inside the body above.
+The surface is closed first. A point lies beyond a joint if that joint and its descendants have more
+than half of the weight; it belongs to the last joint beyond which it lies. Weights are linear in a
+triangle, so triangles are cut along straight lines. The regions beyond two joints are nested or
+disjoint, so every rim separates exactly two bodies. Both bodies close the rim with the same fan
+around its centre, so the pieces fill the whole volume. When rigid pieces rotate, a crack would open
+between them, and fluid would enter it a hundred times as fast as they move. The shapes in the fluid
+therefore have a dome around the joint instead of the fan, inside the parent body.
 """
 
 from __future__ import annotations
@@ -28,33 +28,33 @@ WELD_DISTANCE = 1e-7
 """Distance below which points are welded, relative to the size of the surface."""
 
 MAX_COINCIDENT = 50
-"""Points within that distance of a point, on average."""
+"""Largest mean number of points within that distance of a point."""
 
 DOME_RINGS = 6
-"""Rings of triangles of a dome, 15 degrees each in a half ball."""
+"""Rings of triangles of a dome: 15 degrees each in a hemisphere."""
 
 BEYOND_WEIGHT = 0.5 + 1e-7
 """Weight above which a point lies beyond a joint; more than a half, so that no point lies beyond
 two disjoint ones."""
 
 MIN_VOLUME = 2e-3
-"""Part of the character's volume below which a joint is rigid with the one above it."""
+"""Part of the character's volume below which a joint is rigid with its parent."""
 
 MIN_ROOT_VOLUME = 0.05
-"""Part of the volume below which the topmost joint is rigid with the largest below it: a root that
-is only a handle has no mass, and moves with the hips."""
+"""Part of the volume below which the root is rigid with its largest child: a root that is only a
+control handle has no mass, and moves with the hips."""
 
 
 @dataclass(frozen=True, eq=False)
 class Division:
     """A character as rigid bodies.
 
-    owners  (n,) for each joint the moving joint that it is rigid with, or itself
-    leader  joint of the topmost body from which the body takes its motion
+    owners  (n,) for each joint the moving joint with which it is rigid, or itself
+    leader  joint of the root body that gives the body its motion
     pieces  moving joint -> its closed part of the surface at rest, m
-    shapes  the same with domes about the joints
-    volume  m^3 within the whole surface
-    filled  m across each closed hole of the surface
+    shapes  the same with domes around the joints
+    volume  m^3 inside the whole surface
+    filled  width of each closed hole of the surface, m
     """
 
     owners: Integers
@@ -74,15 +74,15 @@ def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Divisi
     """The bodies of a character.
 
     name    of its file, for messages
-    fill    whether to close holes of any size, and not only small ones
-    raises  SceneError when the surface remains open, or has no inside
+    fill    whether to close holes of any size instead of small ones only
+    raises  SceneError when the surface remains open, or has no positive volume
     """
     whole, filled = closed(surface, name, fill)
     volume = volume_of((whole.vertices, whole.faces))
     if not volume > 0.0:
         raise SceneError(
-            f"{name}: the surface holds {volume:.3g} m^3. Turn its faces outward (in Blender: "
-            "Mesh, Normals, Recalculate Outside), and take a surface with an inside."
+            f"{name}: the surface encloses {volume:.3g} m^3. Orient its faces outward (in Blender: "
+            "Mesh, Normals, Recalculate Outside), and use a surface that encloses a volume."
         )
     own, _ = _pieces(rig, np.arange(len(rig.names)), whole, domed=False)
     owners, leader = _merged(rig, np.array([volume_of(piece) for piece in own]) / volume)
@@ -94,12 +94,12 @@ def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Divisi
 
 
 def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tuple[float, ...]]:
-    """A closed surface: coincident points are welded, triangles without area are removed, all
-    triangles of a part are wound alike, and holes are closed by fans about their middles.
+    """A closed surface: coincident points are welded, degenerate triangles are removed, triangles
+    of a part get consistent winding, and holes are closed by fans around their centres.
 
-    fill     whether to close holes wider than SMALL_HOLE of the surface's size, too
-    returns  the surface, and m across each closed hole
-    raises   SceneError where a hole remains open
+    fill     whether to close also holes wider than SMALL_HOLE of the surface's size
+    returns  the surface, and the width of each closed hole, m
+    raises   SceneError when a hole remains open
     """
     first, welded = weld(surface.vertices)
     weights = np.zeros((len(first), surface.weights.shape[1]))
@@ -118,12 +118,12 @@ def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tu
     if wide and not fill:
         widest = max(wide, key=lambda n: across[n])
         x, y, z = points[loops[widest]].mean(axis=0)
-        ways = "Close them by --fill, or" if volume_of((every, whole)) > 0.0 else "Close them"
+        remedy = "Close them by --fill, or" if volume_of((every, whole)) > 0.0 else "Close them"
         raise SceneError(
             f"{name}: the surface is not watertight: {len(rims)} edges have a triangle on one side "
-            f"alone. Holes wider than {SMALL_HOLE:.0%} of it: {len(wide)}, the widest "
-            f"{across[widest]:.3g} m across, at ({x:.4g}, {y:.4g}, {z:.4g}) m. {ways} in Blender "
-            "(Mesh, Clean Up, Fill Holes), or leave out meshes that have no inside."
+            f"only. Holes wider than {SMALL_HOLE:.0%} of it: {len(wide)}, the widest "
+            f"{across[widest]:.3g} m across, at ({x:.4g}, {y:.4g}, {z:.4g}) m. {remedy} in Blender "
+            "(Mesh, Clean Up, Fill Holes), or leave out meshes that enclose no volume."
         )
     means = [weights[loop].mean(axis=0, keepdims=True) for loop in loops]
     colours = np.concatenate([surface.colours[kept], np.full((len(lids), 3), PLAIN)])
@@ -131,7 +131,7 @@ def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tu
 
 
 def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
-    """`fans`, with a dome instead of a fan in each rim around a joint.
+    """`fans` with a dome instead of a fan in each rim around a joint.
 
     The dome is centred on the joint, so that no gap opens between the two bodies as it turns.
 
@@ -149,9 +149,9 @@ def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
             continue
         normal /= np.linalg.norm(normal)
         about = centre + min(float(((start - centre) @ normal).mean()), 0.0) * normal
-        away = start - about
-        height, radius = away @ normal, np.linalg.norm(away, axis=1)
-        side = away - height[:, None] * normal
+        offset = start - about
+        height, radius = offset @ normal, np.linalg.norm(offset, axis=1)
+        side = offset - height[:, None] * normal
         side /= np.maximum(np.linalg.norm(side, axis=1), np.finfo(float).tiny)[:, None]
         tilt = np.arccos(np.clip(height / np.maximum(radius, np.finfo(float).tiny), -1.0, 1.0))
         ring = rim
@@ -172,16 +172,15 @@ def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
 
 
 def weld(points: Array) -> tuple[Integers, Integers]:
-    """Numbers of the points that differ from all earlier ones, and for every point its number
-    among them."""
+    """Indices of the distinct points, and for every point its index among them."""
     near = WELD_DISTANCE * float(np.ptp(points, axis=0).max())
     single, of_point = np.unique(points, axis=0, return_inverse=True)
     tree = cKDTree(single)
-    crowd = tree.count_neighbors(tree, near)
-    if crowd > MAX_COINCIDENT * len(points):
+    neighbours = tree.count_neighbors(tree, near) / len(points)
+    if neighbours > MAX_COINCIDENT:
         raise SceneError(
-            f"the surface has {crowd / len(points):.3g} points within {near:.3g} m of each other, "
-            f"and {MAX_COINCIDENT} are the most: most of it is tiny for its size. Look for stray "
+            f"the surface has {neighbours:.3g} points within {near:.3g} m of each other; the "
+            f"maximum is {MAX_COINCIDENT}: its details are too small for its size. Look for stray "
             "points."
         )
     pairs = tree.query_pairs(near, output_type="ndarray")
@@ -220,8 +219,7 @@ def _merged(rig: Rig, parts: Array) -> tuple[Integers, int]:
 def _pieces(
     rig: Rig, owners: Integers, surface: Surface, *, domed: bool = True
 ) -> tuple[list[Mesh], list[Mesh]]:
-    """The closed part of each joint, empty for a joint without one; and, if `domed`, those parts
-    with domes."""
+    """The closed part of each joint, which may be empty, and the same with domes if `domed`."""
     beyond = _beyond(rig.parents)
     share = surface.weights @ beyond - BEYOND_WEIGHT
     below = [np.flatnonzero(_parents(rig, owners) == joint) for joint in range(len(owners))]
@@ -248,21 +246,21 @@ def _pieces(
         if rig.parents[joint] >= 0
     }
     caps = {joint: fans(points, loops) for joint, loops in rims.items()}
-    found, round_ones = [], []
+    pieces, domed_pieces = [], []
     for joint in range(len(owners)):
         parts = [(points, faces[of_face == joint])]
         parts += [(caps[d][0], caps[d][1][:, ::-1]) for d in below[joint] if d in caps]
-        found.append(_joined([*parts, caps[joint]] if joint in caps else parts))
+        pieces.append(_joined([*parts, caps[joint]] if joint in caps else parts))
         if domed and joint in rims:
             dome = domes(points, rims[joint], rig.position[joint])
-            round_ones.append(_joined([*parts, dome]))
+            domed_pieces.append(_joined([*parts, dome]))
         else:
-            round_ones.append(found[-1])
-    return found, round_ones
+            domed_pieces.append(pieces[-1])
+    return pieces, domed_pieces
 
 
 def _beyond(parents: Integers) -> Array:
-    """(n, n) 1 where the joint of the row is that of the column or below it."""
+    """(n, n) 1 if the joint of the row is that of the column or its descendant, else 0."""
     found = np.eye(len(parents))
     for joint, parent in enumerate(parents):
         if parent >= 0:
@@ -271,18 +269,18 @@ def _beyond(parents: Integers) -> Array:
 
 
 def _parents(rig: Rig, owners: Integers) -> Integers:
-    """(n,) the moving joint above each moving joint; -1 for other joints, and at the top."""
+    """(n,) the moving parent of each moving joint; -1 for the root and for other joints."""
     moves = owners == np.arange(len(owners))
     return np.where(moves & (rig.parents >= 0), owners[rig.parents], -1)
 
 
 def _last(share: Array) -> Integers:
-    """(k,) the last joint with a share (k, n) above 0, the root without any."""
+    """(k,) the last joint with a share (k, n) above 0, or the root if there is none."""
     return np.asarray((share > 0.0).cumsum(axis=1).argmax(axis=1))
 
 
 def _cut(triangle: Array, heights: list[Array]) -> Array:
-    """(k, 3) the polygon of a triangle in which all linear functions, (3,) at its corners, are
+    """(k, 3) the part of a triangle in which all linear functions, (3,) at its corners, are
     positive."""
     share = np.eye(3)
     for height in heights:
@@ -307,7 +305,7 @@ def _clipped(polygon: Array, height: Array) -> Array:
 
 
 def _joined(parts: list[Mesh]) -> Mesh:
-    """Triangles of several meshes as one mesh, without pairs that lie back to back."""
+    """Triangles of several meshes as one mesh, without coincident pairs of opposite winding."""
     corners = np.concatenate([points[faces].reshape(-1, 3) for points, faces in parts])
     points, number = np.unique(corners, axis=0, return_inverse=True)
     faces = number.reshape(-1, 3)

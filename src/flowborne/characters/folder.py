@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import tomli_w
@@ -24,7 +23,7 @@ from flowborne.characters.rig import (
 )
 from flowborne.characters.source import clip_number, read_source
 from flowborne.errors import SceneError
-from flowborne.motion.bvh import write_clip
+from flowborne.motion.bvh import bvh_text
 from flowborne.motion.clip import Clip
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
@@ -32,13 +31,13 @@ from flowborne.scenes.warn_speed import steps_for_bodies
 from flowborne.solids.skins import skinned
 
 MARGIN = 0.35
-"""Water on every side of the region that the clip reaches, in sizes of the character."""
+"""Water on every side of the region reached by the clip, relative to its longest side."""
 
 DENSITIES = (1e-3, 1e6)
 """kg/m^3"""
 
 MAX_STEM_BYTES = 150
-"""Of the name with which all files of a character begin."""
+"""Length of the file name's stem that all files of a character share."""
 
 CELLS = 64
 """Cells along the longest side of the domain."""
@@ -68,8 +67,8 @@ def import_character(
 ) -> Imported:
     """Make a scene of a rigged character in a new folder.
 
-    The character floats in a room of water, and its joints follow the clip. The scene is meant to
-    be edited.
+    The character floats in a box of water, and its joints follow the clip. Users are expected to
+    edit the scene.
 
     file        .glb, .gltf or USD with a skeleton and a surface bound to it
     out         folder, created if missing
@@ -77,29 +76,29 @@ def import_character(
     animations  file of the clip, with joints of the same names; `file` by default
     density     kg/m^3
     scale       of the character's size, 0.01 for a file in centimetres
-    fill        whether to close holes of any size, and not only small ones
+    fill        whether to close holes of any size instead of small ones only
     raises      SceneError when a file cannot be used, a library is missing, or the scene exists;
                 OSError when the folder cannot be written
     """
     if not DENSITIES[0] <= density <= DENSITIES[1]:
         raise SceneError(
-            f"density is {density:g} kg/m^3, and {DENSITIES[0]:g} to {DENSITIES[1]:g} can be. Give "
-            "1000 for what floats in water."
+            f"density is {density:g} kg/m^3; it must be {DENSITIES[0]:g} to {DENSITIES[1]:g}. Give "
+            "1000 for neutral buoyancy in water."
         )
     path = Path(file)
     name = _plain(path.stem)
     scene = Path(out) / f"{name}.toml"
     if scene.exists():
         raise SceneError(
-            f"there is {scene} already, which may have been edited. Name another folder, or remove "
-            "it first."
+            f"{scene} already exists and may have been edited. Name another folder, or remove it "
+            "first."
         )
     source = read_source(path)
     surface = source.surface
     if surface is None:
         raise SceneError(
             f"{path.name} has no skin: no mesh is bound to its joints. Export the mesh with its "
-            "armature modifier and weights, and not applied."
+            "weights, and do not apply the armature modifier."
         )
     moves = path if animations is None else Path(animations)
     moving = source if animations is None else read_source(moves)
@@ -119,11 +118,12 @@ def import_character(
     sizes = tuple(size_notes(surface.vertices, density * division.volume, scale, path.name))
     pose = posed(rig, skeleton, action)
     once, strays = clip_of(rig, division, pose)
-    motion = as_cycle(once) or once
+    cycle = as_cycle(once)
+    motion = cycle or once
     files = model_files(name, rig, division, surface, density)
-    files[f"{name}.bvh"] = _bvh(motion)
+    files[f"{name}.bvh"] = bvh_text(motion).encode()
     called = printable(f"{path.name}, {moving.clips[number]}")
-    loop, reach = as_cycle(once) is not None, _reach(rig, surface, pose)
+    loop, reach = cycle is not None, _reach(rig, surface, pose)
     files[scene.name] = _scene(name, called, motion, loop, reach).encode()
     for made, content in files.items():
         target = Path(out) / made
@@ -138,7 +138,7 @@ def import_character(
     left_out = printable(", ".join(source.left_out))
     notes = (
         *_body_notes(rig, division, density),
-        *([f"left out, for no joint carries them by weights: {left_out}"] if left_out else []),
+        *([f"left out, because they have no weights for joints: {left_out}"] if left_out else []),
         *sizes,
         _clip_note(motion, moving.clips[number], strays),
     )
@@ -149,12 +149,6 @@ def _plain(stem: str) -> str:
     """A name for files and models."""
     plain = "".join(c if c.isalnum() or c in "-_" else "-" for c in stem) or "character"
     return plain.encode()[:MAX_STEM_BYTES].decode(errors="ignore")
-
-
-def _bvh(clip: Clip) -> bytes:
-    with TemporaryDirectory(prefix="flowborne-clip-") as folder:
-        write_clip(Path(folder) / "clip.bvh", clip)
-        return (Path(folder) / "clip.bvh").read_bytes()
 
 
 def _reach(rig: Rig, surface: Surface, pose: Action) -> tuple[Array, Array]:
@@ -169,7 +163,7 @@ def _reach(rig: Rig, surface: Surface, pose: Action) -> tuple[Array, Array]:
 
 
 def _steps(scene: Path) -> int:
-    """Steps a frame such that the fastest body of a scene crosses at most one cell in a step."""
+    """Steps per frame with which the fastest body of a scene crosses at most one cell per step."""
     loaded = load_scene(scene)
     return steps_for_bodies(loaded, build(loaded).world.setup)
 
@@ -187,10 +181,10 @@ dimensions = 3
 [time]
 frames_per_second = {1.0 / clip.frame_time:.6g}
 frames = {clip.frames - 1}
-# so many that the fastest body crosses one cell at most in each
+# the fastest body crosses at most one cell per step
 steps_per_frame = {steps}
 
-# z is up, and what looks along +z in glTF looks along -y here, as in Blender
+# z is up; +z of a glTF file is -y here, as in Blender
 [domain]
 lower = {_corner(low - room)}
 upper = {_corner(high + room)}
@@ -205,14 +199,14 @@ density = 1000.0
 [solids]
 model = "{name}.xml"
 
-# All joints follow the clip but the free ones, which go where forces take them: the root floats.
-# Joints that a [[control]] moves are left out by themselves.
+# All joints follow the clip except free ones, which forces move: the root floats.
+# Joints of a [[control]] do not follow it.
 [clip]
 file = "{name}.bvh"
 loop = {str(loop).lower()}
 free = [{_quoted(root)}]
 
-# it starts in the clip's first pose, at the speed at which it and the water have no impulse
+# it starts in the clip's first pose, with zero total momentum of body and water
 [initial]
 impulse = "none"
 
@@ -242,7 +236,7 @@ def _corner(point: Array) -> list[float]:
 
 
 def _body_notes(rig: Rig, division: Division, density: float) -> Sequence[str]:
-    """Joints, bodies and mass in sentences."""
+    """Notes on joints, bodies and mass."""
     rigid = [name for n, name in enumerate(rig.names) if division.owners[n] != n]
     lines = [
         f"{len(division.bodies)} bodies of {len(rig.names)} joints, {division.volume:.4g} m^3, "
@@ -252,7 +246,7 @@ def _body_notes(rig: Rig, division: Division, density: float) -> Sequence[str]:
         count, widest = len(division.filled), max(division.filled)
         lines.append(f"{count} hole{'s' * (count > 1)} closed, the widest {widest:.3g} m across")
     if rigid:
-        lines.append(f"rigid with the joint above them: {', '.join(rigid)}")
+        lines.append(f"rigid with their parent joint: {', '.join(rigid)}")
     return lines
 
 

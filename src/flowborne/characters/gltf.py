@@ -25,9 +25,11 @@ from flowborne.characters.rig import (
     Surface,
     frame_times,
     joined,
+    normalised,
     one_tree,
     own_names,
     placed,
+    sampled_action,
     unique_names,
 )
 from flowborne.errors import SceneError
@@ -157,13 +159,12 @@ class GltfSource:
         try:
             world = self._worlds(times, curves)[:, self._joints]
         except ValueError as error:  # a spline of quaternions goes through 0
-            raise SceneError(f"{where} has a rotation that is none. Export it anew.") from error
-        step = float(times[-1] - times[0]) / (len(times) - 1) or 1.0
-        return Action(step, *placed(world, where))
+            raise SceneError(f"{where} has a quaternion of length 0. Export it again.") from error
+        return sampled_action(times, world, where)
 
     @cached_property
     def _rest(self) -> Array:
-        """(nodes, 4, 4) every node's frame to the world's without a clip."""
+        """(nodes, 4, 4) frame of every node to the world's, without a clip."""
         return self._worlds(np.zeros(1), {})[0]
 
     def _parents_first(self) -> list[int]:
@@ -176,7 +177,7 @@ class GltfSource:
 
     @np.errstate(all="ignore")
     def _worlds(self, times: Array, curves: dict[tuple[int, str], Curve]) -> Array:
-        """(frames, nodes, 4, 4) every node's frame to the world's, z up."""
+        """(frames, nodes, 4, 4) frame of every node to the world's, z up."""
         world = np.empty((len(times), len(self._parents), 4, 4))
         turned = np.eye(4)
         turned[:3, :3] = Z_UP
@@ -190,31 +191,29 @@ class GltfSource:
         return world
 
     def _into_world(self, skin: Skin) -> Array:
-        """(4, 4) the frame of a skin's meshes to the world's, by its first joint at rest."""
+        """(4, 4) frame of a skin's meshes to the world's, from its first joint at rest."""
         first = min(range(len(skin.joints)), key=lambda n: self._order.index(skin.joints[n]))
         return np.asarray(self._rest[skin.joints[first]] @ self._inverse_binds(skin)[first])
 
     def _inverse_binds(self, skin: Skin) -> Array:
-        """(joints, 4, 4) the frame of a skin's meshes to each joint's."""
+        """(joints, 4, 4) frame of a skin's meshes to each joint's."""
         assert skin.inverse_bind_matrices is not None
         columns = self._arrays.read(skin.inverse_bind_matrices)[: len(skin.joints)].astype(float)
         return columns.reshape(-1, 4, 4).swapaxes(1, 2)
 
     def _weights(self, part: Primitive, joints: Integers, count: int) -> Array:
-        """(count, n) weights of all joints, normalized: in the file they need not sum to one."""
+        """(count, n) weights of all joints."""
         shares = np.zeros((count, len(self._joints)))
         for number, weight in joint_sets(part):
             own = joints[self._arrays.read(part.attributes[number]).astype(np.int64)]
             weights = self._arrays.read(part.attributes[weight]).astype(float)
             np.add.at(shares, (np.arange(count)[:, None], own), weights)
-        total = shares.sum(axis=1)
-        shares[total <= 0.0, joints[0]] = 1.0
-        return np.asarray(shares / np.where(total > 0.0, total, 1.0)[:, None])
+        return normalised(shares, int(joints[0]))
 
 
 def _local(node: Node, number: int, times: Array, curves: dict[tuple[int, str], Curve]) -> Array:
-    """(frames, 4, 4) a node's frame to its parent's."""
-    still = {
+    """(frames, 4, 4) frame of a node to its parent's."""
+    rest = {
         "translation": node.translation,
         "rotation": node.rotation,
         "scale": node.scale,
@@ -223,7 +222,7 @@ def _local(node: Node, number: int, times: Array, curves: dict[tuple[int, str], 
         path: _sampled(*curves[number, path], times, turns=path == "rotation")
         if (number, path) in curves
         else np.tile(np.asarray(values, float), (len(times), 1))
-        for path, values in still.items()
+        for path, values in rest.items()
     }
     local = np.tile(np.eye(4), (len(times), 1, 1))
     turn = Rotation.from_quat(now["rotation"]).as_matrix()

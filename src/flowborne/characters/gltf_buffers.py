@@ -38,10 +38,10 @@ KINDS = {
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 MAX_NUMBERS = 30_000_000
-"""Of an accessor, three for each point."""
+"""Largest size of an accessor, which has three numbers for each point."""
 
 MAX_PIXELS = 1 << 26
-"""Of a texture."""
+"""Largest size of a texture."""
 
 
 class Accessors:
@@ -100,15 +100,17 @@ class Accessors:
         """(count, width) the elements as integers; raises SceneError for one from `count` on."""
         values = self.read(number).astype(np.int64)
         if (largest := int(values.max())) >= count:
-            raise wrong(f"{where} (accessors[{number}]) names number {largest} of {count} {what}")
+            raise wrong(
+                f"{where} (accessors[{number}]) has index {largest}, but there are {count} {what}"
+            )
         return values
 
     def _check(self, accessor: Accessor, where: str) -> None:
         kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
         if accessor.count * width > MAX_NUMBERS:
             raise SceneError(
-                f"{where} asks for {accessor.count * width:,} numbers, and {MAX_NUMBERS:,} are "
-                "the most. Export fewer points or keys."
+                f"{where} needs {accessor.count * width:,} numbers; the maximum is "
+                f"{MAX_NUMBERS:,}. Export fewer points or keys."
             )
         if accessor.buffer_view is not None:
             self._fits(
@@ -123,10 +125,10 @@ class Accessors:
             self._fits(own.buffer_view, own.byte_offset, chosen, sparse.count, 1, where)
             self._fits(new.buffer_view, new.byte_offset, kind, sparse.count, width, where)
             if (largest := int(self._rows(accessor).max())) >= accessor.count:
-                raise wrong(f"{where} names element {largest} of {accessor.count}")
+                raise wrong(f"{where} has index {largest}, but there are {accessor.count} elements")
 
     def _rows(self, accessor: Accessor) -> NDArray[Any]:
-        """(count,) numbers of the elements that the sparse part of an accessor replaces."""
+        """(count,) indices of the elements that the sparse part of an accessor replaces."""
         assert accessor.sparse is not None
         own, count = accessor.sparse.indices, accessor.sparse.count
         kind = np.dtype(KINDS[own.component_type])
@@ -135,13 +137,13 @@ class Accessors:
     def _fits(
         self, number: int, first: int, kind: np.dtype[Any], count: int, width: int, where: str
     ) -> None:
-        """Raise SceneError unless so many elements lie within a view."""
+        """Raise SceneError unless `count` elements lie within a view."""
         views = self._document.buffer_views
         within(number, views, f"{where}.bufferView", "bufferViews")
         size = width * kind.itemsize
         step = views[number].byte_stride or size
         if step < size:
-            raise wrong(f"{where}: its elements have {size} bytes, and byteStride is {step}")
+            raise wrong(f"{where}: its elements have {size} bytes, but byteStride is {step}")
         end = first + step * (count - 1) + size
         if end > views[number].byte_length:
             raise wrong(
@@ -239,11 +241,11 @@ def texture_at(image: Image.Image, coordinates: Array) -> Array:
 
 
 def within(number: int, things: Any, where: str, what: str) -> None:
-    """Raise SceneError unless a list has an entry of that number."""
+    """Raise SceneError unless a list has an entry of this number."""
     if number >= len(things):
-        raise wrong(f"{where} is {number}, and the file has {len(things)} {what}")
+        raise wrong(f"{where} is {number}, but the file has {len(things)} {what}")
 
 
 def wrong(said: str) -> SceneError:
     """The error of a file that contradicts itself."""
-    return SceneError(f"{said}. Export it anew.")
+    return SceneError(f"{said}. Export it again.")

@@ -173,7 +173,7 @@ class Document(_Table):
 def read_document(path: Path) -> tuple[Document, list[memoryview]]:
     """The tables of a .glb or .gltf file, and the bytes of its buffers.
 
-    raises  SceneError when it is too large, cut, no glTF, or has a buffer outside its folder
+    raises  SceneError when it is too large, truncated, not glTF, or has a buffer outside its folder
     """
     data, binary = _bounded(path, path.name), None
     if data[:4] == b"glTF":
@@ -184,15 +184,15 @@ def read_document(path: Path) -> tuple[Document, list[memoryview]]:
         first = error.errors()[0]
         value = "" if first["type"] == "missing" else f", not {repr(first['input'])[:60]}"
         raise SceneError(
-            f"{path.name}, {_place(first['loc'])}: {first['msg']}{value}. Export it anew."
+            f"{path.name}, {_place(first['loc'])}: {first['msg']}{value}. Export it again."
         ) from None
     except RecursionError:
         raise SceneError(
-            f"{path.name}: its JSON is nested hundreds deep. Export it anew."
+            f"{path.name}: its JSON is nested hundreds deep. Export it again."
         ) from None
     except ValueError as error:
         raise SceneError(
-            f"{path.name} cannot be read as glTF: {str(error)[:100]}. Export it anew."
+            f"{path.name} cannot be read as glTF: {str(error)[:100]}. Export it again."
         ) from None
     return document, _buffers(path, document, binary)
 
@@ -210,7 +210,7 @@ def _bounded(path: Path, shown: str) -> bytes:
         ) from None
     if len(data) > MAX_FILE_BYTES:
         raise SceneError(
-            f"{shown} has more than {MAX_FILE_BYTES / 2**30:g} GB, which is the most. Export fewer "
+            f"{shown} is larger than the maximum of {MAX_FILE_BYTES / 2**30:g} GB. Export fewer "
             "meshes and clips."
         )
     return data
@@ -225,12 +225,12 @@ def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
         if start + 8 + length > len(data):
             raise SceneError(
                 f"{name} cannot be read as glTF: a chunk of {length} bytes at byte {start} ends "
-                f"after the file, which has {len(data)}. Export it anew."
+                f"after the file, which has {len(data)}. Export it again."
             )
         found.setdefault(kind, data[start + 8 : start + 8 + length])
         start += 8 + length
     if JSON_CHUNK not in found:
-        raise SceneError(f"{name} cannot be read as glTF: it has no JSON chunk. Export it anew.")
+        raise SceneError(f"{name} cannot be read as glTF: it has no JSON chunk. Export it again.")
     return found[JSON_CHUNK], found.get(BINARY_CHUNK)
 
 
@@ -238,8 +238,8 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
     asked = sum(buffer.byte_length for buffer in document.buffers)
     if asked > MAX_FILE_BYTES:
         raise SceneError(
-            f"{path.name}: its buffers ask for {asked / 2**30:.3g} GB, and "
-            f"{MAX_FILE_BYTES / 2**30:g} GB is the most. Export fewer meshes and clips."
+            f"{path.name}: its buffers need {asked / 2**30:.3g} GB; the maximum is "
+            f"{MAX_FILE_BYTES / 2**30:g} GB. Export fewer meshes and clips."
         )
     found = []
     for number, buffer in enumerate(document.buffers):
@@ -249,24 +249,24 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
         elif number == 0 and binary is not None:
             data = binary
         else:
-            raise SceneError(f"{where} has neither a uri nor a binary chunk. Export it anew.")
+            raise SceneError(f"{where} has neither a uri nor a binary chunk. Export it again.")
         if len(data) < buffer.byte_length:
             raise SceneError(
                 f"{where} has {len(data)} bytes, and its byteLength is {buffer.byte_length}. "
-                "Export it anew."
+                "Export it again."
             )
         found.append(memoryview(data)[: buffer.byte_length])
     return found
 
 
 def _from_uri(path: Path, uri: str, where: str) -> bytes:
-    """The content of a data uri, or of the file in the folder of `path` that a uri names."""
+    """The content of a data URI, or of the file in the folder of `path` that a URI names."""
     if uri[:5].lower() == "data:":
         try:
             return embedded(uri)
         except ValueError as error:
             raise SceneError(
-                f"{where}: its data uri cannot be read ({error}). Export it anew."
+                f"{where}: its data uri cannot be read ({error}). Export it again."
             ) from None
     file = path.parent / inside(uri, path.parent, where)
     return _bounded(file, f"{where}, {uri[:100]!r},")
@@ -305,13 +305,13 @@ def inside(uri: str, folder: Path, where: str) -> Path:
         leaves = True
     if leaves:
         raise SceneError(
-            f"{where} names {uri[:100]!r}, which is not in the folder of the file. Put what it "
-            "names beside the file, or export the character as one file."
+            f"{where} names {uri[:100]!r}, which is not in the folder of the file. Put it "
+            "there, or export the character as one file."
         )
     return relative
 
 
 def _place(keys: tuple[int | str, ...]) -> str:
-    """accessors[3].count of ("accessors", 3, "count")."""
+    """A path in the document: ("accessors", 3, "count") -> accessors[3].count."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
     return text.lstrip(".") or "document"

@@ -1,4 +1,4 @@
-"""Checks of a whole glTF document, before any of it is read.
+"""Checks of a whole glTF document, before any part of it is used.
 
 source  Khronos glTF 2.0 specification, sections 3.5 (nodes), 3.7 (meshes, skins) and 3.11
         (animations)
@@ -13,6 +13,7 @@ import numpy as np
 
 from flowborne.characters.gltf_buffers import Accessors, within, wrong
 from flowborne.characters.gltf_document import Document, Primitive, Sampler, Skin
+from flowborne.characters.rig import Array
 from flowborne.errors import SceneError
 
 MAX_NODES = 10_000
@@ -20,14 +21,14 @@ MAX_NODES = 10_000
 TRIANGLES = 4
 FLOATS, INDICES, JOINTS = (5126,), (5121, 5123, 5125), (5121, 5123)
 PARTS = (5120, 5121, 5122, 5123, 5126)
-"""Types of components: floats, integers, and floats or normalized integers."""
+"""Component types: floats, integers, and floats or normalized integers."""
 
 WIDTH = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 """Path of a channel -> type of its values."""
 
 
 def check_document(name: str, document: Document, arrays: Accessors) -> None:
-    """Raise SceneError where tables or numbers of a document contradict each other.
+    """Raise SceneError if tables or numbers of a document contradict each other.
 
     name    of the file, for messages
     arrays  of the document
@@ -69,7 +70,7 @@ def check_tree(name: str, document: Document) -> None:
     nodes = document.nodes
     if len(nodes) > MAX_NODES:
         raise SceneError(
-            f"{name} has {len(nodes)} nodes, and {MAX_NODES} are the most. Export the character "
+            f"{name} has {len(nodes)} nodes; the maximum is {MAX_NODES}. Export the character "
             "alone."
         )
     parents = [-1] * len(nodes)
@@ -83,9 +84,8 @@ def check_tree(name: str, document: Document) -> None:
                 )
             parents[child] = number
         if not 1e-6 < (length := hypot(*node.rotation)) < 1e6:
-            raise wrong(
-                f"{name}, nodes[{number}].rotation is none: it has a length of {length:.3g}"
-            )
+            where = f"{name}, nodes[{number}].rotation"
+            raise wrong(f"{where} is not a unit quaternion: it has length {length:.3g}")
     pending = [number for number, parent in enumerate(parents) if parent < 0]
     reached = set(pending)
     while pending:
@@ -93,7 +93,7 @@ def check_tree(name: str, document: Document) -> None:
         reached.update(below)
         pending += below
     if lost := sorted(set(range(len(nodes))) - reached):
-        raise wrong(f"{name}, nodes[{lost[0]}] is among its own children's children")
+        raise wrong(f"{name}, nodes[{lost[0]}] is its own descendant")
 
 
 def _check_skin(skin: Skin, nodes: int, arrays: Accessors, where: str) -> None:
@@ -106,11 +106,8 @@ def _check_skin(skin: Skin, nodes: int, arrays: Accessors, where: str) -> None:
             f"{where} ('{skin.name}') has no inverse bind matrices. Export it with the mesh bound "
             "to the armature."
         )
-    _check_kind(
-        skin.inverse_bind_matrices, arrays, ("MAT4",), FLOATS, f"{where}.inverseBindMatrices"
-    )
     own = f"{where}.inverseBindMatrices"
-    matrices = arrays.numbers(skin.inverse_bind_matrices, own)
+    matrices = _numbers(skin.inverse_bind_matrices, arrays, "MAT4", FLOATS, own)
     if len(matrices) < len(skin.joints):
         raise wrong(f"{own} has {len(matrices)} matrices for {len(skin.joints)} joints")
     matrices = matrices.reshape(-1, 4, 4).swapaxes(1, 2)[: len(skin.joints)]
@@ -132,15 +129,14 @@ def _check_part(part: Primitive, joints: int, arrays: Accessors, where: str, nod
     if "POSITION" not in part.attributes:
         raise wrong(f"{where}.attributes has no POSITION")
     own = f"{where}.attributes.POSITION"
-    _check_kind(part.attributes["POSITION"], arrays, ("VEC3",), FLOATS, own)
-    points = len(arrays.numbers(part.attributes["POSITION"], own))
+    points = len(_numbers(part.attributes["POSITION"], arrays, "VEC3", FLOATS, own))
     corners = points
     if part.indices is not None:
         own = f"{where}.indices"
-        _check_kind(part.indices, arrays, ("SCALAR",), INDICES, own)
+        _check_kind(part.indices, arrays, "SCALAR", INDICES, own)
         corners = len(arrays.indices(part.indices, points, own, "points"))
     if corners % 3:
-        raise wrong(f"{where} has {corners} corners, which make no triangles")
+        raise wrong(f"{where} has {corners} corners, not a multiple of 3")
     if "JOINTS_0" not in part.attributes:
         raise SceneError(
             f"{where}: a mesh of '{node}' has no JOINTS_0. Export it with its weights."
@@ -150,16 +146,17 @@ def _check_part(part: Primitive, joints: int, arrays: Accessors, where: str, nod
             if attribute not in part.attributes:
                 raise wrong(f"{where}.attributes has no {attribute}")
         own = f"{where}.attributes.{number}"
-        _check_kind(part.attributes[number], arrays, ("VEC4",), JOINTS, own)
+        _check_kind(part.attributes[number], arrays, "VEC4", JOINTS, own)
         if len(arrays.indices(part.attributes[number], joints, own, "joints")) != points:
             raise wrong(f"{own} has another number of elements than the {points} points")
         own = f"{where}.attributes.{weight}"
-        _check_kind(part.attributes[weight], arrays, ("VEC4",), PARTS, own)
-        weights = arrays.numbers(part.attributes[weight], own)
+        weights = _numbers(part.attributes[weight], arrays, "VEC4", PARTS, own)
         if len(weights) != points:
             raise wrong(f"{own} has another number of elements than the {points} points")
         if weights.min() < 0.0:
-            raise wrong(f"{own} has a weight of {weights.min():.3g}, and none may be below 0")
+            raise wrong(
+                f"{own} has a weight of {weights.min():.3g}, but weights must be at least 0"
+            )
 
 
 def joint_sets(part: Primitive) -> Iterator[tuple[str, str]]:
@@ -171,28 +168,33 @@ def joint_sets(part: Primitive) -> Iterator[tuple[str, str]]:
 
 
 def _check_sampler(sampler: Sampler, path: str, arrays: Accessors, where: str) -> None:
-    _check_kind(sampler.input, arrays, ("SCALAR",), FLOATS, f"{where}.input")
-    _check_kind(sampler.output, arrays, (WIDTH[path],), PARTS, f"{where}.output")
-    times = arrays.numbers(sampler.input, f"{where}.input").ravel()
+    times = _numbers(sampler.input, arrays, "SCALAR", FLOATS, f"{where}.input").ravel()
     if (np.diff(times) <= 0.0).any():
         raise wrong(f"{where}.input: the times of its keys do not increase")
-    values = arrays.numbers(sampler.output, f"{where}.output")
+    values = _numbers(sampler.output, arrays, WIDTH[path], PARTS, f"{where}.output")
     keys = len(times) * (3 if sampler.interpolation == "CUBICSPLINE" else 1)
     if len(values) != keys:
         raise wrong(f"{where}.output has {len(values)} values for {len(times)} keys, not {keys}")
     own = values[1::3] if sampler.interpolation == "CUBICSPLINE" else values
     if path == "rotation" and not np.any(own, axis=1).all():
-        raise wrong(f"{where}.output has a rotation that is none: all of it is 0")
+        raise wrong(f"{where}.output has a quaternion of length 0")
+
+
+def _numbers(
+    number: int, arrays: Accessors, type_: str, kinds: tuple[int, ...], where: str
+) -> Array:
+    """(count, width) the elements of an accessor of the right type, all finite."""
+    _check_kind(number, arrays, type_, kinds, where)
+    return arrays.numbers(number, where)
 
 
 def _check_kind(
-    number: int, arrays: Accessors, types: tuple[str, ...], kinds: tuple[int, ...], where: str
+    number: int, arrays: Accessors, type_: str, kinds: tuple[int, ...], where: str
 ) -> None:
     within(number, arrays, where, "accessors")
     accessor = arrays.table(number)
-    if accessor.type not in types or accessor.component_type not in kinds:
+    if accessor.type != type_ or accessor.component_type not in kinds:
         raise wrong(
             f"{where} (accessors[{number}]) is {accessor.type} of components "
-            f"{accessor.component_type}, and not {' or '.join(types)} of "
-            f"{' or '.join(map(str, kinds))}"
+            f"{accessor.component_type}, not {type_} of {' or '.join(map(str, kinds))}"
         )

@@ -1,4 +1,4 @@
-"""Limits of a character, checked before the work of an import."""
+"""Limits of a character, checked before an import does expensive work."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from flowborne.errors import SceneError
 Array = NDArray[np.float64]
 
 MAX_FILE_BYTES = 1 << 30
-"""Of a file, and of all its buffers together."""
+"""Size of a file, and total size of its buffers."""
 
 MAX_JOINTS = 500
-"""Each is a body in the one above it."""
+"""Each joint is a body nested in that of its parent."""
 
 MAX_VERTICES = 500_000
 
@@ -24,7 +24,7 @@ MAX_POSES = 3_000_000
 """Frames times nodes."""
 
 MAX_SKINNING = 5e10
-"""Frames times vertices times joints, some minutes of skinning."""
+"""Frames times vertices times joints: some minutes of skinning."""
 
 MAX_COORDINATE = 1e6
 """m"""
@@ -40,7 +40,7 @@ MAX_NAME_LENGTH = 100
 
 
 def check_size(joints: int, vertices: int, where: str) -> None:
-    """Raise SceneError where there are more joints, vertices or weights than an import can take."""
+    """Raise SceneError for more joints, vertices or weights than an import can process."""
     for count, most, what in (
         (joints, MAX_JOINTS, "joints"),
         (vertices, MAX_VERTICES, "vertices"),
@@ -48,18 +48,18 @@ def check_size(joints: int, vertices: int, where: str) -> None:
     ):
         if count > most:
             raise SceneError(
-                f"{where} has {count:,} {what}, and {most:,} are the most. Export a coarser mesh, "
-                "or fewer joints."
+                f"{where} has {count:,} {what}; the maximum is {most:,}. Export a coarser mesh or "
+                "fewer joints."
             )
 
 
 def check_surface(vertices: Array, where: str) -> None:
-    """Raise SceneError unless a surface (k, 3), m, has a size and is near the origin."""
+    """Raise SceneError for a surface (k, 3), m, without a size or far from the origin."""
     check_points(vertices, where)
     size = float(np.ptp(vertices, axis=0).max())
     if size < MIN_SIZE:
         raise SceneError(
-            f"{where}: the surface is {size:.3g} m long, and {MIN_SIZE:g} m is the least. Scale it "
+            f"{where}: the surface is {size:.3g} m long; the minimum is {MIN_SIZE:g} m. Scale it "
             "before exporting."
         )
 
@@ -70,8 +70,8 @@ def check_points(points: Array, where: str) -> None:
         largest = float(np.abs(points).max(initial=0.0))
     if not largest <= MAX_COORDINATE:
         raise SceneError(
-            f"{where}: a point has a coordinate of {largest:.3g} m, and {MAX_COORDINATE:g} m is "
-            "the most. Look for stray points, or scale the character before exporting."
+            f"{where}: a point has a coordinate of {largest:.3g} m; the maximum is "
+            f"{MAX_COORDINATE:g} m. Look for stray points, or scale the character before exporting."
         )
 
 
@@ -87,27 +87,27 @@ def check_poses(matrices: Array, where: str) -> None:
 
 
 def check_work(frames: int, joints: int, vertices: int, where: str) -> None:
-    """Raise SceneError where skinning a surface in every frame takes hours."""
+    """Raise SceneError if skinning a surface in every frame would take hours."""
     if (work := float(frames) * joints * vertices) > MAX_SKINNING:
         raise SceneError(
-            f"{where}: {frames:,} frames of {vertices:,} vertices on {joints} joints ask for "
-            f"{work:.2g} sums, and {MAX_SKINNING:g} are the most. Export a coarser mesh or a "
-            "shorter clip."
+            f"{where}: {frames:,} frames of {vertices:,} vertices on {joints} joints need "
+            f"{work:.2g} sums; the maximum is {MAX_SKINNING:g}. Export a coarser mesh or a shorter "
+            "clip."
         )
 
 
 def check_frames(frames: float, step: float, nodes: int, where: str) -> None:
-    """Raise SceneError where a clip has too many frames for its nodes, or too close ones.
+    """Raise SceneError for a clip with too many frames for its nodes, or a bad key interval.
 
     step  s between keys
     """
     if not KEY_INTERVALS[0] <= step <= KEY_INTERVALS[1]:
         raise SceneError(
-            f"{where} has a key every {step:.3g} s, and {KEY_INTERVALS[0]:g} to "
-            f"{KEY_INTERVALS[1]:g} s can be. Sample it anew before exporting."
+            f"{where} has a key every {step:.3g} s; it must be {KEY_INTERVALS[0]:g} to "
+            f"{KEY_INTERVALS[1]:g} s. Resample it before exporting."
         )
     if frames * nodes > MAX_POSES:
         raise SceneError(
-            f"{where} asks for {frames:,.0f} frames of {nodes} nodes, and {MAX_POSES:,} poses "
-            "are the most. Export a shorter clip, or one with fewer keys."
+            f"{where} needs {frames:,.0f} frames of {nodes} nodes; the maximum is {MAX_POSES:,} "
+            "poses. Export a shorter clip, or one with fewer keys."
         )

@@ -15,16 +15,16 @@ from scipy.spatial.transform import Rotation
 from flowborne.characters.division import Division
 from flowborne.characters.rig import Action, Array, Integers, Rig, Surface
 from flowborne.motion.clip import Clip
-from flowborne.motion.clip_curves import CLOSED
+from flowborne.motion.clip_curves import MAX_CYCLE_MISMATCH
 from flowborne.motion.quaternions import angle, inverse, product
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.geoms import DISPLACED
 
 MAX_INFLUENCES = 8
-"""Joints that carry a vertex of the skin; exporters write as many."""
+"""Largest number of joints per vertex of the skin, as in exporters."""
 
 MAX_COLOURS = 8
-"""Colours of a surface; each is a skin."""
+"""Largest number of colours of a surface; each is a skin."""
 
 Element = ElementTree.Element
 
@@ -32,10 +32,10 @@ Element = ElementTree.Element
 def model_files(
     name: str, rig: Rig, division: Division, surface: Surface, density: float
 ) -> dict[str, bytes]:
-    """A model with a body for each joint of the rig, with its name and frame: file -> content.
+    """Files of a model, name -> content, with a body for each joint of the rig.
 
-    Bodies of moving joints have a ball joint of the same name, the topmost a free joint; the others
-    are rigid with the body above them.
+    A body has the name and frame of its joint. Bodies of moving joints have a ball joint of the
+    same name, the root a free joint; the others are rigid with their parent body.
 
     density  kg/m^3 of all pieces
     """
@@ -77,7 +77,7 @@ def model_files(
 
 
 def mass_of(mesh: Mesh, density: float) -> Any:
-    """Mass, centre and inertia of a closed surface, by trimesh."""
+    """Mass, centre and inertia of a closed surface, computed by trimesh."""
     import trimesh  # takes a tenth of a second
 
     vertices, faces = mesh
@@ -95,7 +95,7 @@ def _inertial(mass: Any) -> Element:
 
 
 def _place(rig: Rig, joint: int) -> dict[str, str]:
-    """Position and rotation of a joint in the frame of the one above it, as attributes."""
+    """Position and rotation of a joint in the frame of its parent, as attributes."""
     position, rotation, parent = rig.position[joint], rig.rotation[joint], int(rig.parents[joint])
     if parent >= 0:
         above = rig.rotation[parent].T
@@ -142,7 +142,7 @@ def _add_bones(skin: Element, rig: Rig, weights: Array) -> None:
 
 
 def few_colours(colours: Array) -> tuple[Array, Integers]:
-    """At most MAX_COLOURS colours (n, 3), and the number (m,) of the one for each of (m, 3)."""
+    """At most MAX_COLOURS colours (n, 3), and for each of (m, 3) the index (m,) of its colour."""
     bytes_of = np.rint(255.0 * np.clip(np.nan_to_num(colours), 0.0, 1.0)).astype(np.uint8)
     found, which = np.unique(bytes_of, axis=0, return_inverse=True)
     if len(found) > MAX_COLOURS:
@@ -172,10 +172,10 @@ def _text(root: Element) -> bytes:
 
 
 def posed(rig: Rig, source: Rig, action: Action) -> Action:
-    """A rig in the frames of a clip of any file, matched by the names of the joints.
+    """A rig in the frames of a clip from any file, matched by joint names.
 
-    Joints get the rotations of the clip; joints without any keep their angles. Displacements in the
-    parents' frames are scaled by the ratio of the bones' lengths.
+    Joints get the rotations of the clip; joints that the clip lacks keep their angles.
+    Displacements in the parents' frames are scaled by the ratio of the bones' lengths.
 
     source  the skeleton of the clip's file
     """
@@ -188,20 +188,20 @@ def posed(rig: Rig, source: Rig, action: Action) -> Action:
     rotation = np.empty((*position.shape, 3))
     for joint, (parent, k) in enumerate(zip(rig.parents, number, strict=True)):
         offset = own[joint] + (moved[:, k] if k >= 0 else np.zeros((len(position), 3)))
-        position[:, joint], still = offset, rig.rotation[joint]
+        position[:, joint], default = offset, rig.rotation[joint]
         if parent >= 0:
             above = rotation[:, parent]
             position[:, joint] = position[:, parent] + np.einsum("fij,fj->fi", above, offset)
-            still = above @ rig.rotation[parent].T @ still
-        rotation[:, joint] = still if k < 0 else action.rotation[:, k]
+            default = above @ rig.rotation[parent].T @ default
+        rotation[:, joint] = default if k < 0 else action.rotation[:, k]
     return Action(action.frame_time, position, rotation)
 
 
 def clip_of(rig: Rig, division: Division, pose: Action) -> tuple[Clip, float]:
     """The motion of a character's bodies.
 
-    returns  a clip of the moving joints, and their largest distance from the file's positions, m:
-             bodies are rigid, and the bones of a file may stretch
+    returns  a clip of the moving joints, and their largest distance from the positions in the file,
+             m: bodies are rigid, but bones of a file may stretch
     """
     joints = list(division.bodies)
     leaders = [division.leader, *joints[1:]]
@@ -223,35 +223,35 @@ def clip_of(rig: Rig, division: Division, pose: Action) -> tuple[Clip, float]:
         rotations=local,
         translation=pose.position[:, division.leader] + turn[:, 0] @ handle,
     )
-    away = np.linalg.norm(clip.places()[0][:, 1:] - pose.position[:, joints[1:]], axis=2)
+    away = np.linalg.norm(clip.poses()[0][:, 1:] - pose.position[:, joints[1:]], axis=2)
     return clip, float(away.max(initial=0.0))
 
 
 def as_cycle(clip: Clip) -> Clip | None:
-    """A clip that ends exactly as it begins; None if it is no cycle.
+    """The clip as a cycle that ends exactly as it begins; None if it is not one.
 
-    A clip whose last pose is within a frame's motion of the first gets its first pose again at the
-    end; a travelling root continues for that frame.
+    If the last pose is within one frame's motion of the first, the first pose is appended; a
+    travelling root continues for that frame.
     """
     steps = angle(product(inverse(clip.rotations[:-1]), clip.rotations[1:])).max()
     apart = angle(product(inverse(clip.rotations[0]), clip.rotations[-1])).max()
     if clip.frames < 3 or apart > steps:
         return None
-    if apart < CLOSED:
+    if apart < MAX_CYCLE_MISMATCH:
         return clip
-    place, step = clip.translation, clip.translation[-1] - clip.translation[-2]
-    gap = np.linalg.norm(place[0] - place[-1])
-    travels = gap > np.linalg.norm(np.diff(place, axis=0), axis=1).max()
-    last = place[-1] + step if travels else place[0]
+    path, step = clip.translation, clip.translation[-1] - clip.translation[-2]
+    gap = np.linalg.norm(path[0] - path[-1])
+    travels = gap > np.linalg.norm(np.diff(path, axis=0), axis=1).max()
+    last = path[-1] + step if travels else path[0]
     return replace(
         clip,
         rotations=np.concatenate([clip.rotations, clip.rotations[:1]]),
-        translation=np.concatenate([place, [[last[0], last[1], place[0, 2]]]]),
+        translation=np.concatenate([path, [[last[0], last[1], path[0, 2]]]]),
     )
 
 
 def _scale(own: Array, other: Array, number: list[int]) -> float:
-    """Length of the bones over that of another file's, summed over the common ones."""
+    """Ratio of the summed lengths of the common bones to those of another file."""
     shared = [joint for joint, k in enumerate(number) if joint > 0 and k > 0]
     lengths = np.linalg.norm(own[shared], axis=1).sum()
     others = np.linalg.norm(other[[number[joint] for joint in shared]], axis=1).sum()

@@ -24,14 +24,14 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""From axes with y up to the world's, the inverse of the rotation by exporters."""
+"""Rotation from axes with y up to the world's, the inverse of the one that exporters apply."""
 
 PLAIN = 0.5
-"""Red, green and blue of a surface whose file gives it no colour."""
+"""Red, green and blue of a surface without a colour in the file."""
 
 ANIMAL_LENGTHS = (2e-3, 35.0)
-"""Longest side of animals in m, from a fruit fly to a whale. Files have numbers without a unit or
-with a wrong one: centimetres taken as metres make a fox 156 m long."""
+"""Range of the longest side of animals in m, from a fruit fly to a whale. Files have numbers
+without a unit or with a wrong one: centimetres read as metres make a fox 156 m long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def scaled(rig: Rig, surface: Surface, scale: float, name: str) -> tuple[Rig, Su
     """A character scaled about the origin.
 
     name    of its file, for messages
-    raises  SceneError when the scale is not positive, or gives lengths beyond the limits
+    raises  SceneError when the scale is not positive, or the result exceeds the limits
     """
     if not (scale > 0.0 and math.isfinite(scale)):
         raise SceneError(f"scale is {scale:g}. Give a number above 0.")
@@ -126,12 +126,10 @@ def scaled(rig: Rig, surface: Surface, scale: float, name: str) -> tuple[Rig, Su
 
 
 def size_notes(vertices: Array, mass: float, scale: float, name: str) -> Iterator[str]:
-    """A sentence about a surface (k, 3), m, that is far longer than animals.
+    """A note if a surface (k, 3), m, is far longer than any animal.
 
-    mass    kg
-    scale   already applied to the surface
-    name    of its file, for messages
-    raises  SceneError when it is far smaller than animals: MuJoCo refuses the inertia of its parts
+    mass    kg scale   already applied to the surface name    of its file, for messages raises
+    SceneError when it is far smaller than any animal: MuJoCo refuses the inertia of its parts
     """
     length = float(np.ptp(vertices, axis=0).max())
     more = 10.0 ** round(-math.log10(length))
@@ -139,21 +137,21 @@ def size_notes(vertices: Array, mass: float, scale: float, name: str) -> Iterato
         f"with --scale {more * scale:g} it is {more * length:.3g} m long and "
         f"{more**3 * mass:.3g} kg"
     )
-    said = f"{length:.3g} m long and {mass:.3g} kg"
+    size = f"{length:.3g} m long and {mass:.3g} kg"
     if length < ANIMAL_LENGTHS[0]:
         raise SceneError(
-            f"{name} is {said}, smaller than a fly, and its parts too small to compute. Import it "
+            f"{name} is {size}, smaller than a fly: its parts are too small to simulate. Import it "
             f"in its own unit: {resized}."
         )
     if length > ANIMAL_LENGTHS[1]:
         yield (
-            f"it is {said}, longer than a whale: is its file in another unit than metres? Imported "
+            f"it is {size}, longer than a whale: is the file in another unit than metres? Imported "
             f"into another folder {resized}"
         )
 
 
 def own_names(names: list[str]) -> tuple[str, ...]:
-    """Unique short names of joints, also where a file has no name or a name twice.
+    """Unique short names of joints, also for missing and repeated names.
 
     BVH reserves braces, and MuJoCo the name "world".
     """
@@ -163,7 +161,7 @@ def own_names(names: list[str]) -> tuple[str, ...]:
 
 
 def unique_names(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, each once: repeated names get an ending, _2 first."""
+    """Unique names: repeated names get a suffix, starting with _2."""
     found: dict[str, None] = {}
     for base in names:
         again = (f"{base}_{n}" for n in count(2))
@@ -172,12 +170,12 @@ def unique_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def printable(text: str) -> str:
-    """A text with '_' in place of each character that has no width or breaks a line."""
+    """A text with '_' in place of each character that is not printable."""
     return "".join(letter if letter.isprintable() else "_" for letter in text)
 
 
 def one_tree(parents: list[int]) -> Integers:
-    """Parents of joints; further roots hang on the first."""
+    """Parents of joints; further roots become children of the first."""
     return np.array([-1, *(max(parent, 0) for parent in parents[1:])], np.int64)
 
 
@@ -199,14 +197,28 @@ def placed(matrices: Array, where: str) -> tuple[Array, Array]:
     return matrices[..., :3, 3], rotations_in(matrices[..., :3, :3])
 
 
+def normalised(weights: Array, root: int) -> Array:
+    """Weights (k, n) with rows that sum to 1: in files they may not. A vertex without weights gets
+    joint `root`; changes the argument."""
+    total = weights.sum(axis=1)
+    weights[total <= 0.0, root] = 1.0
+    return np.asarray(weights / np.where(total > 0.0, total, 1.0)[:, None])
+
+
+def sampled_action(times: Array, world: Array, where: str) -> Action:
+    """A clip from joint frames (frames, n, 4, 4) at evenly spaced times, s; see `placed`."""
+    step = float(times[-1] - times[0]) / (len(times) - 1) or 1.0
+    return Action(step, *placed(world, where))
+
+
 def frame_times(keys: Array, densest: Array, nodes: int, where: str) -> Array:
     """(frames,) s, evenly spaced from the first key to the last.
 
     keys     s of all curves of a clip
-    densest  s of the curve with most keys; its median step is that of the frames
+    densest  s of the curve with most keys; its median step is the time between frames
     nodes    number of nodes with a pose in every frame
     where    the file and its clip
-    raises   SceneError when there are more frames, or closer ones, than a run can have
+    raises   SceneError when there are too many frames, or their interval is out of range
     """
     first, last = float(keys.min()), float(keys.max())
     step = float(np.median(np.diff(densest))) if len(densest) > 1 else 0.0

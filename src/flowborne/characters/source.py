@@ -1,4 +1,4 @@
-"""The reader of a character's file, by its ending."""
+"""The reader of a character's file, by its extension."""
 
 from __future__ import annotations
 
@@ -47,19 +47,19 @@ class Source(Protocol):
 def read_source(path: Path) -> Source:
     """The skeleton, surface and clips of a file.
 
-    raises  SceneError when it is missing, of another kind, or cannot be read
+    raises  SceneError when it is missing, of another format, or cannot be read
     """
     ending = path.suffix.lower()
     if ending == ".fbx":
         how = BLENDER.format(name=path.name, stem=path.stem)
         raise SceneError(
-            f"{path.name}: .fbx is a closed format that is not read. Make a .glb of it, in "
-            f"Blender by File, Import and File, Export, or by: {how}"
+            f"{path.name}: .fbx is a proprietary format and not supported. Make a .glb of it, in "
+            f"Blender with File, Import and File, Export, or with: {how}"
         )
     if ending not in (*GLTF, *USD):
         raise SceneError(
-            f"{path.name} is none of {', '.join((*GLTF, *USD))}. Export the character as one of "
-            "them."
+            f"{path.name} is none of {', '.join((*GLTF, *USD))}. Export the character in one of "
+            "these formats."
         )
     if not path.is_file():
         raise SceneError(f"there is no file {path}. Correct its name.")
@@ -74,19 +74,20 @@ def read_source(path: Path) -> Source:
 
 
 def clip_number(source: Source, clip: str | None, name: str) -> int:
-    """Number of the clip with a name, or of the only clip.
+    """Index of the clip with a name, or of the only clip.
 
     name    of the file, for messages
-    raises  SceneError when there is no clip, or none of that name, or several without a name given
+    raises  SceneError when there is no clip, none of that name, or several and no name is given
     """
     if not source.clips:
         raise SceneError(
-            f"{name} has no clip. Name a file that has one by --animations, whose joints have "
-            "the same names."
+            f"{name} has no clip. Name a file with clips for the same joint names with "
+            "--animations."
         )
     if clip is None and len(source.clips) > 1:
         raise SceneError(
-            f"{name} has {len(source.clips)} clips. Name one by --clip: {', '.join(source.clips)}."
+            f"{name} has {len(source.clips)} clips. Name one with --clip: "
+            f"{', '.join(source.clips)}."
         )
     if clip is not None and clip not in source.clips:
         raise SceneError(f"{name} has no clip '{clip}'. It has: {', '.join(source.clips)}.")

@@ -5,9 +5,10 @@ source  OpenUSD, UsdSkel schemas: binding API, SkelAnimation
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade, UsdSkel
@@ -23,9 +24,11 @@ from flowborne.characters.rig import (
     Surface,
     frame_times,
     joined,
+    normalised,
     one_tree,
     own_names,
     placed,
+    sampled_action,
     unique_names,
 )
 from flowborne.characters.usd_gate import (
@@ -40,7 +43,20 @@ from flowborne.characters.usd_gate import (
 from flowborne.errors import SceneError
 from flowborne.files.colours import to_srgb
 
+Result = TypeVar("Result")
+
 EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+
+
+def _reading(method: Callable[..., Result]) -> Callable[..., Result]:
+    """A method of UsdSource that runs within `reading_usd`."""
+
+    @wraps(method)
+    def within(self: UsdSource, *args: Any) -> Result:
+        with reading_usd(self._name):
+            return method(self, *args)
+
+    return within
 
 
 class UsdSource:
@@ -52,9 +68,9 @@ class UsdSource:
     def __init__(self, path: Path, *, probed: bool = False) -> None:
         """probed  whether to open binary files without a trial in another process"""
         self._name = path.name
-        with reading_usd(path.name):
-            self._open(path, probed)
+        self._open(path, probed)
 
+    @_reading
     def _open(self, path: Path, probed: bool) -> None:
         stage = open_stage(path, probed=probed)
         self._stage, self._cache, self._bound = stage, UsdSkel.Cache(), []
@@ -69,7 +85,7 @@ class UsdSource:
         self._skeleton = skeletons[0]
         self._query = self._cache.GetSkelQuery(self._skeleton)
         if not self._query:
-            raise SceneError(f"{path.name}: its skeleton is damaged. Export it anew.")
+            raise SceneError(f"{path.name}: its skeleton is damaged. Export it again.")
         check_size(len(self._query.GetJointOrder()), 0, path.name)
         check_topology(self._query, path.name)
         self._animations = [UsdSkel.Animation(p) for p in prims if p.IsA(UsdSkel.Animation)]
@@ -87,41 +103,9 @@ class UsdSource:
         return unique_names([animation.GetPrim().GetName() for animation in self._animations])
 
     @cached_property
+    @_reading
     def rig(self) -> Rig:
         """The joints in the pose of their skin's binding."""
-        with reading_usd(self._name):
-            return self._rig()
-
-    @property
-    def surface(self) -> Surface | None:
-        """All meshes bound to the skeleton as one; None when there is none."""
-        with reading_usd(self._name):
-            return self._surface()
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """Names of the meshes that are not bound to the skeleton."""
-        with reading_usd(self._name):
-            carried = {
-                target.GetPrim()
-                for binding in self._bound
-                if binding.GetSkeleton().GetPrim() == self._skeleton.GetPrim()
-                for target in binding.GetSkinningTargets()
-                if target.HasJointInfluences()
-            }
-            prims = Usd.PrimRange.Stage(self._stage, EVERYTHING)
-            meshes = [prim for prim in prims if prim.IsA(UsdGeom.Mesh)]
-            return tuple(prim.GetName() for prim in meshes if prim not in carried)
-
-    def action(self, clip: int) -> Action:
-        """The `clip`-th animation, sampled at its own rate.
-
-        raises  SceneError when it moves no joint
-        """
-        with reading_usd(self._name):
-            return self._action(clip)
-
-    def _rig(self) -> Rig:
         topology = self._query.GetTopology()
         paths = [str(joint) for joint in self._query.GetJointOrder()]
         bind = self._to_world(self._skeleton.GetPrim()) @ _matrices(
@@ -131,7 +115,10 @@ class UsdSource:
         names = own_names([path.rpartition("/")[2] for path in paths])
         return Rig(names, one_tree(parents), *placed(bind, f"{self._name}, joints at rest"))
 
-    def _surface(self) -> Surface | None:
+    @property
+    @_reading
+    def surface(self) -> Surface | None:
+        """All meshes bound to the skeleton as one; None when there is none."""
         found, count = [], 0
         into = self._to_world(self._skeleton.GetPrim())
         for binding in self._bound:
@@ -155,7 +142,27 @@ class UsdSource:
                 found.append(Surface(vertices, faces, weights, colours))
         return joined(found, self._name)
 
-    def _action(self, clip: int) -> Action:
+    @property
+    @_reading
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the meshes that are not bound to the skeleton."""
+        carried = {
+            target.GetPrim()
+            for binding in self._bound
+            if binding.GetSkeleton().GetPrim() == self._skeleton.GetPrim()
+            for target in binding.GetSkinningTargets()
+            if target.HasJointInfluences()
+        }
+        prims = Usd.PrimRange.Stage(self._stage, EVERYTHING)
+        meshes = [prim for prim in prims if prim.IsA(UsdGeom.Mesh)]
+        return tuple(prim.GetName() for prim in meshes if prim not in carried)
+
+    @_reading
+    def action(self, clip: int) -> Action:
+        """The `clip`-th animation, sampled at its own rate.
+
+        raises  SceneError when it moves no joint
+        """
         query = self._cache.GetAnimQuery(self._animations[clip])
         codes = np.array(query.GetJointTransformTimeSamples())
         joints = list(query.GetJointOrder())
@@ -176,7 +183,7 @@ class UsdSource:
             poses = query.ComputeJointLocalTransforms(time * rate)
             if len(poses or ()) != len(joints):
                 raise SceneError(
-                    f"{where} has not a pose for each of its {len(joints)} joints. Export it anew."
+                    f"{where} has not a pose for each of its {len(joints)} joints. Export it again."
                 )
             local[frame, known] = _matrices(poses)[own]
         world, into = local.copy(), self._to_world(self._skeleton.GetPrim())
@@ -184,8 +191,7 @@ class UsdSource:
             parent = self._query.GetTopology().GetParent(joint)
             above = into if parent < 0 else world[:, parent]
             world[:, joint] = above @ local[:, joint]
-        step = float(times[-1] - times[0]) / (len(times) - 1) or 1.0
-        return Action(step, *placed(world, where))
+        return sampled_action(times, world, where)
 
     def _to_world(self, prim: Usd.Prim) -> Array:
         """(4, 4) a prim's frame to the world's, m, z up."""
@@ -193,7 +199,7 @@ class UsdSource:
         return np.asarray(self._turned @ matrix)
 
     def _weights(self, target: UsdSkel.SkinningQuery, count: int) -> Array:
-        """(count, n) weights of the joints, normalized: in the file they need not sum to one."""
+        """(count, n) weights of the joints."""
         where = f"{self._name}, {target.GetPrim().GetPath()}"
         width = target.GetNumInfluencesPerComponent()
         found_for = target.ComputeVaryingJointInfluences(count) or ((), ())
@@ -202,7 +208,7 @@ class UsdSource:
         own = target.GetJointOrder()
         if lost := [str(joint) for joint in own or () if str(joint) not in order]:
             raise SceneError(
-                f"{where} names joint '{lost[0]}', which is not in the skeleton. Export it anew."
+                f"{where} names joint '{lost[0]}', which is not in the skeleton. Export it again."
             )
         number = np.array([order.index(str(joint)) for joint in own] if own else range(len(order)))
         check_influences(indices, shares, count * width, len(number), where)
@@ -210,9 +216,7 @@ class UsdSource:
         rows = np.arange(count)[:, None]
         joints = number[indices.reshape(count, width)]
         np.add.at(found, (rows, joints), shares.reshape(count, width))
-        total = found.sum(axis=1)
-        found[total <= 0.0, 0] = 1.0
-        return np.asarray(found / np.where(total > 0.0, total, 1.0)[:, None])
+        return normalised(found, 0)
 
 
 def _matrices(transforms: Any) -> Array:

@@ -1,7 +1,7 @@
-"""Checks of a USD file, before a character is made of it.
+"""Checks of a USD file, before an import uses it.
 
-A damaged binary file can end the process that reads it, and no check in that process helps. It is
-read by another process first.
+A damaged binary file can crash the process that reads it, and no check in that process prevents it.
+Another process reads it first.
 
 source  OpenUSD: UsdGeomMesh, UsdSkelBindingAPI; SdfLayer.GetCompositionAssetDependencies
 """
@@ -27,13 +27,13 @@ MAX_LAYERS = 1000
 MAX_PRIMS = 100_000
 
 PROBE_SECONDS = 300.0
-"""s that the other process may take."""
+"""Time limit of the other process, s."""
 
 
 def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
-    """The stage of a file that is composed of files in its own folder only.
+    """The stage of a file that is composed only of files in its folder.
 
-    probed  whether to open binary files at once; else another process reads them first
+    probed  whether to open binary files directly; otherwise another process reads them first
     raises  SceneError when it cannot be read, is too large, or names a file elsewhere
     """
     folder, pending, known = path.parent.resolve(), [str(path)], {str(path)}
@@ -57,16 +57,15 @@ def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
                 pending.append(below)
         if len(known) > MAX_LAYERS:
             raise SceneError(
-                f"{path.name} is made of more than {MAX_LAYERS} files, which is the most. Flatten "
-                "it into one (usdcat --flatten)."
+                f"{path.name} is composed of more than {MAX_LAYERS} files. Flatten it into one "
+                "(usdcat --flatten)."
             )
     stage = Usd.Stage.Open(str(path))
     everything = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
     for number, _ in enumerate(Usd.PrimRange.Stage(stage, everything)):
         if number >= MAX_PRIMS:
             raise SceneError(
-                f"{path.name} has more than {MAX_PRIMS:,} prims, which is the most. Export the "
-                "character alone."
+                f"{path.name} has more than {MAX_PRIMS:,} prims. Export the character alone."
             )
     return stage
 
@@ -91,16 +90,14 @@ def probe(path: Path) -> None:
         ) from None
     if done.returncode:
         raise SceneError(
-            f"{path.name} cannot be read as USD: it ends the program that reads it. Export it anew."
+            f"{path.name} cannot be read as USD: reading it crashes the process. Export it again."
         )
 
 
 @contextmanager
 def reading_usd(name: str) -> Iterator[None]:
-    """Context for calls of usd-core that drops its warnings on the terminal.
-
-    raises  SceneError in place of usd-core's exceptions
-    """
+    """Context for calls of usd-core: its warnings do not reach the terminal, and its exceptions
+    become SceneError."""
     with (
         open(os.devnull, "w", encoding="utf-8") as nowhere,
         redirect_stderr(nowhere),  # its output through Python
@@ -122,7 +119,7 @@ def check_topology(query: UsdSkel.SkeletonQuery, name: str) -> None:
     joints = len(query.GetJointOrder())
     valid, reason = query.GetTopology().Validate() if joints else (False, "it has none")
     if not valid:
-        raise _wrong(f"{name}: the skeleton's joints are no tree ({reason})")
+        raise _wrong(f"{name}: the skeleton's joints are not a tree ({reason})")
     for what, poses in (
         ("bindTransforms", query.GetJointWorldBindTransforms()),
         ("restTransforms", query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True)),
@@ -146,12 +143,12 @@ def check_faces(counts: Integers, corners: Integers, points: int, where: str) ->
         raise _wrong(f"{where}.faceVertexCounts: a face needs 3 corners or more")
     if counts.sum() != len(corners):
         raise _wrong(
-            f"{where}.faceVertexCounts add up to {counts.sum()}, and there are {len(corners)} "
+            f"{where}.faceVertexCounts add up to {counts.sum()}, but there are {len(corners)} "
             "faceVertexIndices"
         )
     if corners.min() < 0 or corners.max() >= points:
         raise _wrong(
-            f"{where}.faceVertexIndices are {corners.min()} to {corners.max()}, and the mesh has "
+            f"{where}.faceVertexIndices are {corners.min()} to {corners.max()}, but the mesh has "
             f"{points} points"
         )
 
@@ -164,19 +161,19 @@ def check_influences(indices: Integers, weights: Array, size: int, joints: int, 
         )
     if size and (indices.min() < 0 or indices.max() >= joints):
         raise _wrong(
-            f"{where}.jointIndices are {indices.min()} to {indices.max()}, and there are {joints} "
+            f"{where}.jointIndices are {indices.min()} to {indices.max()}, but there are {joints} "
             "joints"
         )
     if not np.isfinite(weights).all() or (weights < 0.0).any():
-        raise _wrong(f"{where}.jointWeights are not all finite numbers from 0")
+        raise _wrong(f"{where}.jointWeights are not all finite and at least 0")
 
 
 def check_samples(samples: int, joints: int, where: str) -> None:
     """Raise SceneError where a clip has too many samples for its joints."""
     if samples * joints > MAX_POSES:
         raise SceneError(
-            f"{where} asks for {samples:,} samples of {joints} joints, and {MAX_POSES:,} poses "
-            "are the most. Export a shorter clip."
+            f"{where} needs {samples:,} samples of {joints} joints; the maximum is {MAX_POSES:,} "
+            "poses. Export a shorter clip."
         )
 
 
@@ -194,7 +191,7 @@ def _layer(name: str, where: str) -> Sdf.Layer:
     file = Path(Ar.SplitPackageRelativePathOuter(name)[0])
     if (size := file.stat().st_size) > MAX_FILE_BYTES:
         raise SceneError(
-            f"{where} has {size / 2**30:.3g} GB, and {MAX_FILE_BYTES / 2**30:g} GB is the most. "
+            f"{where} has {size / 2**30:.3g} GB; the maximum is {MAX_FILE_BYTES / 2**30:g} GB. "
             "Export fewer meshes and clips."
         )
     layer = Sdf.Layer.FindOrOpen(name)
@@ -227,8 +224,8 @@ def _named_files(layer: Sdf.Layer) -> list[str]:
 
 
 def _unreadable(where: str) -> SceneError:
-    return SceneError(f"{where} cannot be read as USD. Export it anew.")
+    return SceneError(f"{where} cannot be read as USD. Export it again.")
 
 
 def _wrong(said: str) -> SceneError:
-    return SceneError(f"{said}. Export it anew.")
+    return SceneError(f"{said}. Export it again.")

@@ -1,4 +1,4 @@
-"""The process that reads a binary USD file first, which may end it."""
+"""The process that reads a binary USD file first, because reading may crash."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flowborne.characters.usd import UsdSource
 from flowborne.errors import SceneError
 
 MAX_MEMORY = 8 << 30
-"""Bytes of addresses that reading may take; Windows has no such limit."""
+"""Limit of the address space, bytes; Windows has no such limit."""
 
 
 def main(path: Path) -> None:

@@ -17,36 +17,41 @@ from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically, write_text
 from flowborne.motion.bvh_file import BvhFile, BvhJoint, angles_of, load_bvh, quaternions_of
 from flowborne.motion.clip import Clip
-from flowborne.motion.quaternions import angle, inverse, product, turned
+from flowborne.motion.quaternions import angle, inverse, product, rotated
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _Z_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-_OVER = np.diag([1.0, -1.0, -1.0])
-"""Half a turn about x."""
+_HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
 
-TO_WORLD: dict[str, Array] = {"y": _Y_UP, "z": _Z_UP, "-y": _Y_UP @ _OVER, "-z": _Z_UP @ _OVER}
+TO_WORLD: dict[str, Array] = {
+    "y": _Y_UP,
+    "z": _Z_UP,
+    "-y": _Y_UP @ _HALF_TURN_ABOUT_X,
+    "-z": _Z_UP @ _HALF_TURN_ABOUT_X,
+}
 """Up axis of the file -> (3, 3) rotation of its axes to x forward, y left, z up."""
 
-RIGID = 0.2
-"""Motion of a joint, relative to its distance from the joint above, that makes it a root."""
+ROOT_MOTION_RATIO = 0.2
+"""Motion of an only child relative to its parent, over its distance from the parent, above which it
+replaces the parent as the root."""
 
-STILL = 1e-3
-"""Largest motion of the length channels of a rigid bone, m: exporters round and solve so far."""
+MAX_BONE_STRETCH = 1e-3
+"""Largest motion of a rigid bone's end, m: exporters round and solve to about 1 mm."""
 
-SAME = 1e-6
-"""Largest change of a rotation, rad, that keeps the numbers of the file."""
+MIN_ROTATION_CHANGE = 1e-6
+"""Change of a rotation, rad, above which the angles of the file are replaced."""
 
-DEGREES_OF_FREEDOM = 0.01
-"""Degrees that may be lost if a joint of the file has fewer than three rotation channels."""
+MAX_LOST_DEGREES = 0.01
+"""Largest rotation, degrees, that may be dropped about axes without a rotation channel."""
 
-SHORTEST = 1e-6
-"""Least length of a bone, m: programs that read BVH drop or lengthen shorter ones."""
+MIN_BONE_LENGTH = 1e-6
+"""Minimum length of a written end site, m: BVH readers drop or lengthen shorter ones."""
 
-LONE = 0.1
-"""Length of a bone that has none, nor a bone above it, m."""
+DEFAULT_BONE_LENGTH = 0.1
+"""Length of an end site without any bone above it, m."""
 
 ZXY = (2, 0, 1)
 """Axes of the rotation channels in clips without an original file."""
@@ -58,10 +63,10 @@ def read_bvh(path: str | Path, unit: float = 1.0, up: str = "y", skip: int = 0) 
     unit    m per length of the file
     up      up axis of the file, one of TO_WORLD
     skip    frames to drop at the start, such as the T-pose of an exporter
-    raises  SceneError when the file is missing, not BVH, cut or not finite, when a bone changes its
-            length by more than 1 mm, and when `skip` leaves no frame
-    note    position channels of the root give its position, and its OFFSET is not added. A root
-            with a single joint below it that moves relative to it is merged into that joint
+    raises  SceneError when the file is missing, not BVH, truncated or not finite, when a bone
+            changes its length by more than 1 mm, and when `skip` leaves no frame
+    note    position channels of the root give its position without its OFFSET. A root with a single
+            child that moves relative to it is merged into that child
     """
     bvh = load_bvh(Path(path))
     clip = clip_of(bvh, unit, up, skip)
@@ -81,25 +86,25 @@ def clip_of(
     """
     if not 0 <= skip < len(bvh.values):
         raise SceneError(
-            f"{bvh.name} has {len(bvh.values)} frames, and {skip} of them are to be skipped. "
-            "Skip fewer."
+            f"{bvh.name} has {len(bvh.values)} frames, and skip = {skip} leaves none. Skip fewer."
         )
     values, world = bvh.values[skip:], TO_WORLD[up]
     if root is None:
         first = _first_at_rest(bvh, values)
     else:
         first = [joint.name for joint in bvh.joints].index(root)
-    kept, translation, rotation = [first], *_folded(bvh, first, values, world)
+    kept, translation, rotation = [first], *_world_pose(bvh, first, values, world)
     for number, joint in enumerate(bvh.joints):
         if joint.parent in kept:
             kept.append(number)
     joints = [bvh.joints[number] for number in kept]
-    offsets, strays = [np.zeros(3)], {}
+    offsets, deviations = [np.zeros(3)], {}
     for joint in joints[1:]:
-        places, _ = _places(joint, values)
-        offsets.append((places.min(axis=0) + places.max(axis=0)) / 2.0)
-        away = unit * np.abs(places - offsets[-1]).max(axis=1)
-        strays[joint.name] = float(away.max()), int(away.argmax())
+        positions = _positions(joint, values)
+        offsets.append((positions.min(axis=0) + positions.max(axis=0)) / 2.0)
+        distance = unit * np.abs(positions - offsets[-1]).max(axis=1)
+        if distance.max() > 0.0:
+            deviations[joint.name] = float(distance.max()), int(distance.argmax())
     return Clip(
         names=tuple(joint.name for joint in joints),
         parents=np.array([-1] + [kept.index(joint.parent) for joint in joints[1:]], np.int64),
@@ -110,20 +115,22 @@ def clip_of(
             [rotation, *(_rotations(joint, values, world) for joint in joints[1:])], axis=1
         ),
         translation=unit * translation,
-        strays={name: stray for name, stray in strays.items() if stray[0] > 0.0},
+        deviations=deviations,
     )
 
 
-def check_rigid(bvh: BvhFile, clip: Clip, joints: Iterable[str], most: float = STILL) -> None:
-    """Raise SceneError when a joint moves more than `most` (m) about the end of its rigid bone."""
+def check_rigid(
+    bvh: BvhFile, clip: Clip, joints: Iterable[str], most: float = MAX_BONE_STRETCH
+) -> None:
+    """Raise SceneError when a joint is more than `most` (m) from the end of its rigid bone."""
     for joint in joints:
-        stray, frame = clip.strays.get(joint, (0.0, 0))
-        if stray > most:
+        deviation, frame = clip.deviations.get(joint, (0.0, 0))
+        if deviation > most:
             raise SceneError(
                 f"{bvh.name}, line {bvh.lines[frame + len(bvh.values) - clip.frames]}: the "
-                f"position channels of joint '{joint}' move by {2.0 * stray:.3g} m, and bones are "
-                "rigid here. Export the clip without stretching bones, or skip frames that are "
-                "none of the motion."
+                f"position channels of joint '{joint}' move by {2.0 * deviation:.3g} m, but bones "
+                "must be rigid. Export the clip without stretching bones, or skip frames that do "
+                "not belong to the motion."
             )
 
 
@@ -142,15 +149,15 @@ def write_bvh(
 
     source     file for the skeleton, channels, frame time and numbers, which are copied verbatim
     rotations  joint -> (frames, 4) unit quaternions relative to its parent in the file, in world
-               axes. Their angles are continuous from frame to frame; unchanged rotations keep the
-               angles of the file
+               axes. Written angles are continuous from frame to frame; unchanged rotations keep
+               the angles of the file
     root       a joint with position channels, and its (frames, 3) positions, m, and (frames, 4)
                rotations in the world
     unit, up   as in `read_bvh`
     first      first frame of the file to write, counting skipped ones
     last       frame after the last one; the end of the file by default
-    raises     SceneError when the file is bad, lacks a joint or a channel, or has no frame in the
-               range; OSError
+    raises     SceneError when the file is invalid, lacks a joint or a channel, or has no frame in
+               the range; OSError
     """
     bvh = load_bvh(Path(source))
     span = slice(first, last)
@@ -158,41 +165,48 @@ def write_bvh(
     if not rows:
         raise SceneError(
             f"{bvh.name} has {len(bvh.rows)} frames, none of them from {first} to {last}. "
-            "Give a range that has frames."
+            "Give a range with frames."
         )
     joints = {joint.name: joint for joint in bvh.joints}
+    for name in (*rotations, *([] if root is None else [root[0]])):
+        if name not in joints:
+            raise SceneError(f"{bvh.name} has no joint '{name}'. It has: {', '.join(joints)}.")
     words = [row.split() for row in rows] if rotations or root is not None else []
     if root is not None:
-        name, places, turns = root
-        columns, numbers, turns = _within(bvh, name, places / unit, turns, values, TO_WORLD[up])
+        name, positions, turns = root
+        columns, numbers, turns = _root_channels(
+            bvh, joints[name], positions / unit, turns, values, TO_WORLD[up]
+        )
         rotations = {name: turns, **rotations}
         for row, new in zip(words, numbers, strict=True):
             for column, number in zip(columns, new, strict=True):
                 row[column] = f"{number:.6f}"
     for name, wanted in rotations.items():
-        if name not in joints:
-            raise SceneError(f"{bvh.name} has no joint '{name}'. It has: {', '.join(joints)}.")
         columns, angles, new = _replaced(bvh, joints[name], values, wanted, TO_WORLD[up])
         for frame in np.flatnonzero(new):
             for column, degrees in zip(columns, angles[frame], strict=True):
                 words[frame][column] = f"{degrees:.6f}"
     lines = [" ".join(row) for row in words] or rows
     text = f"{bvh.hierarchy}Frames: {len(rows)}\nFrame Time: {bvh.time_text}\n"
-    whole = (text + "\n".join(lines) + "\n").encode(bvh.encoding)
-    write_atomically(Path(path), lambda stream: stream.write(whole))
+    content = (text + "\n".join(lines) + "\n").encode(bvh.encoding)
+    write_atomically(Path(path), lambda stream: stream.write(content))
 
 
 def write_clip(
     path: str | Path, clip: Clip, unit: float = 1.0, sliding: Mapping[str, Array] | None = None
 ) -> None:
-    """Write a clip as a BVH file: y up, facing +z, channels Zrotation Xrotation Yrotation.
+    """Write a clip as a BVH file; see `bvh_text`. Raises OSError."""
+    write_text(Path(path), bvh_text(clip, unit, sliding))
 
-    Every last bone gets an end site of nonzero length (see `_tip`).
+
+def bvh_text(clip: Clip, unit: float = 1.0, sliding: Mapping[str, Array] | None = None) -> str:
+    """A clip in BVH: y up, facing +z, channels Zrotation Xrotation Yrotation.
+
+    Every last bone gets an end site of nonzero length (see `_end_site`).
 
     unit     m per length of the file
     sliding  joint -> (frames, 3) m, positions in the parent's axes of joints other than the root
              that move relative to their parent
-    raises   OSError
     """
     back = TO_WORLD["y"].T
     moving = {clip.names[0]: clip.translation} | dict(sliding or {})
@@ -204,64 +218,58 @@ def write_clip(
         columns.append(angles_of(local, ZXY, np.zeros(3)))
     offsets = clip.offsets @ back.T / unit
     inner = {clip.names[joint] for joint in clip.parents if joint >= 0}
-    tips = {n: end for n, end in clip.ends.items() if np.linalg.norm(end) >= SHORTEST}
-    tips |= {n: _tip(clip, k) for k, n in enumerate(clip.names) if n not in {*inner, *tips}}
+    tips = {n: end for n, end in clip.ends.items() if np.linalg.norm(end) >= MIN_BONE_LENGTH}
+    tips |= {n: _end_site(clip, k) for k, n in enumerate(clip.names) if n not in {*inner, *tips}}
     ends = {name: back @ end / unit for name, end in tips.items()}
     lines = [
         "HIERARCHY",
         *_block(clip, offsets, ends, set(moving), 0, 0),
         "MOTION",
         f"Frames: {clip.frames}",
+        f"Frame Time: {clip.frame_time:.10g}",
+        *(_spaced(row) for row in np.concatenate(columns, axis=1)),
     ]
-    lines.append(f"Frame Time: {clip.frame_time:.10g}")
-    lines += [_spaced(row, 8) for row in np.concatenate(columns, axis=1)]
-    write_text(Path(path), "\n".join(lines) + "\n")
+    return "\n".join(lines) + "\n"
 
 
-def _places(joint: BvhJoint, values: Array) -> tuple[Array, bool]:
-    """(frames, 3) position of a joint in its parent's axes, in the file's unit, and whether it has
-    position channels.
+def _positions(joint: BvhJoint, values: Array) -> Array:
+    """(frames, 3) position of a joint in its parent's axes, in the file's unit.
 
-    For the root, the position channels give it. For other joints, some tools write the full
-    position, and others the difference from OFFSET: the numbers are closer to OFFSET in the first
-    case and closer to 0 in the second.
+    Position channels of the root contain the full position. For other joints, some tools write the
+    full position, and others the difference from OFFSET: the numbers are closer to OFFSET in the
+    first case and closer to 0 in the second.
     """
     result = np.tile(joint.offset, (len(values), 1))
-    axes = [axis for axis, turns in joint.channels if not turns]
-    columns = [joint.first + n for n, (_, turns) in enumerate(joint.channels) if not turns]
+    columns, axes = joint.columns(rotations=False)
     result[:, axes] = values[:, columns]
     middle = (result.min(axis=0) + result.max(axis=0)) / 2.0
     if joint.parent >= 0 and np.linalg.norm(middle - joint.offset) > np.linalg.norm(middle):
         result[:, axes] += joint.offset[axes]
-    return result, bool(axes)
+    return result
 
 
-def _folded(bvh: BvhFile, joint: int, values: Array, world: Array) -> tuple[Array, Array]:
+def _world_pose(bvh: BvhFile, number: int, values: Array, world: Array) -> tuple[Array, Array]:
     """(frames, 3) position, in the file's unit, and (frames, 4) rotation of a joint, world axes."""
-    own = bvh.joints[joint]
-    place, rotation = _places(own, values)[0] @ world.T, _rotations(own, values, world)
-    if own.parent < 0:
-        return place, rotation
-    start, above = _folded(bvh, own.parent, values, world)
-    return start + turned(above, place), product(above, rotation)
+    joint = bvh.joints[number]
+    position, rotation = _positions(joint, values) @ world.T, _rotations(joint, values, world)
+    if joint.parent < 0:
+        return position, rotation
+    start, above = _world_pose(bvh, joint.parent, values, world)
+    return start + rotated(above, position), product(above, rotation)
 
 
-def _within(
-    bvh: BvhFile, name: str, places: Array, rotations: Array, values: Array, world: Array
+def _root_channels(
+    bvh: BvhFile, joint: BvhJoint, positions: Array, rotations: Array, values: Array, world: Array
 ) -> tuple[list[int], Array, Array]:
     """Columns of the position channels of a joint, (frames, k) numbers for them, and (frames, 4)
     rotations relative to its parent, from positions in the file's unit and world rotations."""
-    joint = next(joint for joint in bvh.joints if joint.name == name)
     if joint.parent >= 0:
-        start, above = _folded(bvh, joint.parent, values, world)
-        places = turned(inverse(above), places - start)
+        start, above = _world_pose(bvh, joint.parent, values, world)
+        positions = rotated(inverse(above), positions - start)
         rotations = product(inverse(above), rotations)
-    numbered = [
-        (joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if not turns
-    ]
-    columns, axes = [column for column, _ in numbered], [axis for _, axis in numbered]
-    added = _places(joint, values)[0][:, axes] - values[:, columns]  # OFFSET, if it is added
-    return columns, (places @ world)[:, axes] - added, rotations
+    columns, axes = joint.columns(rotations=False)
+    added = _positions(joint, values)[:, axes] - values[:, columns]  # OFFSET, if the file omits it
+    return columns, (positions @ world)[:, axes] - added, rotations
 
 
 def _first_at_rest(bvh: BvhFile, values: Array) -> int:
@@ -271,22 +279,16 @@ def _first_at_rest(bvh: BvhFile, values: Array) -> int:
         below = [number for number, j in enumerate(bvh.joints) if j.parent == first]
         if len(below) != 1:
             return first
-        places, given = _places(bvh.joints[below[0]], values)
-        moved = np.ptp(places, axis=0).max()
-        if not given or moved <= RIGID * np.linalg.norm(places, axis=1).max():
+        positions = _positions(bvh.joints[below[0]], values)
+        moved = np.ptp(positions, axis=0).max()
+        if moved <= ROOT_MOTION_RATIO * np.linalg.norm(positions, axis=1).max():
             return first
         first = below[0]
 
 
-def _rotation_channels(joint: BvhJoint) -> tuple[list[int], list[int]]:
-    """Columns and axes of a joint's rotation channels."""
-    found = [(joint.first + n, axis) for n, (axis, turns) in enumerate(joint.channels) if turns]
-    return [column for column, _ in found], [axis for _, axis in found]
-
-
 def _rotations(joint: BvhJoint, values: Array, world: Array) -> Array:
     """(frames, 4) rotations relative to the parent, in world axes."""
-    columns, axes = _rotation_channels(joint)
+    columns, axes = joint.columns(rotations=True)
     return quaternions_of(values[:, columns], world.T[axes])
 
 
@@ -301,14 +303,14 @@ def _replaced(
     """Columns, angles (frames, k) in degrees for them, and the frames with new angles."""
     if wanted.shape != (len(values), 4):
         raise ValueError(f"{wanted.shape} is not the shape of {len(values)} quaternions.")
-    columns, axes = _rotation_channels(joint)
+    columns, axes = joint.columns(rotations=True)
     if len(set(axes)) != len(axes):
         raise SceneError(
-            f"{bvh.name}, line {joint.line}: joint '{joint.name}' turns twice about one axis. "
-            "Export the clip with three different rotation channels to have its motion out."
+            f"{bvh.name}, line {joint.line}: joint '{joint.name}' has two rotation channels "
+            "about one axis. To write its motion, export the clip with three different channels."
         )
     own = _rotations(joint, values, world)
-    new = angle(product(inverse(own), wanted)) > SAME
+    new = angle(product(inverse(own), wanted)) > MIN_ROTATION_CHANGE
     if not new.any():
         return columns, values[:, columns], new
     missing = [axis for axis in range(3) if axis not in axes]
@@ -320,11 +322,11 @@ def _replaced(
             start[: len(columns)] = result[begin - 1]
         angles = angles_of(_in_axes(wanted[begin:end], world.T), (i, j, k), start)
         lost = np.abs(angles[:, len(columns) :]).max(initial=0.0)
-        if lost > DEGREES_OF_FREEDOM:
+        if lost > MAX_LOST_DEGREES:
             raise SceneError(
                 f"{bvh.name}, line {joint.line}: joint '{joint.name}' has {len(columns)} rotation "
-                f"channels, and its motion turns {lost:.3g} degrees about axes that have none. "
-                "Export the clip with three rotation channels to have its motion out."
+                f"channels, and its motion turns {lost:.3g} degrees about axes without one. "
+                "To write its motion, export the clip with three rotation channels."
             )
         result[begin:end] = angles[:, : len(columns)]
     return columns, result, new
@@ -336,13 +338,17 @@ def _runs(marked: Mask) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _tip(clip: Clip, joint: int) -> Array:
-    """(3,) m, end site of a last bone for which the clip has none, or one at the joint itself: it
-    goes straight on from the nearest bone above that has a length, as long as that."""
+def _end_site(clip: Clip, joint: int) -> Array:
+    """(3,) m, end site for a last joint without a usable one: a copy of the nearest bone above that
+    has a length."""
     found = np.zeros(3)
-    while np.linalg.norm(found) < SHORTEST and joint >= 0:
+    while np.linalg.norm(found) < MIN_BONE_LENGTH and joint >= 0:
         found, joint = clip.offsets[joint], int(clip.parents[joint])
-    return found if np.linalg.norm(found) >= SHORTEST else np.array([0.0, 0.0, LONE])
+    return (
+        found
+        if np.linalg.norm(found) >= MIN_BONE_LENGTH
+        else np.array([0.0, 0.0, DEFAULT_BONE_LENGTH])
+    )
 
 
 def _block(
@@ -350,21 +356,21 @@ def _block(
 ) -> list[str]:
     """Lines of a joint and all below it; those in `moving` have position channels."""
     name, inner = clip.names[joint], "\t" * (depth + 1)
-    places = "6 Xposition Yposition Zposition" if name in moving else "3"
+    channels = "6 Xposition Yposition Zposition" if name in moving else "3"
     lines = [
         f"{'ROOT' if joint == 0 else 'JOINT'} {name}",
         "{",
-        f"\tOFFSET {_spaced(offsets[joint], 8)}",
-        f"\tCHANNELS {places} Zrotation Xrotation Yrotation",
+        f"\tOFFSET {_spaced(offsets[joint])}",
+        f"\tCHANNELS {channels} Zrotation Xrotation Yrotation",
     ]
     lines = ["\t" * depth + line for line in lines]
     for child in np.flatnonzero(clip.parents == joint):
         lines += _block(clip, offsets, ends, moving, int(child), depth + 1)
     if name in ends:
-        tip = f"{inner}\tOFFSET {_spaced(ends[name], 8)}"
+        tip = f"{inner}\tOFFSET {_spaced(ends[name])}"
         lines += [f"{inner}End Site", f"{inner}{{", tip, f"{inner}}}"]
     return [*lines, "\t" * depth + "}"]
 
 
-def _spaced(numbers: Array, digits: int) -> str:
-    return " ".join(f"{number:.{digits}f}" for number in numbers)
+def _spaced(numbers: Array) -> str:
+    return " ".join(f"{number:.8f}" for number in numbers)

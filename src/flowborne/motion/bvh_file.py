@@ -22,11 +22,10 @@ from flowborne.motion.quaternions import about, product
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LARGEST = 1e9
-"""Largest number of a clip, in its unit of length or degrees: in whatever unit, no creature is as
-large."""
+MAX_NUMBER = 1e9
+"""Largest number of a clip, in its unit of length or degrees: beyond any creature in any unit."""
 
-LOCKED = 1e-7
+GIMBAL_LOCK_COSINE = 1e-7
 """Cosine of the middle angle below which only the sum or difference of the others is defined."""
 
 CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
@@ -44,10 +43,10 @@ def angles_of(rotations: Array, order: tuple[int, int, int], start: Array) -> Ar
     """(frames, 3) angles in degrees, in each frame closest to those of the frame before.
 
     rotations  (frames, 4) unit quaternions
-    order      the axes, all different, of 0, 1, 2
-    start      (3,) reference angles for the first frame; they also decide how a rotation is
-               shared between first and last angle when the middle one is at 90 degrees
-    source     two triples of angles make one rotation: (a, b, c), (a + 180, 180 - b, c + 180)
+    order      axes of the three angles, a permutation of 0, 1, 2
+    start      (3,) reference angles for the first frame; in gimbal lock (middle angle 90 degrees)
+               they also set how the first and the last angle share the rotation
+    note       each rotation has two triples of angles: (a, b, c) and (a + 180, 180 - b, c + 180)
     """
     i, j, k = order
     parity = 1.0 if (j - i) % 3 == 1 else -1.0
@@ -56,15 +55,15 @@ def angles_of(rotations: Array, order: tuple[int, int, int], start: Array) -> Ar
     first = np.arctan2(-parity * R[:, j, k], R[:, k, k])
     middle = np.arctan2(parity * R[:, i, k], cosine)
     last = np.arctan2(-parity * R[:, i, j], R[:, i, i])
-    together = np.rad2deg(np.arctan2(parity * R[:, k, j], R[:, j, j]))
+    combined = np.rad2deg(np.arctan2(parity * R[:, k, j], R[:, j, j]))
     angles = np.rad2deg(np.stack([first, middle, last], axis=-1))
     nearest = np.array(start)
     for frame, found in enumerate(angles):
-        if cosine[frame] > LOCKED:
+        if cosine[frame] > GIMBAL_LOCK_COSINE:
             both = np.stack([found, [found[0] + 180.0, 180.0 - found[1], found[2] + 180.0]])
         else:
             sense = parity * np.sign(found[1])
-            change = _wrapped(together[frame] - nearest[0] - sense * nearest[2]) / 2.0
+            change = _wrapped(combined[frame] - nearest[0] - sense * nearest[2]) / 2.0
             both = nearest + np.array([[change, 0.0, sense * change]])
             both[:, 1] = found[1]
         steps = _wrapped(both - nearest)
@@ -98,6 +97,15 @@ class BvhJoint:
     first: int = 0
     end: Array | None = None
 
+    def columns(self, *, rotations: bool) -> tuple[list[int], list[int]]:
+        """Columns and axes of its rotation channels, or of its position channels."""
+        found = [
+            (self.first + n, axis)
+            for n, (axis, turns) in enumerate(self.channels)
+            if turns == rotations
+        ]
+        return [column for column, _ in found], [axis for _, axis in found]
+
 
 def read_hierarchy(lines: list[str], name: str) -> tuple[list[BvhJoint], int]:
     """Joints, and the number of lines up to and including MOTION.
@@ -111,7 +119,7 @@ def read_hierarchy(lines: list[str], name: str) -> tuple[list[BvhJoint], int]:
         raise SceneError(f"{name} does not begin with HIERARCHY. Give a BVH file.")
     joints: list[BvhJoint] = []
     blocks: list[int | None] = []  # open blocks: number of the joint, None for an End Site
-    opening: list[int | None] = []
+    opening: list[int | None] = []  # the block whose brace comes next
     for number, text in statements:
         where = f"{name}, line {number}"
         word, *after = text.split(maxsplit=1)
@@ -119,7 +127,7 @@ def read_hierarchy(lines: list[str], name: str) -> tuple[list[BvhJoint], int]:
         if keyword == "MOTION":
             return _checked(joints, bool(blocks or opening), where), number
         if opening and text != "{":
-            raise SceneError(f"{where}: '{text}' stands where a brace {{ has to. Mend the file.")
+            raise SceneError(f"{where}: '{text}' is not the expected brace {{. Correct the file.")
         if text == "{" and opening:
             blocks.append(opening.pop())
         elif text == "}" and blocks:
@@ -139,8 +147,8 @@ def read_hierarchy(lines: list[str], name: str) -> tuple[list[BvhJoint], int]:
         elif keyword == "ROOT":
             raise SceneError(f"{where}: a second ROOT. Keep one skeleton in the file.")
         else:
-            raise SceneError(f"{where}: '{text}' is not expected here. Mend the file.")
-    raise SceneError(f"{name} ends in line {number}, before MOTION: it is cut. Export it anew.")
+            raise SceneError(f"{where}: '{text}' is not expected here. Correct the file.")
+    raise SceneError(f"{name} ends in line {number}, before MOTION: it is cut. Export it again.")
 
 
 def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
@@ -152,8 +160,8 @@ def _statements(lines: list[str]) -> Iterator[tuple[int, str]]:
 
 
 def _usable(numbers: Array) -> Mask:
-    """Which numbers are finite, and no larger than LARGEST."""
-    return np.abs(numbers) <= LARGEST  # false for nan
+    """Which numbers are finite, and no larger than MAX_NUMBER."""
+    return np.abs(numbers) <= MAX_NUMBER  # false for nan
 
 
 def _three(text: str, where: str) -> Array:
@@ -161,7 +169,7 @@ def _three(text: str, where: str) -> Array:
     numbers = [number_in(word) for word in words]
     if len(numbers) != 3 or not _usable(np.array(numbers)).all():
         raise SceneError(
-            f"{where}: OFFSET '{text}' is not three numbers of a size up to {LARGEST:g}. Mend it."
+            f"{where}: OFFSET '{text}' is not three numbers of at most {MAX_NUMBER:g}. Correct it."
         )
     return np.array(numbers)
 
@@ -187,7 +195,7 @@ def _channels(text: str, where: str) -> tuple[tuple[int, bool], ...]:
         )
     if count != str(len(words)):
         raise SceneError(
-            f"{where}: CHANNELS says {count or 'no number'} and names {len(words)}. Mend it."
+            f"{where}: CHANNELS says {count or 'no number'} and names {len(words)}. Correct it."
         )
     return tuple(
         ("XYZ".index(match[1].upper()), match[2].lower() == "rotation") for match in found if match
@@ -199,14 +207,14 @@ def _checked(joints: list[BvhJoint], unclosed: bool, where: str) -> list[BvhJoin
     if not joints:
         raise SceneError(f"{where}: there is no ROOT before MOTION. Give a file with a skeleton.")
     if unclosed:
-        raise SceneError(f"{where}: MOTION before the last closing brace. Mend the file.")
+        raise SceneError(f"{where}: MOTION before the last closing brace. Correct the file.")
     column, lines = 0, dict[str, int]()
     for joint in joints:
         file = where.rsplit(", line", 1)[0]
         if joint.name in lines:
             raise SceneError(
-                f"{file}, line {joint.line}: joint '{joint.name}' is in line {lines[joint.name]} "
-                "already. Give every joint its own name."
+                f"{file}, line {joint.line}: joint '{joint.name}' is already in line "
+                f"{lines[joint.name]}. Give every joint a different name."
             )
         if np.isnan(joint.offset).any():
             raise SceneError(f"{file}, line {joint.line}: '{joint.name}' has no OFFSET. Add it.")
@@ -234,12 +242,12 @@ class BvhFile:
     encoding    of its text
     hierarchy   its text before the line of the number of frames
     joints      in the file's order: parents before children
-    time_text   the frame time as it is written
+    time_text   the frame time as written
     frame_time  s
     rows        text of each frame
     lines       line of the file where each frame begins, from 1
     values      (frames, channels) in the file's unit and degrees
-    note        what is wrong with the number of frames; may be empty
+    note        mismatch between stated and actual number of frames; may be empty
     """
 
     name: str
@@ -255,7 +263,7 @@ class BvhFile:
 
 
 def load_bvh(path: Path) -> BvhFile:
-    """Read a BVH file. Raises SceneError with the line when it is none, is cut or is no number."""
+    """Read a BVH file. Raises SceneError with the line for a missing, truncated or invalid file."""
     try:
         raw = read_file(path)
     except FileNotFoundError:
@@ -273,7 +281,7 @@ def load_bvh(path: Path) -> BvhFile:
 
 
 def _decoded(raw: bytes) -> tuple[str, str]:
-    """Old tools write names in the code page of their country: then every byte is a letter."""
+    """Text and encoding: UTF-8, or else Latin-1, in which every byte is valid."""
     encoding = "utf-8-sig" if raw.startswith(b"\xef\xbb\xbf") else "utf-8"
     try:
         return raw.decode(encoding), encoding
@@ -285,11 +293,11 @@ def _motion_header(lines: list[str], after: int, name: str) -> tuple[int, str, f
     """Frames, frame time as text and in s, lines before the first frame, lines before 'Frames'."""
     filled = [n for n in range(after, len(lines)) if lines[n].strip()][:2]
     if len(filled) < 2:
-        raise SceneError(f"{name} ends after MOTION: it is cut. Export it anew.")
+        raise SceneError(f"{name} ends after MOTION: it is cut. Export it again.")
     head, second = filled
     count = re.fullmatch(r"\s*Frames\s*:\s*(\d+)\s*", lines[head], re.IGNORECASE)
     if count is None:
-        raise SceneError(f"{name}, line {head + 1}: not 'Frames: ' and a number. Mend the file.")
+        raise SceneError(f"{name}, line {head + 1}: not 'Frames: ' and a number. Correct the file.")
     given = re.fullmatch(r"\s*Frame\s*Time\s*:\s*(\S+)\s*", lines[second], re.IGNORECASE)
     time = number_in(given[1]) if given else math.nan
     if given is None or not (math.isfinite(time) and time > 0.0):
@@ -315,14 +323,14 @@ def _read_rows(bvh: BvhFile, lines: list[str], after: int, frames: int) -> None:
             begin, count = bvh.lines[-1], len(held) - (len(words) if number > bvh.lines[-1] else 0)
             raise SceneError(
                 f"{bvh.name}, line {begin}: frame {len(values) + 1} has {count} values and the "
-                f"skeleton {width} channels. Mend the line."
+                f"skeleton {width} channels. Correct the line."
             )
         if len(held) == width:
             bvh.rows.append(line if len(words) == width else " ".join(held))
             values.append(_row(bvh, held, len(values)))
             held = []
     if not values:
-        raise SceneError(f"{bvh.name} has no frame. Give a clip that has a motion.")
+        raise SceneError(f"{bvh.name} has no frames. Give a clip with a motion.")
     if len(values) != frames or held:
         rest = f" and {len(held)} of the {width} values of another, left out" if held else ""
         bvh.note = f"says {frames} frames and has {len(values)}{rest}"
@@ -341,6 +349,6 @@ def _row(bvh: BvhFile, words: list[str], frame: int) -> Array:
     joint = next(j for j in reversed(bvh.joints) if j.channels and j.first <= column)
     raise SceneError(
         f"{bvh.name}, line {bvh.lines[frame]}: '{words[column]}' in frame {frame + 1}, joint "
-        f"'{joint.name}', is not a number of a size up to {LARGEST:g}. "
-        "Mend the frame or export the clip anew."
+        f"'{joint.name}', is not a number of at most {MAX_NUMBER:g}. "
+        "Correct the frame or export the clip again."
     )

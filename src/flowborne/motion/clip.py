@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.motion.quaternions import product, turned
+from flowborne.motion.quaternions import product, rotated
 
 Array = NDArray[np.float64]
 
@@ -24,8 +24,8 @@ class Clip:
     frame_time   s
     rotations    (frames, n, 4) unit quaternions, joint relative to parent (root: to the world)
     translation  (frames, 3) m, position of the root
-    strays       joint name -> its largest distance in the file from the end of its rigid bone, m,
-                 and the frame of it
+    deviations   joint name -> its largest distance in the file from the end of its rigid bone, m,
+                 and the frame where it occurs
     """
 
     names: tuple[str, ...]
@@ -35,7 +35,7 @@ class Clip:
     frame_time: float
     rotations: Array
     translation: Array
-    strays: Mapping[str, tuple[float, int]] = field(default_factory=dict)
+    deviations: Mapping[str, tuple[float, int]] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -47,7 +47,7 @@ class Clip:
         """s from the first frame to the last."""
         return (self.frames - 1) * self.frame_time
 
-    def turns(self) -> Array:
+    def rotation_steps(self) -> Array:
         """(frames - 1, n) rotation angle of each joint from a frame to the next, rad."""
         same = np.abs(np.einsum("fnk,fnk->fn", self.rotations[1:], self.rotations[:-1]))
         return 2.0 * np.arccos(np.minimum(same, 1.0))
@@ -61,20 +61,28 @@ class Clip:
         begin = self.translation[0]
         rotations = self.rotations.copy()
         rotations[:, 0] = product(left, rotations[:, 0])
-        translation = begin + turned(left, self.translation - begin) + np.array(offset)
+        translation = begin + rotated(left, self.translation - begin) + np.array(offset)
         return replace(self, rotations=rotations, translation=translation)
 
-    def places(self, frame: int | slice | NDArray[np.int64] = slice(None)) -> tuple[Array, Array]:
-        """Poses of the joints in the world, in one frame or in several.
+    def lineage(self, joint: str) -> list[int]:
+        """Numbers of a joint and all its ancestors, up to the root."""
+        numbers = [self.names.index(joint)]
+        while self.parents[numbers[-1]] >= 0:
+            numbers.append(int(self.parents[numbers[-1]]))
+        return numbers
+
+    def poses(self, frame: int | slice | NDArray[np.int64] = slice(None)) -> tuple[Array, Array]:
+        """World poses of the joints, in one frame or in several.
 
         returns  (..., n, 3) positions, m, and (..., n, 4) rotations, unit quaternions; without the
                  leading axis for a single frame
         """
         local, root = self.rotations[frame], self.translation[frame]
-        places, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)
-        places[..., 0, :], rotations[..., 0, :] = root, local[..., 0, :]
+        positions, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)
+        positions[..., 0, :], rotations[..., 0, :] = root, local[..., 0, :]
         for joint, parent in enumerate(self.parents[1:], start=1):
             above = rotations[..., parent, :]
             rotations[..., joint, :] = product(above, local[..., joint, :])
-            places[..., joint, :] = places[..., parent, :] + turned(above, self.offsets[joint])
-        return places, rotations
+            step = rotated(above, self.offsets[joint])
+            positions[..., joint, :] = positions[..., parent, :] + step
+        return positions, rotations

@@ -1,9 +1,9 @@
-"""Positions of the joints of a model from a clip, frame by frame, and the stride of its loops.
+"""Joint positions of a model from a clip, frame by frame, and the stride of its loops.
 
-Bodies of a model may be rotated at rest. With B0 the world rotation of the body of a joint at rest
-and L the clip's rotation of the mapped joint relative to the joint of the nearest mapped ancestor,
-the quaternion of a ball joint is B0^-1 L B0: the body is then rotated from its rest pose as the
-bone of the clip is from its own.
+Bodies of a model may be rotated at rest. With B0 the world rotation of a joint's body at rest and L
+the clip's rotation of the mapped joint relative to that of the nearest mapped ancestor, the
+quaternion of a ball joint is B0^-1 L B0: the body rotates from its rest pose as the bone of the
+clip rotates from its own.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
-from flowborne.motion.quaternions import about, angle, continuous, inverse, product, turned, twist
+from flowborne.motion.quaternions import about, angle, continuous, inverse, product, rotated, twist
 from flowborne.phrases import suggestion
 from flowborne.solids import geoms
 from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
@@ -28,21 +28,21 @@ Integers = NDArray[np.int64]
 
 UP = np.array([0.0, 0.0, 1.0])
 
-CLOSED = 1e-4
-"""Largest difference between the ends of a clip that is one whole cycle, rad or m."""
+MAX_CYCLE_MISMATCH = 1e-4
+"""Largest difference between the ends of a clip that counts as one whole cycle, rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Layout of a row of numbers: quaternions, then positions of free joints, then scalars.
+    """Layout of a row of joint positions: quaternions, positions of free joints, then scalars.
 
     The scalars are angles of hinges and displacements of slides.
 
-    names     of the joints, as the model numbers them
+    names     of the joints, in the model's order
     owners    index in `names` of the joint of each quaternion, position and scalar
     balls     number of quaternions
-    free      quaternions that belong to free joints, in the order of the positions
-    q         (m,) column of each entry of q of those joints, in MuJoCo's order
+    free      indices of the quaternions of free joints, in the order of the positions
+    q         (m,) column of each entry of q of these joints, in MuJoCo's order
     v         (k,) column of each entry of v in a row of velocities: 3 per quaternion, then
               positions and scalars
     dofs      (k,) ascending
@@ -60,21 +60,21 @@ class Columns:
         """(..., balls, 4) view of the quaternions of rows."""
         return rows[..., : 4 * self.balls].reshape(*rows.shape[:-1], self.balls, 4)
 
-    def places(self, rows: Array) -> Array:
+    def positions(self, rows: Array) -> Array:
         """(..., free, 3) view of the positions in rows."""
         first, count = 4 * self.balls, len(self.free)
         return rows[..., first : first + 3 * count].reshape(*rows.shape[:-1], count, 3)
 
-    def angles(self, rows: Array) -> Array:
+    def scalars(self, rows: Array) -> Array:
         """(..., scalars) view of the scalars in rows."""
         return rows[..., 4 * self.balls + 3 * len(self.free) :]
 
     def moved(self, rows: Array, turn: Array, shift: Array) -> Array:
-        """Rows after a rotation (4,) of free joints about the world origin and a shift (..., 3)."""
+        """Rows with free joints rotated (4,) about the world origin, then shifted (..., 3)."""
         result = rows.copy()
-        here = self.quaternions(result)
-        here[..., self.free, :] = product(turn, here[..., self.free, :])
-        self.places(result)[...] = turned(turn, self.places(rows)) + shift
+        quaternions = self.quaternions(result)
+        quaternions[..., self.free, :] = product(turn, quaternions[..., self.free, :])
+        self.positions(result)[...] = rotated(turn, self.positions(rows)) + shift
         return result
 
 
@@ -83,14 +83,14 @@ def curves_of(
 ) -> tuple[Columns, Array]:
     """Rows of joint positions, one per frame; quaternions and angles are continuous.
 
-    mapping  model joint -> clip joint; it may name joints that the model lacks
+    mapping  model joint -> clip joint; joints that the model lacks are ignored
     joints   model joints that follow the clip
     returns  the layout, and (frames, columns) rows
     raises   SceneError when a joint cannot follow
     """
-    followed = _sorted(model, mapping, joints)
+    followed = _numbers(model, mapping, joints)
     bodies = _mapped_bodies(model, clip, mapping)
-    places, rotations = clip.places()
+    places, rotations = clip.poses()
     rest = Rotation.from_matrix(geoms.rest_poses(model.mj)[1]).as_quat(scalar_first=True)
     quaternions, positions, angles = [], [], []
     for joint in followed:
@@ -121,20 +121,22 @@ def row_of(columns: Columns, q: Array) -> Array:
     return row
 
 
-def _sorted(model: SolidModel, mapping: Mapping[str, str], joints: Sequence[str]) -> list[int]:
-    """Numbers of the joints that follow."""
+def _numbers(model: SolidModel, mapping: Mapping[str, str], joints: Sequence[str]) -> list[int]:
+    """Numbers of the joints that follow the clip, checked."""
     for name in joints:
         if name not in model.joint_names:
             end = suggestion(name, model.joint_names, "Its joints are")
             raise SceneError(f"joint '{name}' is not in the model{end}")
         if name not in mapping:
             raise SceneError(
-                f"joint '{name}' is to follow the clip and is mapped to none of its joints. "
+                f"joint '{name}' follows the clip, but is not mapped to one of its joints. "
                 "Map it, or leave it out."
             )
         kind = int(model.mj.jnt_type[model.joint(name)])
         if kind not in (FREE, BALL, HINGE):
-            raise SceneError(f"joint '{name}' slides, and a clip only turns bones. Leave it out.")
+            raise SceneError(
+                f"joint '{name}' is a slide, but a clip only rotates bones. Leave it out."
+            )
     return sorted({model.joint(name) for name in joints})
 
 
@@ -148,7 +150,7 @@ def _mapped_bodies(model: SolidModel, clip: Clip, mapping: Mapping[str, str]) ->
         body = int(model.mj.jnt_bodyid[model.joint(name)])
         if body in names:
             raise SceneError(
-                f"joints '{names[body]}' and '{name}' are of one body. Map one of them: "
+                f"joints '{names[body]}' and '{name}' belong to one body. Map one of them: "
                 "a ball joint takes the whole rotation."
             )
         names[body] = name
@@ -157,7 +159,7 @@ def _mapped_bodies(model: SolidModel, clip: Clip, mapping: Mapping[str, str]) ->
 
 
 def _ancestor(model: SolidModel, bodies: Mapping[int, int], body: int) -> int | None:
-    """Clip joint of the nearest mapped body above."""
+    """Number of the clip joint of the nearest mapped ancestor of a body."""
     while body > 0:
         body = int(model.mj.body_parentid[body])
         if body in bodies:
@@ -201,18 +203,18 @@ def columns_of(model: SolidModel, joints: Sequence[int]) -> Columns:
 class Stride:
     """The motion from one cycle to the next: a rotation about the vertical and a level shift.
 
-    The height is not part of it: over many cycles on level ground, the smallest difference between
-    the ends of the clip would lift or sink the feet.
+    It leaves the height unchanged: over many cycles on level ground, a small height difference
+    between the ends of the clip would lift or sink the feet.
 
     turn   rad
-    shift  m, x + iy, after the rotation about the world origin
+    shift  m, the horizontal vector x + iy, applied after the rotation about the world origin
     """
 
     turn: float = 0.0
     shift: complex = 0.0j
 
-    def times(self, cycles: int) -> tuple[Array, Array]:
-        """(4,) rotation and (3,) shift of this many strides; negative numbers go back."""
+    def repeated(self, cycles: int) -> tuple[Array, Array]:
+        """(4,) rotation and (3,) shift, m, of `cycles` strides; negative numbers go backward."""
         if abs(np.sin(self.turn / 2.0)) < 1e-12:
             total = self.shift * cycles
         else:
@@ -223,22 +225,24 @@ class Stride:
 
 
 def stride_between(columns: Columns, begin: Array, end: Array) -> Stride:
-    """Stride that brings the first free joint of a row closest to another row."""
+    """The stride that moves the first free joint of row `begin` closest to row `end`."""
     if not len(columns.free):
         return Stride()
     first = columns.free[0]
-    last, before = columns.quaternions(end)[first], columns.quaternions(begin)[first]
-    turn = float(twist(product(last, inverse(before)), UP))
-    shift = columns.places(end)[0] - turned(about(UP, np.array(turn)), columns.places(begin)[0])
+    last, initial = columns.quaternions(end)[first], columns.quaternions(begin)[first]
+    turn = float(twist(product(last, inverse(initial)), UP))
+    shift = columns.positions(end)[0] - rotated(
+        about(UP, np.array(turn)), columns.positions(begin)[0]
+    )
     return Stride(turn, complex(shift[0], shift[1]))
 
 
 def mismatch(columns: Columns, begin: Array, end: Array, stride: Stride) -> tuple[float, str]:
-    """Largest difference, rad or m, between a row and another one after a stride; its joint."""
-    moved = columns.moved(begin, *stride.times(1))
-    turns = angle(product(inverse(columns.quaternions(moved)), columns.quaternions(end)))
-    off = np.abs(columns.places(end) - columns.places(moved)).max(axis=-1)
-    hinges = np.abs(columns.angles(end) - columns.angles(moved))
-    differences = np.concatenate([turns, off, hinges])
+    """Largest difference, rad or m, of row `end` from row `begin` after a stride, and its joint."""
+    moved = columns.moved(begin, *stride.repeated(1))
+    angles = angle(product(inverse(columns.quaternions(moved)), columns.quaternions(end)))
+    distances = np.abs(columns.positions(end) - columns.positions(moved)).max(axis=-1)
+    scalars = np.abs(columns.scalars(end) - columns.scalars(moved))
+    differences = np.concatenate([angles, distances, scalars])
     worst = int(np.argmax(differences))
     return float(differences[worst]), columns.names[columns.owners[worst]]

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import (
-    CLOSED,
+    MAX_CYCLE_MISMATCH,
     UP,
     Columns,
     Stride,
@@ -27,34 +27,37 @@ from flowborne.solids.model import SolidModel
 
 Array = NDArray[np.float64]
 
-MOST_SPEED_RATIO = 5.0
+MAX_SEAM_SPEED_RATIO = 5.0
 """Largest speed of a joint in the seam of a loop, relative to the rest of the loop."""
 
 BLEND_MARGIN = 1.2
-"""Proposed blend over the blend at which this ratio is reached."""
+"""Proposed blend, relative to the blend at which this ratio is reached."""
 
-LEAST_SPEED = 1.0
-"""Least reference speed of a joint, rad/s or m/s, for joints that hardly move."""
+MIN_REFERENCE_SPEED = 1.0
+"""Smallest reference speed, rad/s or m/s, for joints that hardly move."""
 
-SHORTEST = 0.5
-"""Least duration of a proposed loop, s."""
+MIN_LOOP_DURATION = 0.5
+"""Smallest duration of a proposed loop, s."""
 
-TIMES = 240
-"""Times at which speeds are evaluated, in a cycle and in its seam each."""
+SPEED_SAMPLES = 240
+"""Number of times at which speeds are evaluated, in a cycle and in its seam each."""
+
+MIN_FILTER_PERIODS = 0.1
+"""Smallest duration of a clip, in periods of the low-pass cut-off."""
 
 
 @dataclass(frozen=True)
 class Passage:
-    """The part of a clip to follow, and how.
+    """The part of a clip to follow, with its loop, blend and filter.
 
     start, stop  s of the clip; None is its end
-    loop         start again at the end, from the position and heading reached
+    loop         whether to start again at the end, from the position and heading reached
     blend        s, at most half the time from start to stop; see TrajectoryClip. A clip that ends
-                 as it begins is a loop without changes, any other is joined over `blend`
+                 as it begins loops unchanged, any other is joined over `blend`
     smooth       Hz at which a low-pass halves the power (a Butterworth filter of second order,
-                 forward and backward, so that there is no lag), or None
+                 forward and backward for zero lag), or None
     source       Winter 2009, Biomechanics and Motor Control of Human Movement, section 3.4.4.2
-                 (what the cut-off of one pass is for two)
+                 (cut-off of one pass from that of both)
     """
 
     start: float = 0.0
@@ -64,24 +67,25 @@ class Passage:
     smooth: float | None = None
 
 
-WHOLE = Passage()
-"""All of a clip, once."""
+WHOLE_CLIP = Passage()
+"""The whole clip, once."""
 
 
 def trajectory_of_clip(
     model: SolidModel,
     clip: Clip,
     mapping: Mapping[str, str],
-    passage: Passage = WHOLE,
+    passage: Passage = WHOLE_CLIP,
     *,
     joints: Sequence[str] | None = None,
     initial: Array | None = None,
 ) -> TrajectoryClip:
     """Motion of a model's joints along a clip.
 
-    mapping  model joint -> clip joint; names that the model lacks are ignored
+    mapping  model joint -> clip joint; joints that the model lacks are ignored
     joints   model joints that follow the clip; all mapped ones by default
-    initial  (nq,) pose before the start, moved to the start of the clip; the rest pose by default
+    initial  (nq,) pose before the start, moved to the clip's first position and heading; the rest
+             pose by default
     raises   SceneError when an argument does not fit the clip or the model
     """
     start, blend = passage.start, passage.blend
@@ -104,8 +108,8 @@ def trajectory_of_clip(
     if passage.loop and stride is None:
         stride = _joined(columns, spline, start, length, overlap)
     pose = model.rest().q if initial is None else initial
-    places = np.concatenate([model.positions_of(name) for name in columns.names])
-    before = _put(columns, row_of(columns, pose[places]), spline(start))
+    entries = np.concatenate([model.positions_of(name) for name in columns.names])
+    before = _moved_to_start(columns, row_of(columns, pose[entries]), spline(start))
     motion = TrajectoryClip(
         columns.dofs, columns, spline, start, length, blend, before, stride, overlap
     )
@@ -117,7 +121,7 @@ def trajectory_of_clip(
 def _check_times(clip: Clip, start: float, stop: float, blend: float) -> None:
     if not 0.0 <= start < stop <= clip.duration * (1.0 + 1e-9):
         raise SceneError(
-            f"it lasts {clip.duration:g} s, and is to go from {start:g} s to {stop:g} s. "
+            f"it lasts {clip.duration:g} s, but start is {start:g} s and stop {stop:g} s. "
             "Give a start before a stop within the clip."
         )
     if blend > (stop - start) / 2.0:
@@ -133,18 +137,22 @@ def _whole_cycle(columns: Columns, rows: Array, first: float, last: float) -> St
     if max(abs(first - begin), abs(last - end)) > 1e-6:
         return None
     stride = stride_between(columns, rows[begin], rows[end])
-    return stride if mismatch(columns, rows[begin], rows[end], stride)[0] < CLOSED else None
+    return (
+        stride
+        if mismatch(columns, rows[begin], rows[end], stride)[0] < MAX_CYCLE_MISMATCH
+        else None
+    )
 
 
 def _repeated(
     columns: Columns, rows: Array, frame_time: float, span: tuple[float, float], stride: Stride
 ) -> tuple[Array, Array]:
-    """Times and rows of three cycles in a row, so that the ends of the middle one are smooth."""
+    """Times and rows of three successive cycles, which make the ends of the middle one smooth."""
     begin, end = round(span[0] / frame_time), round(span[1] / frame_time)
     cycle = rows[begin:end]
     repeated = np.concatenate(
-        [columns.moved(cycle, *stride.times(n)) for n in (-1, 0, 1)]
-        + [columns.moved(cycle[:1], *stride.times(2))]
+        [columns.moved(cycle, *stride.repeated(n)) for n in (-1, 0, 1)]
+        + [columns.moved(cycle[:1], *stride.repeated(2))]
     )
     quaternions = columns.quaternions(repeated)
     quaternions[...] = continuous(quaternions)
@@ -155,7 +163,7 @@ def _repeated(
 def _joined(
     columns: Columns, spline: CubicSpline, start: float, length: float, overlap: float
 ) -> Stride:
-    """Stride of a loop with cross-faded ends, exact in the middle of the fade."""
+    """Stride of a loop with cross-blended ends, exact in the middle of the fade."""
     begin, end = spline(start + overlap / 2.0), spline(start + length + overlap / 2.0)
     for row in (begin, end):
         normalise(columns, row, np.zeros_like(row))
@@ -163,73 +171,72 @@ def _joined(
     if overlap == 0.0:
         size, joint = mismatch(columns, begin, end, stride)
         raise SceneError(
-            f"it is to loop without a blend, and joint '{joint}' ends {size:.3g} rad or m "
+            f"it loops without a blend, but joint '{joint}' ends {size:.3g} rad or m "
             "from where it begins. Give a blend, or start and stop one whole cycle apart."
         )
     return stride
 
 
-SHORTEST_IN_PERIODS = 0.1
-"""Least duration of a clip, in periods of the low-pass."""
-
-
 def _smoothed(rows: Array, frame_time: float, cut_off: float) -> Array:
-    """Rows after a low-pass of zero lag; `cut_off` (Hz) is that of both passes together."""
+    """Rows after a zero-lag low-pass; `cut_off` (Hz) is that of both passes together."""
     one_pass = cut_off / (np.sqrt(2.0) - 1.0) ** 0.25
     if not 0.0 < one_pass < 0.5 / frame_time:
         most = 0.5 / frame_time * (np.sqrt(2.0) - 1.0) ** 0.25
         raise SceneError(
-            f"smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the most for a clip "
-            f"of {1.0 / frame_time:.4g} frames a second. Leave it out or lower it."
+            f"smooth {cut_off:g} Hz is not between 0 and {most:.3g} Hz, the maximum for a clip "
+            f"of {1.0 / frame_time:.4g} frames per second. Leave it out or lower it."
         )
-    if cut_off * len(rows) * frame_time < SHORTEST_IN_PERIODS:
+    if cut_off * len(rows) * frame_time < MIN_FILTER_PERIODS:
         raise SceneError(
-            f"smooth {cut_off:g} Hz keeps nothing of a clip of {len(rows) * frame_time:.3g} s. "
+            f"smooth {cut_off:g} Hz removes all motion from {len(rows) * frame_time:.3g} s. "
             "Leave it out or raise it."
         )
-    from scipy.signal import butter, sosfiltfilt  # a fifth of a second that most scenes save
+    from scipy.signal import (
+        butter,
+        sosfiltfilt,
+    )  # takes a fifth of a second, and few scenes need it
 
     filters = butter(2, one_pass, fs=1.0 / frame_time, output="sos")
     edge = min(len(rows) - 1, int(np.ceil(1.0 / (one_pass * frame_time))))
     return np.asarray(sosfiltfilt(filters, rows, axis=0, padlen=edge))
 
 
-def _put(columns: Columns, pose: Array, first: Array) -> Array:
+def _moved_to_start(columns: Columns, pose: Array, first: Array) -> Array:
     """A pose with the positions and headings of its free joints from the first row of a clip."""
     result = pose.copy()
-    columns.places(result)[...] = columns.places(first)
-    here, there = columns.quaternions(result), columns.quaternions(first)
+    columns.positions(result)[...] = columns.positions(first)
+    own, target = columns.quaternions(result), columns.quaternions(first)
     for ball in columns.free:
-        heading = twist(product(there[ball], inverse(here[ball])), UP)
-        here[ball] = product(about(UP, heading), here[ball])
+        heading = twist(product(target[ball], inverse(own[ball])), UP)
+        own[ball] = product(about(UP, heading), own[ball])
     return result
 
 
 def check_seam(motion: TrajectoryClip) -> None:
-    """Raise SceneError when different ends are joined in so short a time that joints jump.
+    """Raise SceneError when the cross-fade between different ends makes a joint too fast.
 
     The cross-fade adds a speed: the difference of the ends over its duration.
 
     motion  a loop with an overlap
     """
-    within = np.linspace(motion.overlap, motion.length, TIMES)
-    seam = motion.length + np.linspace(0.0, motion.overlap, TIMES)
+    within = np.linspace(motion.overlap, motion.length, SPEED_SAMPLES)
+    seam = motion.length + np.linspace(0.0, motion.overlap, SPEED_SAMPLES)
     own, joined = _speeds(motion, motion.length + within), _speeds(motion, seam)
-    ratio = joined / np.maximum(own, LEAST_SPEED)
+    ratio = joined / np.maximum(own, MIN_REFERENCE_SPEED)
     worst = int(ratio.argmax())
-    if ratio[worst] <= MOST_SPEED_RATIO:
+    if ratio[worst] <= MAX_SEAM_SPEED_RATIO:
         return
     joint = _joint(motion.columns, worst)
-    longer, remedies = BLEND_MARGIN * motion.overlap * ratio[worst] / MOST_SPEED_RATIO, []
+    longer, remedies = BLEND_MARGIN * motion.overlap * ratio[worst] / MAX_SEAM_SPEED_RATIO, []
     if longer < 0.5 * (motion.length + motion.overlap):
         remedies.append(f"make blend {longer:.2g} s or longer")
     better = _best_stop(motion)
     if better is not None:
-        remedies.append(f"set stop = {better:.3g}, where the clip is most as it begins")
+        remedies.append(f"set stop = {better:.3g}, where the clip is closest to its beginning")
     remedy = ", or ".join(remedies) or "take a longer part of it"
     raise SceneError(
-        f"where it begins again, joint '{joint}' moves {ratio[worst]:.2g} times as fast as "
-        f"anywhere else in it, as a blend of {motion.overlap:g} s joins ends that differ. "
+        f"where it starts again, joint '{joint}' moves {ratio[worst]:.2g} times as fast as "
+        f"anywhere else, because a blend of {motion.overlap:g} s joins different ends. "
         f"{remedy[0].upper()}{remedy[1:]}."
     )
 
@@ -247,7 +254,7 @@ def _speeds(motion: TrajectoryClip, times: Array) -> Array:
 
 
 def _best_stop(motion: TrajectoryClip) -> float | None:
-    """The stop of the clip, s, for which the ends are most alike; None for too short clips."""
+    """The stop of the clip, s, with the smallest difference of the ends; None for short clips."""
     columns, half = motion.columns, 0.5 * motion.overlap
     last = motion.start + motion.length + motion.overlap
 
@@ -257,7 +264,7 @@ def _best_stop(motion: TrajectoryClip) -> float | None:
         return found
 
     begin = row(motion.start + half)
-    times = np.arange(motion.start + SHORTEST + motion.overlap, last, 1.0 / 60.0)
+    times = np.arange(motion.start + MIN_LOOP_DURATION + motion.overlap, last, 1.0 / 60.0)
     ends = [row(time - half) for time in times]
-    off = [mismatch(columns, begin, end, stride_between(columns, begin, end))[0] for end in ends]
-    return float(times[int(np.argmin(off))]) if off else None
+    sizes = [mismatch(columns, begin, end, stride_between(columns, begin, end))[0] for end in ends]
+    return float(times[int(np.argmin(sizes))]) if sizes else None

@@ -1,4 +1,4 @@
-"""The motion of a clip as a prescribed motion of many joints (`coupling.motion.Trajectory`)."""
+"""A clip as the prescribed motion of many joints (`coupling.motion.Trajectory`)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Integers = NDArray[np.int64]
 Rows = tuple[Array, Array]
 """A row of joint positions (see Columns), unit quaternions, and its derivative."""
 
-MOST_CACHED = 64
-"""Most times with cached positions and velocities."""
+MAX_CACHED_TIMES = 64
+"""Number of times for which positions and velocities are cached."""
 
 
 @dataclass(eq=False)
@@ -33,9 +33,9 @@ class TrajectoryClip:
 
     dofs      (k,) all dofs of the joints, ascending
     columns   layout of the rows
-    spline    row of joint positions over the clip's time, s; quaternions not of unit length
+    spline    row of joint positions over the clip's time, s; its quaternions are not normalised
     start     s of the clip at time 0
-    length    s of the clip until it ends or a cycle is over
+    length    s of the clip until its end, or the end of a cycle
     blend     s
     initial   (columns,) row of the pose before the start
     stride    from cycle to cycle; None when the clip does not loop
@@ -76,17 +76,17 @@ class TrajectoryClip:
             known = row[self.columns.q], flat[self.columns.v]
             for values in known:
                 values.setflags(write=False)
-            if len(self._known) >= MOST_CACHED:
+            if len(self._known) >= MAX_CACHED_TIMES:
                 self._known.clear()
             self._known[time] = known
         return known
 
     def _at(self, time: float) -> Rows:
         row, rate = self._running(max(time, 0.0))
-        if time < self.blend:
+        if max(time, 0.0) < self.blend:
             share, slope = smooth_step(time / self.blend)
             still = self.initial, np.zeros_like(rate)
-            row, rate = faded(self.columns, still, (row, rate), share, slope / self.blend)
+            row, rate = blended(self.columns, still, (row, rate), share, slope / self.blend)
         return row, rate if time >= 0.0 else np.zeros_like(rate)
 
     def _running(self, time: float) -> Rows:
@@ -98,30 +98,31 @@ class TrajectoryClip:
         cycle, within = divmod(time, self.length)
         row, rate = self._clip(within)
         if cycle > 0 and within < self.overlap:
-            old = self._strode(self._clip(within + self.length), stride, -1)
+            old = self._moved(self._clip(within + self.length), stride, -1)
             share, slope = smooth_step(within / self.overlap)
-            row, rate = faded(self.columns, old, (row, rate), share, slope / self.overlap)
-        return self._strode((row, rate), stride, int(cycle))
+            row, rate = blended(self.columns, old, (row, rate), share, slope / self.overlap)
+        return self._moved((row, rate), stride, int(cycle))
 
-    def _strode(self, rows: Rows, stride: Stride, cycles: int) -> Rows:
-        turn, shift = stride.times(cycles)
+    def _moved(self, rows: Rows, stride: Stride, cycles: int) -> Rows:
+        """Rows after a number of strides."""
+        turn, shift = stride.repeated(cycles)
         shifts = np.stack([shift, np.zeros(3)])[:, None]
         row, rate = self.columns.moved(np.stack(rows), turn, shifts)
         return row, rate
 
     def _slowed(self, time: float) -> tuple[float, float]:
-        """Time of the clip since its start, and its rate."""
+        """Time of the clip since its start, and its rate: 1, then smoothly to 0 at the end."""
         brake = self.length - self.blend / 2.0
         if time <= brake and time < self.length:
             return time, 1.0
         if time >= brake + self.blend:
             return self.length, 0.0
         u = (time - brake) / self.blend
-        gone = u - u**4 * (u * (u - 3.0) + 2.5)
-        return brake + self.blend * gone, 1.0 - smooth_step(u)[0]
+        covered = u - u**4 * (u * (u - 3.0) + 2.5)
+        return brake + self.blend * covered, 1.0 - smooth_step(u)[0]
 
     def _clip(self, time: float) -> Rows:
-        """At a time since the start."""
+        """Row and derivative at a time (s) since the start of the trimmed clip."""
         row, rate = self.spline(self.start + time), self.spline(self.start + time, 1)
         normalise(self.columns, row, rate)
         return row, rate
@@ -129,7 +130,7 @@ class TrajectoryClip:
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryPart:
-    """Some joints of a clip; the positions of all joints are computed once for all parts.
+    """Some joints of a clip; the positions of all its joints are computed once for all parts.
 
     clip        motion of these joints and others
     dofs        (k,) all dofs of these, ascending
@@ -162,12 +163,12 @@ def smooth_step(u: float) -> tuple[float, float]:
     return u**3 * (u * (6.0 * u - 15.0) + 10.0), 30.0 * (u * (1.0 - u)) ** 2
 
 
-def faded(columns: Columns, old: Rows, new: Rows, share: float, slope: float) -> Rows:
-    """Blend from one motion to another with a `share` that grows by `slope` (1/s)."""
+def blended(columns: Columns, old: Rows, new: Rows, share: float, slope: float) -> Rows:
+    """Blend of two motions with weight `share` of the new one, which grows by `slope` (1/s)."""
     row, rate = new[0].copy(), new[1].copy()
-    across = np.sum(columns.quaternions(old[0]) * columns.quaternions(row), axis=-1) < 0.0
-    columns.quaternions(row)[across] *= -1.0
-    columns.quaternions(rate)[across] *= -1.0
+    opposite = np.sum(columns.quaternions(old[0]) * columns.quaternions(row), axis=-1) < 0.0
+    columns.quaternions(row)[opposite] *= -1.0
+    columns.quaternions(rate)[opposite] *= -1.0
     rate = old[1] + share * (rate - old[1]) + slope * (row - old[0])
     row = old[0] + share * (row - old[0])
     normalise(columns, row, rate)
@@ -175,7 +176,7 @@ def faded(columns: Columns, old: Rows, new: Rows, share: float, slope: float) ->
 
 
 def normalise(columns: Columns, row: Array, rate: Array) -> None:
-    """Normalise quaternions, and adapt their rates, in place."""
+    """Normalise the quaternions of a row, and project their rates accordingly, in place."""
     q, dq = columns.quaternions(row), columns.quaternions(rate)
     size = np.sqrt(np.sum(q * q, axis=-1, keepdims=True))
     q /= size

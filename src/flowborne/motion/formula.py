@@ -1,7 +1,7 @@
 """Formulas of a scene in the time t, with their exact derivative.
 
-A formula is written as in Python and never run as Python: its syntax tree may contain only numbers,
-names, arithmetic and calls of a few functions. It is evaluated in dual numbers.
+A formula has Python syntax but is never executed as Python: its syntax tree may contain only
+numbers, names, arithmetic and calls of a few functions. It is evaluated in dual numbers.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from flowborne.phrases import suggestion
 
 @dataclass(frozen=True)
 class Dual:
-    """value + slope e with e^2 = 0: a number and its derivative by time.
+    """A dual number value + slope e with e^2 = 0: a number and its time derivative.
 
-    At a kink (`absolute`, `least`, `most`) the slope is the one-sided derivative for later times.
+    At a kink (`absolute`, `minimum`, `maximum`) the slope is the one-sided derivative for later
+    times.
     """
 
     value: float
@@ -61,22 +62,11 @@ class Dual:
         return Dual(power, slope)
 
 
-def sine(x: Dual) -> Dual:
-    return Dual(math.sin(x.value), math.cos(x.value) * x.slope)
-
-
-def cosine(x: Dual) -> Dual:
-    return Dual(math.cos(x.value), -math.sin(x.value) * x.slope)
-
-
-def tangent(x: Dual) -> Dual:
-    value = math.tan(x.value)
-    return Dual(value, (1.0 + value**2) * x.slope)
-
-
-def exponential(x: Dual) -> Dual:
-    value = math.exp(x.value)
-    return Dual(value, value * x.slope)
+def elementary(
+    function: Callable[[float], float], derivative: Callable[[float], float]
+) -> Callable[[Dual], Dual]:
+    """A function of one number for dual numbers, by the chain rule."""
+    return lambda x: Dual(function(x.value), derivative(x.value) * x.slope)
 
 
 def logarithm(x: Dual) -> Dual:
@@ -88,31 +78,26 @@ def square_root(x: Dual) -> Dual:
     return Dual(value, 0.5 * x.slope / value if x.slope else 0.0)
 
 
-def hyperbolic_tangent(x: Dual) -> Dual:
-    value = math.tanh(x.value)
-    return Dual(value, (1.0 - value**2) * x.slope)
-
-
 def absolute(x: Dual) -> Dual:
-    return most(x, -x)
+    return maximum(x, -x)
 
 
-def least(*given: Dual) -> Dual:
-    return min(given, key=_shortly_after)
+def minimum(*numbers: Dual) -> Dual:
+    return min(numbers, key=_at_later_time)
 
 
-def most(*given: Dual) -> Dual:
-    return max(given, key=_shortly_after)
+def maximum(*numbers: Dual) -> Dual:
+    return max(numbers, key=_at_later_time)
 
 
-def _shortly_after(x: Dual) -> tuple[float, float]:
-    """Sort key: the order of numbers a short time later."""
+def _at_later_time(x: Dual) -> tuple[float, float]:
+    """Sort key: by value, and equal values by their slope, which orders them later."""
     return x.value, x.slope
 
 
 def ramp(x: Dual, length: Dual = Dual(1.0)) -> Dual:
     """Smooth step 3 s^2 - 2 s^3 with s = x / length from 0 to 1."""
-    s = least(most(x / length, Dual(0.0)), Dual(1.0))
+    s = minimum(maximum(x / length, Dual(0.0)), Dual(1.0))
     return s * s * (Dual(3.0) - Dual(2.0) * s)
 
 
@@ -131,25 +116,25 @@ SIGNS: Mapping[type[ast.unaryop], Callable[[Dual], Dual]] = {
 }
 
 FUNCTIONS: Mapping[str, tuple[Callable[..., Dual], int, float]] = {
-    "sin": (sine, 1, 1),
-    "cos": (cosine, 1, 1),
-    "tan": (tangent, 1, 1),
-    "exp": (exponential, 1, 1),
+    "sin": (elementary(math.sin, math.cos), 1, 1),
+    "cos": (elementary(math.cos, lambda x: -math.sin(x)), 1, 1),
+    "tan": (elementary(math.tan, lambda x: 1.0 + math.tan(x) ** 2), 1, 1),
+    "exp": (elementary(math.exp, math.exp), 1, 1),
     "log": (logarithm, 1, 1),
     "sqrt": (square_root, 1, 1),
-    "tanh": (hyperbolic_tangent, 1, 1),
+    "tanh": (elementary(math.tanh, lambda x: 1.0 - math.tanh(x) ** 2), 1, 1),
     "abs": (absolute, 1, 1),
-    "min": (least, 2, math.inf),
-    "max": (most, 2, math.inf),
+    "min": (minimum, 2, math.inf),
+    "max": (maximum, 2, math.inf),
     "ramp": (ramp, 1, 2),
 }
-"""Name -> function, fewest and most arguments. Angles of sin, cos and tan are in radians."""
+"""Name -> function, minimum and maximum number of arguments. Angles are in radians."""
 
 RESERVED = ("t", "pi", *FUNCTIONS)
-"""Names that a constant must not have."""
+"""Names that are not allowed for constants."""
 
-MOST_LETTERS = 80
-"""Letters of a formula in a message."""
+MAX_SHOWN = 80
+"""Largest number of characters of a formula in a message."""
 
 GRAMMAR = (
     "A formula has numbers, t, pi, constants, + - * / % ** and the functions "
@@ -179,29 +164,29 @@ class Formula:
             raise SceneError(f"{self} cannot be read. {GRAMMAR}") from None
         except (RecursionError, MemoryError, OverflowError):
             raise SceneError(
-                f"{self} is too deep, or has too large a number. Simplify it."
+                f"{self} is nested too deep, or has too large a number. Simplify it."
             ) from None
         object.__setattr__(self, "_tree", tree)
 
     def __str__(self) -> str:
-        return f"formula '{shorten(self.text, MOST_LETTERS)}'"
+        return f"formula '{shorten(self.text, MAX_SHOWN)}'"
 
     def names(self) -> set[str]:
-        """Constants that it uses."""
-        found = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
-        return found - set(RESERVED)
+        """Names of the constants in the formula."""
+        names = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
+        return names - set(RESERVED)
 
     def at(self, time: float) -> Dual:
-        """Value and derivative at `time` (s). Raises ArithmeticError where one is not finite."""
+        """Value and derivative at `time` (s). Raises ArithmeticError if one is not finite."""
         known = {name: Dual(value) for name, value in self.constants.items()}
         known |= {"t": Dual(time, 1.0), "pi": Dual(math.pi)}
         try:
-            found = _value(self._tree, known)
+            result = _value(self._tree, known)
         except (ArithmeticError, ValueError):
-            found = Dual(math.nan)
-        if not (math.isfinite(found.value) and math.isfinite(found.slope)):
+            result = Dual(math.nan)
+        if not (math.isfinite(result.value) and math.isfinite(result.slope)):
             raise ArithmeticError(f"{self} or its derivative is not finite at t = {time:g} s")
-        return found
+        return result
 
     def _check(self, node: ast.expr) -> None:
         """Raise SceneError for anything outside the grammar."""
@@ -219,7 +204,7 @@ class Formula:
             for argument in node.args:
                 self._check(argument)
         else:
-            raise SceneError(f"{self} cannot have '{ast.unparse(node)}'. {GRAMMAR}")
+            raise SceneError(f"{self} cannot contain '{ast.unparse(node)}'. {GRAMMAR}")
 
     def _check_name(self, name: str) -> None:
         if name in FUNCTIONS:
@@ -235,13 +220,12 @@ class Formula:
             raise SceneError(f"{self}: function '{name}' is not known{end}")
         _, fewest, most = FUNCTIONS[name]
         if not fewest <= count <= most:
-            wanted = f"{fewest}" if most == fewest else f"{fewest} or more"
-            wanted = f"{fewest} or {most:g}" if fewest < most < math.inf else wanted
-            raise SceneError(f"{self} gives '{name}' {count} arguments. Give it {wanted}.")
+            other = "" if most == fewest else " or more" if most == math.inf else f" or {most:g}"
+            raise SceneError(f"{self} gives '{name}' {count} arguments. Give it {fewest}{other}.")
 
 
 def _value(node: ast.expr, known: Mapping[str, Dual]) -> Dual:
-    """Value of a checked tree; `known` are its names."""
+    """Value of a checked tree; `known` holds the values of its names."""
     match node:
         case ast.BinOp():
             return OPERATORS[type(node.op)](_value(node.left, known), _value(node.right, known))

@@ -15,14 +15,14 @@ from flowborne.motion.tracks import Curve
 Array = NDArray[np.float64]
 
 Span = tuple[int, float, float]
-"""Axis, and the two ends of a side along it in m."""
+"""Axis, and the two ends of the side along it in m."""
 
 
 class Factor(Protocol):
     """The strength of an inflow or a mouth over time."""
 
     def at(self, time: float) -> float:
-        """Part of the full velocity at `time` (s)."""
+        """Factor of the full velocity at `time` (s)."""
         ...
 
 
@@ -87,36 +87,24 @@ class FactorFormula:
 
 
 @dataclass(frozen=True)
-class ProfileUniform:
-    """The same velocity (m/s) everywhere on the side, times a factor in time."""
+class InflowProfile:
+    """Velocity on a side: uniform, or with a parabola along each of some spans of the side.
 
-    velocity: tuple[float, float, float]
-    factor: Factor
+    A parabola is 0 at the ends of its span and leaves the mean velocity unchanged. Along one span
+    it is plane Poiseuille flow with 1.5 times the mean in the middle; along two it is the product
+    of two parabolas.
 
-    def __call__(self, x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
-        """(u, v, w) in m/s at places in m and a time in s."""
-        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
-        strength = self.factor.at(time)
-        u, v, w = (np.full(shape, strength * component) for component in self.velocity)
-        return u, v, w
-
-
-@dataclass(frozen=True)
-class ProfileParabolic:
-    """Parabola along each span of the side: 0 at its ends, mean velocity `velocity` (m/s).
-
-    Along one span it is plane Poiseuille flow with 1.5 times the mean in the middle; along two it
-    is the product of two parabolas.
+    velocity  m/s, mean over the side
+    factor    of the velocity, over time
     """
 
     velocity: tuple[float, float, float]
-    spans: tuple[Span, ...]
     factor: Factor
+    spans: tuple[Span, ...] = ()
 
     def __call__(self, x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
-        """(u, v, w) in m/s at places in m and a time in s."""
-        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
-        part = np.full(shape, self.factor.at(time))
+        """(u, v, w) in m/s at points in m and a time in s."""
+        part = np.full(np.broadcast(x, y, z).shape, self.factor.at(time))
         for axis, low, high in self.spans:
             s = ((x, y, z)[axis] - low) / (high - low)
             part = part * (6.0 * s * (1.0 - s))
@@ -128,9 +116,9 @@ class ProfileParabolic:
 class Bands:
     """Bands of dye on a side.
 
-    axis   across which the bands follow each other
+    axis   along which the bands alternate
     ends   (from, to) of each band in m
-    value  of the dye in a band; 0 beside it
+    value  of the dye in a band; 0 outside
     times  (start, stop) in s
     """
 
@@ -142,14 +130,13 @@ class Bands:
 
 @dataclass(frozen=True)
 class DyeBandsValue:
-    """Value of a dye that enters through a side: the largest of its bands'."""
+    """Value of a dye that enters through a side: the maximum over its bands."""
 
     groups: tuple[Bands, ...]
 
     def __call__(self, x: Array, y: Array, z: Array, time: float) -> Array:
-        """Value at places in m and a time in s."""
-        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
-        values = np.zeros(shape)
+        """Value at points in m and a time in s."""
+        values = np.zeros(np.broadcast(x, y, z).shape)
         for group in self.groups:
             if not group.times[0] <= time < group.times[1]:
                 continue
@@ -163,7 +150,7 @@ class DyeBandsValue:
 def even_bands(
     low: float, high: float, count: int, width: float
 ) -> tuple[tuple[float, float], ...]:
-    """(from, to) of `count` bands of one width, evenly spread between `low` and `high` (m)."""
+    """(from, to) of `count` bands of equal width, evenly spaced between `low` and `high` (m)."""
     pitch = (high - low) / count
     centres = (low + (index + 0.5) * pitch for index in range(count))
     return tuple((centre - 0.5 * width, centre + 0.5 * width) for centre in centres)

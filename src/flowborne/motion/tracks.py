@@ -1,4 +1,4 @@
-"""Prescribed motions of a joint, known for all time (`coupling.motion.Trajectory`)."""
+"""Prescribed motions of a joint as functions of time (`coupling.motion.Trajectory`)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SPEED_SAMPLES = 200
-"""Times of a run at which the speed of a motion is evaluated."""
+"""Number of times in a run at which the speed of a motion is evaluated."""
 
 
 @dataclass
@@ -72,13 +72,13 @@ class TrajectorySinusoid:
 class Curve:
     """Monotone C1 curve through keyframes; constant before the first and after the last.
 
-    Between two keyframes it never leaves the interval of their values, and it starts and ends at
-    rest, so that velocity is continuous for all time.
+    Between two keyframes it stays within their values. It starts and ends with slope 0, so that the
+    velocity is continuous for all time.
 
     times   (k,) s, increasing, k >= 2
     values  (k,)
-    source  Fritsch and Butland 1984 (scipy's PCHIP), on a table with a repeated first and last
-            value, which makes the end slopes 0
+    source  Fritsch and Butland 1984 (SciPy's PCHIP), on a table with the first and last value
+            repeated, which makes the end slopes 0
     """
 
     times: tuple[float, ...]
@@ -89,13 +89,13 @@ class Curve:
     def __post_init__(self) -> None:
         times, values = self.times, self.values
         before, after = times[0] - (times[1] - times[0]), times[-1] + (times[-1] - times[-2])
-        with np.errstate(over="ignore"):  # of 1 / slope: a slope of 1e-310 becomes 0, as it should
+        with np.errstate(over="ignore"):  # 1 / slope may overflow: the result is then 0
             curve = PchipInterpolator((before, *times, after), (values[0], *values, values[-1]))
         object.__setattr__(self, "_curve", curve)
         object.__setattr__(self, "_slope", curve.derivative())
 
     def value(self, time: float) -> float:
-        """Value at `time` (s); exactly the keyframe's own at a keyframe."""
+        """Value at `time` (s), exact at keyframes."""
         if time >= self.times[-1]:
             return self.values[-1]
         return float(self._curve(max(time, self.times[0])))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flowborne.errors import SceneError
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.clip_motion import TrajectoryClip
-from flowborne.motion.clip_reading import Capture, Reading, read_clip, with_still
+from flowborne.motion.clip_reading import Capture, Reading, read_clip, with_held_joints
 from flowborne.motion.human.body import ELBOWS, human_mjcf
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
@@ -41,7 +41,7 @@ def capture_of(scene: Scene) -> Capture | None:
         )
         named = _words(scene) if found.held else set()
         if still := tuple(joint for joint in found.held if joint in named):
-            found = with_still(found, still)
+            found = with_held_joints(found, still)
     return replace(found, clip=found.clip.placed(offset, heading))
 
 

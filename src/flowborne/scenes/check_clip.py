@@ -55,7 +55,7 @@ def _check_first_pose(draft: Draft, clip: Clip, table: ClipTable) -> Iterator[st
     begun = table.start > 0.5 * clip.frame_time or table.smooth is not None
     if begun or clip.frames < MANY:
         return
-    turns = clip.turns()
+    turns = clip.rotation_steps()
     first, later = turns[0], turns[1:]
     if first.max() > JUMP and first.sum() > JUMPS * later.sum(axis=1).max():
         joint = clip.names[int(first.argmax())]

@@ -16,7 +16,7 @@ from flowborne.motion.bvh import write_bvh, write_clip
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import UP
 from flowborne.motion.clip_reading import Capture
-from flowborne.motion.quaternions import inverse, product, turned
+from flowborne.motion.quaternions import inverse, product, rotated
 from flowborne.runs.run_folder import STATE_NAME, RunFolder
 from flowborne.runs.states import read_state
 from flowborne.scenes.bodies import load_model
@@ -109,7 +109,7 @@ def _unplaced(
     offset, start = np.array(scene.clip.offset), capture.clip.translation[0]
     half = 0.5 * np.radians(scene.clip.heading)
     back = np.array([np.cos(half), 0.0, 0.0, -np.sin(half)])
-    places = start - offset + turned(back, places - start)
+    places = start - offset + rotated(back, places - start)
     if capture.lift is not None:
         places = places - capture.lift[frames, None] * UP
     return places, product(back, rotations)

@@ -7,8 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.control.rules import RuleFixed
-from flowborne.motion.bvh import STILL
-from flowborne.motion.clip_reading import UPRIGHT, Capture, leg_length, named, standing_axis
+from flowborne.motion.bvh import MAX_BONE_STRETCH
+from flowborne.motion.clip_reading import (
+    MIN_STANDING_COSINE,
+    Capture,
+    leg_length,
+    standing_axis,
+    unit_text,
+)
 from flowborne.motion.human.clip_skeleton import lost_bones
 from flowborne.motion.human.skeleton import PARENTS
 from flowborne.phrases import listed
@@ -154,7 +160,7 @@ def clip_notes(scene: Scene) -> Iterator[str]:
     found = []
     if table.unit == "auto":
         legs = leg_length(capture.clip, capture.mapping)
-        found.append(f"unit = {named(capture.unit)}, which makes legs of {legs:.2f} m")
+        found.append(f"unit = {unit_text(capture.unit)}, which makes legs of {legs:.2f} m")
     if table.up == "auto" and capture.up != "y":
         found.append(f"up = '{capture.up}'")
     if found:
@@ -165,14 +171,17 @@ def clip_notes(scene: Scene) -> Iterator[str]:
     if links:
         yield f"[clip]: {table.file} has joints between the human's: {', '.join(links)}"
     stray, bone = max(
-        (capture.clip.strays.get(b, (0.0, 0))[0], b) for b in capture.mapping.values()
+        (capture.clip.deviations.get(b, (0.0, 0))[0], b) for b in capture.mapping.values()
     )
-    if stray > STILL:
+    if stray > MAX_BONE_STRETCH:
         yield (
             f"[clip]: bones of {table.file} stretch, that to '{bone}' by {2e3 * stray:.3g} mm; "
             "each has its middle length here"
         )
-    if capture.posture[2] < UPRIGHT and standing_axis(capture.posture, capture.up) is None:
+    if (
+        capture.posture[2] < MIN_STANDING_COSINE
+        and standing_axis(capture.posture, capture.up) is None
+    ):
         yield f"[clip]: the person of {table.file} lies rather than stands, whichever axis is up"
     yield from _inserted_bones(table.file, capture)
 

@@ -17,7 +17,7 @@ from flowborne.fluid.boundary import (
     BoundaryPeriodic,
 )
 from flowborne.fluid.grid import Array, Grid
-from flowborne.motion.inflow import FactorRamp, FactorSteady, ProfileParabolic, ProfileUniform
+from flowborne.motion.inflow import FactorRamp, FactorSteady, InflowProfile
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.factors import FactorsTable
 from flowborne.tables import ByKind, NotNegative, Places, Table, Vector, triple
@@ -97,11 +97,11 @@ class InflowSide(AnySideTable, FactorsTable):
     def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> BoundaryInflow:
         factor = self.keyframes() or (FactorRamp(self.ramp) if self.ramp > 0.0 else FactorSteady())
         if self.profile == "uniform":
-            return BoundaryInflow(ProfileUniform(triple(self.velocity), factor), dyes)
+            return BoundaryInflow(InflowProfile(triple(self.velocity), factor), dyes)
         spans = tuple(
             (axis, grid.origin[axis], grid.upper[axis]) for axis in grid.axes if axis != normal
         )
-        return BoundaryInflow(ProfileParabolic(triple(self.velocity), spans, factor), dyes)
+        return BoundaryInflow(InflowProfile(triple(self.velocity), factor, spans), dyes)
 
 
 BoundarySide = Annotated[ClosedSide | NoSlipSide | OpenSide | InflowSide | PeriodicSide, *ByKind]

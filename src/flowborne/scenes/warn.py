@@ -13,7 +13,7 @@ import numpy as np
 
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import HYPOTHETICAL, Setup
-from flowborne.motion.clip_reading import UPRIGHT, standing_axis
+from flowborne.motion.clip_reading import MIN_STANDING_COSINE, standing_axis
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.phrases import listed, rounded_up
 from flowborne.scenes.build import surroundings_of
@@ -119,7 +119,7 @@ def lying(scene: Scene, setup: Setup) -> Iterator[str]:
     if scene.clip is None or capture is None or capture.posture is None:
         return
     other = standing_axis(capture.posture, capture.up)
-    if capture.posture[2] < UPRIGHT and other is not None:
+    if capture.posture[2] < MIN_STANDING_COSINE and other is not None:
         yield (
             f"[clip]: with up = '{capture.up}' the person of {scene.clip.file} lies; "
             f"up = '{other}' makes it stand"

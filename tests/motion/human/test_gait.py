@@ -7,8 +7,8 @@ import pytest
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.clip_skeleton import skeleton_of
-from flowborne.motion.human.gait import CYCLE, NAMES, gait_clip, leg_turns
-from flowborne.motion.human.skeleton import standard_skeleton
+from flowborne.motion.human.gait import CYCLE, gait_clip, leg_turns
+from flowborne.motion.human.skeleton import JOINTS, standard_skeleton
 from flowborne.solids.model import SolidModel
 
 LANDMARKS = {
@@ -119,7 +119,7 @@ def test_loop_has_no_seam(clip):
 
 
 def test_left_side_is_half_a_cycle_later(hundred):
-    for joint in NAMES:
+    for joint in JOINTS:
         if joint.startswith("left_"):
             continue
         twin = joint.replace("right_", "left_")
@@ -201,7 +201,7 @@ def test_toes_bend_when_the_heel_lifts():
 
 def test_clip_carries_its_skeleton(clip):
     wanted = standard_skeleton()
-    found = skeleton_of(clip, {name: name for name in NAMES})
+    found = skeleton_of(clip, {name: name for name in JOINTS})
     shift = wanted["root"] - found["root"]
     for name in (*wanted.joints, *wanted.tips):
         np.testing.assert_allclose(found[name] + shift, wanted[name], atol=1e-12)
@@ -221,7 +221,7 @@ def test_a_cycle_lasts():
 
 def test_the_walk_goes_on_round_after_round(model, clip):
     """Played as a loop through a scene's motion, without a jump of place or velocity."""
-    motion = trajectory_of_clip(model, clip, {name: name for name in NAMES}, Passage(loop=True))
+    motion = trajectory_of_clip(model, clip, {name: name for name in JOINTS}, Passage(loop=True))
     stride = clip.translation[-1, 0] - clip.translation[0, 0]
     start = motion.position(0.0)
     np.testing.assert_allclose(motion.position(3.0 * CYCLE)[0] - start[0], 3.0 * stride, rtol=1e-9)

@@ -9,8 +9,8 @@ from flowborne.errors import SceneError
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.body import human_mjcf
-from flowborne.motion.human.clip_skeleton import NAMES, lost_bones, skeleton_of
-from flowborne.motion.human.skeleton import PARENTS, TIPS, Skeleton, standard_skeleton
+from flowborne.motion.human.clip_skeleton import lost_bones, skeleton_of
+from flowborne.motion.human.skeleton import JOINTS, PARENTS, TIPS, Skeleton, standard_skeleton
 from flowborne.motion.mapping import mapping_of
 from flowborne.solids.model import SolidModel
 
@@ -23,7 +23,7 @@ def distance(skeleton, start, end):
 
 def clip_of(skeleton, left_out=()):
     """A clip of one frame with the skeleton's bones, less some joints; names in capitals."""
-    kept = [name for name in NAMES if name not in left_out]
+    kept = [name for name in JOINTS if name not in left_out]
     parents, offsets = [], []
     for name in kept:
         above = PARENTS.get(name)
@@ -46,7 +46,7 @@ def clip_of(skeleton, left_out=()):
 def difference(skeleton, other):
     """Largest distance between two skeletons whose roots are put together."""
     shift = other["root"] - skeleton["root"]
-    return max(np.linalg.norm(skeleton[name] + shift - other[name]) for name in (*NAMES, *TIPS))
+    return max(np.linalg.norm(skeleton[name] + shift - other[name]) for name in (*JOINTS, *TIPS))
 
 
 @pytest.mark.parametrize("height", [1.2, 1.741, 2.0])
@@ -72,7 +72,7 @@ def test_standard_skeleton_has_de_levas_lengths(height):
 
 def test_standard_skeleton_is_its_own_mirror_image():
     skeleton = standard_skeleton()
-    for name in (*NAMES, *TIPS):
+    for name in (*JOINTS, *TIPS):
         twin = (
             name.replace("left_", "other_").replace("right_", "left_").replace("other_", "right_")
         )
@@ -96,7 +96,7 @@ def test_complete_clip_gives_its_own_bones():
         ("left_clavicle", "right_clavicle", "upper_neck"),
         ("left_toes", "right_toes"),
         ("head_top", "left_fingertip", "left_toe_tip"),
-        tuple(name for name in NAMES if not name.endswith(("root", "hip", "knee", "ankle"))),
+        tuple(name for name in JOINTS if not name.endswith(("root", "hip", "knee", "ankle"))),
     ],
 )
 def test_missing_joints_are_filled_in_by_the_standard(left_out):
@@ -150,30 +150,12 @@ def test_a_hand_has_the_forearms_proportion_wherever_the_clip_ends_it():
     assert difference(skeleton_of(cut, mapping), standard_skeleton()) < 1e-9
 
 
-def test_wrong_names_are_told_with_what_was_meant():
-    clip, mapping = clip_of(standard_skeleton())
-    mapping["left_elbo"] = "LEFT_WRIST"
-    mapping["left_knee"] = "LEFT_KNEES"
-    with pytest.raises(SceneError) as caught:
-        skeleton_of(clip, mapping)
-    first, second = sorted(caught.value.problems)
-    assert "mapping left_knee: the clip has no joint 'LEFT_KNEES'; did you mean" in first + second
-    assert "the human has no joint 'left_elbo'; did you mean 'left_elbow'" in first + second
-
-
-def test_missing_root_is_told():
-    clip, mapping = clip_of(standard_skeleton())
-    del mapping["root"]
-    with pytest.raises(SceneError, match="'root' is missing"):
-        skeleton_of(clip, mapping)
-
-
-def test_joints_at_one_place_are_told():
+def test_joints_at_one_point_are_refused():
     clip, mapping = clip_of(standard_skeleton())
     flat = Clip(
         clip.names, clip.parents, 0.0 * clip.offsets, {}, 0.01, clip.rotations, np.zeros((1, 3))
     )
-    with pytest.raises(SceneError, match="at one place"):
+    with pytest.raises(SceneError, match="at one point"):
         skeleton_of(flat, mapping)
 
 

@@ -11,7 +11,7 @@ import pytest
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
-from flowborne.motion.human.soles import STILL, UNEVEN, on_the_floor
+from flowborne.motion.human.soles import MAX_FLOOR_RANGE, STANDING_SPEED, with_soles_on_floor
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
 from flowborne.solids.dynamics import kinematics
@@ -38,7 +38,7 @@ def raised(clip: Clip, heights: np.ndarray) -> Clip:
 
 
 def put(clip: Clip) -> Clip:
-    return on_the_floor(clip, SAME, standard_skeleton(), MASS, "male")
+    return with_soles_on_floor(clip, SAME, standard_skeleton(), MASS, "male")
 
 
 @pytest.mark.parametrize("height", [0.0, -0.9, 3.0])
@@ -58,7 +58,7 @@ def test_a_floor_that_slopes_is_made_level() -> None:
 
 def test_stairs_stay_stairs() -> None:
     clip = several(4)
-    climb = 4.0 * UNEVEN * np.linspace(0.0, 1.0, clip.frames)
+    climb = 4.0 * MAX_FLOOR_RANGE * np.linspace(0.0, 1.0, clip.frames)
     back = put(raised(clip, climb))
     np.testing.assert_allclose(
         np.diff(back.translation[:, 2] - clip.translation[:, 2] - climb), 0.0, atol=1e-12
@@ -67,7 +67,7 @@ def test_stairs_stay_stairs() -> None:
 
 def test_who_never_stands_is_left_where_he_is() -> None:
     clip = several(1)
-    falling = raised(clip, -2.0 * STILL * clip.frame_time * np.arange(clip.frames) * 5.0)
+    falling = raised(clip, -2.0 * STANDING_SPEED * clip.frame_time * np.arange(clip.frames) * 5.0)
     assert put(falling) is falling
 
 
@@ -98,7 +98,7 @@ def test_feet_of_a_capture_stand_on_the_ground_of_its_scene(name: str) -> None:
         q, dt = world.solid.q.copy(), 1.0 / 60.0
         places = motion_places(model, motion, q, dt)
         speed = np.linalg.norm(places[:, 2:] - places[:, :-2], axis=-1) / (2.0 * dt)
-        standing[floor] = places[:, 1:-1, 2][speed < STILL]
+        standing[floor] = places[:, 1:-1, 2][speed < STANDING_SPEED]
     before, after = (np.percentile(standing[floor], (5.0, 95.0)) for floor in ("file", "soles"))
     assert np.abs(before).max() > 0.03
     assert np.abs(after).max() < 0.015

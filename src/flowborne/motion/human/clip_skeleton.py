@@ -1,8 +1,8 @@
-"""The skeleton that a clip was made with, completed where the clip says nothing."""
+"""The skeleton of a clip, completed by standard proportions where the clip lacks joints."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,71 +10,68 @@ from scipy.spatial.transform import Rotation
 from flowborne.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.skeleton import (
-    BODIES,
     FOREARM,
     HAND,
+    JOINTS,
     PARENTS,
     SIDES,
     TIPS,
     Array,
     Link,
     Skeleton,
+    ancestors,
+    nearest_parent,
     standard_skeleton,
 )
-from flowborne.motion.quaternions import angle, inverse, turned
-from flowborne.phrases import suggestion
+from flowborne.motion.quaternions import angle, inverse, rotated
 
-NAMES = tuple(joint for _, joint, _ in BODIES)
-"""Joints, parents first."""
+MIN_BONE_RATIO = 1e-6
+"""Length of a bone, relative to its standard length, below which it counts as missing."""
 
-TINY = 1e-6
-"""Of a bone's standard length: what is shorter is no bone."""
+MAX_JOINT_OFFSET = 1e-3
+"""Largest deviation of a joint from its position in the clip, m."""
 
-NEAR = 1e-3
-"""m by which a joint may be off where the clip has it."""
+MIN_LINK_ROTATION = 1e-6
+"""Largest rotation, rad, of a joint that is not a link."""
 
-SAME = 1e-6
-"""rad; a joint that turns less is none."""
-
-ENDS = {
+BONE_ENDS = {
     "lower_neck": "head_top",
     "left_clavicle": "left_shoulder",
     "right_clavicle": "right_shoulder",
 }
-"""Joint on the thorax -> what has its standard height above that where the bone between is lost:
-BVH files of the CMU database start neck and collar bones on the thorax itself, with a neck that is
-longer than a neck and shoulders that are higher than their start. At the length that the ASF file
-of subject 02 has for all three (117 mm) shoulders would be 96 mm too near to the head."""
+"""Joint on the thorax -> the point that gets its standard height above the thorax if the bone from
+the thorax is missing. In BVH files of the CMU database, neck and collar bones start at the thorax
+joint; their neck is longer than a neck, and their shoulders are higher than their start. With the
+bone length that the ASF file of subject 02 has for all three (117 mm), shoulders would be 96 mm too
+close to the head."""
 
-SHORTEST = 0.1
-"""Of the standard thorax, the least length of such a bone."""
+MIN_THORACIC_RATIO = 0.1
+"""Smallest length of such a bone, relative to the standard thorax."""
 
 
 def skeleton_of(
     clip: Clip, mapping: Mapping[str, str], between: Mapping[str, Sequence[str]] | None = None
 ) -> Skeleton:
-    """Skeleton with a clip's own bones, no joint of the clip turned.
+    """Skeleton of a human with a clip's own bones, with all rotations of the clip zero.
 
-    mapping  joint of the model -> joint of the clip; the root must be among them
+    Mapped joints have their position in the clip. If one coincides with its mapped parent other
+    than the root, the file lacks the bone between them. That bone is inserted, and all joints below
+    move with it; bones of neck and collar get the length that puts head and shoulders at their
+    standard height above the thorax. The standard skeleton places joints that are not mapped:
+    between their neighbours, or beyond the last one in the direction of its bone. Head and toes end
+    at the clip's end sites. A hand points to its farthest end site, with a length in proportion to
+    the forearm, because clips end hands anywhere between wrist and fingertip.
+
+    mapping  joint of the model -> joint of the clip, as `mapping_of` returns it
     between  joint of the model -> joints of the clip above it that are links, from the top
-    returns  joints that are mapped are where the clip has them. Where one lies on its mapped
-             parent, other than the root, the file lacks the bone between: it is put in (neck and
-             collar bones: such that head and shoulders are as high as the standard skeleton's
-             above the thorax), and all beyond moves with it. A joint that is not mapped is placed
-             by the standard skeleton: between its neighbours, or beyond the last of them in the
-             direction of its bone.
-             Head and toes end at the clip's end sites; a hand points to the farthest of them and
-             has the forearm's proportion, as clips end hands anywhere between wrist and fingertip
-    raises   SceneError for unknown joints, when the root or every other joint is missing, and when
-             two joints lie on each other that a bone of any length must part
+    raises   SceneError when joints that need a bone between them coincide
     """
-    _check_names(clip, mapping)
     standard = standard_skeleton()
-    place = _places(clip)
+    rest = _rest_positions(clip)
     found = _found(clip, mapping)
     scale = _scale(found, standard)
     _insert_lost_bones(found, standard, scale, _lost(found, standard, scale))
-    for name in (*NAMES, *TIPS):
+    for name in (*JOINTS, *TIPS):
         if name not in found:
             found[name] = _filled(name, found, standard, scale)
     for side in SIDES:
@@ -86,119 +83,78 @@ def skeleton_of(
             Link(
                 f"{joint}_base{number or ''}",
                 bone,
-                found[joint] + place[bone] - place[mapping[joint]],
+                found[joint] + rest[bone] - rest[mapping[joint]],
             )
             for number, bone in enumerate(bones)
         )
         for joint, bones in (between or {}).items()
     }
-    joints, tips = ({name: found[name] for name in names} for names in (NAMES, TIPS))
+    joints, tips = ({name: found[name] for name in names} for names in (JOINTS, TIPS))
     return Skeleton(joints, tips, links)
 
 
 def between(clip: Clip, mapping: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Joint of the model -> joints of the clip between its own and that of the nearest mapped joint
-    above, from the top, where these move it by more than NEAR."""
-    places, rotations = clip.places()
+    """Joint of the model -> rotating joints of the clip between its own and that of its nearest
+    mapped ancestor, from the top, if they move it by more than MAX_JOINT_OFFSET."""
+    positions, rotations = clip.poses()
     found = {}
-    for joint in NAMES[1:]:
+    for joint in JOINTS[1:]:
         if joint not in mapping:
             continue
         own = clip.names.index(mapping[joint])
-        above = clip.names.index(mapping[_above(joint, mapping)])
-        way = turned(inverse(rotations[:, above]), places[:, own] - places[:, above])
-        bones, at = [], own
-        rest = np.zeros(3)
-        while at != above:
-            rest = rest + clip.offsets[at]
-            at = int(clip.parents[at])
-            bones.append(at)
-        if np.linalg.norm(way - rest, axis=1).max() > NEAR:
-            turning = [n for n in bones[-2::-1] if angle(clip.rotations[:, n]).max() > SAME]
+        above = clip.names.index(mapping[nearest_parent(joint, mapping)])
+        offset = rotated(inverse(rotations[:, above]), positions[:, own] - positions[:, above])
+        bones = clip.lineage(mapping[joint])
+        bones = bones[: bones.index(above)]
+        rest = sum((clip.offsets[bone] for bone in bones), np.zeros(3))
+        if np.linalg.norm(offset - rest, axis=1).max() > MAX_JOINT_OFFSET:
+            turning = [
+                n for n in bones[:0:-1] if angle(clip.rotations[:, n]).max() > MIN_LINK_ROTATION
+            ]
             found[joint] = tuple(clip.names[n] for n in turning)
     return found
 
 
-def _check_names(clip: Clip, mapping: Mapping[str, str]) -> None:
-    problems = []
-    for joint, name in mapping.items():
-        if joint not in NAMES:
-            end = suggestion(joint, NAMES, "The human's joints are")
-            problems.append(f"clip, mapping: the human has no joint '{joint}'{end}")
-        if name not in clip.names:
-            end = suggestion(name, clip.names, "The clip's joints are")
-            problems.append(f"clip, mapping {joint}: the clip has no joint '{name}'{end}")
-    if "root" not in mapping:
-        problems.append("clip, mapping: the joint 'root' is missing. Map it to the clip's root.")
-    if len(mapping) < 2:
-        problems.append("clip, mapping: no joint but the root. Map the joints of a leg at least.")
-    if problems:
-        raise SceneError(problems)
-
-
 def _found(clip: Clip, mapping: Mapping[str, str]) -> dict[str, Array]:
-    """Places of the mapped joints, and of the tips below them, m."""
-    place = _places(clip)
-    found = {joint: place[mapping[joint]] for joint in NAMES if joint in mapping}
+    """(3,) m, positions of the mapped joints and of the tips below them."""
+    rest = _rest_positions(clip)
+    found = {joint: rest[mapping[joint]] for joint in JOINTS if joint in mapping}
     for tip, joint in TIPS.items():
         if joint not in mapping:
             continue
-        start = found[joint]
-        ends = [
-            place[name] + offset
-            for name, offset in clip.ends.items()
-            if mapping[joint] in _lineage(clip, name)
-        ]
+        start, number = found[joint], clip.names.index(mapping[joint])
+        ends = [rest[n] + end for n, end in clip.ends.items() if number in clip.lineage(n)]
         far = max(ends, key=lambda end: float(np.linalg.norm(end - start)), default=start)
         if np.linalg.norm(far - start) > 0.0:
             found[tip] = far
     return found
 
 
-def _places(clip: Clip) -> dict[str, Array]:
-    """(3,) m, place of each joint of the clip with none turned, from the root."""
-    place: dict[str, Array] = {}
-    for number, name in enumerate(clip.names):
-        parent = int(clip.parents[number])
-        above = place[clip.names[parent]] if parent >= 0 else np.zeros(3)
-        place[name] = above + clip.offsets[number]
-    return place
-
-
-def _lineage(clip: Clip, name: str) -> list[str]:
-    """A joint of the clip and all above it."""
-    names = []
-    number = clip.names.index(name)
-    while number >= 0:
-        names.append(clip.names[number])
-        number = int(clip.parents[number])
-    return names
+def _rest_positions(clip: Clip) -> dict[str, Array]:
+    """Joint of the clip -> (3,) m, position with all rotations zero and the root at the origin."""
+    positions = np.zeros_like(clip.offsets)
+    for joint, parent in enumerate(clip.parents):
+        positions[joint] = clip.offsets[joint] + (positions[parent] if parent >= 0 else 0.0)
+    return dict(zip(clip.names, positions, strict=True))
 
 
 def _scale(found: Mapping[str, Array], standard: Skeleton) -> float:
-    """Clip's size over the standard's, by the joints that both have and their nearest above."""
+    """Size of the clip relative to the standard skeleton: ratio of the summed lengths of the bones
+    between mapped joints."""
     ours = theirs = 0.0
     for joint in found:
         if joint == "root" or joint in TIPS:
             continue
-        above = _above(joint, found)
+        above = nearest_parent(joint, found)
         length = float(np.linalg.norm(found[joint] - found[above]))
         usual = float(np.linalg.norm(standard[joint] - standard[above]))
-        if length > TINY * usual:
+        if length > MIN_BONE_RATIO * usual:
             ours, theirs = ours + length, theirs + usual
     if theirs == 0.0:
         raise SceneError(
-            "all mapped joints are at one place. Map joints that have bones between them."
+            "all mapped joints are at one point. Map joints that have bones between them."
         )
     return ours / theirs
-
-
-def _above(name: str, found: Container[str]) -> str:
-    """Nearest joint above that the clip has."""
-    above = PARENTS[name]
-    while above not in found:
-        above = PARENTS[above]
-    return above
 
 
 def _insert_lost_bones(
@@ -210,55 +166,48 @@ def _insert_lost_bones(
         if above == "thorax":
             bone = _thoracic_bone(found, standard, scale, joint)
         for name in found:
-            if name == joint or joint in _ancestors(name):
+            if name == joint or joint in ancestors(name):
                 found[name] = found[name] + bone
 
 
 def _thoracic_bone(
     found: Mapping[str, Array], standard: Skeleton, scale: float, joint: str
 ) -> Array:
-    """From the thorax to a joint on it, along the standard thorax: with what the clip has beyond,
-    the end is as high as that of the standard skeleton; at least SHORTEST of the whole."""
+    """(3,) m, from the thorax to a joint on it, along the standard thorax. Its length, at least
+    MIN_THORACIC_RATIO of the standard thorax, gives the end in BONE_ENDS its standard height."""
     whole = scale * (standard["lower_neck"] - standard["thorax"])
-    end = ENDS[joint]
+    end = BONE_ENDS[joint]
     if end not in found:
         return whole
     beyond = found[end] - found[joint]
     rise = (scale * (standard[end] - standard["thorax"]) - beyond) @ whole / (whole @ whole)
-    return np.asarray(np.clip(rise, SHORTEST, 1.0) * whole)
+    return np.asarray(np.clip(rise, MIN_THORACIC_RATIO, 1.0) * whole)
 
 
 def lost_bones(clip: Clip, mapping: Mapping[str, str]) -> list[str]:
-    """Joints of the human that lie on their parent, other than the root, in a clip: its file lacks
-    the bones between."""
+    """Joints of the human that coincide with their parent other than the root in a clip: its file
+    lacks the bones between them."""
     found, standard = _found(clip, mapping), standard_skeleton()
     return _lost(found, standard, _scale(found, standard))
 
 
 def _lost(found: Mapping[str, Array], standard: Skeleton, scale: float) -> list[str]:
     joints = []
-    for joint in NAMES[1:]:
+    for joint in JOINTS[1:]:
         above = PARENTS[joint]
         if joint not in found or above not in found or above == "root":
             continue
         length = scale * float(np.linalg.norm(standard[joint] - standard[above]))
-        if np.linalg.norm(found[joint] - found[above]) <= TINY * length:
+        if np.linalg.norm(found[joint] - found[above]) <= MIN_BONE_RATIO * length:
             joints.append(joint)
     return joints
 
 
-def _ancestors(name: str) -> list[str]:
-    names = []
-    while name in PARENTS:
-        name = PARENTS[name]
-        names.append(name)
-    return names
-
-
 def _filled(name: str, found: Mapping[str, Array], standard: Skeleton, scale: float) -> Array:
-    """Place of a joint or tip whose parent is known: the standard one, turned and scaled to fit."""
+    """(3,) m, position of a joint or tip with a known parent: the standard bone, rotated and scaled
+    to fit its neighbours."""
     above = PARENTS[name]
-    below = next((n for n in (*NAMES, *TIPS) if n in found and name in _ancestors(n)), None)
+    below = next((n for n in (*JOINTS, *TIPS) if n in found and name in ancestors(n)), None)
     offset = standard[name] - standard[above]
     if below is not None:
         ours, theirs = found[below] - found[above], standard[below] - standard[above]
@@ -269,8 +218,6 @@ def _filled(name: str, found: Mapping[str, Array], standard: Skeleton, scale: fl
         ours = found[above] - found[PARENTS[above]]
         theirs = standard[above] - standard[PARENTS[above]]
     if not np.any(ours):
-        raise SceneError(
-            f"the joints around '{name}' lie on each other. Leave one out of the mapping."
-        )
+        raise SceneError(f"the joints around '{name}' coincide. Leave one out of the mapping.")
     turn, _ = Rotation.align_vectors(ours[None], theirs[None])
     return np.asarray(found[above] + scale * turn.apply(offset))

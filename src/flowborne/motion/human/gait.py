@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from flowborne.motion.clip import Clip
-from flowborne.motion.human.skeleton import BODIES, PARENTS, SIDES, TIPS, Array, Skeleton
+from flowborne.motion.human.skeleton import JOINTS, PARENTS, SIDES, TIPS, Array, Skeleton
 
 # fmt: off
 ROWS = np.array(
@@ -66,9 +66,9 @@ ROWS = np.array(
     ]
 )
 # fmt: on
-"""(51, 5): percent of the cycle from heel strike; degrees of forward tilt of the pelvis, flexion of
-hip and knee and dorsiflexion of the ankle. Means of Schwartz, Rozumalski and Trost 2008,
-J. Biomechanics 41:1639, free speed.
+"""(51, 5): percent of the cycle from heel strike; forward tilt of the pelvis, flexion of hip and
+knee and dorsiflexion of the ankle in degrees. Means of Schwartz, Rozumalski and Trost 2008, J.
+Biomechanics 41:1639, free speed.
 """
 
 PELVIS, HIP, KNEE, ANKLE = 1, 2, 3, 4
@@ -77,36 +77,34 @@ CYCLE = 1.05
 """s from one heel strike to the next of the same foot."""
 
 RATE = 120.0
-"""Frames a second, about: a cycle is a whole number of frames."""
-
-NAMES = tuple(joint for _, joint, _ in BODIES)
+"""Approximate frames per second: a cycle is a whole number of frames."""
 
 LEG = ("hip", "knee", "ankle", "toes")
 
-LATER = {"left": 0.5, "right": 0.0}
-"""Of a cycle, how much later a side does the same."""
+PHASE_LAG = {"left": 0.5, "right": 0.0}
+"""Phase lag of a side, as part of a cycle."""
 
 SHOULDER, SHOULDER_SWING, ELBOW, ELBOW_SWING = np.radians([-8.0, 16.0, 32.5, 12.5])
-"""Mean and amplitude of flexion: from 24 degrees back, where the heel of the same side strikes, to
-8 forward, and an elbow bent by 20 to 45 (Perry 1992, Gait Analysis, chapter 8)."""
+"""Mean and amplitude of flexion, rad: a shoulder goes from 24 degrees back at heel strike of its
+side to 8 forward, an elbow from 20 to 45 (Perry 1992, Gait Analysis, chapter 8)."""
 
-FLAT = np.radians(4.0)
-"""Tilts of the foot around level over which the toes begin to bend."""
+FLAT_TOE_TILT = np.radians(4.0)
+"""Tilt of the foot, rad, over which the bending of the toes sets in smoothly."""
 
-LIFTED = np.radians(25.0)
-"""Extension of the toes in swing and at heel strike (Perry 1992, chapter 4)."""
+TOE_EXTENSION = np.radians(25.0)
+"""Extension of the toes in swing and at heel strike, rad (Perry 1992, chapter 4)."""
 
-SUPPORT = 0.003
-"""m: what is so much higher than the lowest point of the soles carries 1 / e of what that does."""
+SUPPORT_HEIGHT = 0.003
+"""Height above the lowest point of the soles, m, at which the weight of support is 1 / e."""
 
 SAMPLES = 1024
-"""Instants of a cycle at which the support is found, for its integral."""
+"""Number of times in a cycle at which the support is evaluated for its integral."""
 
 
 def curve(column: int) -> CubicSpline:
-    """Periodic spline through a column: phase, 0 to 1 from heel strike -> rad.
+    """Periodic spline through a column of ROWS: phase, 0 to 1 from heel strike -> rad.
 
-    The first and the last row are the same instant; their mean stands for both.
+    The first and the last row are the same phase; both are replaced by their mean.
     """
     angles = np.radians(ROWS[:, column])
     angles[0] = angles[-1] = 0.5 * (angles[0] + angles[-1])
@@ -114,18 +112,18 @@ def curve(column: int) -> CubicSpline:
 
 
 def gait_clip(skeleton: Skeleton, cycle: float = CYCLE) -> Clip:
-    """One cycle of a straight walk along x from the right heel's strike, at about 120 Hz.
+    """One cycle of a straight walk along x from the strike of the right heel, at about 120 Hz.
 
-    The last frame is the first frame one stride later, in all derivatives too: a loop without the
-    last frame has no seam. Legs follow `ROWS`, the left half a cycle after the right. The trunk
-    stays upright: the lower back compensates the tilt of the pelvis. Toes stay flat on the floor
-    while the heel lifts. The root moves such that the soles touch the ground and do not slide;
-    where the support passes from one point of the soles to another, their heights and speeds are
-    mixed over `SUPPORT`, so that the root moves smoothly.
+    The last frame equals the first one stride later, including all derivatives: a loop without the
+    last frame is smooth. Legs follow `ROWS`, the left one half a cycle after the right one. The
+    trunk stays upright: the lower back compensates the tilt of the pelvis. Toes stay flat on the
+    floor while the heel lifts. The root moves such that the soles touch the ground and do not
+    slide. Heights and speeds of all points of the soles are averaged with weights that fall off
+    over `SUPPORT_HEIGHT`, so that the root moves smoothly when the support changes.
 
     skeleton  upright at rest, arms down, feet forward
     cycle     s
-    raises    ValueError when the cycle does not last
+    raises    ValueError when the cycle is not positive and finite
     """
     if not (np.isfinite(cycle) and cycle > 0.0):
         raise ValueError(f"a walk cannot have a cycle of {cycle} s. Give a time above 0.")
@@ -136,38 +134,38 @@ def gait_clip(skeleton: Skeleton, cycle: float = CYCLE) -> Clip:
 
 
 def pelvis_tilt(phase: Array) -> Array:
-    """(n,) rad, forward; the mean over both sides, whose curves differ by 0.2 degrees."""
+    """(n,) rad, forward: the mean over both sides, which differ by 0.2 degrees."""
     tilt = curve(PELVIS)
     return np.asarray(0.5 * (tilt(phase % 1.0) + tilt((phase + 0.5) % 1.0)))
 
 
 def leg_turns(phase: Array) -> Array:
-    """(4, n) turns of hip, knee, ankle and toes at phases (n,) of the leg's own cycle, rad.
+    """(4, n) rotations of hip, knee, ankle and toes at phases (n,) of the leg's own cycle, rad.
 
-    They are relative to the parent, about the axis that points left: a positive turn carries what
-    is below the joint backward.
+    They are relative to the parent, about the axis that points left: a positive rotation moves the
+    bodies below the joint backward.
     """
     phase = phase % 1.0
     hip, knee, ankle = (curve(column)(phase) for column in (HIP, KNEE, ANKLE))
     pitch = pelvis_tilt(phase) - hip + knee - ankle
-    flat = 0.5 * (pitch + np.hypot(pitch, FLAT))
+    flat = 0.5 * (pitch + np.hypot(pitch, FLAT_TOE_TILT))
     swing = _rise(phase, 0.54, 0.74) + 1.0 - _rise(phase, 0.02, 0.1)
-    return np.array([-hip, knee, -ankle, -(flat + (LIFTED - flat) * swing)])
+    return np.array([-hip, knee, -ankle, -(flat + (TOE_EXTENSION - flat) * swing)])
 
 
 def _rise(phase: Array, start: float, end: float) -> Array:
-    """(n,) from 0 at one phase to 1 at another, with two continuous derivatives."""
+    """(n,) smooth step from 0 at phase `start` to 1 at `end`, with two continuous derivatives."""
     x = np.clip((phase - start) / (end - start), 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
 def joint_turns(phase: Array) -> dict[str, Array]:
-    """Joint -> (n,) turn about the left-pointing axis, rad, of all 23 joints."""
+    """Joint -> (n,) rotation about the left-pointing axis, rad, for all 23 joints."""
     tilt = pelvis_tilt(phase)
-    turns = {joint: np.zeros(len(phase)) for joint in NAMES}
+    turns = {joint: np.zeros(len(phase)) for joint in JOINTS}
     turns["root"], turns["lower_back"] = tilt, -tilt
     for side in SIDES:
-        own = phase - LATER[side]
+        own = phase - PHASE_LAG[side]
         turns |= {f"{side}_{name}": turn for name, turn in zip(LEG, leg_turns(own), strict=True)}
         swing = np.cos(2.0 * np.pi * own)
         turns[f"{side}_shoulder"] = -(SHOULDER - SHOULDER_SWING * swing)
@@ -176,10 +174,11 @@ def joint_turns(phase: Array) -> dict[str, Array]:
 
 
 def root_path(skeleton: Skeleton, phase: Array) -> Array:
-    """(n, 3) m, place of the root at phases (n,) from 0 on, by what carries it."""
+    """(n, 3) m, position of the root at phases (n,) from 0, from the supporting points of the
+    soles."""
     instants = np.arange(SAMPLES) / SAMPLES
     x, z = _soles(skeleton, instants)
-    weight = np.exp(-(z - z.min(axis=1, keepdims=True)) / SUPPORT)
+    weight = np.exp(-(z - z.min(axis=1, keepdims=True)) / SUPPORT_HEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
     speed = -(weight * _rate(x)).sum(axis=1)
     height = -(weight * z).sum(axis=1)
@@ -198,58 +197,52 @@ def _rate(values: Array) -> Array:
 
 
 def _soles(skeleton: Skeleton, phase: Array) -> tuple[Array, Array]:
-    """x and z (n, 8) of points of both soles, from the root, m.
-
-    A foot has its heel and its ball, the toes their ball and their tip.
-    """
+    """x and z (n, 8) of points of both soles relative to the root, m: heel and ball of a foot, ball
+    and tip of its toes."""
     points = [_sole(skeleton, side, phase) for side in SIDES]
     x, z = np.moveaxis(np.concatenate(points, axis=1), (0, 1, 2), (0, 2, 1))
     return x, z
 
 
 def _sole(skeleton: Skeleton, side: str, phase: Array) -> Array:
-    """(2, 4, n) x and z of the points of one sole, from the root, m."""
-    turns = leg_turns(phase - LATER[side])
+    """(2, 4, n) x and z of the points of one sole relative to the root, m."""
+    turns = leg_turns(phase - PHASE_LAG[side])
     angles = np.cumsum([pelvis_tilt(phase), *turns], axis=0)
     names = ("root", *(f"{side}_{name}" for name in LEG))
-    places = [skeleton[name] for name in names]
+    points = [skeleton[name] for name in names]
     joints = np.cumsum(
         [
-            _turned(end - start, angle)
-            for start, end, angle in zip(places, places[1:], angles, strict=False)
+            _rotated(end - start, angle)
+            for start, end, angle in zip(points, points[1:], angles, strict=False)
         ],
         axis=0,
     )
-    down, ankle, toes = skeleton.to_sole(side), places[3], places[4]
-    points = [
-        joints[2] + _turned(skeleton.heel(side) + down - ankle, angles[3]),
-        joints[2] + _turned(toes + down - ankle, angles[3]),
-        joints[3] + _turned(down, angles[4]),
-        joints[3] + _turned(skeleton[f"{side}_toe_tip"] + down - toes, angles[4]),
+    down, ankle, toes = skeleton.to_sole(side), points[3], points[4]
+    sole = [
+        joints[2] + _rotated(skeleton.heel(side) + down - ankle, angles[3]),
+        joints[2] + _rotated(toes + down - ankle, angles[3]),
+        joints[3] + _rotated(down, angles[4]),
+        joints[3] + _rotated(skeleton[f"{side}_toe_tip"] + down - toes, angles[4]),
     ]
-    return np.stack(points, axis=1)
+    return np.stack(sole, axis=1)
 
 
-def _turned(offset: Array, angle: Array) -> Array:
-    """(2, n) x and z of an offset (3,) turned about y by angles (n,)."""
+def _rotated(offset: Array, angle: Array) -> Array:
+    """(2, n) x and z of an offset (3,) rotated about y by angles (n,)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([offset[0] * cosine + offset[2] * sine, offset[2] * cosine - offset[0] * sine])
 
 
-def _clip(skeleton: Skeleton, frame_time: float, turns: dict[str, Array], place: Array) -> Clip:
-    parents = [NAMES.index(PARENTS[joint]) if joint in PARENTS else -1 for joint in NAMES]
-    offsets = [
-        skeleton[joint] - skeleton[PARENTS[joint]] if joint in PARENTS else np.zeros(3)
-        for joint in NAMES
-    ]
+def _clip(skeleton: Skeleton, frame_time: float, turns: dict[str, Array], path: Array) -> Clip:
+    bones = [(joint, PARENTS[joint]) for joint in JOINTS[1:]]
     axis = np.array([0.0, 1.0, 0.0])
-    turned = [Rotation.from_rotvec(turns[joint][:, None] * axis) for joint in NAMES]
+    rotations = [Rotation.from_rotvec(turns[joint][:, None] * axis) for joint in JOINTS]
     return Clip(
-        names=NAMES,
-        parents=np.array(parents, dtype=np.int64),
-        offsets=np.array(offsets),
+        names=JOINTS,
+        parents=np.array([-1, *(JOINTS.index(parent) for _, parent in bones)], dtype=np.int64),
+        offsets=np.array([np.zeros(3), *(skeleton[end] - skeleton[start] for end, start in bones)]),
         ends={joint: skeleton[tip] - skeleton[joint] for tip, joint in TIPS.items()},
         frame_time=frame_time,
-        rotations=np.stack([turn.as_quat(scalar_first=True) for turn in turned], axis=1),
-        translation=place,
+        rotations=np.stack([turn.as_quat(scalar_first=True) for turn in rotations], axis=1),
+        translation=path,
     )

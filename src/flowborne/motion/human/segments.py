@@ -1,4 +1,4 @@
-"""Inertia of the human's bodies, such that the segments of de Leva (1996) come out exactly."""
+"""Inertia of the human's bodies, which add up exactly to the segments of de Leva (1996)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from flowborne.motion.human.skeleton import SIDES, Array, Skeleton
 
 Sex = Literal["male", "female"]
 
-MOST_SPREAD = 0.95
-"""Largest part of a segment's inertia from the distances of its bodies, in any direction."""
+MAX_SPREAD = 0.95
+"""Largest part of a segment's inertia, in any direction, that comes from the distances of its
+bodies' centres of mass."""
 
 
 @dataclass(frozen=True)
 class Measures:
     """Inertia of a segment, relative to the mass of the body and the length of the segment.
 
-    mass          of the mass of the body, one side
-    centre        of the length, centre of mass from the start of the segment
-    sagittal      of the length, radius of gyration about the axis from back to front
+    mass          of one side, per mass of the body
+    centre        centre of mass from the start of the segment, per length
+    sagittal      radius of gyration about the axis from back to front, per length
     transverse    ... about the axis from right to left
-    longitudinal  ... about the segment's own axis
+    longitudinal  ... about the axis of the segment
     """
 
     mass: float
@@ -55,25 +56,27 @@ MEASURES: dict[Sex, dict[str, Measures]] = {
         "foot": Measures(0.0129, 0.4014, 0.299, 0.279, 0.124),
     },
 }
-"""de Leva 1996, J. Biomechanics 29:1223, Table 4. Segments run from vertex to C7, C7 to mid hip,
-between joint centres, from heel to toe tip, and from wrist to the third knuckle (the hand's
-figures there are for that length). Women's head is 0.0668 in the paper; 0.0669 makes the sum 1.
+"""de Leva 1996, J. Biomechanics 29:1223, Table 4. Segments go from vertex to C7, C7 to mid hip,
+between joint centres, from heel to toe tip, and from wrist to third knuckle (the table's length for
+the hand). The head of women is 0.0668 in the paper; 0.0669 makes the sum 1.
 """
 
 TRUNK: dict[Sex, dict[str, float]] = {
     "male": {"upper": 0.1596, "middle": 0.1633, "lower": 0.1117},
     "female": {"upper": 0.1545, "middle": 0.1465, "lower": 0.1247},
 }
-"""Parts of the trunk, of the body's mass; they meet at xiphoid and navel. Source as above."""
+"""Masses of the parts of the trunk, per mass of the body; they meet at xiphoid and navel. Source as
+above."""
 
 CLAVICLE = 0.1
-"""Of the upper trunk's mass, what moves with one collar bone: our estimate, as are the next two."""
+"""Part of the upper trunk's mass that moves with one collar bone; an estimate, as the next two."""
 
 NECK = 0.12
-"""Of the head segment's mass, each of the neck's two bodies: near 10 cm of a neck 12 cm thick."""
+"""Part of the head segment's mass in each of the neck's two bodies: a neck 10 cm long and 12 cm
+thick."""
 
 TOES = 0.18
-"""Of the foot's mass: 27 % of its length, and thinner."""
+"""Part of the foot's mass in the toes, which are 27 % of its length and thinner."""
 
 
 def segments() -> tuple[str, ...]:
@@ -102,7 +105,7 @@ def ends_of(segment: str, skeleton: Skeleton) -> tuple[Array, Array]:
 
 
 def shares_of(segment: str, sex: Sex) -> dict[str, float]:
-    """Bodies of a segment -> their parts of its mass."""
+    """Body of a segment -> its share of the segment's mass."""
     if segment == "head":
         return {"lower_neck": NECK, "upper_neck": NECK, "head": 1.0 - 2.0 * NECK}
     if segment == "trunk":
@@ -157,9 +160,9 @@ def axes_of(start: Array, end: Array, ahead: Array | None = None) -> Array:
 def inertias(skeleton: Skeleton, mass: float, sex: Sex) -> dict[str, Inertia]:
     """Inertia of each body of a human of `mass` kg.
 
-    A segment of one body has de Leva's values. A segment of several bodies has them as a whole, at
-    rest: the centres of mass of the bodies are the middles of their bones, moved together so that
-    the centre of the segment is right. If they are too far apart for the radii of gyration of the
+    A segment of one body has de Leva's values. A segment of several bodies has them in total, at
+    rest: the centres of mass of the bodies are the midpoints of their bones, shifted together to
+    match the centre of the segment. If they are too far apart for the radii of gyration of the
     segment, they move towards its centre. The bodies share the remaining inertia by their mass.
     """
     found: dict[str, Inertia] = {}
@@ -169,30 +172,30 @@ def inertias(skeleton: Skeleton, mass: float, sex: Sex) -> dict[str, Inertia]:
 
 
 def _of_segment(segment: str, skeleton: Skeleton, mass: float, sex: Sex) -> dict[str, Inertia]:
-    figures, shares = measures_of(segment, sex), shares_of(segment, sex)
+    measures, shares = measures_of(segment, sex), shares_of(segment, sex)
     start, end = ends_of(segment, skeleton)
-    centre = start + figures.centre * (end - start)
+    centre = start + measures.centre * (end - start)
     whole = _second_moment(segment, skeleton, sex)
     weight = np.array(list(shares.values()))
     middle = np.array([np.mean(skeleton.bone(body), axis=0) for body in shares])
-    away = middle - weight @ middle
+    offsets = middle - weight @ middle
     inward = np.linalg.inv(np.linalg.cholesky(whole))
-    spread = float(np.linalg.eigvalsh(inward @ (away.T * weight) @ away @ inward.T)[-1])
-    away *= min(1.0, np.sqrt(MOST_SPREAD / max(spread, MOST_SPREAD)))
-    rest = whole - (away.T * weight) @ away
+    spread = float(np.linalg.eigvalsh(inward @ (offsets.T * weight) @ offsets @ inward.T)[-1])
+    offsets *= min(1.0, np.sqrt(MAX_SPREAD / max(spread, MAX_SPREAD)))
+    rest = whole - (offsets.T * weight) @ offsets
     tensor = np.trace(rest) * np.eye(3) - rest
-    kilograms = figures.mass * mass
+    kilograms = measures.mass * mass
     return {
         body: Inertia(share * kilograms, centre + offset, share * kilograms * tensor)
-        for (body, share), offset in zip(shares.items(), away, strict=True)
+        for (body, share), offset in zip(shares.items(), offsets, strict=True)
     }
 
 
 def _second_moment(segment: str, skeleton: Skeleton, sex: Sex) -> Array:
     """(3, 3) m^2: the mean of x x^T of a segment about its centre of mass, in world axes."""
-    figures = measures_of(segment, sex)
+    measures = measures_of(segment, sex)
     start, end = ends_of(segment, skeleton)
-    radii = np.array([figures.sagittal, figures.transverse, figures.longitudinal])
+    radii = np.array([measures.sagittal, measures.transverse, measures.longitudinal])
     squares = (float(np.linalg.norm(end - start)) * radii) ** 2
     axes = axes_of(start, end)
     return np.asarray(axes @ np.diag(0.5 * squares.sum() - squares) @ axes.T)

@@ -1,4 +1,4 @@
-"""The outer form of the human: a geometry for each body, as large as its mass asks for."""
+"""The geometries of the human's bodies, with the volume that their mass needs."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ SKIN, SHIRT, TROUSERS, SHOES = (
 
 @dataclass(frozen=True)
 class Form:
-    """What the geometry of a body is like.
+    """Type and proportions of the geometry of a body.
 
-    kind     "capsule" along the bone, "ellipsoid" about it, "box" under it, or "lump": an ellipsoid
-             of fixed proportions at the bone's end, where clips differ in where the bone starts
+    kind     "capsule" along the bone, "ellipsoid" around it, "box" below it, or "lump": an
+             ellipsoid of fixed proportions at the bone's end, for bones with a varying start
     density  kg/m^3 (Winter 2009, Table 4.1)
     flat     size from back to front over size from side to side
-    half     half length of an ellipsoid over its bone's length, of a lump over its half breadth;
-             half height of a box over the toes'
-    middle   of the bone's length, middle of an ellipsoid from the bone's start; of a lump's half
-             length, from the bone's end
-    ahead    of its own half depth, how far an ellipsoid or a lump is in front of the bone
-    counted  of a lump's volume, what is not within its neighbours
+    half     half length: of an ellipsoid per length of its bone, of a lump per half breadth; half
+             height of a box per half height of the toes
+    middle   centre: of an ellipsoid from the bone's start, per length of the bone; of a lump from
+             the bone's end, per half length
+    ahead    distance of an ellipsoid or a lump in front of the bone, per half depth
+    counted  part of a lump's volume outside its neighbours
     """
 
     kind: str
@@ -60,18 +60,19 @@ FORMS: dict[str, Form] = {
     "foot": Form("box", 1100.0, SHOES, half=1.4),
     "toes": Form("box", 1100.0, SHOES, half=1.0),
 }
-"""Depths over breadths of chest, waist and head: Gordon et al. 1989, means of men. The rest, and
-the places of the ellipsoids, by eye; hips narrower than theirs, so that a hanging arm is free."""
+"""Depth over breadth of chest, waist and head: Gordon et al. 1989, means of men. All other
+proportions, and the positions of the ellipsoids, by eye; hips are narrower than in that source, so
+that a hanging arm does not touch them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
     """A geometry in the world at rest.
 
-    kind    as MJCF calls it
-    size    half sizes in m, as many as MJCF wants for the kind
+    kind    type of the geom in MJCF
+    size    half sizes in m, as many as MJCF needs for the kind
     centre  (3,) m
-    axes    (3, 3) columns: its own axes
+    axes    (3, 3) columns: its axes
     colour  red, green, blue, opacity
     """
 
@@ -83,10 +84,10 @@ class Shape:
 
 
 def shapes(skeleton: Skeleton, masses: dict[str, float]) -> dict[str, Shape]:
-    """The geometry of each body, of the volume that its mass (kg) has at its density.
+    """The geometry of each body, with the volume of its mass (kg) at its density.
 
-    Neighbours overlap, so not all of a shape counts: one half of a capsule's round ends, of an
-    ellipsoid what is between the ends of the bone, of a lump the share that its form says.
+    Neighbours overlap, so only part of a shape counts: half of a capsule's round ends, the part of
+    an ellipsoid between the ends of the bone, and `counted` of a lump.
     """
     return {body: _shape(body, skeleton, masses) for body in masses}
 
@@ -110,7 +111,7 @@ def _shape(body: str, skeleton: Skeleton, masses: dict[str, float]) -> Shape:
 
 
 def _ellipsoid(form: Form, volume: float, length: float) -> tuple[float, float, float]:
-    """Half sizes of an ellipsoid on a bone of that length, or of a lump, m."""
+    """Half sizes, m, of an ellipsoid on a bone of this length, or of a lump."""
     if form.kind == "lump":
         breadth = float(np.cbrt(0.75 * volume / (np.pi * form.counted * form.flat * form.half)))
         return form.flat * breadth, breadth, form.half * breadth
@@ -122,7 +123,7 @@ def _ellipsoid(form: Form, volume: float, length: float) -> tuple[float, float, 
 
 
 def _box(body: str, skeleton: Skeleton, volume: float) -> Shape:
-    """Foot or toes on the sole, as broad as the volume asks for."""
+    """Box of a foot or toes on the sole, with the breadth that gives the volume."""
     form, side = _form(body), body.split("_")[0]
     start, end = skeleton.bone(body)
     axes, length = axes_of(start, end), float(np.linalg.norm(end - start))
@@ -135,7 +136,7 @@ def _box(body: str, skeleton: Skeleton, volume: float) -> Shape:
 
 
 def _capsule_radius(volume: float, length: float) -> float:
-    """Radius at which pi r^2 length + 2/3 pi r^3 is the volume; the root is the only positive."""
+    """Radius r with pi r^2 length + 2/3 pi r^3 = volume, the only positive root."""
     roots = np.roots([2.0 / 3.0 * np.pi, np.pi * length, 0.0, -volume])
     return float(roots[np.argmax(roots.real)].real)
 
