@@ -408,7 +408,7 @@ def test_help_is_told_without_anything_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0
-    assert "Creatures that answer the fluid" in done.stdout
+    assert "Creatures that react to the fluid" in done.stdout
 
 
 def test_public_names_are_found_and_others_are_not():
