@@ -1,7 +1,7 @@
-"""The built-in objectives: what each measures, its keys in a scene, and the checks of them.
+"""The built-in objectives, their keys in a scene, and the checks of these keys.
 
-Paper: eq. (1) effort, eqs. (2)-(4) simple wind drag, eq. (10) pressure drag and lift. A new one is
-a class with `value`, and a table with `build` that is in `BuiltInObjective`.
+Paper: eq. (1) effort, eqs. (2)-(4) simple wind drag, eq. (10) pressure drag and lift. A new
+objective is a class with `value` and a table with `build`, which is added to `BuiltInObjective`.
 """
 
 from __future__ import annotations
@@ -66,11 +66,11 @@ class ObjectiveTable(Table):
         return True
 
     def check(self, around: Surroundings) -> Iterator[str]:
-        """Everything that does not fit the scene around it."""
+        """Everything that does not fit the scene."""
         yield from ()
 
     def build(self, around: Surroundings) -> Objective:
-        """The objective, where `check` finds nothing."""
+        """The objective; requires that `check` finds nothing."""
         raise NotImplementedError
 
 
@@ -491,7 +491,7 @@ class ObjectivePythonTable(ObjectiveTable):
 
 
 class ObjectiveOwnTable(ObjectiveTable, OwnTable):
-    """An objective of the user's own; every further key is a parameter of it."""
+    """A user's objective; all further keys are its parameters."""
 
     registry = OBJECTIVES
 
