@@ -85,7 +85,7 @@ def _set(help: str) -> Any:
 
 SceneOption = Annotated[list[str] | None, _set("Change a value of the scene.")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print only a list of objects.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print only a JSON list of results.")]
 
 
 def _version(wanted: bool) -> None:
@@ -136,14 +136,13 @@ def run(
     workers: Annotated[
         int | None, typer.Option(help="Trials of the controller at once; changes no number.")
     ] = None,
-    resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the folder.")] = False,
+    resume: Annotated[
+        bool, typer.Option(help="Continue from the checkpoint in the folder.")
+    ] = False,
     replace: Annotated[bool, typer.Option(help="Replace an earlier run in the folder.")] = False,
     film: Annotated[bool, typer.Option(help="Draw preview.png and preview.mp4.")] = True,
 ) -> None:
     """Run a scene and write its numbers and a film to a folder."""
-    for name, count in (("--frames", frames), ("--workers", workers)):
-        if count is not None and count < 1:
-            raise InputError(f"{name} is {count}; give a whole number of 1 or more")
     from flowborne.progress import ProgressDisplay
     from flowborne.scenes.load import load_scene
 
@@ -174,10 +173,11 @@ def run(
 
 @app.command()
 def check(
-    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="Scene file to look through.")],
+    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="Scene file to check.")],
     settings: SceneOption = None,
     trust: Annotated[
-        bool, typer.Option("--trust", help="Import the Python files of the scene, as run does.")
+        bool,
+        typer.Option("--trust", help="Import the Python code that the scene names, as run does."),
     ] = False,
     strict: Annotated[
         bool, typer.Option("--strict", help="End with exit code 3 if there are warnings.")
@@ -356,7 +356,7 @@ def validate(
         with _writing(report or Path(), ValueError):
             results = run_cases(ids or None, Tier(wanted), on_result=show, report=report)
     except KeyboardInterrupt as stop:
-        kept = "" if report is None else f"; {report} has what is done, the same command goes on"
+        kept = "" if report is None else f"; {report} has the finished cases; run again to continue"
         raise StoppedError(f"interrupted{kept}") from stop
     _report(results, as_json)
 
@@ -379,7 +379,8 @@ def bench(
 @app.command()
 def figures(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Only these figures.")
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Only these figures; all by default."),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
 ) -> None:
@@ -418,7 +419,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in BLAS_THREADS:
         os.environ[name] = "1"
     if not sys.warnoptions:
-        warnings.simplefilter("ignore")  # of libraries; what is wrong is said in one message
+        warnings.simplefilter("ignore")  # of libraries; errors have their own messages
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)
@@ -470,7 +471,7 @@ def _overrides(settings: list[str] | None) -> dict[str, str]:
         if not equals or not key.strip():
             raise InputError(f"--set {setting} has no KEY=VALUE; write for example fluid.density=1")
         key, value = key.strip(), value.strip()
-        if key in FILE_KEYS and os.path.exists(value):  # False for what is no path, too
+        if key in FILE_KEYS and os.path.exists(value):  # also False for text that is no path
             value = str(Path(value).absolute())
         overrides[key] = value
     return overrides

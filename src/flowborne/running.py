@@ -206,7 +206,7 @@ class _Run:
             folder.drop_states_after(simulation.frame)
         except (OSError, ValueError) as error:
             raise RunFolderError(
-                f"{folder.path} cannot be gone on with: {error}; start again with --replace"
+                f"{folder.path} cannot be resumed: {error}; start again with --replace"
             ) from error
 
     def go_on(self) -> tuple[RunOutcome, str]:
@@ -415,7 +415,7 @@ class _Run:
     def _how(self) -> str:
         """How to continue the run."""
         path = self.folder.path
-        return f"go on with: flowborne run {self.folder.scene} --out {path} --resume"
+        return f"continue with: flowborne run {self.folder.scene} --out {path} --resume"
 
     def _show_drawn(self, drawn: int, frames: int) -> None:
         self._show("film", frame=drawn, frames=frames)

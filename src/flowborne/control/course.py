@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import methodcaller
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
@@ -64,11 +65,6 @@ class Evaluation(Protocol):
     def run(self) -> float:
         """The objective. Raises TrialError when it is not finite."""
         ...
-
-
-def run(evaluation: Evaluation) -> float:
-    """Run an evaluation; a function at module level, so that any executor can take it."""
-    return evaluation.run()
 
 
 class Course(Protocol):
@@ -139,7 +135,7 @@ class Trials:
         """(k,) objective on courses displaced by the rows of (k, m). Raises TrialError."""
         trials = [self.course.trial(self.objective, self._full(row)) for row in displacements]
         self.evaluations += len(trials)
-        return np.array(self.mapper.map(run, trials, self.course.world.setup))
+        return np.array(self.mapper.map(methodcaller("run"), trials, self.course.world.setup))
 
     def _full(self, displacement: Array) -> Array:
         """(N,) a displacement (m,) of all decision variables."""
