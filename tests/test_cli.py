@@ -66,9 +66,9 @@ def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp
     ("arguments", "said"),
     [
         (["run"], "Missing argument 'SCENE'"),
-        (["run", "SMALL", "--frames", "0"], "--frames is 0; give a whole number of 1 or more"),
+        (["run", "SMALL", "--frames", "0"], "frames is 0; give 1 or more"),
         (["run", "SMALL", "--frames", "two"], "Invalid value for '--frames'"),
-        (["run", "SMALL", "--workers", "0"], "--workers is 0"),
+        (["run", "SMALL", "--workers", "0"], "workers is 0"),
         (["run", "SMALL", "--set", "fluid.density"], "--set fluid.density has no KEY=VALUE"),
         (["run", "SMALL", "--set", "=3"], "has no KEY=VALUE"),
         (["run", "SMALL", "--set", "solids.density=-3"], "density"),
@@ -251,7 +251,7 @@ def test_an_interrupted_command_says_how_to_go_on(command, small_scene, monkeypa
         patch.setattr(Simulation, "advance_frame", interrupted)
         code, _, err = command("run", small_scene, "--out", "run", "--no-film")
     assert code == 130
-    assert "stopped after frame 3; go on with: flowborne run run/scene.toml --out run" in err
+    assert "stopped after frame 3; continue with: flowborne run run/scene.toml --out run" in err
     code, out, _ = command("run", "run/scene.toml", "--out", "run", "--resume", "--no-film")
     assert (code, out.splitlines()[0]) == (0, "12 frames are in run")
 
@@ -340,7 +340,7 @@ def test_an_interrupted_validation_says_how_it_goes_on(command, cases, monkeypat
     monkeypatch.setattr("flowborne.validation.running.run_cases", interrupted)
     code, out, err = command("validate", "--report", "kept")
     assert (code, out) == (130, "")
-    assert err == "flowborne: interrupted; kept has what is done, the same command goes on\n"
+    assert err == "flowborne: interrupted; kept has the finished cases; run again to continue\n"
 
 
 @pytest.mark.parametrize("arguments", [["validate", "--case", "K2"], ["bench", "K2"]])
@@ -408,7 +408,7 @@ def test_help_is_told_without_anything_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0
-    assert "Creatures that answer the fluid" in done.stdout
+    assert "Creatures that react to the fluid" in done.stdout
 
 
 def test_public_names_are_found_and_others_are_not():

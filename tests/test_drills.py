@@ -282,5 +282,5 @@ def test_a_run_without_workers_tells_how_to_go_on(small_scene, tmp_path, monkeyp
     monkeypatch.setattr(Simulation, "advance_frame", dead)
     message = run(small_scene, tmp_path / "run").message
     assert "the run stopped in frame 1, step 1: of 2 worker processes one died" in message
-    assert "then go on with: flowborne run" in message
+    assert "then continue with: flowborne run" in message
     assert "more steps" not in message

@@ -179,7 +179,7 @@ def test_a_signal_ends_a_run_well(small_scene, tmp_path, number):
     _, said = process.communicate()
     assert process.returncode == 130
     frames = summary_of(out)["frames"]
-    assert f"stopped after frame {frames}; go on with: flowborne run" in said
+    assert f"stopped after frame {frames}; continue with: flowborne run" in said
     assert "Traceback" not in said
     with np.load(out / "checkpoint.npz") as checkpoint:
         assert checkpoint["frame"] == frames

@@ -10,8 +10,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from flowborne import Scene, Simulation, load_scene
-from flowborne.control.creature import away
+from flowborne import Measurement, Scene, Simulation, load_scene
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.controller import input_motions
@@ -40,14 +39,13 @@ def walked(scene: Scene) -> tuple[float, float]:
     with Simulation(scene, workers=1) as simulation:
         wanted = input_motions(scene, surroundings_of(scene, simulation.setup.solid)).values()
         for frame in range(FRAMES):
-            actuator = simulation.advance_frame().step.actuator
+            step = simulation.advance_frame().step
             if frame < FIRST:
                 continue
-            world = simulation.world
-            angles.append(
-                [np.linalg.norm(away(world, m.dofs, m.position(world.time))) for m in wanted]
-            )
-            torques.append([np.linalg.norm(actuator[motion.dofs]) for motion in wanted])
+            measured = Measurement(simulation.world, step)
+            away = [measured.joints_away(m.dofs, m.position(measured.time)) for m in wanted]
+            angles.append([np.linalg.norm(angle) for angle in away])
+            torques.append([np.linalg.norm(step.actuator[motion.dofs]) for motion in wanted])
     rms = np.sqrt(np.mean(np.square(angles)))
     return float(np.degrees(rms)), float(np.median(np.sum(torques, axis=1)))
 

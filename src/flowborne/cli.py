@@ -1,8 +1,8 @@
 """The command `flowborne`.
 
-Whatever is wrong with the input is one message on stderr and exit code 2; a run that blew up or
-could not be written ends with 1, one that was interrupted with 130. A run that is complete but not
-to be trusted, and `check --strict` where there are warnings, end with 3.
+Exit codes: 1 if a run blew up or could not be written, 2 for wrong input, 3 for a complete run
+with doubtful results and for `check --strict` with warnings, 130 after an interruption. Each error
+is one message on stderr.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from pathlib import Path
 from time import perf_counter
@@ -44,11 +44,15 @@ BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREA
 """Our solves are small: more threads in BLAS are slower, and their sums differ."""
 
 FILE_KEYS = ("clip.file", "earlier.run", "solids.model")
-"""Keys of scenes that name files or folders: a path in a command starts from where one is."""
+"""Keys of scenes that name files or folders: paths in a command start from the current folder."""
+
+
+class InputError(Exception):
+    """The command line is wrong; the text says where and how to correct it."""
 
 
 class StoppedError(Exception):
-    """Ctrl-C, which typer would end without a message; the text says what is left."""
+    """Ctrl-C, which typer would turn into an exit without a message; the text is the message."""
 
 
 class _Commands(TyperGroup):
@@ -58,13 +62,13 @@ class _Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as stop:
-            raise StoppedError(str(stop) or "interrupted") from stop
+            raise StoppedError(str(stop)) from stop
 
 
 app = typer.Typer(
     name="flowborne",
     cls=_Commands,
-    help="Creatures that answer the fluid around them.",
+    help="Creatures that react to the fluid around them.",
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -74,14 +78,14 @@ UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 """What typer raises when the command line itself is wrong."""
 
 
-class InputError(Exception):
-    """Something on the command line is wrong; the text says what and how to mend it."""
+def _set(help: str) -> Any:
+    """An option --set, which may be repeated."""
+    return typer.Option("--set", metavar="KEY=VALUE", help=help)
 
 
-SceneArgument = Annotated[
-    str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print a list of objects and no more.")]
+SceneOption = Annotated[list[str] | None, _set("Change a value of the scene.")]
+FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print only a JSON list of results.")]
 
 
 def _version(wanted: bool) -> None:
@@ -99,7 +103,7 @@ def flowborne(
         bool, typer.Option("--debug", help="Show the traceback of an error as well.")
     ] = False,
 ) -> None:
-    """Creatures that answer the fluid around them."""
+    """Creatures that react to the fluid around them."""
     if debug:
         log.setLevel(logging.DEBUG)
         log.addHandler(logging.StreamHandler())
@@ -119,54 +123,48 @@ def scenes() -> None:
 
 @app.command()
 def run(
-    scene: SceneArgument,
+    scene: Annotated[
+        str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Folder to write.", show_default="runs/<scene name>")
     ] = None,
     frames: Annotated[
-        int | None, typer.Option(help="How many frames.", show_default="what the scene says")
+        int | None, typer.Option(help="Number of frames.", show_default="from the scene")
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the scene."),
-    ] = None,
+    settings: SceneOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Trials of the controller at once; changes no number.")
     ] = None,
-    resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the folder.")] = False,
+    resume: Annotated[
+        bool, typer.Option(help="Continue from the checkpoint in the folder.")
+    ] = False,
     replace: Annotated[bool, typer.Option(help="Replace an earlier run in the folder.")] = False,
     film: Annotated[bool, typer.Option(help="Draw preview.png and preview.mp4.")] = True,
 ) -> None:
-    """Run a scene and leave numbers and a film in a folder."""
-    for name, count in (("--frames", frames), ("--workers", workers)):
-        if count is not None and count < 1:
-            raise InputError(f"{name} is {count}; give a whole number of 1 or more")
+    """Run a scene and write its numbers and a film to a folder."""
     from flowborne.progress import ProgressDisplay
     from flowborne.scenes.load import load_scene
 
-    loaded = load_scene(scene, _overrides(settings or []))
+    loaded = load_scene(scene, _overrides(settings))
     folder = Path("runs") / loaded.name if out is None else out
     missing = missing_to_draw() if film else None
     if missing is not None:
         print(f"no film will be drawn: {missing}", flush=True)
     with ProgressDisplay() as progress:
-        from flowborne.running import RunInterrupted, RunOutcome
+        from flowborne.running import RunOutcome
         from flowborne.running import run as run_scene
 
-        try:
-            result = run_scene(
-                loaded,
-                folder,
-                frames=frames,
-                workers=workers,
-                resume=resume,
-                replace=replace,
-                film=film,
-                progress=progress,
-            )
-        except RunInterrupted as stopped:
-            progress.say(f"flowborne: {stopped}")
-            raise typer.Exit(INTERRUPTED) from stopped
+        result = run_scene(
+            loaded,
+            folder,
+            frames=frames,
+            workers=workers,
+            resume=resume,
+            replace=replace,
+            film=film,
+            progress=progress,
+        )
     if result.outcome is not RunOutcome.DONE:
         complain(result.message)
         raise typer.Exit(WARNED if result.outcome is RunOutcome.DOUBTFUL else FAILED)
@@ -175,38 +173,36 @@ def run(
 
 @app.command()
 def check(
-    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="Scene file to look through.")],
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the scene."),
-    ] = None,
+    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="Scene file to check.")],
+    settings: SceneOption = None,
     trust: Annotated[
-        bool, typer.Option("--trust", help="Import the Python that the scene names, as run does.")
+        bool,
+        typer.Option("--trust", help="Import the Python code that the scene names, as run does."),
     ] = False,
     strict: Annotated[
         bool, typer.Option("--strict", help="End with exit code 3 if there are warnings.")
     ] = False,
 ) -> None:
-    """Say what the creature is to the fluid, everything that is wrong with a scene, what is
-    implausible, and how the fluid meets its bodies.
+    """Describe the creature, list everything that is wrong or implausible in a scene, and say how
+    the grid resolves its bodies.
 
-    Bodies and fluid are set going, as in a run. A warning does not stop a run; it names a value
-    that will do.
+    Bodies and fluid are started as in a run. A warning does not stop a run; it names a suitable
+    value.
     """
     from flowborne.progress import ProgressDisplay, RunProgress
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.warn import warnings_of
 
-    loaded = load_scene(scene, _overrides(settings or []), trust=trust)
+    loaded = load_scene(scene, _overrides(settings), trust=trust)
     began = perf_counter()
-    with ProgressDisplay() as progress:
+    with ProgressDisplay() as display:
         from flowborne.kernels.compilation import compilation_watched
         from flowborne.simulation import Simulation
 
-        def tell(kernels: int) -> None:
-            progress(RunProgress("compiling", 0, 0, perf_counter() - began, kernels))
+        def show(kernels: int) -> None:
+            display(RunProgress("compiling", 0, 0, perf_counter() - began, kernels))
 
-        with compilation_watched(tell), Simulation(loaded, workers=1) as simulation:
+        with compilation_watched(show), Simulation(loaded, workers=1) as simulation:
             setup = simulation.world.setup
     found = warnings_of(loaded, setup)
     print(check_lines(loaded, setup, found))
@@ -216,13 +212,8 @@ def check(
 
 @app.command()
 def film(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")],
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Change a value of [film]: camera.orbit=30"
-        ),
-    ] = None,
+    folder: FolderArgument,
+    settings: Annotated[list[str] | None, _set("Change a value of [film]: camera.orbit=30")] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -232,7 +223,7 @@ def film(
         ),
     ] = None,
 ) -> None:
-    """Draw the picture and the film of a run again, as the table [film] of its scene says."""
+    """Redraw the picture and the film of a run, as set in [film] of its scene."""
     files = RunFolder.existing(folder)
     check_drawing()
     from flowborne.progress import ProgressDisplay, RunProgress
@@ -240,35 +231,30 @@ def film(
     from flowborne.view.film import make_preview, write_shot
     from flowborne.view.shot import Shot
 
-    shot = Shot.of(film_settings(files, _overrides(settings or [])))
-    drawn = f"{folder / 'preview.png'}, {folder / 'preview.mp4'}"
+    shot = Shot.of(film_settings(files, _overrides(settings)))
+    drawn = f"{files.picture}, {files.film}"
     began = perf_counter()
-    try:
-        with ProgressDisplay() as display:
+    with _writing(folder if out is None else out, ValueError), ProgressDisplay() as display:
 
-            def tell(done: int, frames: int) -> None:
-                display(RunProgress("film", done, frames, perf_counter() - began))
+        def show(done: int, frames: int) -> None:
+            display(RunProgress("film", done, frames, perf_counter() - began))
 
-            if out is None:
-                make_preview(files.path, tell, shot)
-            else:
-                drawn = write_shot(files.path, out, tell, shot)
-    except ValueError as error:
-        raise InputError(str(error)) from error
-    except OSError as error:
-        raise cannot_write(folder if out is None else out, error) from error
+        if out is None:
+            make_preview(files.path, show, shot)
+        else:
+            drawn = write_shot(files.path, out, show, shot)
     print(f"drawn: {drawn}")
 
 
 @app.command()
 def view(
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder of a run, which may still go on.")
+        Path, typer.Argument(metavar="DIR", help="Folder of a run, which may still be running.")
     ],
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Where the page is served.")] = 8080,
-    host: Annotated[str, typer.Option(help="0.0.0.0 lets other machines look, too.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the page.")] = 8080,
+    host: Annotated[str, typer.Option(help="0.0.0.0 lets other machines connect.")] = "127.0.0.1",
 ) -> None:
-    """Look at a run in a browser; docs/viewer.md says what can be seen."""
+    """View a run in a browser; see docs/viewer.md."""
     optional("pyvista", "PyVista", "view", "views in a browser")
     from flowborne.view.browser.viewer import open_viewer, serve
 
@@ -283,24 +269,19 @@ def view(
 
 @app.command()
 def export(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="File to write; its ending says what.")],
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the exporter."),
-    ] = None,
+    folder: FolderArgument,
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="File to write; its ending selects the format.")
+    ],
+    settings: Annotated[list[str] | None, _set("A parameter of the exporter.")] = None,
 ) -> None:
-    """Write a run for another program; docs/exporters.md says what the endings stand for."""
+    """Export a run for another program; docs/exporters.md lists the formats."""
     from flowborne.exporting import export as export_run
     from flowborne.scenes.load import value_of
 
-    parameters = {key: value_of(text) for key, text in _overrides(settings or []).items()}
-    try:
+    parameters = {key: value_of(text) for key, text in _overrides(settings).items()}
+    with _writing(out, PartError):
         written = export_run(folder, out, parameters)
-    except PartError as error:
-        raise InputError(str(error)) from error
-    except OSError as error:
-        raise cannot_write(out, error) from error
     first, last = written.files[0], written.files[-1]
     print(f"written: {first}" if first == last else f"written: {first} to {last}")
     if written.note:
@@ -319,28 +300,26 @@ def import_(
     animations: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="File that has the clip.", show_default="that of the character"
+            metavar="FILE", help="File with the clip.", show_default="file of the character"
         ),
     ] = None,
     density: Annotated[float, typer.Option(help="Of the body, kg/m^3.")] = 1000.0,
     scale: Annotated[
-        float, typer.Option(help="Larger by: 0.01 where the file is in centimetres.")
+        float, typer.Option(help="Scale factor: 0.01 for a file in centimetres.")
     ] = 1.0,
     fill: Annotated[
-        bool, typer.Option("--fill", help="Close holes of any size, and not only small ones.")
+        bool, typer.Option("--fill", help="Close holes of any size, not only small ones.")
     ] = False,
 ) -> None:
-    """Make a scene of a rigged character and its clip; docs/import.md says what becomes of it."""
+    """Make a scene of a rigged character and its clip; see docs/import.md."""
     if not density > 0.0:
         raise InputError(f"--density is {density:g}; give kg/m^3 above 0")
     from flowborne.characters.folder import import_character
 
-    try:
+    with _writing(out):
         made = import_character(
             file, out, clip=clip, animations=animations, density=density, scale=scale, fill=fill
         )
-    except OSError as error:
-        raise cannot_write(out, error) from error
     print(f"written: {made.scene}")
     for note in made.notes:
         print(f"  {note}")
@@ -359,7 +338,7 @@ def validate(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Folder of a report that the cases are put into; what it has is not run again.",
+            help="Folder of a report; cases that it contains are not run again.",
         ),
     ] = None,
     as_json: JsonOption = False,
@@ -374,15 +353,11 @@ def validate(
     if report is not None:
         make_folder(report)
     try:
-        results = run_cases(ids or None, Tier(wanted), on_result=show, report=report)
-    except ValueError as error:
-        raise InputError(str(error)) from error
-    except OSError as error:
-        raise cannot_write(report or Path(), error) from error
-    except KeyboardInterrupt as stopped:
-        kept = "" if report is None else f"; {report} has what is done, the same command goes on"
-        complain(f"interrupted{kept}")
-        raise typer.Exit(INTERRUPTED) from stopped
+        with _writing(report or Path(), ValueError):
+            results = run_cases(ids or None, Tier(wanted), on_result=show, report=report)
+    except KeyboardInterrupt as stop:
+        kept = "" if report is None else f"; {report} has the finished cases; run again to continue"
+        raise StoppedError(f"interrupted{kept}") from stop
     _report(results, as_json)
 
 
@@ -393,7 +368,7 @@ def bench(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure how fast it is."""
+    """Measure the speed of flowborne."""
     from flowborne.bench import bench_names, run_benches
 
     chosen = _known(names or [], bench_names(), "bench", "NAME")
@@ -404,11 +379,12 @@ def bench(
 @app.command()
 def figures(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Which; all when none is named.")
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Only these figures; all by default."),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
 ) -> None:
-    """Our numbers for Figures 2, 7, 9b, 10 and 11 of the paper, as tables and pictures."""
+    """Reproduce Figures 2, 7, 9b, 10 and 11 of the paper, as tables and pictures."""
     from flowborne.extras import check_drawing
     from flowborne.simulation import BlowUpError
 
@@ -427,7 +403,7 @@ def figures(
 
 @app.command()
 def doctor() -> None:
-    """Try what flowborne needs of this machine, and say how to mend what is missing."""
+    """Check that this machine has what flowborne needs, and say how to install what is missing."""
     from flowborne.doctor import findings
 
     missing = 0
@@ -443,25 +419,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in BLAS_THREADS:
         os.environ[name] = "1"
     if not sys.warnoptions:
-        warnings.simplefilter("ignore")  # of libraries; what is wrong is said in one message
+        warnings.simplefilter("ignore")  # of libraries; errors have their own messages
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)
     except UsageError as error:
         complain(f"{sentence_of(error)}; see flowborne --help")
         code = WRONG
-    except SceneError as error:
-        for problem in error.problems:
+    except (InputError, RunFolderError, SceneError) as error:
+        for problem in getattr(error, "problems", [str(error)]):
             complain(problem)
         code = WRONG
-    except (InputError, RunFolderError) as error:
-        complain(str(error))
-        code = WRONG
-    except StoppedError as stop:
-        complain(str(stop))
-        code = INTERRUPTED
-    except (KeyboardInterrupt, typer.Abort):
-        complain("interrupted")
+    except (StoppedError, KeyboardInterrupt, typer.Abort) as stop:
+        complain(str(stop) or "interrupted")
         code = INTERRUPTED
     except MemoryError as error:
         complain(
@@ -479,25 +449,36 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _overrides(settings: list[str]) -> dict[str, str]:
-    """What --set says; files are found from here first, then from the scene's folder.
+@contextmanager
+def _writing(path: Path, *refused: type[Exception]) -> Iterator[None]:
+    """Context that writes to `path`: names it if that fails; `refused` errors are of the input."""
+    try:
+        yield
+    except refused as error:
+        raise InputError(str(error)) from error
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
+def _overrides(settings: list[str] | None) -> dict[str, str]:
+    """Values of --set by key. Files are found from the current folder, then the scene's folder.
 
     raises  InputError when one has no key or no '='
     """
     overrides = {}
-    for setting in settings:
+    for setting in settings or ():
         key, equals, value = setting.partition("=")
         if not equals or not key.strip():
             raise InputError(f"--set {setting} has no KEY=VALUE; write for example fluid.density=1")
         key, value = key.strip(), value.strip()
-        if key in FILE_KEYS and os.path.exists(value):  # False for what is no path, too
+        if key in FILE_KEYS and os.path.exists(value):  # also False for text that is no path
             value = str(Path(value).absolute())
         overrides[key] = value
     return overrides
 
 
 def _known(asked: list[str], known: Sequence[str], kind: str, option: str) -> list[str]:
-    """What was asked for. Raises InputError when one of them does not exist."""
+    """The names asked for. Raises InputError if one of them does not exist."""
     for name in asked:
         if name not in known:
             near = get_close_matches(name, known, n=1, cutoff=0.4)
@@ -507,7 +488,7 @@ def _known(asked: list[str], known: Sequence[str], kind: str, option: str) -> li
 
 
 def _report(results: Sequence[Any], as_json: bool) -> None:
-    """Print all results as JSON when asked to; leave with 1 when one has failed."""
+    """Print all results as JSON if asked to; exit with 1 if one has failed."""
     if as_json:
         print(json.dumps([result.as_dict() for result in results], indent=2))
     if any(result.verdict == "fail" for result in results):

@@ -1,4 +1,4 @@
-"""What flowborne finds on this machine, and what is missing: `flowborne doctor`."""
+"""Checks of this machine and its libraries: `flowborne doctor`."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from flowborne.extras import missing_to_draw
 from flowborne.view.space.opengl import REMEDY
 
 FOR_DEVELOPERS = ("all", "browser", "test")
-"""Extras that bring nothing to a user that others do not."""
+"""Extras that are not reported: they serve development, or repeat others."""
 
 DRAWING = "from flowborne.doctor import draw_sphere; draw_sphere()"
-"""Code of the process that draws a picture: a driver that crashes ends that process alone."""
+"""Code of the process that draws a picture: a driver that crashes only ends that process."""
 
 PIXELS = 64
-"""Width and height of the pictures that are tried."""
+"""Width and height of the test pictures."""
 
-PATIENCE = 120.0
-"""s after which a picture that is not drawn is given up."""
+DRAWING_TIMEOUT = 120.0
+"""Maximum time for drawing the test picture, s."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One part of the machine.
+    """Result of a check.
 
-    what    it is
-    found   what is there, or what is wrong with it
-    remedy  what to do about that; empty where it works
-    needed  whether a run needs it
+    what    part of the machine that was checked
+    found   its version or state, or the fault
+    remedy  what to do about a fault; empty without one
+    needed  whether a run needs this part
     """
 
     what: str
@@ -47,22 +47,22 @@ class Finding:
 
     @property
     def missing(self) -> bool:
-        """Whether a run cannot do its work for it."""
+        """Whether it prevents a run."""
         return self.needed and bool(self.remedy)
 
     def line(self) -> str:
-        """All of it, for people."""
+        """The result in one line."""
         state = "missing" if self.missing else "optional" if self.remedy else "ok"
-        told = f"{self.found}; {self.remedy}" if self.remedy else self.found
-        return f"{state:<8}  {self.what:<12}  {told}"
+        found = f"{self.found}; {self.remedy}" if self.remedy else self.found
+        return f"{state:<8}  {self.what:<12}  {found}"
 
 
 @dataclass(frozen=True)
 class Check:
-    """How a part of the machine is tried.
+    """A check of one part of the machine.
 
-    look    what is there, in a few words; raises with what is wrong
-    remedy  what to do about that
+    look    returns `found`; raises an error that describes a fault
+    remedy  what to do about a fault
     """
 
     what: str
@@ -73,13 +73,13 @@ class Check:
     def finding(self) -> Finding:
         try:
             return Finding(self.what, self.look(), needed=self.needed)
-        except Exception as error:  # whatever is wrong is what is looked for
+        except Exception as error:  # any error is a finding
             said = " ".join(str(error).split()) or type(error).__name__
             return Finding(self.what, said, self.remedy, self.needed)
 
 
 def findings() -> Iterator[Finding]:
-    """Every part of the machine, as soon as it has been tried."""
+    """The result of each check, as soon as it is known."""
     for check in CHECKS:
         yield check.finding()
     for extra, required in sorted(extras().items()):
@@ -90,14 +90,14 @@ def findings() -> Iterator[Finding]:
 
 
 def versions_here() -> str:
-    """Versions of what the numbers depend on."""
+    """Versions of all libraries that affect the results."""
     from flowborne.runs.summary import versions
 
     return ", ".join(f"{name} {number}" for name, number in versions().items())
 
 
 def libraries() -> str:
-    """The libraries that every run needs. Raises ImportError with those that are not there."""
+    """Number of libraries that every run needs. Raises ImportError with the missing ones."""
     needed = requirements()
     lacking = [said for each in needed if (said := lack(each))]
     if lacking:
@@ -106,7 +106,7 @@ def libraries() -> str:
 
 
 def kernels() -> str:
-    """Where compiled kernels are kept, after one has been compiled, or taken from there."""
+    """Folder of compiled kernels, after one has been compiled or loaded from there."""
     import numpy as np
 
     from flowborne.kernels.vectors import largest
@@ -120,7 +120,7 @@ def kernels() -> str:
 
 
 def threads() -> str:
-    """Threads of large kernels, and the library that they come from."""
+    """Number of threads of large kernels, and the library that provides them."""
     from flowborne.kernels.jit import allowed_threads, cores, kernel_threads, numba_layer
 
     with kernel_threads():
@@ -131,15 +131,15 @@ def threads() -> str:
 
 
 def memory() -> str:
-    """Size of the machine's memory, where the system tells."""
+    """Size of the machine's memory, if the system reports it."""
     if "SC_PHYS_PAGES" not in getattr(os, "sysconf_names", {}):
-        return "this system does not tell how much"
+        return "not reported by this system"
     size = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return f"{size / 1e9:.1f} GB"
 
 
 def films() -> str:
-    """Films of two frames, written as those of a run and read again, in every kind of file."""
+    """Formats of films, after one of two frames has been written and read in each."""
     if missing_to_draw() is not None:
         raise OSError("what draws films is not installed")
     import imageio_ffmpeg  # type: ignore[import-untyped]
@@ -162,11 +162,11 @@ def films() -> str:
 
 
 def opengl() -> str:
-    """What draws three dimensions, after it has drawn a picture in a process of its own."""
+    """Class and renderer of 3D pictures, after one has been drawn in a separate process."""
     if missing_to_draw() is not None:
         raise OSError("what draws films is not installed")
     command = [sys.executable, "-c", DRAWING]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=DRAWING_TIMEOUT)
     if done.returncode < 0:
         raise OSError(f"drawing ends in a crash ({signal.Signals(-done.returncode).name})")
     if done.returncode:
@@ -175,7 +175,7 @@ def opengl() -> str:
 
 
 def draw_sphere() -> None:
-    """Draw a sphere off screen and print what has drawn it, or end the process with why not."""
+    """Draw a sphere off screen and print the renderer, or exit with the reason for a failure."""
     import pyvista
 
     from flowborne.view.space.opengl import off_screen
@@ -189,13 +189,13 @@ def draw_sphere() -> None:
     picture = plotter.screenshot(return_img=True)
     if picture.min() == picture.max():
         sys.exit("a picture of a sphere is empty")
-    told = plotter.render_window.ReportCapabilities().splitlines()
-    names = [line.partition(":")[2].strip() for line in told if "renderer string" in line]
+    lines = plotter.render_window.ReportCapabilities().splitlines()
+    names = [line.partition(":")[2].strip() for line in lines if "renderer string" in line]
     print(", ".join([plotter.render_window.GetClassName(), *names]))
 
 
 def extras() -> dict[str, list[Requirement]]:
-    """Extra of flowborne -> the libraries that it brings on this system."""
+    """Extra of flowborne -> the libraries that it installs on this system."""
     try:
         names = metadata("flowborne").get_all("Provides-Extra") or []
     except PackageNotFoundError:
@@ -205,22 +205,20 @@ def extras() -> dict[str, list[Requirement]]:
 
 
 def requirements(extra: str = "") -> list[Requirement]:
-    """What flowborne asks for on this system, or what an extra asks for besides.
+    """Requirements of flowborne on this system, or the further ones of an extra.
 
-    raises  PackageNotFoundError where flowborne itself is not installed
+    raises  PackageNotFoundError if flowborne itself is not installed
     """
-    found = []
-    for each in map(Requirement, requires("flowborne") or ()):
-        marker = each.marker
-        if ("extra" in str(marker)) != bool(extra):
-            continue
-        if marker is None or marker.evaluate({"extra": extra}):
-            found.append(each)
-    return found
+    return [
+        each
+        for each in map(Requirement, requires("flowborne") or ())
+        if ("extra" in str(each.marker)) == bool(extra)
+        and (each.marker is None or each.marker.evaluate({"extra": extra}))
+    ]
 
 
 def lack(requirement: Requirement) -> str:
-    """What is wrong with the library that is asked for, in a few words; empty when nothing is."""
+    """Why a required library cannot be used; empty if it can."""
     try:
         number = version(requirement.name)
     except PackageNotFoundError:
@@ -258,4 +256,4 @@ CHECKS = (
     ),
     Check("OpenGL", opengl, REMEDY, needed=False),
 )
-"""What every machine is tried for."""
+"""The checks, in order."""

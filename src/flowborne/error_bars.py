@@ -1,4 +1,4 @@
-"""Error bars of a number of a scene, from its values on several grids and with several steps."""
+"""Error bars of a number, from its values on several grids and with several steps."""
 
 from __future__ import annotations
 
@@ -21,41 +21,40 @@ from flowborne.scenes.load import load_scene
 Array = NDArray[np.float64]
 
 FORMAL_ORDER = 2.0
-"""Order of the scheme in grid and step, where all is smooth."""
+"""Order of the scheme in grid and step for smooth flows."""
 
 LEAST_ORDER, MOST_ORDER = 0.5, 2.0
-"""Bounds of the order in the bar: a higher one, by chance, would make it too short."""
+"""Bounds of the order in the bar: a higher one, by chance, would make the bar too short."""
 
 SAFETY_FACTOR, CAUTIOUS_FACTOR = 1.25, 3.0
-"""Factors of safety where the observed order is that of the scheme, and where it is not."""
+"""Factors of safety if the observed order is that of the scheme, and if it is not."""
 
 ORDER_TOLERANCE = 0.1
-"""Part of the scheme's order by which the observed one may differ from it in the former case."""
+"""Relative difference of the observed order from the scheme's in the former case."""
 
 LARGEST_ORDER = 30.0
 """Upper bound in the search for the order."""
 
-
 Convergence = Literal["monotone", "equal", "none", "unknown"]
-"""How the last three values come closer to each other: from one side; they are all the same; they
-swing, or their differences grow; there are only two."""
+"""Convergence of the last three values: from one side; all equal; they oscillate, or their
+differences grow; unknown for only two values."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """A number at several resolutions, and what follows from its last three values.
+    """A number at several resolutions, and its convergence from the last three values.
 
-    The error of value i is C h_i^p with h_i = 1 / resolution_i. Three values give C and p; without
-    an order, where values swing or their differences grow, the bar is how far they are apart.
+    The error of value i is C h_i^p with h_i = 1 / resolution_i. Three values give C and p. If they
+    oscillate or their differences grow, there is no order, and the bar is their range.
 
     resolutions   from coarse to fine: cells, or steps per frame
     values        one each
     convergence   of the last three: "monotone", "equal", "none" or "unknown"
     order         observed p; nan unless they approach a value from one side
-    extrapolated  value at h = 0 of Richardson's extrapolation with that p; nan where there is none,
-                  or one below 0.5, with which next to nothing is known of it
+    extrapolated  value at h = 0 by Richardson extrapolation with that p; nan without p or with
+                  p < 0.5, for which the extrapolation is unreliable
     uncertainty   half width of the bar around the finest value, never negative
-    spread        largest value less the smallest, of all
+    spread        largest value minus the smallest, of all
     """
 
     resolutions: tuple[float, ...]
@@ -68,9 +67,9 @@ class Refinement:
 
     @classmethod
     def of(cls, resolutions: Sequence[float], values: Sequence[float]) -> Refinement:
-        """What follows from known values, in the order of the resolutions.
+        """The refinement of known values, in the order of the resolutions.
 
-        raises  ValueError for less than two values, resolutions that do not grow or are not
+        raises  ValueError for fewer than two values, resolutions that do not grow or are not
                 positive, and numbers that are not finite
         source  order for any ratio of spacings: Celik et al. 2008, "Procedure for estimation and
                 reporting of uncertainty due to discretization in CFD applications", J. Fluids Eng.
@@ -109,7 +108,7 @@ class Refinement:
 
     @property
     def value(self) -> float:
-        """That of the finest."""
+        """Value at the finest resolution."""
         return self.values[-1]
 
     def __str__(self) -> str:
@@ -122,8 +121,8 @@ class ErrorBar:
     """A number of a scene with its numerical uncertainty.
 
     value        on the finest grid with the shortest step
-    uncertainty  half width of its bar: those of grids and steps added
-    spread       largest value less the smallest, of all runs
+    uncertainty  half width of its bar: the sum of those of grids and steps
+    spread       largest value minus the smallest, of all runs
     grids        its values on all grids, with the shortest step; None for one grid
     steps        its values with all steps, on the finest grid; None for one step
     """
@@ -150,36 +149,34 @@ def error_bar(
     settings: Mapping[str, str] | None = None,
     out: Path | str | None = None,
 ) -> ErrorBar:
-    """Run a scene on several grids, and with several steps, and put a bar on a number.
+    """Error bar of a number, from runs of a scene on several grids and with several steps.
 
-    The grids are run with the last number of steps, the steps on the last grid. The bar is of grid
-    and step alone: it says nothing of what the model leaves out.
+    The grids are run with the last number of steps, the steps on the last grid. The bar contains
+    the errors of grid and step only, not those of the model.
 
     scene        name of a built-in scene, or path of a scene file
-    measure      a column of the history, of which the mean over all frames is taken, or what gives
-                 the number of a run
-    resolutions  values of [domain] resolution, ascending; three or more show an order. That of the
-                 scene unless given
-    steps        values of [time] steps_per_frame, ascending; as before
-    frames       how many are run; as many as the scene has unless given
-    settings     further keys of the scene, as `load_scene` takes them
-    out          folder that keeps the runs; each is thrown away when it is measured unless given
+    measure      a column of the history, for its mean over all frames, or a function of a run
+    resolutions  values of [domain] resolution, ascending; three or more give an order. The scene's
+                 by default
+    steps        values of [time] steps_per_frame, ascending; likewise
+    frames       number of frames; the scene's by default
+    settings     further keys of the scene, as for `load_scene`
+    out          folder that keeps the runs; by default each is deleted after its measurement
     returns      the number on the finest grid with the shortest step, and its bar
-    raises       ValueError when there are not at least two grids or two numbers of steps, or they
-                 do not grow, for an unknown column, and a number that is not finite; SceneError
-                 when the scene is wrong, or one of its runs ends as anything but `done`;
-                 RunFolderError when `out` has such runs already
+    raises       ValueError for fewer than two grids and two numbers of steps, or if they do not
+                 grow, for an unknown column, and a number that is not finite; SceneError if the
+                 scene is wrong, or one of its runs ends with another outcome than `done`;
+                 RunFolderError if `out` already contains such runs
     """
     for name, given in (("resolutions", resolutions), ("steps", steps)):
         if len(given):
             _check_growing(name, given)
     if max(len(resolutions), len(steps)) < 2:
         raise ValueError("an error bar needs two grids or two steps. Give resolutions or steps.")
-    cells_of = list(resolutions) if len(resolutions) else [None]
-    counts = list(steps) if len(steps) else [None]
-    finest, shortest = cells_of[-1], counts[-1]
-    grids = [(cells, shortest) for cells in cells_of]
-    times = [(finest, count) for count in counts]
+    cells_of: list[int | None] = [*resolutions] or [None]
+    counts: list[int | None] = [*steps] or [None]
+    grids = [(cells, counts[-1]) for cells in cells_of]
+    times = [(cells_of[-1], count) for count in counts]
     values: dict[tuple[int | None, int | None], float] = {}
     for cells, count in dict.fromkeys([*grids, *times]):
         keys = {"domain.resolution": cells, "time.steps_per_frame": count}
@@ -192,18 +189,11 @@ def error_bar(
             if result.outcome is not RunOutcome.DONE:
                 raise SceneError(f"no error bar of {scene} with {name}: {result.message}.")
             values[cells, count] = _measured(OpenRun(folder), measure)
-    of_grids = [values[key] for key in grids]
-    of_steps = [values[key] for key in times]
-    grid = Refinement.of(resolutions, of_grids) if len(grids) > 1 else None
-    step = Refinement.of(steps, of_steps) if len(times) > 1 else None
-    found = [one for one in (grid, step) if one is not None]
-    return ErrorBar(
-        values[finest, shortest],
-        sum(one.uncertainty for one in found),
-        float(np.ptp(list(values.values()))),
-        grid,
-        step,
-    )
+    grid = Refinement.of(resolutions, [values[key] for key in grids]) if len(grids) > 1 else None
+    step = Refinement.of(steps, [values[key] for key in times]) if len(times) > 1 else None
+    uncertainty = sum(found.uncertainty for found in (grid, step) if found is not None)
+    spread = float(np.ptp(list(values.values())))
+    return ErrorBar(values[times[-1]], uncertainty, spread, grid, step)
 
 
 def order_of(spacings: Array, values: Array) -> float:
@@ -244,7 +234,7 @@ def _measured(done: OpenRun, measure: str | Callable[[OpenRun], float]) -> float
 
 
 def _check(resolutions: Sequence[float], values: Sequence[float]) -> None:
-    """Raise ValueError for what no bar can be put on."""
+    """Raise ValueError for numbers that give no bar."""
     if len(values) != len(resolutions) or len(values) < 2:
         raise ValueError(
             f"there are {len(values)} values at {len(resolutions)} resolutions. "

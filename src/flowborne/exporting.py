@@ -1,4 +1,4 @@
-"""From a run folder to a file that another program opens."""
+"""Export of a run for other programs."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from flowborne.runs.run_folder import RunFolder, RunFolderError
 def export(
     run: str | Path, out: str | Path, parameters: Mapping[str, Any] | None = None
 ) -> Written:
-    """Write a run as a file; the ending of its name says as what.
+    """Write a run as a file; the ending of its name selects the format.
 
-    run         folder of the run; one that goes on, or was stopped, gives the frames that it has
-    out         file to write; its folder is made
+    run         folder of the run, which may still be running or have been stopped
+    out         file to write; its folder is created
     parameters  of the exporter
-    returns     the files that were written, and what there is to tell of them
-    raises      SceneError when nothing writes such files, the run lacks what they hold, or a
-                library is missing; RunFolderError when `run` is no run; PartError when an exporter
-                of one's own fails; OSError when the file cannot be written
+    returns     the written files, and a note about them
+    raises      SceneError if no exporter has this ending, the run lacks the required data, or a
+                library is missing; RunFolderError if `run` is no run; PartError if a user's
+                exporter fails; OSError if the file cannot be written
     """
     from flowborne.scenes.load import read_scene
 
     folder, path = RunFolder.existing(Path(run)), Path(out)
-    read_scene(folder.scene)  # brings the plugins
+    read_scene(folder.scene)  # imports the plugins
     ending = path.suffix
     if not can_write(ending):
         raise SceneError(
@@ -41,9 +41,8 @@ def export(
         raise SceneError(f"{path.name}: exporter {error}.") from error
     opened = OpenRun(folder.path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    passing = OSError, RunFolderError, SceneError
     part = f"exporter of '{ending}' files"
-    with PartError.guarding(part, *passing):
+    with PartError.guarding(part, OSError, RunFolderError, SceneError):
         written = exporter.write(opened, path)
     if not isinstance(written, Written | None):
         raise PartError(f"{part} gave {written!r:.100}: return nothing, or what was Written")

@@ -1,4 +1,4 @@
-"""Resources of a run: threads, memory, seconds by part, and where trials run."""
+"""Resources of a run: threads, memory, seconds by part, and executors of trials."""
 
 from __future__ import annotations
 
@@ -40,12 +40,11 @@ __all__ = [
 ]
 
 STREAM = (100, 100, 1000)
-"""Shape of arrays that fit into no cache."""
+"""Shape of arrays that exceed every cache."""
 
 
 def memory_bandwidth() -> float:
-    """Bytes per second that p = z + s p moves, at best of a few times, on the threads that kernels
-    may use here."""
+    """Bytes per second of p = z + s p, the best of six runs, on the threads allowed for kernels."""
     p, z = np.ones(STREAM), np.ones(STREAM)
     seconds = []
     for _ in range(6):

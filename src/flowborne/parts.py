@@ -9,16 +9,16 @@
         def value(self, measured: Measurement) -> float:
             return (measured.body(self.body).centre[2] - self.height) ** 2
 
-A scene that names the file in `plugins` then has `[[objectives]]` of `kind = "reach"`, with `body`
-and `height` as keys. Objectives are minimised; `goal = "most"` in a scene, or a negative weight,
-maximises them.
+A scene that names the file in `plugins` can then use `[[objectives]]` of `kind = "reach"`, with
+`body` and `height` as keys. Objectives are minimised; `goal = "most"` in a scene, or a negative
+weight, maximises them.
 
-A rule has `step` and `step_scale`; `FullStep` has the latter for rules that always use the full
+A rule has `step` and `step_scale`; `FullStep` defines the latter for rules that always use the full
 strength and probe. A gradient has a field `displacement`, which flowborne sets from the scene's
-probes (rad or m for each dof), and `of` and `estimate`; `FiniteDifference` has all but the latter.
-An exporter has `write(run, path)` and is registered by the ending of its files; it replaces a
-built-in one of the same ending. A shape has `distance(points)` and `half_extents()`; in Python
-`PlacedShape(Torus(0.3, 0.1), "ring")` is one of the `shapes` of `SolidModel.from_string`.
+probes (rad or m for each dof), and `of` and `estimate`; `FiniteDifference` defines all except
+`estimate`. An exporter has `write(run, path)` and is registered by the ending of its files; it
+replaces a built-in one with the same ending. A shape has `distance(points)` and `half_extents()`;
+in Python `PlacedShape(Torus(0.3, 0.1), "ring")` is one of the `shapes` of `SolidModel.from_string`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A run from its scene to its folder: begin or go on, record, stop well."""
+"""A run from its scene to its folder: begin or resume, record, stop cleanly."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from enum import Enum
-from math import nan, prod
+from math import prod
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("flowborne")
 
 FILM_BYTES = 20_000_000
-"""Room that is kept for the picture, the film and the history."""
+"""Disc space reserved for the picture, the film and the history."""
 
 
 class RunOutcome(Enum):
@@ -56,13 +56,13 @@ class RunOutcome(Enum):
 
 @dataclass(frozen=True)
 class RunResult:
-    """What came of a run.
+    """Result of a run.
 
-    folder   where it is
+    folder   of the run
     outcome  how it ended
-    message  what to tell a person about it
-    frames   frames done, those of earlier runs in the same folder included
-    summary  what summary.json says
+    message  for the user
+    frames   frames done, including those of earlier runs in the same folder
+    summary  content of summary.json
     """
 
     folder: Path
@@ -73,9 +73,9 @@ class RunResult:
 
 
 class RunInterrupted(KeyboardInterrupt):
-    """The run was asked to stop; everything up to its last whole frame is saved.
+    """The run was interrupted; everything up to its last whole frame is saved.
 
-    result  what there is of the run
+    result  of the run so far
     """
 
     def __init__(self, result: RunResult) -> None:
@@ -94,21 +94,21 @@ def run(
     film: bool = True,
     progress: Callable[[RunProgress], None] | None = None,
 ) -> RunResult:
-    """Run a scene and leave behind what is listed in `flowborne.runs.run_folder`.
+    """Run a scene and write the files listed in `flowborne.runs.run_folder`.
 
     scene     a Scene, or the name of a built-in one, or the path of a scene file
     out       folder to write
-    frames    how many; by default what the scene says
+    frames    number of frames; the scene's by default
     workers   trials of the controller at once; changes no number
-    resume    go on with the run in `out` from its checkpoint
-    replace   take the place of an earlier run in `out`
+    resume    continue the run in `out` from its checkpoint
+    replace   replace an earlier run in `out`
     film      draw preview.png and preview.mp4 at the end
-    progress  called with news of the run
-    returns   the result; a run that blew up or filled the disc returns, too: see its outcome
-    raises    RunFolderError when `out` or the arguments are wrong or another run is being written
-              there, SceneError when the scene is wrong or does not fit into memory; nothing is then
+    progress  called with the progress of the run
+    returns   the result, also of a run that blew up or filled the disc: see its outcome
+    raises    RunFolderError if `out` or the arguments are wrong or another run is being written
+              there, SceneError if the scene is wrong or does not fit into memory; nothing is then
               written. RunInterrupted (a KeyboardInterrupt) after Ctrl-C or SIGTERM, when everything
-              has been saved; KeyboardInterrupt when there was nothing to save yet
+              has been saved; KeyboardInterrupt if there was nothing to save yet
     """
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.save import scene_files
@@ -132,9 +132,9 @@ def run(
                 files = scene_files(wanted)
                 simulation = open_until_the_end.enter_context(Simulation(wanted, workers=workers))
                 job = _Run(simulation, folder, files, signals, progress)
-                open_until_the_end.enter_context(job.compilation_told())
+                open_until_the_end.enter_context(job.watching_compilation())
                 if not resume:
-                    job.start()
+                    _ = simulation.world  # starts bodies and fluid, which may take long
         except KeyboardInterrupt as stop:
             raise KeyboardInterrupt("stopped before anything was written") from stop
         if resume:
@@ -162,9 +162,6 @@ class _Run:
         self.frames = simulation.frames
         self.taken = earlier_joints(simulation.scene)
         self.warnings = warnings_of(simulation.scene, simulation.setup)
-        self.notes = list(notes_of(simulation.scene, simulation.setup.solid))
-        creature = creature_of(simulation.scene, simulation.setup)
-        self.creature = None if creature is None else asdict(creature)
         self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
@@ -172,12 +169,8 @@ class _Run:
         self._progress = progress
         self._started = perf_counter()
 
-    def start(self) -> None:
-        """Set bodies and fluid going, which may take long. Raises SceneError."""
-        _ = self.simulation.world
-
     def begin(self, *, replace: bool) -> None:
-        """Make the folder ready for a new run. Raises RunFolderError; then nothing is written."""
+        """Prepare the folder for a new run. Raises RunFolderError; nothing is then written."""
         self._check_space(freed=self.folder.bytes_used() if replace else 0)
         RunFolder.create(self.folder.path, replace=replace)
         try:
@@ -191,7 +184,7 @@ class _Run:
             raise cannot_write(self.folder.path, error) from error
 
     def resume(self) -> None:
-        """Stand where the checkpoint is, and drop what was written after it."""
+        """Restore the checkpoint, and drop everything written after it."""
         folder, simulation = self.folder, self.simulation
         try:
             if folder.checkpoint.exists():
@@ -213,13 +206,13 @@ class _Run:
             folder.drop_states_after(simulation.frame)
         except (OSError, ValueError) as error:
             raise RunFolderError(
-                f"{folder.path} cannot be gone on with: {error}; start again with --replace"
+                f"{folder.path} cannot be resumed: {error}; start again with --replace"
             ) from error
 
     def go_on(self) -> tuple[RunOutcome, str]:
-        """Advance and record to the last frame, or to what stops the run."""
+        """Advance and record to the last frame, or until the run stops; outcome and message."""
         simulation, signals = self.simulation, self._signals
-        self._tell("start")
+        self._show("start")
         while simulation.frame < self.frames and not signals.asked:
             try:
                 with signals.interruptible():
@@ -234,7 +227,8 @@ class _Run:
                 values = self._record(report)
             except OSError as error:
                 return RunOutcome.NOT_WRITTEN, self._not_written(error)
-            self._tell("frame", report.objective, values)
+            joints = tuple((c, values[c]) for c in simulation.measures.controlled)
+            self._show("frame", objective=report.objective, joints=joints)
         try:
             self._save()
         except OSError as error:
@@ -247,7 +241,7 @@ class _Run:
         return RunOutcome.DOUBTFUL, f"{message}, but not to be trusted: {'. '.join(doubts)}"
 
     def finish(self, outcome: RunOutcome, message: str, *, film: bool) -> RunResult:
-        """Write the summary and the film, and say what came of the run."""
+        """Write exports, summary and film; the result. Raises RunInterrupted after a signal."""
         assert self.history is not None
         self.history.close()
         folder = self.folder
@@ -271,7 +265,7 @@ class _Run:
         return result
 
     def _draw(self) -> str:
-        """Draw the picture and the film; what to tell when they are not, or not whole."""
+        """Draw the picture and the film; an addition to the message if that fails."""
         missing = missing_to_draw()
         if missing is not None:
             return f"; no film: {missing}"
@@ -279,7 +273,7 @@ class _Run:
 
         try:
             with self._signals.interruptible():
-                make_preview(self.folder.path, self._tell_drawn)
+                make_preview(self.folder.path, self._show_drawn)
         except (RunFolderError, ValueError) as error:
             return f"; no film: {error}"
         except KeyboardInterrupt:
@@ -287,7 +281,8 @@ class _Run:
         return ""
 
     def _export(self) -> tuple[list[str], str]:
-        """Write the files that the scene asks for; their names, and what to tell of the others."""
+        """Write the exports of the scene; their names, and an addition to the message about those
+        that failed."""
         from flowborne.exporting import export
 
         exported: list[str] = []
@@ -297,8 +292,7 @@ class _Run:
                 out = self.folder.path / table.file
                 with self._signals.interruptible():
                     written = export(self.folder.path, out, table.parameters)
-                names = (str(file.relative_to(self.folder.path)) for file in written.files)
-                exported += names
+                exported += (str(file.relative_to(self.folder.path)) for file in written.files)
             except (OSError, PartError, RunFolderError, SceneError) as error:
                 failed += f"; no {table.file}: {error}"
             except KeyboardInterrupt:
@@ -306,14 +300,14 @@ class _Run:
                 failed += f"; stopped before {table.file} was written; write it with: {how}"
         return exported, failed
 
-    def compilation_told(self) -> AbstractContextManager[None]:
-        """Context in which news is given of every kernel that is compiled."""
+    def watching_compilation(self) -> AbstractContextManager[None]:
+        """Context that shows the progress of compiling kernels."""
         if not self.simulation.scene.has_fluid:
             return nullcontext()
-        return compilation_watched(lambda kernels: self._tell("compiling", kernels=kernels))
+        return compilation_watched(lambda kernels: self._show("compiling", kernels=kernels))
 
     def _write_start(self) -> None:
-        """Everything that a run has at frame 0; the checkpoint last."""
+        """Write all files of frame 0, the checkpoint last."""
         simulation, folder = self.simulation, self.folder
         write_model(
             folder,
@@ -346,14 +340,14 @@ class _Run:
         return values
 
     def _save(self) -> None:
-        """Write the checkpoint, after the rows and states that it speaks of are on the disc."""
+        """Write the checkpoint, once the rows and states before it are on the disc."""
         assert self.history is not None
         self.history.sync()
         self.recorder.sync()
         save_checkpoint(self.folder.checkpoint, self.simulation.world, self.simulation.frame)
 
     def _check_space(self, freed: int) -> None:
-        """Raise RunFolderError when the frames still to come do not fit on the disc."""
+        """Raise RunFolderError if the remaining frames do not fit on the disc."""
         simulation = self.simulation
         states = (self.frames - simulation.frame) * self.recorder.bytes_per_frame(simulation.world)
         needed = states + 2 * state_bytes(simulation.world) + FILM_BYTES
@@ -361,20 +355,21 @@ class _Run:
 
     def _summary(self, outcome: RunOutcome, message: str) -> dict[str, Any]:
         simulation = self.simulation
-        world = simulation.world
+        world, scene = simulation.world, simulation.scene
         strength = simulation.measures.strength_steps(simulation.frame_time)
-        every = simulation.scene.controller.every if simulation.scene.can_settle else None
+        every = scene.controller.every if scene.can_settle else None
+        creature = creature_of(scene, world.setup)
         cells = None if world.setup.fluid is None else prod(world.setup.fluid.grid.shape)
         return {
-            "scene": simulation.scene.name,
+            "scene": scene.name,
             "outcome": outcome.name.lower(),
             "message": message,
             "doubts": self._doubts(),
             **summarise(self.folder.history, strength, every),
             "cells": cells,
-            "creature": self.creature,
+            "creature": None if creature is None else asdict(creature),
             "warnings": self.warnings,
-            "notes": self.notes,
+            "notes": list(notes_of(scene, world.setup.solid)),
             "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],
             "state_bytes": state_bytes(world),
             "bytes_per_cell": None if cells is None else state_bytes(world) / cells,
@@ -384,7 +379,7 @@ class _Run:
         }
 
     def _blown_up(self, error: BlowUpError) -> str:
-        """Save the last good frame; the message."""
+        """Save the last good frame; returns the message."""
         kept = f"everything up to frame {self.simulation.frame} is kept"
         try:
             self._save()
@@ -408,53 +403,36 @@ class _Run:
         )
 
     def _doubts(self) -> list[str]:
-        """Reasons not to trust the frames so far, those of earlier runs in the folder included."""
+        """Reasons not to trust the frames so far, including those of earlier runs in the folder."""
         model, fluid = self.simulation.setup.solid, self.simulation.setup.fluid
         bodies = [model.body_names[body] for body in np.flatnonzero(model.met & model.moving)]
         return doubts_of(self.folder.history, bodies, fluid)
 
     def _rows(self) -> int:
-        """Frames that are in the history."""
+        """Number of frames in the history."""
         return 0 if self.history is None else self.history.rows
 
     def _how(self) -> str:
-        """How to go on."""
+        """How to continue the run."""
         path = self.folder.path
-        return f"go on with: flowborne run {self.folder.scene} --out {path} --resume"
+        return f"continue with: flowborne run {self.folder.scene} --out {path} --resume"
 
-    def _tell_drawn(self, drawn: int, frames: int) -> None:
-        if self._progress is not None:
-            seconds = perf_counter() - self._started
-            self._progress(RunProgress("film", drawn, frames, seconds))
+    def _show_drawn(self, drawn: int, frames: int) -> None:
+        self._show("film", frame=drawn, frames=frames)
 
-    def _tell(
-        self,
-        stage: Stage,
-        objective: float = nan,
-        values: dict[str, float] | None = None,
-        kernels: int = 0,
-    ) -> None:
+    def _show(self, stage: Stage, **news: Any) -> None:
+        """Report progress; by default of the simulation's frame."""
         if self._progress is None:
             return
-        joints = self.simulation.measures.controlled
-        self._progress(
-            RunProgress(
-                stage=stage,
-                frame=self.simulation.frame,
-                frames=self.frames,
-                seconds=perf_counter() - self._started,
-                kernels=kernels,
-                warnings=len(self.warnings),
-                objective=objective,
-                joints=() if values is None else tuple((c, values[c]) for c in joints),
-            )
-        )
+        news = {"frame": self.simulation.frame, "frames": self.frames, **news}
+        seconds, warnings = perf_counter() - self._started, len(self.warnings)
+        self._progress(RunProgress(stage=stage, seconds=seconds, warnings=warnings, **news))
 
 
 class _Signals:
-    """Ctrl-C and SIGTERM during a run: noted, and raised only where that is safe.
+    """Ctrl-C and SIGTERM during a run: recorded, and raised only where that is safe.
 
-    asked  whether one has come
+    asked  whether one has arrived
     """
 
     def __init__(self) -> None:
@@ -480,15 +458,15 @@ class _Signals:
 
     @contextmanager
     def interruptible(self) -> Iterator[None]:
-        """Context that a signal ends at once, by KeyboardInterrupt, also one that came before."""
+        """Context that a signal ends by KeyboardInterrupt, also one that arrived before."""
         if self.asked:
             raise KeyboardInterrupt
         self._safe = True
         try:
             yield
         except Exception as error:
-            # what an interrupt becomes within a library: a SystemError while a kernel hands back
-            # its result, a TypingError while Numba compiles it
+            # an interrupt becomes a SystemError while a kernel returns its result, and a
+            # TypingError while Numba compiles it
             if not self.asked:
                 raise
             raise KeyboardInterrupt from error

@@ -1,4 +1,4 @@
-"""A scene in motion, frame after frame."""
+"""The simulation of a scene, frame by frame."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
 from flowborne.runs.frame_report import PARTS, FrameReport
 from flowborne.solids.flesh import inversion
+from flowborne.solids.model import FREE, SLIDE
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
@@ -32,12 +33,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Step = Callable[[World, float, "JointCommand | None"], StepReport]
 
-TORN = 0.02
-"""Part of the elements of flesh that may be inside out, on their way back for instance."""
-
+MAX_INVERTED = 0.02
+"""Largest share of the elements of flesh that may be inside out for a while."""
 
 LISTED = 4
-"""Most dofs that a message names."""
+"""Maximum number of dofs named in a message."""
 
 
 class BlowUpError(Exception):
@@ -46,7 +46,7 @@ class BlowUpError(Exception):
     frame  the frame that could not be finished, counted from 1
     step   the step in it, counted from 1
     cause  what happened, a sentence without a full stop
-    fault  whether that was an error that no step should end with
+    fault  whether that was an internal error
     """
 
     def __init__(self, frame: int, step: int, cause: str, fault: bool = False) -> None:
@@ -59,7 +59,7 @@ class BlowUpError(Exception):
 
 @dataclass(frozen=True)
 class _Moment:
-    """The state after some frames, and the report of the last; they change together."""
+    """The state after some frames and the report of the last, which change together."""
 
     world: World
     frame: int
@@ -67,21 +67,21 @@ class _Moment:
 
 
 class Simulation:
-    """A world, its controller and the clock that drives both.
+    """A world and its controller, advanced frame by frame.
 
     scene     a Scene, or the name of a built-in one, or the path of a scene file
-    workers   how many trials of the controller run at once; by default as many as there are
-              trials and processors. Results do not depend on it
+    workers   number of trials of the controller that run at once; by default that of the trials,
+              at most that of the cores. Results do not depend on it
     executor  "serial", "threads" (default), "processes", or an object with submit() or map()
-    raises    SceneError when the scene is wrong or does not fit into memory; ValueError for
+    raises    SceneError if the scene is wrong or does not fit into memory; ValueError for
               workers < 1
 
     scene            the Scene
     controller       the Controller, or None
-    frame_time       s of a frame
+    frame_time       duration of a frame, s
     steps_per_frame  physics steps in a frame
-    frames           how many the scene asks for; `advance_frame` does not stop there
-    measures         what `measure` tells
+    frames           number of frames of the scene; `advance_frame` does not stop there
+    measures         columns of the history
     """
 
     def __init__(
@@ -121,9 +121,9 @@ class Simulation:
 
     @property
     def world(self) -> World:
-        """The state after `frame` frames; each frame puts a new World in its place.
+        """The state after `frame` frames, a new World for each.
 
-        raises  SceneError when the bodies and the fluid cannot be set going, the first time
+        raises  SceneError if the bodies and the fluid cannot be started, on the first use
         """
         if not self._started:
             self._start()
@@ -131,12 +131,12 @@ class Simulation:
 
     @property
     def setup(self) -> Setup:
-        """What never changes during the run."""
+        """The constant part of the world."""
         return self._moment.world.setup
 
     @property
     def frame(self) -> int:
-        """Frames done."""
+        """Number of frames done."""
         return self._moment.frame
 
     @property
@@ -150,14 +150,14 @@ class Simulation:
         return self._moment.report
 
     def restore(self, world: World, frame: int) -> None:
-        """Go on from `world`, which is the state after `frame` frames of the same scene."""
+        """Continue from `world`, the state after `frame` frames of the same scene."""
         self._moment, self._started = _Moment(world, frame, None), True
 
     def advance_frame(self) -> FrameReport:
-        """Decide, then take the steps of one frame, on all cores unless a context allows less.
+        """Decide, then take the steps of one frame, on all cores unless a context allows fewer.
 
-        raises  BlowUpError when a step fails or a measure is not a finite number. Whatever is
-                raised, the frame has not begun
+        raises  BlowUpError if a step fails or a measure is not a finite number. After any error the
+                state is that before the frame
         """
         world = self.world.copy()
         with _one_blas_thread(), kernel_threads():
@@ -186,14 +186,14 @@ class Simulation:
         return Named.after(self.world, self.report)
 
     def measure(self) -> dict[str, float]:
-        """What the history says of the present state, by the history's column names.
+        """A row of the history for the present state: column -> value.
 
-        Numbers that only a step can give are nan before the first frame.
+        Values that only a step can give are nan before the first frame.
         """
         return self.measures.values(self.world, self.frame, self.report)
 
     def close(self) -> None:
-        """Shut the controller's workers down."""
+        """Stop the controller's workers."""
         if self.controller is not None:
             self.controller.close()
 
@@ -204,12 +204,13 @@ class Simulation:
         self.close()
 
     def _start(self) -> None:
-        """Set bodies and fluid going; controlled joints keep their velocity until a decision."""
+        """Start bodies and fluid; controlled joints keep their velocity until a decision."""
         from flowborne.coupling.motion import JointCommand
         from flowborne.coupling.start import start
 
         world, scene = self._moment.world, self.scene
-        free = free_joint_dofs(world.setup.solid)
+        model = world.setup.solid
+        free = model.mj.jnt_type[model.mj.dof_jntid] == FREE
         given = np.ones(free.size, bool) if scene.initial.impulse == "given" else ~free
         held = JointCommand.none(free.size)
         if self.controller is not None:
@@ -229,7 +230,7 @@ class Simulation:
         self._started = True
 
     def _advance(self, world: World, frame: int) -> FrameReport:
-        """Take `world` through a frame."""
+        """Advance `world` by a frame, in place."""
         started = perf_counter()
         controller, dt = self.controller, self.frame_time / self.steps_per_frame
         end = world.time + self.frame_time
@@ -290,7 +291,7 @@ def _enough_memory(scene: Scene) -> Iterator[None]:
 
 
 def trouble(world: World, report: StepReport) -> str | None:
-    """Why the world cannot be stepped on after the step of `report`, or None."""
+    """Why the world cannot be advanced after the step of `report`, or None."""
     if report.outcome is Outcome.PRESSURE_NOT_CONVERGED:
         detail = f"relative residual {report.residual:.2g} after {report.iterations} iterations"
         return f"{report.outcome.value} ({detail})"
@@ -307,7 +308,7 @@ def trouble(world: World, report: StepReport) -> str | None:
         return f"{name} turns by {turn.max():.3g} rad in one step, more than half a turn"
     flesh = world.setup.solid.flesh
     torn = None if flesh is None else inversion(flesh, solid.q)
-    if torn is not None and len(torn.elements) > TORN * torn.of:
+    if torn is not None and len(torn.elements) > MAX_INVERTED * torn.of:
         return torn.sentence()
     if fluid is None or properties is None:
         return None
@@ -333,31 +334,25 @@ def _listed(world: World, dofs: NDArray[np.int64]) -> str:
 def turning_dofs(model: SolidModel) -> NDArray[np.bool_]:
     """(nv,) which dofs are rotations: hinges, balls and the last three of free joints."""
     kind, first = model.mj.jnt_type[model.mj.dof_jntid], model.mj.jnt_dofadr[model.mj.dof_jntid]
-    turning: NDArray[np.bool_] = np.where(kind == 0, np.arange(model.nv) - first >= 3, kind != 2)
-    return turning
-
-
-def free_joint_dofs(model: SolidModel) -> NDArray[np.bool_]:
-    """(nv,) which dofs are of free joints."""
-    free: NDArray[np.bool_] = model.mj.jnt_type[model.mj.dof_jntid] == 0
-    return free
+    of_free = np.arange(model.nv) - first >= 3
+    return np.asarray(np.where(kind == FREE, of_free, kind != SLIDE))
 
 
 def default_workers(joints: int, fluid: bool) -> int:
-    """As many workers as a controller of so many joints has trials, but no more than processors.
+    """Number of workers: that of the trials of a controller of some joints, at most that of cores.
 
-    Without a fluid one: a trial then takes less time than handing it to a thread.
+    Without a fluid it is 1, as a trial takes less time than passing it to a thread.
     """
     return max(1, min(2 * joints, cores())) if fluid else 1
 
 
 @lru_cache(maxsize=1)
 def _blas() -> ThreadpoolController:
-    """The BLAS libraries that are loaded; all are, once a simulation has been built."""
+    """The loaded BLAS libraries: all of them, once a simulation has been built."""
     return ThreadpoolController()
 
 
 def _one_blas_thread() -> AbstractContextManager[object]:
-    """Context in which BLAS uses one thread: small solves are faster, and sums always the same."""
+    """Context in which BLAS uses one thread: small solves are faster, and sums reproducible."""
     limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
     return limit

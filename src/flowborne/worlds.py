@@ -1,10 +1,10 @@
-"""Worlds made and stepped in code: a model, a grid, and what the fluid is.
+"""Worlds made and stepped in code, from a model, a grid and the properties of the fluid.
 
 world = make_world("<mujoco>...</mujoco>", Grid.slab(64, 64, 1 / 64, (0, 0)), density=1000.0)
 report = advance(world, 0.01, 20)
 
-Also here: what the sides of a domain do, and the operators of a step on plain arrays, for research
-on the numerics; the operators change with the numerics.
+Also here: boundary conditions of the sides of a domain, and the operators of a step on plain
+arrays, for research on the numerics; the operators change with the numerics.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ EMPTY = "<mujoco/>"
 
 
 class FluidProperties(TypedDict, total=False):
-    """What a fluid may be given; see `Fluid`."""
+    """Properties of a fluid; see `Fluid`."""
 
     density: float
     viscosity: float
@@ -109,15 +109,15 @@ def make_world(
 ) -> World:
     """A world at rest.
 
-    model          MJCF as text, or a model that is there already
-    grid           of the fluid; None for a world without one
-    slab           whether the bodies move in the plane; as the grid says unless given
+    model          MJCF as text, or a model
+    grid           of the fluid; None for a world without fluid
+    slab           whether the bodies move in the plane; that of the grid by default
     gravity        m/s^2, of a model given as text
-    solid_density  kg/m^3 of every geom of such a model, in place of its own
-    motions        joints that are told how to move
+    solid_density  kg/m^3 of every geom of a model given as text, in place of its own
+    motions        prescribed motions of joints
     winds          simple winds
-    fluid          its properties; its density is 1 kg/m^3 unless another is given
-    raises         SceneError when the text is no model
+    fluid          its properties; the density is 1 kg/m^3 by default
+    raises         SceneError if the text is no model
     """
     if isinstance(model, str):
         flat = (grid is not None and grid.is_slab) if slab is None else slab
@@ -131,10 +131,10 @@ def make_world(
 def advance(
     world: World, dt: float, steps: int = 1, command: JointCommand | None = None
 ) -> StepReport:
-    """Take equal steps of dt (s), in place; gives the last report.
+    """Take equal steps of dt (s), in place; returns the last report.
 
     command  to joints without a trajectory
-    raises   ArithmeticError when a step fails; ValueError for less than one step
+    raises   ArithmeticError if a step fails; ValueError for fewer than one step
     """
     if steps < 1:
         raise ValueError(f"steps is {steps}: give 1 or more")
@@ -146,7 +146,7 @@ def advance(
 
 
 def set_velocity(world: World, field: Field) -> None:
-    """Give the fluid a velocity, as what it is and as what carries it."""
+    """Set the velocity of the fluid, and its advecting velocity."""
     fluid, state = world.flow()
     for axis in fluid.grid.axes:
         x, y, z = np.meshgrid(*fluid.grid.face_coordinates(axis), indexing="ij")
@@ -156,13 +156,13 @@ def set_velocity(world: World, field: Field) -> None:
 
 
 def velocity_at(world: World, x: Array) -> Array:
-    """(n, 3) velocity of the fluid at the places x (n, 3), m/s, linear between faces."""
+    """(n, 3) velocity of the fluid at points x (n, 3), m/s, linear between faces."""
     fluid, state = world.flow()
     return Sampled(state.velocity, fluid.grid)(x, world.time)
 
 
 def kinetic_energy(world: World) -> float:
-    """J of the fluid and the bodies together (J/m in a slab)."""
+    """Kinetic energy of fluid and bodies, J (J/m in a slab)."""
     energy = momentum.kinetic_energy(world.setup.solid, world.solid)
     if world.fluid is None:
         return energy
@@ -172,7 +172,7 @@ def kinetic_energy(world: World) -> float:
 
 
 def start_from(coarse: World, fine: World) -> None:
-    """Give `fine` the flow of `coarse`, interpolated: velocity and pressure."""
+    """Set velocity and pressure of `fine` to those of `coarse`, interpolated."""
     (fluid, to), (rough, of) = fine.flow(), coarse.flow()
     for axis in fluid.grid.axes:
         known, wanted = (g.face_coordinates(axis) for g in (rough.grid, fluid.grid))
@@ -186,12 +186,11 @@ def start_from(coarse: World, fine: World) -> None:
 def _interpolated(
     values: Array, known: tuple[Array, Array, Array], wanted: tuple[Array, Array, Array]
 ) -> Array:
-    """Values (nx, ny, nz) between the coordinates where they are known: trilinear, in a slab
-    bilinear."""
+    """Values (nx, ny, nz) at known coordinates, interpolated at the wanted ones: trilinear, in a
+    slab bilinear."""
     axes = 2 if values.shape[2] == 1 else 3
     table = RegularGridInterpolator(
         known[:axes], values if axes == 3 else values[:, :, 0], bounds_error=False, fill_value=None
     )
-    places = np.meshgrid(*wanted[:axes], indexing="ij")
-    found = np.asarray(table(tuple(places)))
+    found = np.asarray(table(tuple(np.meshgrid(*wanted[:axes], indexing="ij"))))
     return found if axes == 3 else found[:, :, None]

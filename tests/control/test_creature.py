@@ -24,7 +24,8 @@ def ball_angle(q: np.ndarray) -> float:
 
 
 def test_hinge_stops_at_its_range_and_may_come_back_from_beyond(make_world: MakeWorld) -> None:
-    model, state = creature.parts(make_world(limited=True))
+    world = make_world(limited=True)
+    model, state = world.setup.solid, world.solid
     state.q[0] = 1.0
     for wanted, allowed in ((0.5, 0.2), (0.1, 0.1), (-3.0, -2.2)):
         far = creature.within_range(model, state.q, np.array([wanted, 9.0, 0.0]))
@@ -40,7 +41,8 @@ def test_hinge_stops_at_its_range_and_may_come_back_from_beyond(make_world: Make
 def test_ball_stays_within_its_cone(
     make_world: MakeWorld, first: np.ndarray, then: np.ndarray
 ) -> None:
-    model, state = creature.parts(make_world(ball=True, limited=True))
+    world = make_world(ball=True, limited=True)
+    model, state = world.setup.solid, world.solid
     allowed = creature.within_range(model, state.q, first)
     assert np.linalg.norm(allowed) == pytest.approx(min(np.linalg.norm(first), 0.7), abs=1e-9)
     here = creature.moved(model, state.q, allowed)
@@ -52,7 +54,8 @@ def test_ball_stays_within_its_cone(
 
 
 def test_ball_beyond_its_cone_may_only_come_back(make_world: MakeWorld) -> None:
-    model, state = creature.parts(make_world(ball=True, limited=True))
+    world = make_world(ball=True, limited=True)
+    model, state = world.setup.solid, world.solid
     out = creature.moved(model, state.q, np.array([0.0, 1.0, 0.0]))
     assert not creature.within_range(model, out, np.array([0.0, 0.2, 0.0])).any()
     back = np.array([0.0, -0.2, 0.0])
@@ -64,7 +67,8 @@ def test_ball_beyond_its_cone_may_only_come_back(make_world: MakeWorld) -> None:
 def test_difference_undoes_a_displacement_of_a_ball(
     make_world: MakeWorld, first: np.ndarray, then: np.ndarray
 ) -> None:
-    model, state = creature.parts(make_world(ball=True))
+    world = make_world(ball=True)
+    model, state = world.setup.solid, world.solid
     here = creature.moved(model, state.q, first)
     there = creature.moved(model, here, then)
     assert model.difference(here, there) == pytest.approx(then, abs=1e-9)
@@ -123,10 +127,3 @@ def test_kept_velocities_stay() -> None:
     creature.give_velocity(world, np.array([7]), np.zeros(1), np.array([6]))
     assert world.solid.v[6:].tolist() == [1.0, 0.0]
     assert np.abs(world.solid.v[:6] - 1.0).max() > 1e-3
-
-
-def test_world_without_bodies_is_refused(make_world: MakeWorld) -> None:
-    world = make_world()
-    world.solid = None
-    with pytest.raises(ValueError, match="no bodies to control"):
-        creature.parts(world)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -62,8 +62,8 @@ def trial_of(
     world: World, step: Step, hypothesis: Hypothesis, dofs: np.ndarray, displacement: list[float]
 ) -> Trial:
     objective = ObjectiveSum.of(ObjectiveCallable(angle))
-    pose = world.solid.q.copy()
-    return Trial(world, step, objective, hypothesis, dofs, pose, np.array(displacement))
+    course = PoseCourse(world, step, hypothesis, dofs, world.solid.q.copy())
+    return course.trial(objective, np.array(displacement))
 
 
 @pytest.fixture
@@ -183,16 +183,8 @@ def test_trial_in_a_flow_leaves_it_alone_and_needs_no_dye() -> None:
     trials = controller.trials(world, stepping.step)
     value = trials.values(np.array([[0.1]]))
     assert {name: values.tobytes() for name, values in world.arrays().items()} == before
-    dyed = Trial(
-        world,
-        stepping.step,
-        controller.objective,
-        controller.hypothesis,
-        controller.dofs,
-        world.solid.q,
-        np.array([0.1]),
-    )
-    assert dyed.run() == value
+    dyed = PoseCourse(world, stepping.step, controller.hypothesis, controller.dofs, world.solid.q)
+    assert dyed.trial(controller.objective, np.array([0.1])).run() == value
     assert without_scalars(world).flow()[1].scalars == {}
 
 
@@ -203,9 +195,7 @@ def test_phases_are_those_of_the_decision(make_world: MakeWorld, step: Step) -> 
     early = PhaseIntervals(((0.0, 0.3),))
     term = ObjectiveSum.of(ObjectiveCallable(angle)).terms[0]
     phased = ObjectiveSum((type(term)(term.objective, 2.0, early),))
-    value = Trial(
-        world, step, phased, trial.hypothesis, trial.dofs, trial.pose, trial.displacement
-    ).run()
+    value = replace(trial, objective=phased).run()
     assert value == pytest.approx(0.4)
 
 
@@ -224,8 +214,8 @@ def test_blown_up_trial_says_what_was_tried(
     ):
         trial.run()
     nothing = ObjectiveSum.of(ObjectiveCallable(lambda m: np.nan))
-    trial = Trial(
-        make_world(), step, nothing, Hypothesis(0.1), SHOULDER, trial.pose, trial.displacement
+    trial = replace(
+        trial_of(make_world(), step, Hypothesis(0.1), SHOULDER, [0.25]), objective=nothing
     )
     with pytest.raises(TrialError, match="the objective is nan"):
         trial.run()

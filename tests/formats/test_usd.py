@@ -127,7 +127,7 @@ def test_flesh_is_where_the_run_has_it_and_bound_to_its_bones(stages: Stages) ->
     weights = np.zeros_like(skin.weights)
     np.add.at(weights, (np.arange(len(bones))[:, None], bones), shares)
     assert_allclose(weights, skin.weights, atol=1e-6)
-    assert_allclose(UsdGeom.Mesh(guide).GetPointsAttr().Get(), skin.rest, atol=1e-7)
+    assert_allclose(UsdGeom.Mesh(guide).GetPointsAttr().Get(), skin.vertices, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["chain", "fish"])

@@ -1,4 +1,4 @@
-"""The controller: decides targets for the controlled joints and drives the joints there.
+"""The controller chooses targets for the controlled joints, and drives the joints towards them.
 
 Paper: sections 2.1 and 4.3 (algorithm).
 """
@@ -6,7 +6,8 @@ Paper: sections 2.1 and 4.3 (algorithm).
 from __future__ import annotations
 
 import math
-from contextlib import AbstractContextManager
+from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
@@ -35,17 +36,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Decision:
     """What the controller decided at the start of a frame.
 
-    decided       False in frames between decisions; the numbers are then those of the last one
-    objective     weighted sum in the pose from which the decision set out, as its trials evaluate
-                  it: the mean of all of them for central differences, the trial without a
-                  displacement for one-sided ones; with a horizon the mean over the plan; where
-                  joints have different objectives, the sum of theirs. 0 when no term is on
+    decided       False in frames between decisions, which repeat the numbers of the last one
+    objective     weighted sum before the decision, from its trials: the mean of all trials for
+                  central differences, the trial without a displacement for one-sided ones; with a
+                  horizon the mean over the plan; the sum over groups of joints with different
+                  objectives. 0 when no term is active
     gradient      (n,) in the present pose, per rad or m
     displacement  (n,) from the pose at the decision to the target, rad or m
     target        (nq,) pose whose controlled entries are the target
@@ -64,11 +66,11 @@ class Decision:
 
 @dataclass(frozen=True)
 class StrengthInPhase:
-    """Strength of some dofs while its phases are on; it replaces their usual strength.
+    """Strength of some dofs in phases, where it replaces their usual strength.
 
-    indices    (m,) which of the controlled dofs, counted from 0
+    indices   (m,) numbers of the dofs among the controlled ones, from 0
     strength  rad/s or m/s; one for all of them or one each
-    phases    when
+    phases    when it applies
     """
 
     indices: tuple[int, ...]
@@ -80,28 +82,27 @@ class StrengthInPhase:
 class Controller:
     """Gradient descent on an objective over the controlled joints, within the creature's strength.
 
-    Its own state is in the world's memory: "target" (nq,), "displacement" (n,), "gradient" (n,),
-    "objective" (1,), "step_scale" (2, n): that of the rule and the gradient that it came from,
-    "schedule" (2,): frames left after this one until the next decision, and the frame time in s,
-    and with a horizon "plan" (knots, n): displacements from knot to knot; "step_scale" is then
+    Its state is in the world's memory: "target" (nq,), "displacement" (n,), "gradient" (n,),
+    "objective" (1,), "step_scale" (2, n): the rule's scale and the gradient that it came from,
+    "schedule" (2,): frames left after this one until the next decision, and the frame time in s.
+    A horizon adds "plan" (knots, n), displacements from knot to knot; "step_scale" is then
     (2, knots n).
 
     dofs        (n,) controlled dofs, indices into v
     objective   what to minimise
     hypothesis  how a pose is tried, or how far a plan looks ahead
-    strength    rad/s or m/s, the fastest that a dof moves; one for all dofs or one each
+    strength    rad/s or m/s, maximum speed of a dof; one for all dofs or one each
     gradient    finite difference
     rule        how far to go down the gradient
-    every       a decision every so many frames; its step is as long as strength allows in all of
-                them together and is spread evenly over them
-    iterations  descent steps per decision, each from the pose found so far in the flow as it is
-                now; more than one is the paper's infinite strength, and the target may be as many
-                steps away
+    every       number of frames from decision to decision. The step may use the strength of all
+                these frames, and is spread evenly over them
+    iterations  descent steps per decision, each from the pose found so far, in the present flow.
+                More than one is the paper's infinite strength: the target may be as many steps away
     servo       how the drives approach the target
     executor    where the trials run
-    in_phases   strength at times; where several are on, the last one counts
-    raises      ValueError for controlled dofs that are none, negative or repeated, a strength that
-                is not positive and finite or not one per dof, every < 1 or iterations < 1
+    in_phases   strength in phases; of several active ones the last counts
+    raises      ValueError for no, negative or repeated dofs, a strength that is not positive and
+                finite or not one per dof, every < 1 or iterations < 1
     """
 
     dofs: Integers
@@ -121,10 +122,9 @@ class Controller:
         if dofs.ndim != 1 or dofs.size == 0 or dofs.min() < 0 or np.unique(dofs).size < dofs.size:
             raise ValueError(f"controlled dofs are {dofs.tolist()}: give at least one, each once")
         object.__setattr__(self, "dofs", dofs.astype(np.int64))
-        for name in ("strength", "servo.torque_limit"):
-            values = np.asarray(
-                self.strength if name == "strength" else self.servo.torque_limit, dtype=np.float64
-            )
+        given = {"strength": self.strength, "servo.torque_limit": self.servo.torque_limit}
+        for name, value in given.items():
+            values = np.asarray(value, dtype=np.float64)
             if values.ndim and values.shape != dofs.shape:
                 raise ValueError(
                     f"{name} has {values.size} values for {dofs.size} controlled dofs: "
@@ -145,7 +145,7 @@ class Controller:
     def decide(self, world: World, frame_time: float, step: Step) -> Decision:
         """Choose the target for the coming frames; call at the start of every frame.
 
-        Nothing of the world changes but its memory.
+        Only the memory of the world changes.
 
         frame_time  s
         raises      TrialError when a hypothetical step blows up
@@ -156,9 +156,9 @@ class Controller:
             memory["schedule"] = np.array([memory["schedule"][0] - 1.0, frame_time])
             return self._decision(world, False, 0, started)
         course, value, gradient, evaluations = self._descend(world, frame_time, step)
-        model, state = creature.parts(world)
         memory["target"] = goal = course.goal
-        memory["displacement"] = model.difference(state.q, goal)[self.dofs]
+        difference = world.setup.solid.difference(world.solid.q, goal)
+        memory["displacement"] = difference[self.dofs]
         memory["gradient"] = gradient[: self.dofs.size]
         memory["objective"] = np.array([value])
         if isinstance(course, PlanCourse):
@@ -167,7 +167,7 @@ class Controller:
         return self._decision(world, True, evaluations, started)
 
     def memory_shapes(self, nq: int) -> dict[str, tuple[int, ...]]:
-        """Shapes of its arrays in a world's memory, by name; nq numbers are a pose."""
+        """Shapes of its arrays in a world's memory, by name; a pose has nq numbers."""
         n = self.dofs.size
         knots = self.hypothesis.knots if isinstance(self.hypothesis, Horizon) else 1
         return {
@@ -181,7 +181,7 @@ class Controller:
         }
 
     def strength_at(self, time: float) -> Array:
-        """(n,) the fastest that each controlled dof moves at `time` (s), rad/s or m/s."""
+        """(n,) maximum speed of each controlled dof at `time` (s), rad/s or m/s."""
         strength = self._strengths()
         for other in self.in_phases:
             if other.phases.active(time):
@@ -189,7 +189,7 @@ class Controller:
         return strength
 
     def greatest_strength(self) -> Array:
-        """(n,) as `strength_at`, the most of all times."""
+        """(n,) maximum of `strength_at` over all times."""
         greatest = self._strengths()
         for other in self.in_phases:
             indices = list(other.indices)
@@ -201,7 +201,7 @@ class Controller:
         return np.array(np.broadcast_to(self.strength, self.dofs.shape), dtype=np.float64)
 
     def command(self, world: World, frame_end_time: float, dt: float) -> JointCommand:
-        """Command to the controlled dofs for the next step; without a decision yet, to hold still.
+        """Command to the controlled dofs for the next step: zero velocity before any decision.
 
         frame_end_time  s, end of the frame that the step is in
         dt              s, length of the step
@@ -216,7 +216,7 @@ class Controller:
         return creature.approach(world, self.dofs, self.servo, target, remaining, dt)
 
     def measure(self, world: World, report: StepReport) -> dict[str, float]:
-        """Every term's own value after a real step."""
+        """Value of each term after a real step."""
         return self.objective.values(Measurement(world, report))
 
     def trials(
@@ -228,12 +228,12 @@ class Controller:
         indices: Integers | None = None,
         scale: Array | None = None,
     ) -> Trials:
-        """An objective as a function of what a course in `world` is displaced by.
+        """An objective as a function of the displacement of a course in `world`.
 
         course     the present pose when None
         objective  the controller's own when None
-        indices     (m,) those of the course's numbers that are displaced; all when None
-        scale       (N,) part of the gradient's displacements, 1 when None
+        indices    (m,) decision variables that are displaced; all when None
+        scale      (N,) part of the gradient's displacements, 1 when None
         """
         course = self._here(world, step) if course is None else course
         indices = np.arange(course.count) if indices is None else indices
@@ -261,14 +261,13 @@ class Controller:
         return course.displaced(course.within_range(np.zeros(course.count)))
 
     def _here(self, world: World, step: Step) -> PoseCourse:
-        """The present pose, with a horizon too: its trials move as far in one of its steps."""
-        _, state = creature.parts(world)
+        """The present pose; with a horizon, its trials make their displacement in one step."""
         how = self.hypothesis
         how = Hypothesis(how.dt, velocities="probe") if isinstance(how, Horizon) else how
-        return PoseCourse(without_scalars(world), step, how, self.dofs, state.q.copy())
+        return PoseCourse(without_scalars(world), step, how, self.dofs, world.solid.q.copy())
 
     def _limit(self, time: float, frame_time: float) -> Array:
-        """(N,) what strength allows of each number of a course that is decided at `time` (s)."""
+        """(N,) limit by strength on each variable of a decision at `time` (s), rad or m."""
         knots = self.hypothesis.knots if isinstance(self.hypothesis, Horizon) else 1
         interval = self.every * frame_time
         strength = [self.strength_at(time + knot * interval) for knot in range(knots)]
@@ -276,12 +275,12 @@ class Controller:
 
     def positions(self, world: World) -> Array:
         """(n,) present positions of controlled scalar joints, rad or m; NaN for ball dofs."""
-        return creature.positions(world, self.dofs)
+        return creature.positions(world.setup.solid, world.solid.q, self.dofs)
 
     def targets(self, world: World) -> Array:
-        """(n,) targets of controlled scalar joints; before the first decision where they are."""
-        model, state = creature.parts(world)
-        return creature.positions_in(model, world.memory.get("target", state.q), self.dofs)
+        """(n,) targets of controlled scalar joints; present positions before the first decision."""
+        target = world.memory.get("target", world.solid.q)
+        return creature.positions(world.setup.solid, target, self.dofs)
 
     def close(self) -> None:
         """Stop the workers."""
@@ -290,10 +289,9 @@ class Controller:
     def _descend(
         self, world: World, frame_time: float, step: Step
     ) -> tuple[Course, float, Array, int]:
-        """Course to take; objective and gradient (N,) on that from which the decision set out;
-        number of trials run.
+        """The new course; objective and gradient (N,) on the course before; number of trials.
 
-        Dofs with different objectives each descend on their own, all from the same course.
+        Groups of dofs with different objectives descend separately, from the same course.
         """
         course = self.course(world, frame_time, step)
         size, value, evaluations = course.count, 0.0, 0
@@ -303,15 +301,15 @@ class Controller:
         groups = self._groups(world, size)
         for iteration in range(self.iterations):
             displacement = np.zeros(size)
-            for indices, wanted in groups:
-                trials = self.trials(world, step, course, wanted, indices, scale)
+            for indices, objective in groups:
+                trials = self.trials(world, step, course, objective, indices, scale)
                 estimate, slopes = self._estimate(trials)
                 if iteration == 0:
                     value, gradient[indices] = value + estimate, slopes
                 scale[indices] = self._step_scale(scale[indices], slope[indices], slopes)
                 slope[indices] = slopes
-                way = scale[indices] * self._step(trials, slopes, limit[indices])
-                displacement[indices] = trials.within_range(way)
+                wanted = scale[indices] * self._step(trials, slopes, limit[indices])
+                displacement[indices] = trials.within_range(wanted)
                 evaluations += trials.evaluations
             if not displacement.any():
                 break
@@ -320,42 +318,40 @@ class Controller:
         return course, value, gradient, evaluations
 
     def _groups(self, world: World, size: int) -> list[tuple[Integers, ObjectiveSum]]:
-        """Groups of indices into the numbers (N,) of a course with the same objectives, each with
+        """Indices into the variables (N,) of a decision, in groups with the same objectives, and
         their sum. Groups without an active term are left out, except on a plan, where terms can
         become active later."""
         knots = self.dofs.size * np.arange(size // self.dofs.size)[:, None]
         return [
-            ((knots + indices).ravel(), wanted)
-            for indices, wanted in self.objective.group_by_joints(self.dofs)
-            if isinstance(self.hypothesis, Horizon) or wanted.active(world.time)
+            ((knots + indices).ravel(), objective)
+            for indices, objective in self.objective.group_by_joints(self.dofs)
+            if isinstance(self.hypothesis, Horizon) or objective.active(world.time)
         ]
 
     def _estimate(self, trials: Trials) -> tuple[float, Array]:
-        """Objective, and its gradient (m,). Raises PartError when the estimate is no such pair."""
+        """Objective and its gradient (m,). Raises PartError if the estimate is no such pair."""
         with _guarding("gradient", self.gradient):
             estimate = trials.estimator.estimate(trials)
         value = getattr(estimate, "value", estimate)
         gradient = getattr(estimate, "gradient", estimate)
-        asked = "an Estimate of numbers, whose gradient has one"
-        (number,) = _numbers("gradient", self.gradient, [value], asked, (1,))
-        return float(number), _numbers("gradient", self.gradient, gradient, asked, (trials.count,))
+        expected = "an Estimate of numbers, whose gradient has one"
+        (number,) = _checked("gradient", self.gradient, [value], expected, (1,))
+        slopes = _checked("gradient", self.gradient, gradient, expected, (trials.count,))
+        return float(number), slopes
 
     def _step_scale(self, scale: Array, before: Array, gradient: Array) -> Array:
-        """(m,) the part of strength that the rule uses. Raises PartError when it is none."""
+        """(m,) the rule's part of strength and probe. Raises PartError if it is not in (0, 1]."""
         with _guarding("rule", self.rule):
             given = self.rule.step_scale(scale, before, gradient)
-        asked = "a scale above 0 and at most 1"
-        found = _numbers("rule", self.rule, given, asked, gradient.shape)
-        if not ((found > 0.0) & (found <= 1.0)).all():
-            raise _wrong("rule", self.rule, given, asked, gradient.shape)
-        return found
+        expected = "a scale above 0 and at most 1"
+        return _checked("rule", self.rule, given, expected, gradient.shape, _is_scale)
 
     def _step(self, trials: Trials, gradient: Array, limit: Array) -> Array:
-        """(m,) what the rule says. Raises PartError when that is no such displacement."""
+        """(m,) the rule's displacement. Raises PartError if it is not finite or misshapen."""
         with _guarding("rule", self.rule):
             given = self.rule.step(trials, gradient, limit)
-        asked = "a finite displacement in rad or m"
-        return _numbers("rule", self.rule, given, asked, gradient.shape)
+        expected = "a finite displacement in rad or m"
+        return _checked("rule", self.rule, given, expected, gradient.shape)
 
     def _decision(self, world: World, decided: bool, evaluations: int, started: float) -> Decision:
         memory = world.memory
@@ -370,29 +366,30 @@ class Controller:
         )
 
 
-def _numbers(kind: str, part: object, given: object, asked: str, shape: tuple[int, ...]) -> Array:
-    """What a rule or gradient gave, as finite numbers of this shape.
-
-    raises  PartError when it is nothing of the kind
-    """
-    try:
+def _checked(
+    kind: str,
+    part: object,
+    given: object,
+    expected: str,
+    shape: tuple[int, ...],
+    valid: Callable[[Array], Mask] = np.isfinite,
+) -> Array:
+    """The numbers that a rule or gradient returned. Raises PartError if they are not `expected`."""
+    with suppress(ArithmeticError, TypeError, ValueError):
         found = np.asarray(given, dtype=np.float64)
-    except (ArithmeticError, TypeError, ValueError):
-        raise _wrong(kind, part, given, asked, shape) from None
-    if found.shape != shape or not np.isfinite(found).all():
-        raise _wrong(kind, part, given, asked, shape)
-    return found
-
-
-def _wrong(kind: str, part: object, given: object, asked: str, shape: tuple[int, ...]) -> PartError:
-    """The error to raise when a rule or gradient gave something else than was asked of it."""
-    return PartError(
-        f"{kind} {type(part).__name__} gave {given!r:.100}: return {asked} for each of "
+        if found.shape == shape and valid(found).all():
+            return found
+    raise PartError(
+        f"{kind} {type(part).__name__} gave {given!r:.100}: return {expected} for each of "
         f"{shape[0]} dofs"
     )
 
 
+def _is_scale(values: Array) -> Mask:
+    return (values > 0.0) & (values <= 1.0)
+
+
 def _guarding(kind: str, part: object) -> AbstractContextManager[None]:
-    """Context in which a rule or gradient fails as a part; what trials raise is no fault of it."""
+    """Context that makes errors of a rule or gradient PartErrors, except errors of trials."""
     name = f"{kind} {type(part).__name__}"
     return PartError.guarding(name, *BREAKDOWNS, MemoryError)

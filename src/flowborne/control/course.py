@@ -1,13 +1,14 @@
 """The variables of a decision, and its trials: the objective as a function of a displacement.
 
 A decision changes a course: the pose to which the joints move (`trial`), or the poses of a plan
-that looks ahead (`plan`). Gradients and rules get numbers in rad or m only.
+that looks ahead (`plan`). Gradients and rules only get its variables, in rad or m.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import methodcaller
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Step = Callable[["World", float, JointCommand | None], StepReport]
-"""step(world, dt, drive): advances `world` in place and says what it did."""
+"""step(world, dt, command): advances `world` in place."""
 
 
 class TrialError(ArithmeticError):
@@ -33,7 +34,7 @@ class TrialError(ArithmeticError):
 
     @classmethod
     def of(cls, evaluation: Evaluation, dt: float, what: str) -> TrialError:
-        """That of a step of dt (s) in an evaluation; `what` is wrong."""
+        """The error of a step of dt (s) in an evaluation; `what` is wrong."""
         return cls(
             f"in a hypothetical step of {dt:.4g} s that {evaluation.tried}, {what}; "
             "try a smaller displacement or a shorter step"
@@ -43,7 +44,7 @@ class TrialError(ArithmeticError):
 def advance(evaluation: Evaluation, world: World, dt: float, command: JointCommand) -> StepReport:
     """Take `world` through a hypothetical step of an evaluation. Raises TrialError when its numbers
     are not finite."""
-    report = evaluation.step(world, dt, command)
+    report = evaluation.course.step(world, dt, command)
     if report.outcome in (Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE):
         raise TrialError.of(evaluation, dt, report.outcome.value)
     return report
@@ -52,12 +53,11 @@ def advance(evaluation: Evaluation, world: World, dt: float, command: JointComma
 class Evaluation(Protocol):
     """One evaluation of an objective, complete in itself: it may run in any thread or process.
 
-    step   the physics
     tried  what it does to the joints and when, as "moves knee by 0.1 at time 2 s"
     """
 
     @property
-    def step(self) -> Step: ...
+    def course(self) -> Course: ...
 
     @property
     def tried(self) -> str: ...
@@ -67,21 +67,20 @@ class Evaluation(Protocol):
         ...
 
 
-def run(evaluation: Evaluation) -> float:
-    """Run an evaluation; a function at module level, so that any executor can take it."""
-    return evaluation.run()
-
-
 class Course(Protocol):
     """The motion of the controlled joints that a decision changes.
 
-    world  its flow and time are those of the trials
+    world  the present state; trials step copies of it
+    step   the physics
     count  N, number of decision variables
     goal   (nq,) pose at the time of the next decision
     """
 
     @property
     def world(self) -> World: ...
+
+    @property
+    def step(self) -> Step: ...
 
     @property
     def count(self) -> int: ...
@@ -104,12 +103,11 @@ class Course(Protocol):
 
 @dataclass(eq=False)
 class Trials:
-    """The objective as a function of what the course is displaced by.
+    """The objective as a function of the displacement of a course.
 
     estimator    of the gradient
     mapper       runs the trials
-    indices       (m,) those of the course's numbers that are displaced, of which all displacements
-                 here speak; the others stay
+    indices      (m,) decision variables that are displaced; the others stay
     evaluations  number of trials run so far
     """
 
@@ -122,7 +120,7 @@ class Trials:
 
     @property
     def count(self) -> int:
-        """m, how many numbers are displaced."""
+        """m."""
         return int(self.indices.size)
 
     def within_range(self, displacement: Array) -> Array:
@@ -137,10 +135,10 @@ class Trials:
         """(k,) objective on courses displaced by the rows of (k, m). Raises TrialError."""
         trials = [self.course.trial(self.objective, self._full(row)) for row in displacements]
         self.evaluations += len(trials)
-        return np.array(self.mapper.map(run, trials, self.course.world.setup))
+        return np.array(self.mapper.map(methodcaller("run"), trials, self.course.world.setup))
 
     def _full(self, displacement: Array) -> Array:
-        """(N,) a displacement (m,) among all numbers of the course."""
+        """(N,) a displacement (m,) of all decision variables."""
         full = np.zeros(self.course.count)
         full[self.indices] = displacement
         return full

@@ -1,4 +1,4 @@
-"""Joints as the controller knows them: the one module of control that looks into solids.
+"""The joints as the controller moves them.
 
 A displacement is a velocity times a time, (nv,) like a velocity, so that it is defined for ball
 joints (a rotation about axes of the joint's own frame) as for hinges and slides.
@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.servo import Servo
-from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow, outboard_dofs, rigidify
-from flowborne.solids.momentum import momentum
 from flowborne.solids.state import SolidState
 
 if TYPE_CHECKING:
@@ -27,16 +25,9 @@ Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
-def parts(world: World) -> tuple[SolidModel, SolidState]:
-    """Model and state of the bodies. Raises ValueError when the world has none."""
-    if world.setup.solid is None or world.solid is None:
-        raise ValueError("the world has no bodies to control: give its setup a solid model")
-    return world.setup.solid, world.solid
-
-
-def given(setup: Setup, model: SolidModel) -> Mask:
+def given(setup: Setup) -> Mask:
     """(nv,) dofs whose velocity the controller cannot choose: prescribed and locked ones."""
-    mask = np.asarray(model.locked, dtype=bool).copy()
+    mask = np.asarray(setup.solid.locked, dtype=bool).copy()
     for motion in setup.motions:
         mask[motion.dofs] = True
     return mask
@@ -44,9 +35,8 @@ def given(setup: Setup, model: SolidModel) -> Mask:
 
 def outboard(world: World, dofs: Integers) -> Integers:
     """Free dofs outboard of any of `dofs`, in ascending order, without `dofs` themselves."""
-    model, _ = parts(world)
-    below = outboard_dofs(model, dofs)
-    own = given(world.setup, model)
+    below = outboard_dofs(world.setup.solid, dofs)
+    own = given(world.setup)
     own[dofs] = True
     return below[~own[below]]
 
@@ -58,8 +48,8 @@ def give_velocity(world: World, dofs: Integers, velocity: Array, kept: Integers)
 
     source  Lentine et al. 2011, sections 3.3 and 5
     """
-    model, state = parts(world)
-    fixed = given(world.setup, model)
+    model, state = world.setup.solid, world.solid
+    fixed = given(world.setup)
     fixed[kept] = True
     wanted = np.zeros(model.nv)
     wanted[dofs] = velocity
@@ -114,50 +104,10 @@ def _within_cone(quaternion: Array, turn: Array, limit: float) -> Array:
     return turn * (min(max(largest, 0.0), angle) / angle)
 
 
-def positions_in(model: SolidModel, q: Array, dofs: Integers) -> Array:
+def positions(model: SolidModel, q: Array, dofs: Integers) -> Array:
     """(k,) positions of scalar joints in pose `q`, rad or m; NaN for dofs of other joints."""
     at = model.dof_position[dofs]
     return np.where(at >= 0, q[at], np.nan)
-
-
-def positions(world: World, dofs: Integers) -> Array:
-    """(k,) present positions of scalar joints, rad or m; NaN for dofs of other joints."""
-    model, state = parts(world)
-    return positions_in(model, state.q, dofs)
-
-
-def away(world: World, dofs: Integers, places: Array) -> Array:
-    """(k,) displacement from given entries of q (m,) of the joints of `dofs` to their present."""
-    model, state = parts(world)
-    start = state.q.copy()
-    start[model.indices_of(dofs)] = places
-    return model.difference(start, state.q)[dofs]
-
-
-def body_rotation(world: World, body: int) -> Array:
-    """(3, 3) columns are the body's axes in the world."""
-    model, state = parts(world)
-    return kinematics(model, state.q).body_rotation[body]
-
-
-def body_position(world: World, body: int) -> Array:
-    """(3,) origin of the body's frame, m."""
-    model, state = parts(world)
-    return kinematics(model, state.q).body_position[body]
-
-
-def body_velocity(world: World, body: int) -> Array:
-    """(3,) velocity of the origin of the body's frame, m/s."""
-    model, state = parts(world)
-    pose = kinematics(model, state.q)
-    twist = pose.twist_jacobian[body] @ state.v
-    return twist[:3] + np.cross(twist[3:], pose.body_position[body])
-
-
-def whole_velocity(world: World) -> Array:
-    """(3,) velocity of the centre of mass of all bodies and their flesh, m/s."""
-    model, state = parts(world)
-    return momentum(model, state)[0] / model.body_mass.sum()
 
 
 def approach(
@@ -168,12 +118,12 @@ def approach(
     target     (nq,)
     remaining  s until it is due
     """
-    model, state = parts(world)
+    model, state = world.setup.solid, world.solid
     remaining = max(remaining, dt)
     gap = model.difference(state.q, target)[dofs]
     v = state.v[dofs]
     rate, final = servo.velocity(gap, v, remaining, dt)
-    # a drive that may give way moves with the velocity it has: it steers the step after
+    # a torque-limited drive keeps its velocity in this step, and steers the next one
     ahead, _ = servo.velocity(gap - dt * v, v, max(remaining - dt, dt), dt)
     limit = np.asarray(servo.torque_limit, dtype=np.float64)
     command = JointCommand.none(model.nv)

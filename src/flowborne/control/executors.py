@@ -1,9 +1,8 @@
-"""Where the evaluations of a decision run: here, in threads, in processes, or anywhere else.
+"""Executors of the evaluations of a decision: serial, threads, processes, or a foreign one.
 
-Each evaluation depends on nothing but its own task and the answers come back in the order of the
-tasks, so that a decision is the same, bit for bit, whatever runs it. Evaluations that run at once
-share the threads that the caller's kernels may run on. flowborne has no scheduler of
-its own: all there is are the interfaces of `concurrent.futures`.
+Each evaluation only depends on its own task, and results are in the order of the tasks, so that a
+decision is the same, bit for bit, with any executor. Concurrent evaluations share the threads of
+the caller's kernels. The interfaces are those of `concurrent.futures`.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 GRACE = 10.0
-"""Seconds that a process has to clean up once it is told to end."""
+"""Time between the signal that ends a process and its forced exit, s."""
 
 
 class Mapper(Protocol):
@@ -38,23 +37,15 @@ class Mapper(Protocol):
     def map(
         self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
     ) -> list[Answer]:
-        """Answers in the order of the tasks; an exception in one is raised here.
+        """Results in the order of the tasks; an exception in one is raised here.
 
         shared  an object that tasks refer to and that stays the same from call to call
         """
         ...
 
     def close(self) -> None:
-        """Let the workers go; a later `map` starts new ones."""
+        """Stop the workers; a later `map` starts new ones."""
         ...
-
-
-def worker_count(workers: int | None) -> int:
-    """Number of workers; None is one per core. Raises ValueError for less than one."""
-    count = cores() if workers is None else workers
-    if count < 1:
-        raise ValueError(f"number of workers is {workers}: give at least 1")
-    return count
 
 
 def collect(futures: list[Any]) -> list[Any]:
@@ -76,18 +67,20 @@ class Serial:
         return [function(task) for task in tasks]
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """There are no workers to stop."""
 
 
 class Pool:
     """Workers of `concurrent.futures` that start at the first use and are not pickled.
 
-    workers  how many; None is one per core
-    raises   ValueError for less than one
+    workers  number of workers; None is one per core
+    raises   ValueError for fewer than one
     """
 
     def __init__(self, workers: int | None = None) -> None:
-        self.workers = worker_count(workers)
+        self.workers = cores() if workers is None else workers
+        if self.workers < 1:
+            raise ValueError(f"number of workers is {workers}: give at least 1")
         self._executor: Executor | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -97,18 +90,18 @@ class Pool:
         self.__init__(state["workers"])  # type: ignore[misc]
 
     def share(self, tasks: int) -> int:
-        """Threads for the kernels of each of so many tasks."""
+        """Number of threads for the kernels of each of some tasks."""
         return max(1, allowed_threads() // max(1, min(self.workers, tasks)))
 
     def close(self) -> None:
-        """Let the workers go; a later `map` starts new ones."""
+        """Stop the workers; a later `map` starts new ones."""
         if self._executor is not None:
             self._executor.shutdown()
             self._executor = None
 
 
 class Threads(Pool):
-    """Threads of this process: a physics step lets go of the interpreter lock."""
+    """Threads of this process: a physics step releases the interpreter lock."""
 
     def map(
         self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
@@ -123,12 +116,12 @@ class Threads(Pool):
 
 
 class Processes(Pool):
-    """Other processes of this machine, started anew: a fork would not carry the threads over.
+    """Other processes of this machine, spawned: a fork would not copy the threads.
 
-    The shared object goes to each worker once, when the workers start; tasks that refer to it
-    carry a mark in its place. Each worker gets its part of the tasks in one parcel, so that what
-    they have in common travels once. The main script must guard its start by
-    `__name__ == "__main__"`. When a worker dies, all start anew, once.
+    Each worker receives the shared object once, at its start; pickled tasks contain a mark in its
+    place. The tasks of a worker are pickled together, so that their common objects are sent once.
+    The main script must guard its start by `__name__ == "__main__"`. If a worker dies, all are
+    started again, once.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -176,9 +169,9 @@ class Foreign:
     """Any object with `submit` (giving futures with `result`) or else an ordered `map`.
 
     For example an executor of `concurrent.futures` or mpi4py, or a client of `dask.distributed`;
-    whoever made it lets it go.
+    its owner closes it.
 
-    raises  TypeError when the object has neither
+    raises  TypeError if the object has neither
     """
 
     def __init__(self, executor: Any) -> None:
@@ -197,11 +190,11 @@ class Foreign:
         return list(self.executor.map(function, tasks))
 
     def close(self) -> None:
-        """The executor belongs to whoever made it."""
+        """The owner of the executor closes it."""
 
 
 def mapper(executor: str | object = "threads", workers: int | None = None) -> Mapper:
-    """The mapper of that name, or one around any executor.
+    """The mapper of a name, or one for any executor.
 
     executor  "serial", "threads", "processes", or an object with `submit` or `map`
     workers   for threads and processes; None is one per core
@@ -232,7 +225,7 @@ class _Packer(pickle.Pickler):
 
 
 class _Unpacker(pickle.Unpickler):
-    """Unpickler that puts this process's shared object in the place of the mark."""
+    """Unpickler that replaces the mark by this process's shared object."""
 
     def persistent_load(self, pid: str) -> object:
         return _received[pid]
@@ -242,20 +235,20 @@ _received: dict[str, object] = {}
 
 
 def pack(item: object, shared: object) -> bytes:
-    """The item pickled, with a mark wherever it refers to `shared`."""
+    """The pickled item, with a mark for each reference to `shared`."""
     file = io.BytesIO()
     _Packer(file, shared).dump(item)
     return file.getvalue()
 
 
 def begin_worker(pickled: bytes) -> None:
-    """First thing that a worker process does: keep an eye on its parent, and the shared object."""
+    """Initialise a worker process: watch its parent, and store the shared object."""
     end_with_parent()
     receive_shared(pickled)
 
 
 def receive_shared(pickled: bytes) -> None:
-    """Keep the shared object."""
+    """Store the shared object."""
     _received["shared"] = pickle.loads(pickled)
 
 
@@ -266,15 +259,15 @@ def run_packed(packed: bytes, threads: int) -> list[Any]:
 
 
 def run_on(threads: int, function: Callable[[Task], Answer], task: Task) -> Answer:
-    """Apply the function to a task, its kernels on at most so many threads."""
+    """Apply the function to a task, with a limit on the threads of its kernels."""
     with kernel_threads(threads):
         return function(task)
 
 
 def end_with_parent() -> None:
-    """Let this process, a child of multiprocessing's, end when its parent has.
+    """Make this child process of multiprocessing end after its parent.
 
-    A pool's worker that waits for work would wait for ever: it holds both ends of the queue.
+    A worker that waits for work would otherwise wait for ever: it holds both ends of the queue.
     """
     threading.Thread(target=_outlive_no_parent, daemon=True).start()
 

@@ -39,9 +39,9 @@ class Poses(Protocol):
 
 @dataclass(frozen=True)
 class OffsetPoses:
-    """Poses about a displaced one: displacements add up.
+    """Poses relative to a displaced one: displacements add up.
 
-    poses  about the present pose
+    poses  relative to the present pose
     by     (n,) rad or m
     """
 
@@ -97,13 +97,13 @@ GRADIENTS: Registry[Gradient] = Registry(
 
 @dataclass(frozen=True)
 class FiniteDifference:
-    """What both differences have in common.
+    """Common part of both differences.
 
-    displacement  d in rad or m, one for all dofs or one each. A dof closer than that to the end
-                  of its range is tried at the end
-    resolution    a difference smaller than this part of the objective's size is no gradient, so
-                  that the rounding of a symmetric pose moves nothing
-    raises        ValueError when a displacement is not positive and finite or resolution negative
+    displacement  d in rad or m, one for all dofs or one each. A dof that is closer than d to the
+                  end of its range is displaced to the end
+    resolution    differences smaller than this part of the objective count as zero, so that
+                  rounding in a symmetric pose moves no dof
+    raises        ValueError if a displacement is not positive and finite or resolution is negative
     """
 
     displacement: float | tuple[float, ...]
@@ -159,7 +159,7 @@ class GradientCentral(FiniteDifference):
 class GradientOneSided(FiniteDifference):
     """(f(+d) - f(0)) / d for every dof with one f(0) for all: n + 1 evaluations, error O(d).
 
-    A dof that its range keeps from going forward is tried backward.
+    A dof that cannot move forward within its range is displaced backward.
 
     source  Lentine et al. 2011
     """
@@ -178,10 +178,10 @@ class GradientOneSided(FiniteDifference):
 
 
 class GradientTable(Table):
-    """What every gradient has."""
+    """Keys of every gradient."""
 
     def trials(self, dofs: int) -> int:
-        """Trials of a gradient over some dofs."""
+        """Number of trials for a number of dofs."""
         return 2 * dofs
 
     def build(self, displacement: tuple[float, ...]) -> Gradient:
@@ -211,7 +211,7 @@ class GradientOneSidedTable(GradientTable):
 
 
 class GradientOwnTable(GradientTable, OwnTable):
-    """A gradient of the user's own; every further key is a parameter of it."""
+    """A user's gradient; all further keys are its parameters."""
 
     registry = GRADIENTS
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from flowborne.control import creature
 from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import StepReport
+from flowborne.solids.dynamics import Kinematics, kinematics
+from flowborne.solids.momentum import momentum
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
@@ -52,37 +54,46 @@ class Measurement:
         return self.world.time
 
     @cached_property
+    def _pose(self) -> Kinematics:
+        return kinematics(self.world.setup.solid, self.world.solid.q)
+
+    @cached_property
     def _named(self) -> Named:
         return Named.after(self.world, self.report)
 
     def body(self, name: str) -> BodyState:
-        """Everything that is known of a body. Raises ValueError for an unknown name."""
+        """The state of a body. Raises ValueError for an unknown name."""
         return self._named.body(name)
 
     def joint(self, name: str) -> JointState:
-        """Everything that is known of a joint. Raises ValueError for an unknown name."""
+        """The state of a joint. Raises ValueError for an unknown name."""
         return self._named.joint(name)
 
     def joint_positions(self, dofs: Integers) -> Array:
         """(k,) positions of scalar joints, rad or m; NaN for dofs of ball and free joints."""
-        return creature.positions(self.world, dofs)
+        return creature.positions(self.world.setup.solid, self.world.solid.q, dofs)
 
-    def joints_away(self, dofs: Integers, places: Array) -> Array:
+    def joints_away(self, dofs: Integers, positions: Array) -> Array:
         """(k,) displacement to the present pose of the joints of `dofs` from given entries of q."""
-        return creature.away(self.world, dofs, places)
+        model, q = self.world.setup.solid, self.world.solid.q
+        start = q.copy()
+        start[model.indices_of(dofs)] = positions
+        return model.difference(start, q)[dofs]
 
     def body_rotation(self, body: int) -> Array:
         """(3, 3) columns are the body's axes in the world."""
-        return creature.body_rotation(self.world, body)
+        return self._pose.body_rotation[body]
 
     def body_position(self, body: int) -> Array:
         """(3,) origin of the body's frame, m."""
-        return creature.body_position(self.world, body)
+        return self._pose.body_position[body]
 
     def body_velocity(self, body: int) -> Array:
         """(3,) velocity of the origin of the body's frame, m/s."""
-        return creature.body_velocity(self.world, body)
+        twist = self._pose.twist_jacobian[body] @ self.world.solid.v
+        return twist[:3] + np.cross(twist[3:], self.body_position(body))
 
     def whole_velocity(self) -> Array:
-        """(3,) velocity of the centre of mass of all bodies, m/s."""
-        return creature.whole_velocity(self.world)
+        """(3,) velocity of the centre of mass of all bodies and their flesh, m/s."""
+        model = self.world.setup.solid
+        return momentum(model, self.world.solid)[0] / model.body_mass.sum()

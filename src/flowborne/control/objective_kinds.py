@@ -1,7 +1,7 @@
-"""The built-in objectives: what each measures, its keys in a scene, and the checks of them.
+"""The built-in objectives, their keys in a scene, and the checks of these keys.
 
-Paper: eq. (1) effort, eqs. (2)-(4) simple wind drag, eq. (10) pressure drag and lift. A new one is
-a class with `value`, and a table with `build` that is in `BuiltInObjective`.
+Paper: eq. (1) effort, eqs. (2)-(4) simple wind drag, eq. (10) pressure drag and lift. A new
+objective is a class with `value` and a table with `build`, which is added to `BuiltInObjective`.
 """
 
 from __future__ import annotations
@@ -66,26 +66,21 @@ class ObjectiveTable(Table):
         return True
 
     def check(self, around: Surroundings) -> Iterator[str]:
-        """Everything that does not fit the scene around it."""
+        """Everything that does not fit the scene."""
         yield from ()
 
     def build(self, around: Surroundings) -> Objective:
-        """The objective, where `check` finds nothing."""
+        """The objective; requires that `check` finds nothing."""
         raise NotImplementedError
 
 
 def unit(direction: Direction) -> Array:
-    """(3,) the direction with length one. Raises ValueError when it has no direction."""
+    """(3,) the unit vector of a direction. Raises ValueError for zero or infinite length."""
     vector = np.asarray(direction, dtype=np.float64)
     length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
     if not 0.0 < length < np.inf:
         raise ValueError(f"direction is {direction}: give three finite numbers, not all zero")
     return vector / length
-
-
-def force(wrench: Array, bodies: Integers) -> Array:
-    """(3,) total force on `bodies` of the wrenches (nbody, 6), N."""
-    return wrench[bodies, :3].sum(axis=0)
 
 
 def velocity_of(body: int | None, measurement: Measurement) -> Array:
@@ -95,11 +90,10 @@ def velocity_of(body: int | None, measurement: Measurement) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveEffort:
-    """Impulse with which the drives of `dofs` hold their velocities, eq. (1), N s or N m s.
+    """Norm of the impulse of the drives of `dofs` in a step, eq. (1), N s or N m s.
 
-    The norm over the scope of actuator force times step. In a hypothetical step whose drives hold
-    a velocity that the joints already have it is the effort of section 2.3; in a real step it is
-    what the muscles did, the change of velocity included.
+    In a hypothetical step whose drives maintain the velocities of the joints it is the effort of
+    section 2.3. In a real step it includes the impulse that changes the velocities.
 
     source  Lentine et al. 2011, section 2.3
     """
@@ -157,22 +151,34 @@ class DirectedTable(ObjectiveTable):
 
 
 @dataclass(frozen=True, eq=False)
-class ObjectiveWindDrag:
-    """Force of the simple winds on `bodies` along `direction`, eqs. (2)-(4), N.
-
-    raises  ValueError for a direction of no length
-    source  Lentine et al. 2011, eqs. (2)-(4)
-    """
+class ForceObjective:
+    """A force on `bodies` along `direction`."""
 
     bodies: Integers
     direction: Direction
-    name: str = "wind-drag"
 
     def __post_init__(self) -> None:
         unit(self.direction)
 
+    def component(self, wrench: Array, rotation: Array | None = None) -> float:
+        """Component of the force of wrenches (nbody, 6) along the rotated direction, N."""
+        along = unit(self.direction)
+        along = along if rotation is None else rotation @ along
+        return float(wrench[self.bodies, :3].sum(axis=0) @ along)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectiveWindDrag(ForceObjective):
+    """Force of the simple winds on `bodies` along `direction`, eqs. (2)-(4), N.
+
+    raises  ValueError for a direction of zero length
+    source  Lentine et al. 2011, eqs. (2)-(4)
+    """
+
+    name: str = "wind-drag"
+
     def value(self, measurement: Measurement) -> float:
-        return float(force(measurement.report.wind_wrench, self.bodies) @ unit(self.direction))
+        return self.component(measurement.report.wind_wrench)
 
 
 class ObjectiveWindDragTable(DirectedTable):
@@ -190,23 +196,17 @@ class ObjectiveWindDragTable(DirectedTable):
 
 
 @dataclass(frozen=True, eq=False)
-class ObjectiveDrag:
+class ObjectiveDrag(ForceObjective):
     """Force of the winds and the moving fluid on `bodies` along `direction`, N; not buoyancy.
 
-    raises  ValueError for a direction of no length
+    raises  ValueError for a direction of zero length
     """
 
-    bodies: Integers
-    direction: Direction
     name: str = "drag"
-
-    def __post_init__(self) -> None:
-        unit(self.direction)
 
     def value(self, measurement: Measurement) -> float:
         report = measurement.report
-        wrench = report.wind_wrench + report.pressure_wrench + report.viscous_wrench
-        return float(force(wrench, self.bodies) @ unit(self.direction))
+        return self.component(report.wind_wrench + report.pressure_wrench + report.viscous_wrench)
 
 
 class ObjectiveDragTable(DirectedTable):
@@ -219,29 +219,22 @@ class ObjectiveDragTable(DirectedTable):
 
 
 @dataclass(frozen=True, eq=False)
-class ObjectivePressureDrag:
+class ObjectivePressureDrag(ForceObjective):
     """Force of the fluid's pressure on `bodies` along `direction`, eq. (10), N.
 
     With a direction across the stream it is lift.
 
-    frame   body on which the direction rides (it is then given in that body's axes), or None
-    raises  ValueError for a direction of no length
+    frame   body in whose axes the direction is given; None: the world's axes
+    raises  ValueError for a direction of zero length
     source  Lentine et al. 2011, section 4.3
     """
 
-    bodies: Integers
-    direction: Direction
     frame: int | None = None
     name: str = "pressure-drag"
 
-    def __post_init__(self) -> None:
-        unit(self.direction)
-
     def value(self, measurement: Measurement) -> float:
-        along = unit(self.direction)
-        if self.frame is not None:
-            along = measurement.body_rotation(self.frame) @ along
-        return float(force(measurement.report.pressure_wrench, self.bodies) @ along)
+        rotation = None if self.frame is None else measurement.body_rotation(self.frame)
+        return self.component(measurement.report.pressure_wrench, rotation)
 
 
 class ObjectivePressureTable(DirectedTable):
@@ -281,8 +274,8 @@ class ObjectiveInputMotion:
     name: str = "input-motion"
 
     def value(self, measurement: Measurement) -> float:
-        wanted = self.reference.position(measurement.world.time)
-        return float(np.sum(measurement.joints_away(self.dofs, wanted) ** 2))
+        reference = self.reference.position(measurement.world.time)
+        return float(np.sum(measurement.joints_away(self.dofs, reference) ** 2))
 
 
 class ObjectiveInputMotionTable(ObjectiveTable):
@@ -315,8 +308,8 @@ class ObjectiveInputMotionTable(ObjectiveTable):
     def check(self, around: Surroundings) -> Iterator[str]:
         joint = self.joint
         unknown = [*around.unknown_joints([joint])]
+        yield from unknown
         if unknown:
-            yield from unknown
             return
         kind = joint_kind(around.model, joint)
         if self.values is None and joint not in around.in_clip:
@@ -334,7 +327,7 @@ class ObjectiveInputMotionTable(ObjectiveTable):
             )
 
     def reference(self, around: Surroundings) -> Trajectory:
-        """The motion that the joint is to be close to."""
+        """The given motion of the joint."""
         if self.values is None:
             return around.clip_of(self.joint)
         unit, dofs = around.unit(self.joint), around.model.dofs_of(self.joint)
@@ -371,8 +364,8 @@ class MovingTable(ObjectiveTable):
 class ObjectiveVelocity:
     """Squared distance of a velocity from a target, m^2/s^2.
 
-    body  whose velocity it is, at the origin of its frame; None is the centre of mass of all, which
-          outer forces alone can move: what a trial has won in it is the fluid's whole impulse
+    body  its velocity is that of the origin of its frame. None: the centre of mass of all bodies,
+          which only external forces accelerate: a trial changes it by the fluid's total impulse
     """
 
     body: int | None
@@ -399,10 +392,10 @@ class ObjectiveVelocityTable(MovingTable):
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveSpeed:
-    """Velocity along a direction, m/s. Over a plan it is the way made, by its time.
+    """Velocity along a direction, m/s; the mean over a plan is the distance divided by its time.
 
-    body    whose velocity it is, at the origin of its frame; None is the centre of mass of all
-    raises  ValueError for a direction of no length
+    body    its velocity is that of the origin of its frame. None: the centre of mass of all bodies
+    raises  ValueError for a direction of zero length
     """
 
     body: int | None
@@ -417,7 +410,7 @@ class ObjectiveSpeed:
 
 
 class ObjectiveSpeedTable(MovingTable):
-    """Velocity along a direction; on a plan of several `knots`, the distance over its time.
+    """Velocity along a direction; with several `knots`, the distance divided by the plan's time.
 
     direction  of any length
     """
@@ -485,7 +478,7 @@ class ObjectivePythonTable(ObjectiveTable):
 
 
 class ObjectiveOwnTable(ObjectiveTable, OwnTable):
-    """An objective of the user's own; every further key is a parameter of it."""
+    """A user's objective; all further keys are its parameters."""
 
     registry = OBJECTIVES
 

@@ -59,7 +59,7 @@ def name_of(objective: Objective) -> str:
 
 
 def value_of(objective: Objective, measurement: Measurement) -> float:
-    """The objective's number. Raises PartError when it fails, or gives anything else."""
+    """The objective's number. Raises PartError if it fails, or returns anything else."""
     with PartError.guarding(f"objective '{name_of(objective)}'"):
         value = objective.value(measurement)
     if type(value) is float:
@@ -73,7 +73,7 @@ def value_of(objective: Objective, measurement: Measurement) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveCallable:
-    """Any function of the measurement (a picklable one, if the evaluations run in processes).
+    """Any function of the measurement; it must be picklable for evaluations in processes.
 
     A hypothetical world has no dye and no smoke.
     """
@@ -100,9 +100,9 @@ class WeightedObjective:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveSum:
-    """Weighted sum of the terms that are on at the time of the decision.
+    """Weighted sum of the terms that are active at the time of the decision.
 
-    raises  ValueError when there is no term, or when a weight is not finite
+    raises  ValueError if there is no term, or a weight is not finite
     """
 
     terms: tuple[WeightedObjective, ...]
@@ -119,7 +119,7 @@ class ObjectiveSum:
 
     @classmethod
     def of(cls, objective: Objective, weight: float = 1.0) -> ObjectiveSum:
-        """Sum of a single objective that always counts."""
+        """Sum of a single objective that is always active."""
         return cls((WeightedObjective(objective, weight),))
 
     def group_by_joints(self, dofs: Integers) -> list[tuple[Integers, ObjectiveSum]]:
@@ -128,26 +128,26 @@ class ObjectiveSum:
         raises  ValueError when a dof has no objective
         """
         groups: dict[tuple[int, ...], list[int]] = {}
-        for place, dof in enumerate(dofs):
-            wanted = tuple(
+        for index, dof in enumerate(dofs):
+            numbers = tuple(
                 n
                 for n, term in enumerate(self.terms)
                 if term.wanted_by is None or dof in term.wanted_by
             )
-            if not wanted:
+            if not numbers:
                 raise ValueError(f"controlled dof {dof} has no objective: give it one")
-            groups.setdefault(wanted, []).append(place)
+            groups.setdefault(numbers, []).append(index)
         return [
-            (np.array(indices), ObjectiveSum(tuple(self.terms[n] for n in wanted)))
-            for wanted, indices in groups.items()
+            (np.array(indices), ObjectiveSum(tuple(self.terms[n] for n in numbers)))
+            for numbers, indices in groups.items()
         ]
 
     def active(self, time: float) -> bool:
-        """Whether any term counts at `time`."""
+        """Whether any term is active at `time`."""
         return any(term.phases.active(time) for term in self.terms)
 
     def value(self, measurement: Measurement) -> float:
-        """Sum of weight times value over the terms that are on."""
+        """Sum of weight times value over the active terms."""
         now = measurement.phase_time
         return float(
             sum(
@@ -158,7 +158,7 @@ class ObjectiveSum:
         )
 
     def values(self, measurement: Measurement) -> dict[str, float]:
-        """Value of every term without its weight, on or off, under distinct names."""
+        """Value of each term, active or not, without its weight, under distinct names."""
         named: dict[str, float] = {}
         for term in self.terms:
             own, again = name_of(term.objective), 2

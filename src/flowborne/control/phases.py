@@ -1,4 +1,4 @@
-"""When an objective or a strength is active: always, at times, or while a motion rises or falls."""
+"""Phases of objectives and strengths: always, at times, or while a motion rises or falls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flowborne.coupling.motion import Trajectory
 from flowborne.tables import ByKind, Number, Positive, Table, Text
 
 SLACK = 1e-9
-"""s; a time that rounding has left this far before a boundary counts as having reached it."""
+"""A time less than this before a boundary, by rounding, has reached it, s."""
 
 
 class Phases(Protocol):
@@ -27,7 +27,7 @@ class Phases(Protocol):
 
 @dataclass(frozen=True)
 class PhaseAlways:
-    """On for all time."""
+    """Always active."""
 
     def active(self, time: float) -> bool:
         return True
@@ -35,12 +35,12 @@ class PhaseAlways:
 
 @dataclass(frozen=True)
 class PhaseIntervals:
-    """On in half-open intervals of time.
+    """Active in half-open intervals of time.
 
-    intervals  (start, stop) each, s; on from start until just before stop
-    period     s; the intervals repeat with it and may wrap around its end. None: they come once
-    raises     ValueError when an interval is empty or not finite at its start, or when it is
-               longer than the period
+    intervals  (start, stop) each, s; active at start, not at stop
+    period     s; the intervals repeat with it and may wrap around its end. None: no repetition
+    raises     ValueError if an interval is empty or longer than the period, or its start is not
+               finite
     """
 
     intervals: tuple[tuple[float, float], ...]
@@ -69,14 +69,14 @@ class PhaseIntervals:
 
 @dataclass(frozen=True)
 class PhaseTrack:
-    """On while a prescribed motion is above (or below) a threshold: downstroke, upstroke.
+    """Active while a prescribed motion is above (or below) a threshold: downstroke, upstroke.
 
     track      the motion
     quantity   its position (rad, m) or its velocity (rad/s, m/s)
-    sign       +1: on while the quantity is at or above the threshold; -1: on while it is below,
-               so that of two opposite phases exactly one is on
+    sign       +1: active while the quantity is at or above the threshold; -1: while it is below,
+               so that exactly one of two opposite phases is active
     threshold  rad, m, rad/s or m/s
-    column     which dof of the motion
+    column     number of the dof in the motion
     raises     ValueError for another sign or quantity
     """
 
@@ -99,10 +99,10 @@ class PhaseTrack:
 
 
 class PhaseIntervalsTable(Table):
-    """On during intervals.
+    """Active in intervals.
 
-    intervals  [start, stop] of each, s; it is on at start and no longer at stop
-    period     s after which they come again; they come once unless given
+    intervals  [start, stop] of each, s; active at start, not at stop
+    period     s; the intervals repeat with it. No repetition by default
     """
 
     kind: Literal["intervals"]
@@ -133,7 +133,7 @@ class PhaseIntervalsTable(Table):
 
 
 class PhaseMotionTable(Table):
-    """On while the position or velocity of a prescribed motion is on one side of a threshold.
+    """Active while the position or velocity of a prescribed motion is on one side of a threshold.
 
     joint      joint of the [[motion]]
     quantity   "velocity" (degrees/s or m/s) or "position" (degrees or m)

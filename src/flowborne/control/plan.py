@@ -1,4 +1,4 @@
-"""A decision that looks ahead: poses at the times of several decisions, tried by going there.
+"""A decision that looks ahead: poses at the times of several decisions.
 
 A plan has a knot at the time of each decision within its horizon: a pose that the drives approach
 from the previous one. A trial simulates the plan on a copy of the world, step by step, and its
@@ -56,49 +56,45 @@ class Horizon:
 class RolloutEvaluation:
     """One evaluation of a plan, complete in itself: it may run in any thread or process.
 
-    world      as it is now; only its copy is stepped
-    step       the physics
-    objective  what is measured, at the time of each step
-    horizon    in what steps
-    dofs       (n,) the controlled dofs
-    servo      how their drives approach a pose
-    poses      (knots, nq) those of the plan
+    course     gives the world, whose copy is stepped, and the drives
+    objective  what is measured, after each step
+    poses      (knots, nq) of the plan
     """
 
-    world: World
-    step: Step
+    course: PlanCourse
     objective: ObjectiveSum
-    horizon: Horizon
-    dofs: Integers
-    servo: Servo
     poses: Array
 
     def run(self) -> float:
         """Mean of the objective over the steps. Raises TrialError when it is not finite."""
-        world, dt, total = self.world.copy(), self.horizon.dt, 0.0
+        course, horizon = self.course, self.course.horizon
+        world, dt, total = course.world.copy(), horizon.dt, 0.0
         world.setup = world.setup.rehearsed
         for pose in self.poses:
-            for left in range(self.horizon.steps, 0, -1):
-                command = creature.approach(world, self.dofs, self.servo, pose, left * dt, dt)
+            for left in range(horizon.steps, 0, -1):
+                command = creature.approach(world, course.dofs, course.servo, pose, left * dt, dt)
                 report = advance(self, world, dt, command)
                 total += self.objective.value(Measurement(world, report))
         if not np.isfinite(total):
             raise TrialError.of(self, dt, f"the objective is {total}")
-        return total / (len(self.poses) * self.horizon.steps)
+        return total / (len(self.poses) * horizon.steps)
 
     @property
     def tried(self) -> str:
-        """What is tried and when, in words."""
-        return f"follows a plan made at time {self.world.time:.6g} s"
+        return f"follows a plan made at time {self.course.world.time:.6g} s"
 
 
 @dataclass(frozen=True, eq=False)
 class PlanCourse:
-    """Going along a plan, pose by pose.
+    """A plan: the controlled joints move from pose to pose.
 
-    world, step, horizon, dofs, servo  as in `RolloutEvaluation`
-    most   (knots n,) the farthest that strength allows from knot to knot, rad or m
-    moves  (knots n,) displacement of the dofs from knot to knot, those to the first knot first
+    world    the present state
+    step     the physics
+    horizon  length of the plan and of its steps
+    dofs     (n,) the controlled dofs
+    servo    how their drives approach a pose
+    most     (knots n,) limit by strength on the moves, rad or m
+    moves    (knots n,) displacement of the dofs from knot to knot, first knot first
     """
 
     world: World
@@ -118,19 +114,12 @@ class PlanCourse:
         """(knots n,) the part of a displacement of the moves that strength and the joints' ranges
         allow."""
         wanted = np.clip(self.moves + displacement, -self.most, self.most)
-        allowed = [move[self.dofs] for move, _ in self._way(wanted)]
+        allowed = [move[self.dofs] for move, _ in self._poses(wanted)]
         return np.concatenate(allowed) - self.moves
 
     def trial(self, objective: ObjectiveSum, displacement: Array) -> RolloutEvaluation:
-        return RolloutEvaluation(
-            self.world,
-            self.step,
-            objective,
-            self.horizon,
-            self.dofs,
-            self.servo,
-            np.array([pose for _, pose in self._way(self.moves + displacement)]),
-        )
+        poses = np.array([pose for _, pose in self._poses(self.moves + displacement)])
+        return RolloutEvaluation(self, objective, poses)
 
     def displaced(self, displacement: Array) -> PlanCourse:
         return replace(self, moves=self.moves + displacement)
@@ -138,13 +127,12 @@ class PlanCourse:
     @property
     def goal(self) -> Array:
         """(nq,) pose at the first knot."""
-        return next(self._way(self.moves))[1]
+        return next(self._poses(self.moves))[1]
 
-    def _way(self, moves: Array) -> Iterator[tuple[Array, Array]]:
-        """(nv,) the part of each of the moves (knots n,) that ranges allow, and the pose (nq,) to
-        which it leads."""
-        model, state = creature.parts(self.world)
-        pose, move = state.q, np.zeros(model.nv)
+    def _poses(self, moves: Array) -> Iterator[tuple[Array, Array]]:
+        """(nv,) the part of each move of (knots n,) that ranges allow, and the pose (nq,) after."""
+        model = self.world.setup.solid
+        pose, move = self.world.solid.q, np.zeros(model.nv)
         for wanted in moves.reshape(self.horizon.knots, -1):
             move[self.dofs] = wanted
             allowed = creature.within_range(model, pose, move)

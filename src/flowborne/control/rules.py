@@ -71,10 +71,10 @@ class FullStep:
 
 @dataclass(frozen=True)
 class FixedStep(FullStep):
-    """One step as long as strength allows, whatever the size of the gradient.
+    """A step as long as strength allows, for any size of the gradient.
 
-    So the frames to an optimum are the distance over strength times frame time, rounded up, and
-    what remains there is a chatter of at most one step.
+    The number of frames to an optimum is the distance divided by strength times frame time, rounded
+    up; a chatter of at most one step remains there.
 
     source  Lentine et al. 2011, section 2.1
     """
@@ -84,8 +84,8 @@ class FixedStep(FullStep):
 
 
 @dataclass(frozen=True)
-class ResilientStep:
-    """Steps and probes that shorten where the descent turns back, and grow where it goes on.
+class ResilientStep(FixedStep):
+    """Steps and probes that shorten if the descent reverses, and grow if it continues.
 
     Far from an optimum the step is that of `FixedStep`. If the gradient of a dof changes its sign,
     the dof has passed the optimum, and its next step and probe are half as long. The oscillation
@@ -112,22 +112,19 @@ class ResilientStep:
             raise ValueError(f"least scale is {self.least}: give a number above 0, at most 1")
 
     def step_scale(self, scale: Array, before: Array, gradient: Array) -> Array:
-        way = np.sign(before) * np.sign(gradient)
-        factor = np.where(way < 0.0, self.shorten, np.where(way > 0.0, self.lengthen, 1.0))
+        same = np.sign(before) * np.sign(gradient)
+        factor = np.where(same < 0.0, self.shorten, np.where(same > 0.0, self.lengthen, 1.0))
         return np.clip(scale * factor, self.least, 1.0)
-
-    def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
-        return descent(gradient, limit)
 
 
 @dataclass(frozen=True)
 class GoldenSection(FullStep):
-    """Search for the least objective along -gradient; the step then goes there, within strength.
+    """Line search for the minimum along -gradient; the step leads there, within strength.
 
-    reach      rad or m, travel at the far end of the search of the dof that moves most; None: as
-               far as strength allows in one decision
-    tolerance  length, as a part of the search, to which the least is bracketed
-    raises     ValueError when reach is not positive or tolerance is outside (0, 1)
+    reach      rad or m, displacement of the dof that moves most at the far end of the search; None:
+               as far as strength allows in one decision
+    tolerance  length of the final bracket, relative to the search
+    raises     ValueError if reach is not positive or tolerance is outside (0, 1)
     source     Lentine et al. 2011
     """
 
@@ -148,7 +145,7 @@ class GoldenSection(FullStep):
         return min(scale * self._least(poses, scale * strongest), 1.0) * strongest
 
     def _least(self, poses: Poses, far: Array) -> float:
-        """Part of the displacement `far` at which the objective is least, of all tried."""
+        """Part of the displacement `far` with the smallest objective of all tried."""
         low, high = 0.0, 1.0
         inner, outer = 1.0 - GOLDEN, GOLDEN
         at = [low, inner, outer, high]
@@ -169,15 +166,15 @@ class GoldenSection(FullStep):
 
 @dataclass(frozen=True)
 class QuasiNewton(FullStep):
-    """Least objective within strength, by limited-memory BFGS, which couples the joints.
+    """Minimum within strength, by limited-memory BFGS, which couples the joints.
 
     Gradients in several poses show how the slope of one joint changes with another joint. The
     search therefore follows the floor of a narrow valley, where steepest descent zigzags. All poses
     are evaluated in the present flow. The step goes to the best of them.
 
-    gradients  most gradients in a decision, including that of the present pose; each takes one
-               further trial, and so does the last pose
-    raises     ValueError when gradients < 1
+    gradients  maximum number of gradients in a decision, including that of the present pose; each
+               takes one further trial, and so does the last pose
+    raises     ValueError if gradients < 1
     source     Byrd, Lu, Nocedal and Zhu 1995 (L-BFGS-B, in SciPy)
     """
 
@@ -191,7 +188,7 @@ class QuasiNewton(FullStep):
         steepest = float(np.max(np.abs(limit * gradient)))
         if steepest == 0.0:
             return np.zeros_like(gradient)
-        from scipy.optimize import minimize  # a fifth of a second that other rules save
+        from scipy.optimize import minimize  # takes 0.2 s, which other rules save
 
         search = _Search(poses, gradient, limit, steepest, self.gradients)
         ends = np.array([poses.within_range(-limit), poses.within_range(limit)]) / limit
@@ -201,12 +198,12 @@ class QuasiNewton(FullStep):
 
 
 class _EnoughError(Exception):
-    """As many gradients as a decision may have were estimated."""
+    """The maximum number of gradients has been estimated."""
 
 
 class _Search:
-    """The objective for a minimiser, in units of strength and of the steepest slope; it remembers
-    the best displacement so far."""
+    """The objective for a minimiser, in units of strength and of the steepest slope, and the best
+    displacement so far."""
 
     def __init__(
         self, poses: Poses, gradient: Array, limit: Array, steepest: float, most: int
@@ -217,7 +214,7 @@ class _Search:
         self.best = np.zeros_like(gradient)
 
     def __call__(self, share: Array) -> tuple[float, Array]:
-        """Objective and gradient where each dof has gone a share (n,) of its limit."""
+        """Objective and gradient where each dof is displaced by a share (n,) of its limit."""
         displacement = self._poses.within_range(share * self._limit)
         value = float(self._poses.values(displacement[None])[0])
         if value < self._least:
@@ -230,9 +227,9 @@ class _Search:
 
 
 class RuleTable(Table):
-    """What every rule has.
+    """Keys of every rule.
 
-    estimates  gradients in a decision, at most
+    estimates  maximum number of gradients in a decision
     """
 
     @property
@@ -245,7 +242,7 @@ class RuleTable(Table):
 
 
 class RuleFixed(RuleTable):
-    """The largest step down the gradient that strength allows."""
+    """The longest step down the gradient that strength allows."""
 
     kind: Literal["fixed"]
 
@@ -254,10 +251,10 @@ class RuleFixed(RuleTable):
 
 
 class RuleResilient(RuleTable):
-    """Steps and probes that halve where the descent turns back, and grow again where it goes on.
+    """Steps and probes that halve if the descent reverses, and grow again if it continues.
 
-    least  part of strength and probe below which nothing shortens. In a fluid a probe that moves a
-           body by less than about a cell depends on the grid
+    least  smallest part of strength and probe. In a fluid a probe that moves a body by less than
+           about a cell depends on the grid
     """
 
     kind: Literal["resilient"]
@@ -270,9 +267,9 @@ class RuleResilient(RuleTable):
 class RuleGoldenSection(RuleTable):
     """Golden-section search along the gradient.
 
-    reach      degrees or m that the joint that moves most may travel in the search; what strength
-               allows unless given
-    tolerance  part of the bracket at which the search ends
+    reach      degrees or m, displacement of the joint that moves most at the far end of the search;
+               by default what strength allows
+    tolerance  length of the final bracket, relative to the search
     """
 
     kind: Literal["golden-section"]
@@ -287,7 +284,7 @@ class RuleGoldenSection(RuleTable):
 class RuleQuasiNewton(RuleTable):
     """Limited-memory BFGS over all joints with the same objectives.
 
-    gradients  most in a decision, in as many poses
+    gradients  maximum number in a decision, each in another pose
     """
 
     kind: Literal["quasi-newton"]
@@ -302,7 +299,7 @@ class RuleQuasiNewton(RuleTable):
 
 
 class RuleOwn(RuleTable, OwnTable):
-    """A rule of the user's own; every further key is a parameter of it."""
+    """A user's rule; all further keys are its parameters."""
 
     registry = RULES
 

@@ -1,4 +1,4 @@
-"""What a scene has around its objectives, phases, rules and winds."""
+"""The parts of a scene that its objectives, phases, rules and winds depend on."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a scene has around its objectives, phases, rules and winds.
+    """The parts of a scene that its objectives, phases, rules and winds depend on.
 
     model       the bodies
-    source      where they are from, for messages: "model swim.xml"
+    source      of the model, for messages: "model swim.xml"
     controlled  joints that the controller moves
     driven      joints with a drive: controlled, or with a prescribed motion
     followed    joints whose [[motion]] phases may follow
@@ -33,9 +33,9 @@ class Surroundings:
     clip_of     joint in `in_clip` -> its motion in the clip
     has_wind    whether there is a simple wind
     has_fluid   whether a fluid is simulated
-    is_one_way  whether that fluid flows as if there were no bodies
+    is_one_way  whether the bodies do not affect the fluid
     is_slab     whether the scene has 2 dimensions
-    unread      tables that could not be read whole: what they should have is not called missing
+    unread      tables with errors: their content is not reported as missing
     """
 
     model: SolidModel
@@ -53,7 +53,7 @@ class Surroundings:
     unread: frozenset[str] = frozenset()
 
     def read(self, *tables: str) -> bool:
-        """Whether these tables could be read whole."""
+        """Whether these tables could be read without errors."""
         return not self.unread & set(tables)
 
     def unknown_joints(self, joints: Iterable[str]) -> Iterator[str]:
@@ -90,7 +90,7 @@ class Surroundings:
 
 
 def unknown_joints(model: SolidModel, source: str, joints: Iterable[str]) -> Iterator[str]:
-    """A complaint for each joint that a model lacks; `source` is where the model is from."""
+    """A complaint for each joint that a model lacks; `source` names the model."""
     carried = zip(model.joint_names, model.mj.jnt_bodyid, strict=True)
     bones = [name for name, body in carried if body < model.nbody]  # the others are of flesh
     for joint in joints:
@@ -99,7 +99,7 @@ def unknown_joints(model: SolidModel, source: str, joints: Iterable[str]) -> Ite
 
 
 def unknown_bodies(model: SolidModel, source: str, bodies: Iterable[str]) -> Iterator[str]:
-    """A complaint for each body that a model lacks; `source` is where the model is from."""
+    """A complaint for each body that a model lacks; `source` names the model."""
     known = model.body_names
     for body in bodies:
         if body not in known:

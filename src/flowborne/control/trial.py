@@ -1,7 +1,7 @@
 """One hypothetical evaluation: copy the world, move the controlled joints, step, measure.
 
-Paper: sections 2.1 and 2.2 (positional change), 2.3 and 3.2 (which velocities are there when the
-objective is read), 3.3 and 5 (what is outboard is rigid), 3.3 and 4.3 (steady state).
+Paper: sections 2.1 and 2.2 (positional change), 2.3 and 3.2 (velocities when the objective is
+measured), 3.3 and 5 (outboard joints are rigid), 3.3 and 4.3 (steady state).
 """
 
 from __future__ import annotations
@@ -35,20 +35,19 @@ class Hypothesis:
     dt          s, length of a hypothetical step
     steps       number of steps over which the displacement is spread
     settle      number of steps in the new pose after that, for the flow to adapt. They also keep
-                what the displacement itself does to the inertia of a turning creature out of the
-                drives' force; take one for the effort of a floating one
-    velocities  what the controlled dofs' velocities are while the objective is read, which is in
-                the last step:
-                "removed"  none: relative velocities are taken out first, momentum kept, and the
-                           fluid sees the pose, not the motion into it (steady state, sections 3.3
-                           and 4.3)
-                "present"  those that the dofs have now: the drives' force is what holds them
-                           (effort, eq. 1). In the last steps, at least one, the dofs move on with
-                           them, having started so far behind that they end in the pose tried
-                "probe"    that of the displacement itself, from the start and over all steps; the
-                           other controlled dofs have none (section 3.2; in a fluid the
-                           pseudo-velocity of section 4.3). There the first step holds the impulse
-                           that starts the flow: take two steps or settle
+                the displacement's effect on the inertia of a turning creature out of the drives'
+                force: use one for the effort of a floating creature
+    velocities  of the controlled dofs in the last step, in which the objective is measured:
+                "removed"  zero: relative velocities are removed first, at constant momentum, so
+                           that the flow depends on the pose and not on the motion into it (steady
+                           state, sections 3.3 and 4.3)
+                "present"  as now: the drives' force maintains them (effort, eq. 1). In the last
+                           steps, at least one, the dofs keep moving with them; they start so far
+                           back that they end in the pose tried
+                "probe"    of the displacement itself, from the start and over all steps; the other
+                           controlled dofs have zero velocity (section 3.2; in a fluid the
+                           pseudo-velocity of section 4.3). In a fluid the first step contains the
+                           impulse that starts the flow: use two steps or settle
     raises      ValueError when dt is not positive, steps < 1, settle < 0 or velocities is unknown
     """
 
@@ -85,91 +84,82 @@ class Hypothesis:
 class Trial:
     """One evaluation, complete in itself: it may run in any thread or process.
 
-    world         as it is now; only its copy is stepped
-    step          the physics
+    course        gives the world, whose copy is stepped, and the pose before the displacement
     objective     what is measured
-    hypothesis    how the pose is tried
-    dofs          (n,) the controlled dofs
-    pose          (nq,) from which the displacement starts, in the flow of `world`
-    displacement  (n,) rad or m
-    rigid         (k,) dofs outboard of the controlled ones; found when None
+    displacement  (n,) of the controlled dofs, rad or m
     """
 
-    world: World
-    step: Step
+    course: PoseCourse
     objective: ObjectiveSum
-    hypothesis: Hypothesis
-    dofs: Integers
-    pose: Array
     displacement: Array
-    rigid: Integers | None = None
 
     def run(self) -> float:
         """Objective after the hypothetical steps. Raises TrialError when it is not finite."""
-        world = self.world.copy()
+        hypothesis, dofs = self.course.hypothesis, self.course.dofs
+        world = self.course.world.copy()
         world.setup = world.setup.hypothetical
-        _, state = creature.parts(world)
-        state.q[:] = self.pose
-        hypothesis = self.hypothesis
+        world.solid.q[:] = self.course.pose
         command = self._prepare(world)
         whole = hypothesis.steps + hypothesis.last_steps
         for number in range(1, whole + 1):
             if number == hypothesis.steps + 1:
-                command.rate[self.dofs] = self._last_rate(command)
+                command.rate[dofs] = self._last_rate(command)
             # only the last step is measured; before it, prescribed motion needs no solve
             if number == whole or not move_as_told(world, hypothesis.dt, command):
                 report = advance(self, world, hypothesis.dt, command)
-        value = self.objective.value(Measurement(world, report, self.world.time))
+        value = self.objective.value(Measurement(world, report, self.course.world.time))
         if not np.isfinite(value):
             raise TrialError.of(self, hypothesis.dt, f"the objective is {value}")
         return value
 
     def _prepare(self, world: World) -> JointCommand:
-        """Make rigid what is outboard, and give the drive that moves the controlled dofs.
+        """Make outboard joints rigid; returns the command that moves the controlled dofs.
 
-        All that is outboard of any controlled dof is rigid in every trial, so that trials of
-        different dofs, and the one with no displacement, differ in nothing but the displacement.
+        Every trial makes all dofs outboard of any controlled one rigid, so that trials differ only
+        in the displacement.
         """
-        _, state = creature.parts(world)
-        rigid = creature.outboard(world, self.dofs) if self.rigid is None else self.rigid
-        hypothesis = self.hypothesis
+        hypothesis, dofs, rigid = self.course.hypothesis, self.course.dofs, self.course.rigid
+        v = world.solid.v
         rate = self.displacement / hypothesis.duration
         if hypothesis.velocities == "present":
-            final = state.v[self.dofs].copy()
-            creature.give_velocity(world, rigid, np.zeros(rigid.size), self.dofs)
+            final = v[dofs].copy()
+            creature.give_velocity(world, rigid, np.zeros(rigid.size), dofs)
         else:
             final = rate if hypothesis.velocities == "probe" else np.zeros_like(rate)
-            held = np.concatenate([self.dofs, rigid])
+            held = np.concatenate([dofs, rigid])
             velocity = np.concatenate([final, np.zeros(rigid.size)])
             creature.give_velocity(world, held, velocity, np.zeros(0, np.int64))
-        command = JointCommand.none(state.v.size)
+        command = JointCommand.none(v.size)
         command.set(rigid, 0.0, 0.0)
-        command.set(self.dofs, rate, final)
+        command.set(dofs, rate, final)
         ahead = hypothesis.last_steps * hypothesis.dt * self._last_rate(command)
-        command.rate[self.dofs] -= ahead / hypothesis.duration
+        command.rate[dofs] -= ahead / hypothesis.duration
         return command
 
     def _last_rate(self, command: JointCommand) -> Array:
         """(n,) velocity of the controlled dofs' positions in the last steps."""
-        final = command.final_velocity[self.dofs]
-        return final if self.hypothesis.velocities == "present" else np.zeros_like(final)
+        final = command.final_velocity[self.course.dofs]
+        return final if self.course.hypothesis.velocities == "present" else np.zeros_like(final)
 
     @property
     def tried(self) -> str:
-        """What is tried and when, in words."""
-        model, _ = creature.parts(self.world)
+        world, dofs = self.course.world, self.course.dofs
+        names = world.setup.solid.dof_names
         tried = ", ".join(
-            f"{model.dof_names[dof]} by {by:.4g}"
-            for dof, by in zip(self.dofs, self.displacement, strict=True)
+            f"{names[dof]} by {by:.4g}" for dof, by in zip(dofs, self.displacement, strict=True)
         )
-        return f"moves {tried} at time {self.world.time:.6g} s"
+        return f"moves {tried} at time {world.time:.6g} s"
 
 
 @dataclass(frozen=True, eq=False)
 class PoseCourse:
-    """Going straight to a pose: what a decision of the paper is about.
+    """Going straight to a pose, as in the paper.
 
-    world, step, hypothesis, dofs, pose  as in `Trial`
+    world       the present state
+    step        the physics
+    hypothesis  how a pose is tried
+    dofs        (n,) the controlled dofs
+    pose        (nq,) from which displacements start, in the flow of `world`
     """
 
     world: World
@@ -180,7 +170,7 @@ class PoseCourse:
 
     @property
     def count(self) -> int:
-        """n, a displacement for each of the controlled dofs."""
+        """n."""
         return int(self.dofs.size)
 
     @cached_property
@@ -190,24 +180,14 @@ class PoseCourse:
 
     def within_range(self, displacement: Array) -> Array:
         """(n,) the part of a displacement that the joints' ranges allow."""
-        model, _ = creature.parts(self.world)
+        model = self.world.setup.solid
         return creature.within_range(model, self.pose, self._full(displacement))[self.dofs]
 
     def trial(self, objective: ObjectiveSum, displacement: Array) -> Trial:
-        return Trial(
-            self.world,
-            self.step,
-            objective,
-            self.hypothesis,
-            self.dofs,
-            self.pose,
-            displacement,
-            self.rigid,
-        )
+        return Trial(self, objective, displacement)
 
     def displaced(self, displacement: Array) -> PoseCourse:
-        model, _ = creature.parts(self.world)
-        pose = creature.moved(model, self.pose, self._full(displacement))
+        pose = creature.moved(self.world.setup.solid, self.pose, self._full(displacement))
         return replace(self, pose=pose)
 
     @property
@@ -217,15 +197,14 @@ class PoseCourse:
 
     def _full(self, displacement: Array) -> Array:
         """(nv,) a displacement (n,) of the controlled dofs among all."""
-        model, _ = creature.parts(self.world)
-        full = np.zeros(model.nv)
+        full = np.zeros(self.world.setup.solid.nv)
         full[self.dofs] = displacement
         return full
 
 
 def without_scalars(world: World) -> World:
-    """The same world, its arrays shared, without dye and smoke: they exert no force, so that trials
-    need not advect them, and objectives cannot read them."""
+    """The same world, its arrays shared, without dye and smoke: these exert no force, so trials do
+    not advect them, and objectives cannot read them."""
     if world.fluid is None:
         return world
     return replace(world, fluid=replace(world.fluid, scalars={}))

@@ -1,1 +1,1 @@
-"""Files of any kind: given ones read within limits, own ones written whole or not at all."""
+"""Files: those of users are read within limits, our own are written atomically."""

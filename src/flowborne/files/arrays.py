@@ -1,4 +1,4 @@
-"""Archives of arrays, as NumPy writes them: read whole, or refused in one sentence."""
+"""Archives of arrays, as NumPy writes them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 from flowborne.files.given import check_file
 
 SHORT = 200
-"""Most letters of what another library says."""
+"""Maximum length of a quoted message of another library."""
 
 MOST_UNPACKED = 1 << 30
-"""Bytes that arrays may take where their file is smaller: those of runs are not compressed."""
+"""Maximum size in memory of arrays with a smaller file, in bytes; those of runs are not
+compressed."""
 
 
 def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
     """Arrays of an .npz file by name.
 
-    names   which; all when None
-    raises  OSError when the file cannot be opened; ValueError when it is cut, empty or something
-            else, unpacks to more than MOST_UNPACKED, or lacks one of the names
+    names   those to read; all when None
+    raises  OSError if the file cannot be opened; ValueError if it is cut, empty or no archive,
+            unpacks to more than MOST_UNPACKED, or lacks one of the names
     """
     check_file(path, None)
     with open(path, "rb") as file:
@@ -38,14 +39,14 @@ def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDA
                 )
             found = {name: archive[name] for name in names or archive.files}
             for name, values in found.items():
-                if not isinstance(values, np.ndarray):  # NumPy gives the bytes of any other member
+                if not isinstance(values, np.ndarray):  # NumPy returns other members as bytes
                     raise ValueError(f"its '{name}' is no array")
             return found
-        except Exception as error:  # NumPy, zip and zlib raise whatever they stumble over
+        except Exception as error:  # NumPy, zip and zlib raise many types
             raise ValueError(f"{path} is cut or no archive of arrays ({said_of(error)})") from error
 
 
 def said_of(error: Exception) -> str:
-    """What an error says, in one short line without its full stop."""
+    """The text of an error, in one short line without its full stop."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text.rstrip(".") if len(text) <= SHORT else f"{text[:SHORT]} ..."

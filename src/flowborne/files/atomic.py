@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files written atomically: whole or not at all."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 
 def partial_name(name: str) -> str:
-    """Name under which a file called `name` is written until it is whole."""
+    """Temporary name of a file called `name`, until it is complete."""
     return f".{name}.partial"
 
 
@@ -21,15 +21,14 @@ def write_atomically(
 ) -> None:
     """Write a file that other processes see either whole or not at all.
 
-    path     where it belongs; what was there is replaced in one go
-    write    gets the open binary file
-    durable  wait until the file is on the disc, so that it outlives a loss of power too; without
-             it only the death of the process is provided for
-    raises   whatever `write` raises and OSError; the half-written file is then gone and `path` is
-             as it was
+    path     of the file; an existing one is replaced atomically
+    write    receives the open binary file
+    durable  wait until the file is on the disc, so that it survives a power failure, not only the
+             death of the process
+    raises   errors of `write`, and OSError; the partial file is then removed and `path` unchanged
     """
     partial = path.with_name(partial_name(path.name))
-    partial.unlink(missing_ok=True)  # of a run that was killed; or a link, or a pipe
+    partial.unlink(missing_ok=True)  # of a killed run; or a link, or a pipe
     try:
         with open(partial, "xb") as file:
             write(file)
@@ -46,9 +45,9 @@ def write_atomically(
 
 @contextmanager
 def replaced_whole(path: Path) -> Iterator[Path]:
-    """Context with a file to write by name, which takes the place of `path` once it is whole.
+    """Context with the path of a file to write, which then replaces `path`.
 
-    It has the name of `path`, in a folder beside it that is gone in the end.
+    It has the name of `path`, in a temporary folder next to it.
     """
     with TemporaryDirectory(dir=path.absolute().parent, prefix=f".{path.name}.") as folder:
         new = Path(folder) / path.name

@@ -1,4 +1,4 @@
-"""Files that a user names: regular ones alone, and only up to a size."""
+"""Files named by a user: only regular ones, up to a maximum size."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 MOST_BYTES = 1 << 28
-"""Bytes of a file that is read whole."""
+"""Maximum size of a file that is read whole, in bytes."""
 
 LONGEST_NAME = 200
-"""Most bytes of a name that files are called by: they add an ending and a mark of what is half
-written, and no system has file names of more than 255."""
+"""Maximum length of a name, in bytes: files add an ending and a mark while they are written, and
+systems limit file names to 255."""
 
 MOST_PATH = 2000
-"""Bytes of a file's name with its folders."""
+"""Maximum length of a path, in bytes."""
 
 KINDS = {
     stat.S_IFDIR: "a folder",
@@ -31,7 +31,7 @@ KINDS = {
 
 
 class FileError(OSError):
-    """A file that is not read, because of what it is; `strerror` says why."""
+    """A file that is refused because of its kind or size; `strerror` says why."""
 
     def __init__(self, path: Path, why: str, number: int = errno.EINVAL) -> None:
         super().__init__(number, why, str(path))
@@ -41,7 +41,7 @@ class FileError(OSError):
 
 
 def possible_name(value: str) -> str:
-    """A name that a file can have, as it is. Raises ValueError for any other."""
+    """The name, if a file can have it. Raises ValueError otherwise."""
     lengths = [len(part.encode()) for part in Path(value).parts]
     if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > LONGEST_NAME:
         raise ValueError("is no name that a file can have. Shorten it, without letters of no width")
@@ -51,7 +51,7 @@ def possible_name(value: str) -> str:
 def check_file(path: Path, most: int | None = MOST_BYTES) -> None:
     """Raise OSError unless this is a regular file of at most `most` bytes.
 
-    A pipe or a device may have no end, and waits for one who writes.
+    A pipe or a device may have no end, and waits for a writer.
     """
     _check(path, os.stat(path), most)
 
@@ -69,12 +69,12 @@ def read_file(path: Path, most: int | None = MOST_BYTES) -> bytes:
 
 
 def read_json(path: Path) -> Any:
-    """What a JSON file holds. Raises OSError as `read_file`, ValueError for what is no JSON."""
+    """Content of a JSON file. Raises OSError as `read_file`, ValueError for invalid JSON."""
     return _parsed(path, json.loads)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """What a TOML file holds. Raises OSError as `read_file`, ValueError for what is no TOML."""
+    """Content of a TOML file. Raises OSError as `read_file`, ValueError for invalid TOML."""
     found: dict[str, Any] = _parsed(path, tomllib.loads)
     return found
 

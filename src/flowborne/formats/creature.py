@@ -66,57 +66,49 @@ class Skeleton:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """A geometry of a bone in the rest pose.
+class Mesh:
+    """A surface of triangles in the rest pose.
 
-    name      of the geometry
-    bone      number, -1 if it is fixed to the world
+    name      of the geometry, <skin> or flesh
     vertices  (k, 3) m
     faces     (m, 3) vertices of each triangle, outward
     rgba      (4,) colour
     """
 
     name: str
-    bone: int
     vertices: Array
     faces: Integers
     rgba: Array
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
-    """The surface of one flesh.
+class Surface(Mesh):
+    """A geometry.
 
-    name      of the flesh
-    chosen    (k,) its vertices in the `flesh_vertices` of a state
-    faces     (m, 3) vertices of each triangle, outward
-    rest      (k, 3) vertices in the rest pose, m
-    weights   (k, n) weight of each bone for each vertex; rows sum to 1
+    bone  number of the bone that carries it, -1 if it is fixed to the world
     """
 
-    name: str
-    chosen: Integers
-    faces: Integers
-    rest: Array
-    weights: Array
+    bone: int
 
 
 @dataclass(frozen=True, eq=False)
-class Bound:
+class Bound(Mesh):
     """A <skin> of the model: a surface bound to several bones.
 
-    name      of the skin
-    vertices  (k, 3) m in the rest pose
-    faces     (m, 3) vertices of each triangle, outward
-    weights   (k, n) weight of each bone for each vertex; rows sum to 1
-    rgba      (4,) colour
+    weights  (k, n) weight of each bone for each vertex; rows sum to 1
     """
 
-    name: str
-    vertices: Array
-    faces: Integers
     weights: Array
-    rgba: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Skin(Bound):
+    """The surface of one flesh.
+
+    chosen  (k,) its vertices in the `flesh_vertices` of a state
+    """
+
+    chosen: Integers
 
 
 class Creature:
@@ -161,10 +153,10 @@ class Creature:
             found.append(
                 Surface(
                     model.geom_names[geom],
-                    bone_of[int(model.geom_body[geom])],
                     rest.geom_position[geom] + vertices @ rest.geom_rotation[geom].T,
                     np.asarray(faces, np.int64),
                     model.geom_rgba[geom],
+                    bone_of[int(model.geom_body[geom])],
                 )
             )
         return tuple(found)
@@ -173,7 +165,7 @@ class Creature:
     def bound(self) -> tuple[Bound, ...]:
         """The model's skins, which follow the bodies and do not affect the flow."""
         return tuple(
-            Bound(skin.name, skin.vertices, skin.faces, skin.weights[:, self._bodies], skin.rgba)
+            Bound(skin.name, skin.vertices, skin.faces, skin.rgba, skin.weights[:, self._bodies])
             for skin in skins_of(self.model.mj)
         )
 
@@ -198,10 +190,11 @@ class Creature:
                 found.append(
                     Skin(
                         name,
-                        np.searchsorted(kept, vertices),
-                        np.searchsorted(vertices, triangles),
                         flesh.rest[vertices],
+                        np.searchsorted(vertices, triangles),
+                        SKIN_COLOUR,
                         flesh.carried[vertices][:, self._bodies],
+                        np.searchsorted(kept, vertices),
                     )
                 )
         return tuple(found)
@@ -225,7 +218,7 @@ class Creature:
     def size(self) -> float:
         """Largest extent of bodies and flesh in the rest pose, m."""
         points = [surface.vertices for surface in self.surfaces if surface.bone >= 0]
-        points += [skin.rest for skin in self.skins]
+        points += [skin.vertices for skin in self.skins]
         every = np.concatenate(points or [self.skeleton.rest[0]])
         return float(np.ptp(every, axis=0).max())
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.files.colours import to_linear
-from flowborne.formats.creature import SKIN_COLOUR, Array, Bound, Creature, Integers, Skin, Surface
+from flowborne.formats.creature import Array, Bound, Creature, Integers, Mesh, Skin, Surface
 from flowborne.formats.morphs import MorphedSkin, strongest
 from flowborne.motion.quaternions import continuous
 from flowborne.version import __version__
@@ -98,20 +98,19 @@ class _File:
         if surface.bone >= 0:
             count = len(surface.vertices)
             self._bind(attributes, np.full((count, 1), surface.bone), np.ones((count, 1)))
-        skin = None if surface.bone < 0 else skinned
-        self._mesh(surface.name, attributes, surface.faces, surface.rgba, skin)
+        self._mesh(surface, attributes, None if surface.bone < 0 else skinned)
 
     def add_bound(self, bound: Bound, skinned: int) -> None:
         """Add a surface on several bones."""
         attributes = gl.Attributes(POSITION=self._points(bound.vertices))
         self._bind(attributes, *strongest(bound, INFLUENCES))
-        self._mesh(bound.name, attributes, bound.faces, bound.rgba, skinned)
+        self._mesh(bound, attributes, skinned)
 
     def add_flesh(self, skin: Skin, morphed: MorphedSkin) -> None:
         """Add a flesh on its bones, with its morph targets and the remaining error."""
-        attributes = gl.Attributes(POSITION=self._points(skin.rest))
+        attributes = gl.Attributes(POSITION=self._points(skin.vertices))
         self._bind(attributes, morphed.bones, morphed.shares)
-        node, mesh = self._mesh(skin.name, attributes, skin.faces, SKIN_COLOUR, 0)
+        node, mesh = self._mesh(skin, attributes, 0)
         mesh.extras = {"error_m": morphed.error, "error_by_skinning_alone_m": morphed.unmorphed}
         if len(morphed.targets):
             mesh.primitives[0].targets = [
@@ -129,10 +128,10 @@ class _File:
         gltf.save_binary(str(path))
 
     def _mesh(
-        self, name: str, attributes: gl.Attributes, faces: Integers, rgba: Array, skin: int | None
+        self, shown: Mesh, attributes: gl.Attributes, skin: int | None
     ) -> tuple[int, gl.Mesh]:
         """Add a node with a mesh of triangles; returns its number and the mesh."""
-        gltf = self._gltf
+        gltf, name, rgba = self._gltf, shown.name, shown.rgba
         colour = gl.PbrMetallicRoughness(
             baseColorFactor=[*to_linear(rgba[:3]).tolist(), float(rgba[3])],
             metallicFactor=0.0,
@@ -142,10 +141,11 @@ class _File:
         gltf.materials.append(
             gl.Material(name=name, pbrMetallicRoughness=colour, alphaMode=blend, alphaCutoff=None)
         )
-        corners = self._numbers(faces.astype(np.uint32).reshape(-1), target=gl.ELEMENT_ARRAY_BUFFER)
-        part = gl.Primitive(
-            attributes=attributes, indices=corners, material=len(gltf.materials) - 1
+        corners = self._numbers(
+            shown.faces.astype(np.uint32).reshape(-1), target=gl.ELEMENT_ARRAY_BUFFER
         )
+        material = len(gltf.materials) - 1
+        part = gl.Primitive(attributes=attributes, indices=corners, material=material)
         mesh = gl.Mesh(name=name, primitives=[part])
         gltf.meshes.append(mesh)
         gltf.nodes.append(gl.Node(name=name, mesh=len(gltf.meshes) - 1, skin=skin))
@@ -167,12 +167,10 @@ class _File:
 
     def _animate(self, node: int, path: str, values: Array) -> None:
         """Animate a property of a node by its values in every frame; rotations are (x, y, z, w)."""
-        sampler = gl.AnimationSampler(
-            input=self._times,
-            output=self._numbers(values.astype(np.float32)),
-            interpolation="LINEAR",
+        output = self._numbers(values.astype(np.float32))
+        self._animation.samplers.append(
+            gl.AnimationSampler(input=self._times, output=output, interpolation="LINEAR")
         )
-        self._animation.samplers.append(sampler)
         target = gl.AnimationChannelTarget(node=node, path=path)
         self._animation.channels.append(
             gl.AnimationChannel(sampler=len(self._animation.samplers) - 1, target=target)

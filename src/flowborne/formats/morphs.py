@@ -46,7 +46,7 @@ def morphed(
     bones, shares = strongest(skin, influences)
     R, t = _blended(creature.skeleton, bones, shares)
     wanted = creature.run.every("flesh_vertices")[:, skin.chosen]
-    skinned = np.einsum("fkij,kj->fki", R, skin.rest) + t
+    skinned = np.einsum("fkij,kj->fki", R, skin.vertices) + t
     inverse = np.linalg.pinv(R, rcond=MIN_SINGULAR_VALUE)
     needed = np.einsum("fkij,fkj->fki", inverse, wanted - skinned)
     frames, vertices = needed.shape[:2]
@@ -77,7 +77,7 @@ def _split_by_sign(column: Array, mode: Array) -> tuple[Array, Array]:
     return targets.reshape(-1, *mode.shape), weights.reshape(-1, len(column))
 
 
-def strongest(skin: Skin | Bound, most: int) -> tuple[Integers, Array]:
+def strongest(skin: Bound, most: int) -> tuple[Integers, Array]:
     """The bones (k, m <= most) with the largest weights for each vertex, and these (k, m).
 
     The weights are scaled so that rows sum to 1.

@@ -23,7 +23,7 @@ from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, UsdVol, Vt
 from scipy.spatial.transform import Rotation
 
 from flowborne.files.colours import to_linear
-from flowborne.formats.creature import SKIN_COLOUR, Creature, Skeleton, Surface
+from flowborne.formats.creature import Creature, Mesh, Skeleton
 from flowborne.formats.morphs import strongest
 from flowborne.motion.quaternions import continuous
 from flowborne.runs.open_run import OpenRun
@@ -111,24 +111,24 @@ def _creature(stage: Usd.Stage, creature: Creature) -> None:
     names = Names()
     for surface in creature.seen:
         if surface.bone >= 0:
-            mesh = _surface(stage, parent.AppendChild(names.of(surface.name)), surface)
+            mesh = _mesh(stage, parent.AppendChild(names.of(surface.name)), surface)
+            _set_points(mesh, surface.vertices)
             _bind(mesh, np.array([[surface.bone]]), np.ones((1, 1)), rigid=True)
     for bound in creature.bound:
-        path = parent.AppendChild(names.of(bound.name))
-        mesh = _mesh(stage, path, bound.name, bound.faces, bound.rgba)
+        mesh = _mesh(stage, parent.AppendChild(names.of(bound.name)), bound)
         _set_points(mesh, bound.vertices)
         _bind(mesh, *strongest(bound, INFLUENCES), rigid=False)
     for skin in creature.skins:
-        UsdGeom.Scope.Define(stage, parent.AppendChild("Bound"))
-        path = parent.AppendChild("Bound").AppendChild(names.of(skin.name))
-        mesh = _mesh(stage, path, skin.name, skin.faces, SKIN_COLOUR)
+        guides = UsdGeom.Scope.Define(stage, parent.AppendChild("Bound")).GetPath()
+        mesh = _mesh(stage, guides.AppendChild(names.of(skin.name)), skin)
         mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
-        _set_points(mesh, skin.rest)
+        _set_points(mesh, skin.vertices)
         _bind(mesh, *strongest(skin, INFLUENCES), rigid=False)
     names = Names()
     for surface in creature.surfaces:
         if surface.bone < 0:
-            _surface(stage, _scope(stage, "World").AppendChild(names.of(surface.name)), surface)
+            path = _scope(stage, "World").AppendChild(names.of(surface.name))
+            _set_points(_mesh(stage, path, surface), surface.vertices)
 
 
 def _flesh(stage: Usd.Stage, creature: Creature) -> None:
@@ -136,10 +136,7 @@ def _flesh(stage: Usd.Stage, creature: Creature) -> None:
     if not creature.skins:
         return
     scope, names = _scope(stage, "Flesh"), Names()
-    meshes = [
-        _mesh(stage, scope.AppendChild(names.of(skin.name)), skin.name, skin.faces, SKIN_COLOUR)
-        for skin in creature.skins
-    ]
+    meshes = [_mesh(stage, scope.AppendChild(names.of(s.name)), s) for s in creature.skins]
     for number, frame in enumerate(creature.run.frames):
         vertices = creature.run.arrays["flesh_vertices"][number]
         for skin, mesh in zip(creature.skins, meshes, strict=True):
@@ -249,18 +246,11 @@ def _scope(stage: Usd.Stage, name: str) -> Sdf.Path:
     return path
 
 
-def _surface(stage: Usd.Stage, path: Sdf.Path, surface: Surface) -> UsdGeom.Mesh:
-    mesh = _mesh(stage, path, surface.name, surface.faces, surface.rgba)
-    _set_points(mesh, surface.vertices)
-    return mesh
-
-
-def _mesh(
-    stage: Usd.Stage, path: Sdf.Path, name: str, faces: NDArray[np.int64], rgba: Array
-) -> UsdGeom.Mesh:
+def _mesh(stage: Usd.Stage, path: Sdf.Path, shown: Mesh) -> UsdGeom.Mesh:
     """A mesh of triangles without points yet."""
+    faces, rgba = shown.faces, shown.rgba
     mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.GetPrim().SetDisplayName(name)
+    mesh.GetPrim().SetDisplayName(shown.name)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray([3] * len(faces)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.astype(np.int32).ravel()))

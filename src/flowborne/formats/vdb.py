@@ -72,11 +72,10 @@ def _write_states(run: OpenRun, grid: Grid, path: Path, *, velocity: bool) -> tu
     x, y, z = (float(along[0]) for along in grid.cell_coordinates())
     for number, file in enumerate(files):
         state = run.state(number)
-        fields = {dye: state[f"scalar_{dye}"] for dye in run.dyes}
-        grids = [
-            VdbGrid(dye, "fog volume", values, values != 0.0, grid.spacing, (x, y, z))
-            for dye, values in fields.items()
-        ]
+        grids = []
+        for dye in run.dyes:
+            values = state[f"scalar_{dye}"]
+            grids.append(VdbGrid(dye, "fog volume", values, values != 0.0, grid.spacing, (x, y, z)))
         if velocity:
             field, active = cell_velocity(grid, state), np.ones(grid.shape, bool)
             grids.append(VdbGrid("velocity", "unknown", field, active, grid.spacing, (x, y, z)))
