@@ -8,7 +8,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from flowborne import Scene, Simulation, load_scene
-from flowborne.bench.timing import FRAMES, Result, frame_times, in_words, verdict
+from flowborne.bench.timing import FRAMES, Result, at_least, at_most, frame_times, in_words, verdict
 from flowborne.machine import cores, kernel_threads
 
 EXECUTORS = ("threads", "processes")
@@ -46,20 +46,11 @@ def compare_workers(scene: Scene, frames: int = FRAMES) -> Result:
         alone, *together = frame_times(simulations, frames)
     ratios = [float(alone.min() / times.min()) for times in together]
     best = int(np.argmax(ratios))
-    return Result(
-        "workers",
-        f"{scene.name}: one worker's time over that of two {EXECUTORS[best]}",
-        ratios[best],
-        f"at least {FASTER:g}",
-        verdict(ratios[best] >= FASTER),
-        [
-            f"one           {in_words(alone)}",
-            *(
-                f"two {executor:<9} {in_words(times)}; {ratio:.2f} times faster"
-                for executor, times, ratio in zip(EXECUTORS, together, ratios, strict=True)
-            ),
-        ],
-    )
+    title = f"{scene.name}: one worker's time over that of two {EXECUTORS[best]}"
+    lines = [f"one           {in_words(alone)}"]
+    for executor, times, ratio in zip(EXECUTORS, together, ratios, strict=True):
+        lines.append(f"two {executor:<9} {in_words(times)}; {ratio:.2f} times faster")
+    return at_least("workers", title, ratios[best], FASTER, lines)
 
 
 def straightness(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
@@ -71,17 +62,10 @@ def straightness(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
         times = frame_times(simulations, frames)
     joints = np.arange(1.0, len(scenes) + 1.0)
     slope, start, deviation = straight_line(joints, times.min(axis=1))
-    return Result(
-        "chain",
-        "largest deviation of the serial time of a frame from a line in the joints, part of it",
-        deviation,
-        f"at most {DEVIATION:g}",
-        verdict(deviation <= DEVIATION),
-        [
-            *(f"{scene.name} {in_words(row)}" for scene, row in zip(scenes, times, strict=True)),
-            f"line {1e3 * start:.1f} ms + {1e3 * slope:.1f} ms a joint",
-        ],
-    )
+    title = "largest deviation of the serial time of a frame from a line in the joints, part of it"
+    lines = [f"{scene.name} {in_words(row)}" for scene, row in zip(scenes, times, strict=True)]
+    lines.append(f"line {1e3 * start:.1f} ms + {1e3 * slope:.1f} ms a joint")
+    return at_most("chain", title, deviation, DEVIATION, lines)
 
 
 def compare_threads(scene: Scene, frames: int = 4) -> Result:

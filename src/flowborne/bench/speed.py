@@ -8,7 +8,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from flowborne import Scene, Simulation, load_scene
-from flowborne.bench.timing import Result, frame_times, in_words, verdict
+from flowborne.bench.timing import Result, at_least, frame_times, in_words
 
 BLOCK = "ns-block-drag-max"
 BLOCK_SETTINGS = {"domain.resolution": "128", "controller.settle_steps": "0"}
@@ -38,17 +38,9 @@ def default_speed(scene: Scene, seconds: float = 3.0) -> Result:
         grid = simulation.world.setup.fluid
     reached = 1.0 / float(np.median(times))
     size = "" if grid is None else " x ".join(str(n) for n in grid.grid.shape[:2])
-    return Result(
-        "realtime",
-        f"{scene.name}, {size} cells, no settling: frames a second over {shown:g}",
-        reached / shown,
-        "at least 1",
-        verdict(reached >= shown),
-        [
-            f"{in_words(times)}, {1e3 * times.mean():.1f} ms on average; "
-            f"{reached:.1f} frames a second"
-        ],
-    )
+    title = f"{scene.name}, {size} cells, no settling: frames a second over {shown:g}"
+    mean = f"{1e3 * times.mean():.1f} ms on average; {reached:.1f} frames a second"
+    return at_least("realtime", title, reached / shown, 1.0, [f"{in_words(times)}, {mean}"])
 
 
 def best_speed(scene: Scene, frames: int = 48) -> Result:
@@ -59,16 +51,10 @@ def best_speed(scene: Scene, frames: int = 48) -> Result:
         ]
         times = frame_times(simulations, frames)
         shown = 1.0 / simulations[0].frame_time
-    medians = np.median(times, axis=1)
-    ratio = float(1.0 / medians.min() / shown)
-    return Result(
-        "human",
-        f"{scene.name}: frames a second over {shown:g}",
-        ratio,
-        "at least 1",
-        verdict(ratio >= 1.0),
-        [
-            f"{count} {executor:<9} {in_words(row)}"
-            for (count, executor), row in zip(WORKERS, times, strict=True)
-        ],
-    )
+    ratio = float(1.0 / np.median(times, axis=1).min() / shown)
+    lines = [
+        f"{count} {executor:<9} {in_words(row)}"
+        for (count, executor), row in zip(WORKERS, times, strict=True)
+    ]
+    title = f"{scene.name}: frames a second over {shown:g}"
+    return at_least("human", title, ratio, 1.0, lines)

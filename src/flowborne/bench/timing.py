@@ -51,6 +51,21 @@ def verdict(met: bool) -> Verdict:
     return "pass" if met else "fail"
 
 
+def info(name: str, title: str, value: float, lines: list[str]) -> Result:
+    """A figure without a target."""
+    return Result(name, title, value, "", "info", lines)
+
+
+def at_least(name: str, title: str, value: float, bound: float, lines: list[str]) -> Result:
+    """A figure that has to reach a bound."""
+    return Result(name, title, value, f"at least {bound:g}", verdict(value >= bound), lines)
+
+
+def at_most(name: str, title: str, value: float, bound: float, lines: list[str]) -> Result:
+    """A figure that may not exceed a bound."""
+    return Result(name, title, value, f"at most {bound:g}", verdict(value <= bound), lines)
+
+
 def timed(action: Callable[[], T], repeats: int = 1) -> tuple[T, float]:
     """Result of the last call of an action, and the seconds of its quickest call."""
     best = float("inf")
