@@ -11,13 +11,13 @@ from flowborne.validation.channel_cylinder import (
     DIAMETER,
     DURATION,
     HEIGHT,
-    Parabola,
     Pulse,
     channel,
     pressure_drop,
     pulse,
     recirculation,
 )
+from flowborne.validation.worlds import Parabola
 from flowborne.worlds import set_velocity, start_from
 
 

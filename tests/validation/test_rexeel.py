@@ -67,7 +67,7 @@ def test_motors_follow_the_gait_a_fortieth_of_a_second_late() -> None:
 
 def test_the_scenes_robot_has_the_links_of_the_measured_one() -> None:
     """Mass centre by the model, whose masses have four digits, and by the published ones."""
-    path = swim(20, 61, scene="eel").path
+    path, _ = swim(20, 61, scene="eel")
     t, head = TIMES[:, None], path.head
     s = np.minimum(t, 1.0)
     gait = 20.0 * s**2 * (3.0 - 2.0 * s) * np.sin(2.0 * np.pi * (0.5 * t - 0.14 * np.arange(1, 6)))

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from flowborne import Array, Grid, SolidModel, SolidState, World
+from flowborne import Array, SolidModel, SolidState, World
 from flowborne.bodies import (
-    JointCommand,
     TrajectorySinusoid,
     halfway_momentum,
     holding,
@@ -16,9 +13,9 @@ from flowborne.bodies import (
     mass_matrix,
 )
 from flowborne.validation.case import Case
-from flowborne.validation.findings import Finding, GridSeries, at_most, near
+from flowborne.validation.findings import Finding, Grids, at_most, near
 from flowborne.validation.pendulums import DOWN, G
-from flowborne.validation.worlds import mjcf
+from flowborne.validation.worlds import PLANAR, at_start, chain, hold_all, mjcf, square
 from flowborne.worlds import advance, make_world
 
 LINKS, LINK = 4, 0.7
@@ -27,15 +24,15 @@ ARM_DENSITY = 1000.0
 
 def arm() -> str:
     """A chain of LINKS boxes along x, the root hinged at the origin."""
-    body = ""
-    for k in reversed(range(LINKS)):
-        size = f"{0.5 * LINK} {0.05 + 0.01 * k} 1"
-        body = (
-            f'<body name="link{k}" pos="{LINK if k else 0.0} 0 0"><joint name="j{k}" axis="0 0 1"/>'
-            f'<geom type="box" size="{size}" pos="{0.5 * LINK} 0 0" density="{ARM_DENSITY}"/>'
-            f"{body}</body>"
-        )
-    return mjcf(body)
+    return chain(
+        [
+            f'<joint name="j{k}" axis="0 0 1"/>'
+            f'<geom type="box" size="{0.5 * LINK} {0.05 + 0.01 * k} 1" pos="{0.5 * LINK} 0 0" '
+            f'density="{ARM_DENSITY}"/>'
+            for k in range(LINKS)
+        ],
+        LINK,
+    )
 
 
 def statics(model: SolidModel, q: Array, weight: Array) -> Array:
@@ -51,9 +48,7 @@ def statics(model: SolidModel, q: Array, weight: Array) -> Array:
 def held(world: World, q: Array, dt: float) -> Array:
     """(LINKS,) torques of the drives that hold a pose for a step, N m."""
     world.solid.q[:] = q
-    command = JointCommand.none(LINKS)
-    command.set(np.arange(LINKS), 0.0, 0.0)
-    return advance(world, dt, command=command).actuator
+    return advance(world, dt, command=hold_all(LINKS)).actuator
 
 
 def static_chain(quick: bool) -> list[Finding]:
@@ -76,28 +71,18 @@ def static_chain(quick: bool) -> list[Finding]:
         at_most("error of tau_k over m g L", wrong / scale, 1e-6),
         at_most("error of the effort over m g L dt", effort / scale, 1e-6),
     ]
-    side, density = 2.2 * LINKS * LINK, 1300.0
-    cells = 48
-    grid = Grid.slab(cells, cells, side / cells, (-0.5 * side, -0.5 * side))
-    wet = make_world(arm(), grid, gravity=DOWN, density=density)
-    volume = model.volume[1:]
-    buoyed = G * (ARM_DENSITY - density) * volume
+    density = 1300.0
+    wet = make_world(arm(), square(48, 2.2 * LINKS * LINK), gravity=DOWN, density=density)
+    buoyed = G * (ARM_DENSITY - density) * model.volume[1:]
     wrong = max(
         float(np.abs(held(wet.copy(), q, 0.01) - statics(model, q, buoyed)).max()) for q in poses
     )
     findings.append(at_most("in fluid at rest, error of tau_k over m g L", wrong / scale, 1e-6))
     balanced, leaning = balance(model, poses)
-    findings += [
-        at_most("tau_k over m g L with the outboard centre of mass below joint k", balanced, 1e-6),
-        Finding(
-            "least |tau_k| over m g L, 0.01 rad from there",
-            leaning,
-            "> 0",
-            "not zero",
-            leaning > 1e-4,
-        ),
-    ]
-    return findings
+    title = "tau_k over m g L with the outboard centre of mass below joint k"
+    findings.append(at_most(title, balanced, 1e-6))
+    title = "least |tau_k| over m g L, 0.01 rad from there"
+    return [*findings, Finding(title, leaning, "> 0", "not zero", leaning > 1e-4)]
 
 
 def balance(model: SolidModel, poses: Array) -> tuple[float, float]:
@@ -127,17 +112,15 @@ def torque_at(model: SolidModel, q: Array, joint: int) -> float:
 
 def floating(flat: bool) -> str:
     """A free chain of LINKS boxes of different densities; in 3D its joints' axes alternate."""
-    body = ""
-    for k in reversed(range(LINKS)):
+    links = []
+    for k in range(LINKS):
         axis = "0 0 1" if flat or k % 2 else "0 1 0"
         joint = f'<joint name="j{k}" axis="{axis}"/>' if k else '<freejoint name="root"/>'
-        size = f"{0.5 * LINK} {0.05 + 0.02 * k} .1"
-        body = (
-            f'<body name="link{k}" pos="{LINK if k else 0.0} 0 0">{joint}'
-            f'<geom type="box" size="{size}" pos="{0.5 * LINK} 0 0" density="{1000 - 100 * k}"/>'
-            f"{body}</body>"
+        links.append(
+            f'{joint}<geom type="box" size="{0.5 * LINK} {0.05 + 0.02 * k} .1" '
+            f'pos="{0.5 * LINK} 0 0" density="{1000 - 100 * k}"/>'
         )
-    return mjcf(body)
+    return chain(links, LINK)
 
 
 def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
@@ -152,8 +135,7 @@ def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
     world = make_world(floating(flat), slab=flat, motions=motions)
     state = world.solid
     state.v[:6] = [0.3, -0.2, 0.0, 0.0, 0.0, 0.7] if flat else [0.3, -0.2, 0.1, 0.2, 0.5, 0.7]
-    for k, motion in enumerate(motions):
-        state.q[7 + k], state.v[6 + k] = motion.position(0.0)[0], motion.velocity(0.0)[0]
+    state.q[7:], state.v[6:] = at_start(motions)
     model = world.setup.solid
     first = halfway_momentum(model, state, dt)
     change = np.zeros(2)
@@ -166,9 +148,7 @@ def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
 
 
 CAT = mjcf(
-    '<body name="middle"><joint name="x" type="slide" axis="1 0 0"/>'
-    '<joint name="y" type="slide" axis="0 1 0"/><joint name="turn" axis="0 0 1"/>'
-    '<geom type="box" size=".5 .1 1" density="1"/>'
+    f'<body name="middle">{PLANAR}<geom type="box" size=".5 .1 1" density="1"/>'
     '<body name="front" pos=".5 0 0"><joint name="front" axis="0 0 1"/>'
     '<geom type="box" size=".4 .1 1" pos=".4 0 0" density="1"/></body>'
     '<body name="rear" pos="-.5 0 0"><joint name="rear" axis="0 0 1"/>'
@@ -186,8 +166,7 @@ def cat_turn(steps: int, seconds: float) -> float:
     )
     world = make_world(CAT, slab=True, motions=motions)
     state, dt = world.solid, seconds / steps
-    for k, motion in enumerate(motions):
-        state.q[3 + k], state.v[3 + k] = motion.position(0.0)[0], motion.velocity(0.0)[0]
+    state.q[3:], state.v[3:] = at_start(motions)
     state.v[:3] = unmoved(world.setup.solid, state.q[3:] + 0.5 * dt * state.v[3:], state.v[3:])
     advance(world, dt, steps)
     return float(world.solid.q[2])
@@ -222,10 +201,10 @@ def free_chain(quick: bool) -> list[Finding]:
         findings.append(at_most(f"change of linear {title}", linear, 1e-10))
         findings.append(at_most(f"change of angular {title}", angular, 1e-10))
     exact = cat_turn_by_geometry()
-    steps: Sequence[int] = (100, 200, 400) if quick else (200, 400, 800, 1600)
-    turns = [cat_turn(n, 1.0) for n in steps]
-    series = GridSeries.toward("steps in a loop", steps, turns, exact)
-    findings.append(near("falling cat's turn in a loop, rad", series, exact, relative=1e-3))
+    steps = (100, 200, 400) if quick else (200, 400, 800, 1600)
+    turns, grids = [cat_turn(n, 1.0) for n in steps], Grids("steps in a loop", steps)
+    title = "falling cat's turn in a loop, rad"
+    findings.append(near(title, turns, exact, grids, relative=1e-3))
     slow = cat_turn(steps[-1], 10.0)
     findings.append(at_most("the same ten times slower, difference, rad", slow - turns[-1], 1e-10))
     return findings

@@ -21,7 +21,7 @@ from flowborne.validation.shedding import (
     judged,
     watch,
 )
-from flowborne.validation.worlds import refined
+from flowborne.validation.worlds import Parabola, recorded, refined, whole_steps
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -41,12 +41,8 @@ LENGTH, HEIGHT = 2.2, 0.41
 VISCOSITY = 1e-3
 """Pa s; the fluid's density is 1 kg/m^3."""
 
-STEADY_GRIDS = {True: (10,), False: (20, 40, 80)}
-SHEDDING_GRIDS = {True: (10,), False: (10, 20, 40)}
-"""Cells across D of B1, and of B2 and B3, by quick; multiples of 10 fit the channel."""
-
-STEADY = {True: 1e-2, False: 2e-5}
-"""Change of a coefficient in a time D/U below which B1's flow is steady, by quick."""
+GRIDS = {True: (10,), False: (10, 20, 40)}
+"""Cells across D of B2 and B3, by quick; multiples of 10 fit the channel."""
 
 LONGEST = 40
 """Longest time of B1 on one grid, times D/U."""
@@ -60,19 +56,6 @@ DURATION = 8.0
 
 DRAG_AT, LIFT_AT = 3.93625, 5.693125
 """s at which B3's published drag and lift are largest."""
-
-
-@dataclass(frozen=True)
-class Parabola:
-    """Inflow of the channel with the largest velocity `peak` (m/s), as a profile and as a field."""
-
-    peak: float
-
-    def __call__(
-        self, x: Array, y: Array, z: Array, time: float = 0.0
-    ) -> tuple[Array, Array, Array]:
-        none = 0.0 * (x + y + z)
-        return 4.0 * self.peak * y * (HEIGHT - y) / HEIGHT**2 + none, none, none
 
 
 @dataclass(frozen=True)
@@ -139,10 +122,10 @@ def steady_flow(world: World, change: float) -> tuple[float, float]:
 
 def steady_cylinder(quick: bool) -> list[Finding]:
     """B1: from the undisturbed flow on the coarsest grid, from the coarser one's on the others."""
-    grids, inflow = STEADY_GRIDS[quick], Parabola(CREEPING.fastest)
+    grids, inflow = (10,) if quick else (20, 40, 80), Parabola(CREEPING.fastest)
     rows = []
     for _, world, _ in refined(grids, lambda n: channel(n, inflow), inflow):
-        forces = steady_flow(world, STEADY[quick])
+        forces = steady_flow(world, 1e-2 if quick else 2e-5)
         rows.append((*forces, pressure_drop(world), recirculation(world)))
     drag, lift, drop, length = zip(*rows, strict=True)
     return [
@@ -156,7 +139,7 @@ def steady_cylinder(quick: bool) -> list[Finding]:
 def shedding_in_channel(quick: bool) -> list[Finding]:
     """B2: largest coefficients over some periods, frequency, and the pressure drop half a period
     after the largest lift."""
-    grids, periods = SHEDDING_GRIDS[quick], PERIODS[quick]
+    grids, periods = GRIDS[quick], PERIODS[quick]
     inflow = Parabola(SHEDDING.fastest)
     field = Kicked(inflow, SHEDDING, CENTRE, CENTRE)
     rows, lines = [], []
@@ -181,19 +164,20 @@ def shedding_in_channel(quick: bool) -> list[Finding]:
 def pulse(cells: int, duration: float = DURATION) -> Array:
     """(n, 4) time in s, drag and lift coefficient, pressure drop in Pa, from a fluid at rest."""
     world = channel(cells, Pulse())
-    fluid, _ = world.flow()
-    count = int(np.ceil(duration * SHEDDING.fastest / (CFL * fluid.grid.spacing)))
-    dt = duration / count
-    rows = []
-    for _ in range(count):
-        drag, lift = SHEDDING.coefficients(advance(world, dt))
-        rows.append((world.time, drag, lift, pressure_drop(world)))
-    return np.array(rows)
+    steps, dt = whole_steps(duration, CFL * DIAMETER / cells / SHEDDING.fastest)
+    return np.array(
+        recorded(
+            world,
+            dt,
+            steps,
+            lambda report: (world.time, *SHEDDING.coefficients(report), pressure_drop(world)),
+        )
+    )
 
 
 def swelling_inflow(quick: bool) -> list[Finding]:
     """B3: largest drag and lift in the pulse, and the pressure drop at its end."""
-    grids = SHEDDING_GRIDS[quick]
+    grids = GRIDS[quick]
     runs = [pulse(n) for n in grids]
     drags, lifts = ([crest(run[:, column])[0] for run in runs] for column in (1, 2))
     drops = [float(run[-1, 3]) for run in runs]

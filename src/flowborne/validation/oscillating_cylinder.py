@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from flowborne import Array, Grid, World
 from flowborne.bodies import TrajectorySinusoid
 from flowborne.validation.case import Case, Tier, confirmed, reference
-from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near
+from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, near
 from flowborne.validation.shedding import CFL, STREAM, UNBOUNDED, Kicked, Oscillation, amplitude
-from flowborne.validation.worlds import mjcf
-from flowborne.worlds import (
-    Boundaries,
-    BoundaryInflow,
-    BoundaryOpen,
-    advance,
-    make_world,
-    set_velocity,
-)
+from flowborne.validation.worlds import force_on, mjcf, recorded, square, through_flow
+from flowborne.worlds import advance, make_world, set_velocity
 
 PERIOD, KC, REYNOLDS = 5.0, 5.0, 100.0
 """V3: s; Keulegan and Carpenter's number Umax T / D and Reynolds number; D = 1 m, Umax = 1 m/s."""
 
 SIDE = 20
 """Diameters across V3's closed box."""
-
-GRIDS = {True: (6, 8), False: (8, 16, 32)}
-"""Cells across D of V3, by quick."""
-
-CYCLES = {True: 3, False: 7}
-"""Of V3, by quick; the last one is evaluated."""
 
 SWING_CFL = 0.5
 """Cells that V3's cylinder crosses in a step at most."""
@@ -41,14 +28,9 @@ CURVE = "C_D(t/T)=F/(0.5 rho Umax^2 D) digitised"
 SPRING_REYNOLDS, MASS = 150.0, 2.0
 """V5: Re, and the cylinder's mass over rho D^2; D = 1 m, U = 1 m/s."""
 
-CELLS = {True: 4, False: 16}
-"""Across D of V5, by quick."""
-
-SPEEDS = {True: (3.0, 5.0, 8.0), False: (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)}
-"""U / (f_n D) of V5, by quick; f_n is the frequency on the spring in vacuum."""
-
 LOCKED, UNLOCKED = 5.0, 3.0
-"""Two of these: with the vortices in step with the spring, and out of step."""
+"""U / (f_n D) of V5 with the vortices in step with the spring, and out of step; f_n is the
+frequency on the spring in vacuum."""
 
 DURATION, PERIODS = 120.0, 5
 """Times D/U of V5, and evaluated periods at their end."""
@@ -60,10 +42,9 @@ def tank(cells: int) -> World:
         '<body name="cylinder"><joint name="swing" type="slide" axis="1 0 0"/>'
         '<geom type="cylinder" size="0.5 1"/></body>'
     )
-    half = 0.5 * SIDE
     return make_world(
         mjcf(body),
-        Grid.slab(SIDE * cells, SIDE * cells, 1.0 / cells, (-half, -half)),
+        square(SIDE * cells, SIDE),
         viscosity=1.0 / REYNOLDS,
         motions=(TrajectorySinusoid(np.array([0]), -KC / (2.0 * np.pi), PERIOD),),
         tolerance=1e-7,
@@ -76,10 +57,7 @@ def last_cycle(cells: int, cycles: int) -> tuple[Array, Array]:
     count = int(np.ceil(PERIOD * cells / SWING_CFL))
     dt = PERIOD / count
     advance(world, dt, (cycles - 1) * count)
-    forces = []
-    for _ in range(count):
-        report = advance(world, dt)
-        forces.append(2.0 * float((report.pressure_wrench + report.viscous_wrench)[1, 0]))
+    forces = recorded(world, dt, count, lambda report: 2.0 * force_on(report)[0])
     return (np.arange(count) + 0.5) / count, np.array(forces)
 
 
@@ -95,37 +73,36 @@ def morison(phases: Array, forces: Array) -> tuple[float, float]:
 
 def swinging(quick: bool) -> list[Finding]:
     """V3: the in-line force in a cycle, and Morison's coefficients of it."""
-    grids = GRIDS[quick]
-    runs = [last_cycle(n, CYCLES[quick]) for n in grids]
+    grids = Grids("cells across D", (6, 8) if quick else (8, 16, 32))
+    runs = [last_cycle(n, 3 if quick else 7) for n in grids.cells]
     phase, published = np.array(reference("V3", CURVE)).T
     largest = float(np.abs(published).max())
-    peaks = [float(np.abs(forces).max()) for _, forces in runs]
+    peaks = [np.abs(forces).max() for _, forces in runs]
     away = [
-        float(np.abs(np.interp(phase, phases, forces, period=1.0) - published).max())
+        np.abs(np.interp(phase, phases, forces, period=1.0) - published).max()
         for phases, forces in runs
     ]
-    drags, inertias = zip(*(morison(*run) for run in runs), strict=True)
     curves = (Curve("Duetsch et al.", phase, published, True), Curve("flowborne", *runs[-1]))
     plot = Plot("t/T", "in-line force coefficient", curves)
-    label = "cells across D"
-    peak = GridSeries.toward(label, grids, peaks, largest)
-    course = GridSeries.toward(label, grids, away, 0.0)
-    known = dict(part.split("=") for part in reference("V3", "Morison fit").split(", "))
-    sure = confirmed("V3", "Morison fit")
+    course = at_most("farthest from the measured curve", away, 0.15, grids)
     findings = [
-        near("largest coefficient", peak, largest, relative=0.03),
-        replace(at_most("farthest from the measured curve", course, 0.15), plot=plot),
+        near("largest coefficient", peaks, largest, grids, relative=0.03),
+        replace(course, plot=plot),
     ]
-    for name, values in (("C_d", drags), ("C_i", inertias)):
-        exact = float(known[name])
-        series = GridSeries.toward(label, grids, values, exact)
-        fitted = near(f"Morison's {name}", series, exact, relative=0.03)
-        findings.append(replace(fitted, confirmed=sure))
+    known = dict(part.split("=") for part in reference("V3", "Morison fit").split(", "))
+    coefficients = zip(*(morison(*run) for run in runs), strict=True)
+    for name, values in zip(("C_d", "C_i"), coefficients, strict=True):
+        fitted = near(f"Morison's {name}", values, float(known[name]), grids, relative=0.03)
+        findings.append(replace(fitted, confirmed=confirmed("V3", "Morison fit")))
     return findings
 
 
 def sprung(cells: int, speed: float) -> World:
-    """V5's cylinder, which moves only across the stream, on its spring without damping."""
+    """V5's cylinder, which moves only across the stream, on its spring without damping.
+
+    cells  across D
+    speed  U / (f_n D)
+    """
     stiffness = MASS * (2.0 * np.pi / speed) ** 2
     body = (
         f'<body name="cylinder"><joint name="y" type="slide" axis="0 1 0" stiffness="{stiffness}"/>'
@@ -136,71 +113,49 @@ def sprung(cells: int, speed: float) -> World:
         Grid.slab(40 * cells, 40 * cells, 1.0 / cells, (-15.0, -20.0)),
         solid_density=MASS / (0.25 * np.pi),
         viscosity=1.0 / SPRING_REYNOLDS,
-        boundaries=Boundaries(BoundaryInflow(STREAM), BoundaryOpen()),
+        boundaries=through_flow(STREAM),
         tolerance=1e-7,
     )
 
 
-@dataclass(frozen=True)
-class Vibration:
-    """The cylinder's motion in the last periods: A/D, and its frequency over that of its spring."""
-
-    amplitude: float
-    frequency: float
-
-
-def vibration(cells: int, speed: float) -> Vibration:
-    """The cylinder's motion, from a stream with a gust across its wake."""
+def vibration(cells: int, speed: float) -> tuple[float, float]:
+    """A/D in the last periods, and their frequency over that of the spring, from a stream with a
+    gust across the cylinder's wake."""
     world = sprung(cells, speed)
     set_velocity(world, Kicked(STREAM, UNBOUNDED, 0.0, 0.0))
     dt = CFL / cells
-    path = []
-    for _ in range(round(DURATION / dt)):
-        advance(world, dt)
-        path.append(float(world.solid.q[0]))
+    path = recorded(world, dt, round(DURATION / dt), lambda _: world.solid.q[0])
     late = np.array(path[len(path) // 2 :])
     steps, period = Oscillation(dt, late).last(PERIODS)
-    return Vibration(amplitude(late[steps]), speed / period)
+    return amplitude(late[steps]), speed / period
 
 
 def vibrating(quick: bool) -> list[Finding]:
     """V5: amplitude and frequency in step with the spring, and the amplitude out of step."""
-    found = {speed: vibration(CELLS[quick], speed) for speed in SPEEDS[quick]}
+    cells, speeds = (4, (3.0, 5.0, 8.0)) if quick else (16, (3.0, 4.0, 5.0, 6.0, 7.0, 8.0))
+    found = {speed: vibration(cells, speed) for speed in speeds}
     lines = tuple(
-        f"U/(f_n D) = {speed:g}: A/D {seen.amplitude:.3f}, f/f_n {seen.frequency:.3f}"
-        for speed, seen in found.items()
+        f"U/(f_n D) = {speed:g}: A/D {size:.3f}, f/f_n {frequency:.3f}"
+        for speed, (size, frequency) in found.items()
     )
-    best, worst = found[LOCKED], found[UNLOCKED]
-    drop = best.amplitude / worst.amplitude
-    peak, lock = confirmed("V5", "(a) peak A/D"), confirmed("V5", "lock-in")
+    size, frequency = found[LOCKED]
     at = f"at U/(f_n D) = {LOCKED:g}"
-    return [
-        Finding(
-            f"A/D {at}",
-            best.amplitude,
-            0.55,
-            "[0.5, 0.6] with a margin of 0.05",
-            0.45 <= best.amplitude <= 0.65,
-            lines=lines,
-            confirmed=peak,
-        ),
-        Finding(
-            f"f/f_n {at}",
-            best.frequency,
-            1.0,
-            "10 %",
-            abs(best.frequency - 1.0) <= 0.1,
-            confirmed=lock,
-        ),
-        Finding(
-            f"A/D {at} over that at {UNLOCKED:g}",
-            drop,
-            5.0,
-            "more than 5",
-            drop > 5.0,
-            confirmed=lock,
-        ),
+    peak = Finding(
+        f"A/D {at}",
+        size,
+        0.55,
+        "[0.5, 0.6] with a margin of 0.05",
+        0.45 <= size <= 0.65,
+        lines=lines,
+        confirmed=confirmed("V5", "(a) peak A/D"),
+    )
+    drop = size / found[UNLOCKED][0]
+    locked = [
+        near(f"f/f_n {at}", frequency, 1.0, relative=0.1),
+        Finding(f"A/D {at} over that at {UNLOCKED:g}", drop, 5.0, "more than 5", drop > 5.0),
     ]
+    sure = confirmed("V5", "lock-in")
+    return [peak, *(replace(finding, confirmed=sure) for finding in locked)]
 
 
 CASES = (

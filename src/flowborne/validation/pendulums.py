@@ -7,8 +7,8 @@ import numpy as np
 from flowborne import Array, SolidState, World
 from flowborne.bodies import halfway_momentum, kinematics, kinetic_energy, potential_energy
 from flowborne.validation.case import Case, reference, table
-from flowborne.validation.findings import Finding, GridSeries, at_most, near
-from flowborne.validation.worlds import mjcf
+from flowborne.validation.findings import Finding, Grids, at_most, near
+from flowborne.validation.worlds import mjcf, recorded
 from flowborne.worlds import advance, make_world, start
 
 G = 9.81
@@ -36,19 +36,26 @@ def period(model: str, amplitude: float, dt: float, longest: float) -> float:
     """
     world = make_world(model, slab=True, gravity=DOWN)
     world.solid.q[0] = amplitude
-    start(world, dt)
-    angles = [amplitude]
-    for _ in range(int(longest / dt)):
-        advance(world, dt)
-        angles.append(float(world.solid.q[0]))
-    times = passages(np.array(angles), dt)
+    times = passages(first_angle(world, dt, int(longest / dt)), dt)
     return float(times[2] - times[0])
+
+
+def first_angle(world: World, dt: float, steps: int) -> Array:
+    """(steps + 1,) position of the first joint, after the start from rest."""
+    start(world, dt)
+    first = world.solid.q[0]
+    return np.array([first, *recorded(world, dt, steps, lambda _: world.solid.q[0])])
 
 
 def passages(angles: Array, dt: float) -> Array:
     """Times (s) at which angles sampled every dt pass through 0."""
     k = np.flatnonzero(angles[:-1] * angles[1:] < 0.0)
     return np.asarray(dt * (k + angles[k] / (angles[k] - angles[k + 1])))
+
+
+def frequency(heights: Array, dt: float) -> float:
+    """Mean frequency of a signal sampled every dt (s), from its passages through 0, Hz."""
+    return float(1.0 / (2.0 * np.diff(passages(heights, dt)).mean()))
 
 
 def pendulum_period(quick: bool) -> list[Finding]:
@@ -62,8 +69,8 @@ def pendulum_period(quick: bool) -> list[Finding]:
             period(bar(length, width), np.radians(degrees), t0 / n, 1.3 * ratio * t0) / t0
             for n in steps
         ]
-        series = GridSeries.toward("steps in T0", steps, runs, ratio)
-        findings.append(near(f"T/T0 let go at {degrees:g} degrees", series, ratio, relative=1e-3))
+        title, grids = f"T/T0 let go at {degrees:g} degrees", Grids("steps in T0", steps)
+        findings.append(near(title, runs, ratio, grids, relative=1e-3))
     swing = np.radians(5.0)
     factor = table("A1", "T/T0")[5.0]
     for label, wide in (("block 1.2 x 0.3", width), ("thin rod", 1e-4 * length)):
@@ -95,12 +102,8 @@ def mode(number: int, steps: int) -> float:
     expected = float(reference("A2", "modes")[number]) * np.sqrt(G)
     dt = 2.0 * np.pi / (expected * steps)
     world = double_pendulum(0.002, 0.002 * (sign * np.sqrt(2.0) - 1.0))
-    start(world, dt)
-    angles = [float(world.solid.q[0])]
-    for _ in range(int(4.3 * steps)):
-        advance(world, dt)
-        angles.append(float(world.solid.q[0]))
-    return float(np.pi / np.diff(passages(np.array(angles), dt)).mean() / np.sqrt(G))
+    times = passages(first_angle(world, dt, int(4.3 * steps)), dt)
+    return float(np.pi / np.diff(times).mean() / np.sqrt(G))
 
 
 def energy(world: World, dt: float) -> float:
@@ -155,9 +158,8 @@ def double_pendulum_case(quick: bool) -> list[Finding]:
     steps = (25, 50, 100) if quick else (100, 200, 400)
     for number, expected in enumerate(reference("A2", "modes")):
         runs = [mode(number, n) for n in steps]
-        series = GridSeries.toward("steps in a period", steps, runs, expected)
-        title = f"omega of mode {number + 1} over sqrt(g/L)"
-        findings.append(near(title, series, expected, relative=1e-3))
+        title, on = f"omega of mode {number + 1} over sqrt(g/L)", Grids("steps in a period", steps)
+        findings.append(near(title, runs, expected, on, relative=1e-3))
     drift, apart = swings(100, 10.0 if quick else 100.0)
     span = f"{10 if quick else 100} periods"
     findings.append(at_most(f"drift of the energy over {span}", drift, 1e-3))

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import gzip
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from time import perf_counter
 from types import MappingProxyType
@@ -30,10 +30,11 @@ from types import MappingProxyType
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flowborne import Array, BlowUpError, Simulation, load_scene
+from flowborne import Array, Simulation, load_scene
 from flowborne.bodies import kinematics
 from flowborne.validation.case import Case, reference
-from flowborne.validation.findings import Finding, GridSeries
+from flowborne.validation.findings import Finding, Grids, at_most
+from flowborne.validation.worlds import frames_of
 
 LINK_LENGTH = np.array([12.0, 9.8, 9.8, 9.8, 9.8, 9.8])
 """cm of each link, head first."""
@@ -53,13 +54,6 @@ QUANTITIES = (
 )
 HEADING = 4
 """Compared quantities, and the number of the heading."""
-
-GRIDS = {True: (122,), False: (122, 183, 244)}
-ROOM_GRIDS = (61, 92, 122)
-"""Cells across the tank, by quick; and across the tank of `eel-room`, unless quick."""
-
-AMPLITUDES = {True: (20,), False: (20, 40)}
-"""Degrees of the gait, by quick."""
 
 TANK_LENGTH = {20: 1.0, 40: 1.25}
 """Length of the tank over that of the scene, by amplitude."""
@@ -160,25 +154,13 @@ def lag(changes: Array, runs: list[SwimPath]) -> tuple[float, float]:
     return float(lags[best]), errors[best]
 
 
-@dataclass(frozen=True)
-class Swim:
-    """A run of the scene.
-
-    path     at TIMES
-    seconds  of wall clock
-    """
-
-    path: SwimPath
-    seconds: float
-
-
 def swim(
     amplitude: int,
     cells: int,
     settings: Mapping[str, str] = MappingProxyType({}),
     scene: str = "eel",
-) -> Swim:
-    """Run the robot of a scene.
+) -> tuple[SwimPath, float]:
+    """The path of a scene's robot, and the seconds of wall clock of the run.
 
     cells     across the tank
     settings  in place of the scene's own
@@ -194,15 +176,10 @@ def swim(
     }
     started = perf_counter()
     with Simulation(load_scene(scene, {**own, **settings})) as simulation:
-        rows = [quantities(simulation)]
-        try:
-            for _ in TIMES[1:]:
-                simulation.advance_frame()
-                rows.append(quantities(simulation))
-        except BlowUpError as error:
-            raise ArithmeticError(f"{scene} on {cells} cells: {error}") from error
-    found = np.array(rows)
-    return Swim(SwimPath(found[:, :2], found[:, 2:]), perf_counter() - started)
+        first = quantities(simulation)
+        later = frames_of(simulation, len(TIMES) - 1, lambda _: quantities(simulation))
+    found = np.array([first, *later])
+    return SwimPath(found[:, :2], found[:, 2:]), perf_counter() - started
 
 
 def quantities(simulation: Simulation) -> Array:
@@ -217,35 +194,26 @@ def quantities(simulation: Simulation) -> Array:
 def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list[Finding]:
     """Errors of the robot on some grids, of which the last is judged, and of other simulators."""
     runs = measured(amplitude)
-    swims = [swim(amplitude, count, scene=scene) for count in cells]
-    errors = np.array([rmse(one.path.changes(), runs) for one in swims])
-    least = scatter(runs)
+    paths, seconds = zip(*(swim(amplitude, n, scene=scene) for n in cells), strict=True)
+    errors = np.array([rmse(path.changes(), runs) for path in paths])
+    least, grids = scatter(runs), Grids("cells across the tank", cells)
+    times = [
+        f"{n:>6} cells across the tank: 4 s in {spent:.0f} s"
+        for n, spent in zip(cells, seconds, strict=True)
+    ]
     findings = []
     for n, quantity in enumerate(QUANTITIES):
         aquarium, genesis = (
             reference("R1", simulator)[str(amplitude)][quantity]
             for simulator in ("Aquarium", "Genesis")
         )
-        found = [float(error) for error in errors[:, n]]
-        value = found[-1]
-        lines = [
-            f"{count:>6} cells across the tank: 4 s in {one.seconds:.0f} s"
-            for count, one in zip(cells, swims, strict=True)
-        ]
-        if n == HEADING:
-            lines += delay_lines(swims[-1].path.changes(), amplitude, runs)
+        title = f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}"
+        delay = delay_lines(paths[-1].changes(), amplitude, runs) if n == HEADING else []
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
-        findings.append(
-            Finding(
-                f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}",
-                value,
-                aquarium,
-                "at most",
-                value <= aquarium,
-                GridSeries("cells across the tank", cells, found, found),
-                lines=(*lines, f"{others}, mean of the {len(runs)} runs {least[n]:.3f}"),
-            )
-        )
+        scattered = f"mean of the {len(runs)} runs {least[n]:.3f}"
+        lines = [*times, *delay, f"{others}, {scattered}"]
+        found = at_most(title, errors[:, n], aquarium, grids, lines=lines)
+        findings.append(replace(found, reference=aquarium, tolerance="at most"))
     return findings
 
 
@@ -261,10 +229,15 @@ def delay_lines(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[st
 
 def robot(quick: bool) -> list[Finding]:
     """R1: errors at most those of the robot's own simulator, Aquarium."""
-    cases = [(amplitude, GRIDS[quick], "eel") for amplitude in AMPLITUDES[quick]]
-    if not quick:
-        cases += [(amplitude, ROOM_GRIDS, "eel-room") for amplitude in AMPLITUDES[quick]]
-    return [finding for case in cases for finding in compared(*case)]
+    if quick:
+        return compared(20, (122,))
+    runs = (("eel", (122, 183, 244)), ("eel-room", (61, 92, 122)))
+    return [
+        finding
+        for scene, cells in runs
+        for amplitude in (20, 40)
+        for finding in compared(amplitude, cells, scene)
+    ]
 
 
 CASES = (Case("R1", robot, coarse=True),)

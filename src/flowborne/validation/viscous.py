@@ -7,8 +7,8 @@ import numpy as np
 from flowborne import Grid, World
 from flowborne.bodies import Trajectory, TrajectoryConstant
 from flowborne.validation.case import Case
-from flowborne.validation.findings import Finding, GridSeries, near
-from flowborne.validation.worlds import mjcf
+from flowborne.validation.findings import Finding, Grids, near
+from flowborne.validation.worlds import force_on, mjcf, ring_of_boxes
 from flowborne.worlds import advance, make_world
 
 INNER, OUTER = 0.5, 1.0
@@ -16,9 +16,6 @@ INNER, OUTER = 0.5, 1.0
 
 SPIN = 1.0
 """Omega, rad/s."""
-
-GRIDS = {True: (16, 24), False: (16, 32, 64, 128)}
-"""Cells across the outer radius, by quick."""
 
 SIDES = 48
 """Boxes that make the outer cylinder."""
@@ -55,16 +52,11 @@ def annulus(cells: int, free: bool) -> World:
     h = OUTER / cells
     side = cells + 2
     grid = Grid.slab(2 * side, 2 * side, h, (-side * h, -side * h))
-    angle = 2.0 * np.pi / SIDES
+    half = np.pi / SIDES
     # the mean of apothem / cos(t) over half a side is the radius
-    half = 0.5 * angle
     apothem = OUTER * half / np.log(1.0 / np.cos(half) + np.tan(half))
     reach = apothem + SHELL
-    ring = "".join(
-        f'<geom type="box" size="{SHELL} {1.05 * half * (reach + SHELL)} 1" '
-        f'pos="{reach * np.cos(t)} {reach * np.sin(t)} 0" euler="0 0 {t}"/>'
-        for t in angle * np.arange(SIDES)
-    )
+    ring = ring_of_boxes(SIDES, reach, f"{SHELL} {1.05 * half * (reach + SHELL)} 1")
     shaft = (
         '<body name="shaft"><joint name="turn" type="hinge" axis="0 0 1"/>'
         f'<geom type="cylinder" size="{INNER} 1" density="{HEAVY}"/></body>'
@@ -81,14 +73,14 @@ def measured(cells: int) -> tuple[float, float]:
     dt = OUTER / cells / (SPIN * INNER)
     driven = annulus(cells, free=False)
     report = advance(driven, dt, int(SETTLING / dt))
-    wrench = report.viscous_wrench + report.pressure_wrench
+    torque = force_on(report, -1)[5]
     freed = annulus(cells, free=True)
     freed.fluid = driven.fluid
     freed.solid.v[0] = SPIN
     steps = int(PART / RATE / dt)
     advance(freed, dt, steps)
     rate = np.log(SPIN / freed.solid.v[0]) / (steps * dt)
-    return float(-wrench[-1, 5] / (SPIN * TORQUE)), float(rate / RATE)
+    return float(-torque / (SPIN * TORQUE)), float(rate / RATE)
 
 
 def between_cylinders(quick: bool) -> list[Finding]:
@@ -96,16 +88,12 @@ def between_cylinders(quick: bool) -> list[Finding]:
 
     The list's unbounded cylinder is the limit of the same formula for large b.
     """
-    grids = GRIDS[quick]
-    torques, rates = zip(*(measured(n) for n in grids), strict=True)
-    findings = []
-    for quantity, values, tolerance in (
-        ("torque / exact, steady", torques, 0.01),
-        ("rate of the spin-down / exact", rates, 0.02),
-    ):
-        series = GridSeries.toward("cells across b", grids, values, 1.0)
-        findings.append(near(quantity, series, 1.0, relative=tolerance))
-    return findings
+    grids = Grids("cells across b", (16, 24) if quick else (16, 32, 64, 128))
+    torques, rates = zip(*(measured(n) for n in grids.cells), strict=True)
+    return [
+        near("torque / exact, steady", torques, 1.0, grids, relative=0.01),
+        near("rate of the spin-down / exact", rates, 1.0, grids, relative=0.02),
+    ]
 
 
 CASES = (Case("V8", between_cylinders),)
