@@ -16,9 +16,11 @@ COMPILING, COMPILED = 60.0, 5.0
 """Most seconds of `--help`, and of a run of one frame with nothing and with everything compiled."""
 
 
-def start() -> Iterator[Result]:
-    """Seconds from the command to its help."""
-    yield help_time()
+def start(repeats: int = 5) -> Iterator[Result]:
+    """Seconds that `flowborne --help` takes, the quickest time of a few."""
+    command = [sys.executable, "-m", "flowborne", "--help"]
+    _, seconds = timed(lambda: subprocess.run(command, check=True, capture_output=True), repeats)
+    yield below("start", "flowborne --help: seconds from the command to its end", seconds, HELP)
 
 
 def first_run(scene: str = "ns-block-drag-max") -> Iterator[Result]:
@@ -27,13 +29,6 @@ def first_run(scene: str = "ns-block-drag-max") -> Iterator[Result]:
         for state, allowed in (("first run", COMPILING), ("later run", COMPILED)):
             title = f"{scene}: seconds to the first frame, {state}"
             yield below("first-run", title, run_once(scene, Path(folder)), allowed)
-
-
-def help_time(repeats: int = 5) -> Result:
-    """Seconds that `flowborne --help` takes, the quickest time of a few."""
-    command = [sys.executable, "-m", "flowborne", "--help"]
-    _, seconds = timed(lambda: subprocess.run(command, check=True, capture_output=True), repeats)
-    return below("start", "flowborne --help: seconds from the command to its end", seconds, HELP)
 
 
 def below(name: str, title: str, seconds: float, allowed: float) -> Result:
