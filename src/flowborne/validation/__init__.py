@@ -12,7 +12,7 @@ __all__ = ["Case", "GridSeries", "Result", "Tier", "case", "case_ids"]
 
 MODULES = {
     "added_mass": ("I1", "I2"),
-    "articulated": ("A3", "A4"),
+    "articulated": ("A1", "A2", "A3", "A4"),
     "cavity": ("F2",),
     "channel_cylinder": ("B1", "B2", "B3"),
     "controller": ("K1", "K2", "K3", "K4"),
@@ -26,14 +26,12 @@ MODULES = {
     "human": ("K8", "K9", "K10"),
     "hydrostatics": ("F5",),
     "inviscid": ("I4", "I6", "I7", "I8", "I9"),
+    "moving_cylinder": ("V3", "V5", "V8"),
     "open_water": ("B4", "B5", "B6", "B7", "V9"),
-    "oscillating_cylinder": ("V3", "V5"),
-    "pendulums": ("A1", "A2"),
     "rexeel": ("R1",),
     "scalar_cases": ("F4",),
     "settling": ("V1", "V2"),
     "swimmers": ("S1", "S5"),
-    "viscous": ("V8",),
 }
 """Module -> its cases; a module is imported when one of them is run."""
 

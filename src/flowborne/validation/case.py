@@ -151,10 +151,6 @@ class Case:
     def title(self) -> str:
         return entry(self.id).name
 
-    @property
-    def source(self) -> str:
-        return entry(self.id).source
-
     def tier_in(self, wanted: Tier) -> Tier | None:
         """The largest of the case's tiers within `wanted`; None if there is none."""
         has = (self.full, self.quick)

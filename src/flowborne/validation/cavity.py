@@ -17,9 +17,6 @@ from flowborne.worlds import Boundaries, BoundaryNoSlip, advance, make_world
 LONGEST = 400.0
 """s within which a flow has to become steady."""
 
-CFL = 1.0
-"""Cells that the lid crosses in a step."""
-
 MISPRINT = (400, 0.9063)
 """Reynolds number and x of a wrong value in the printed table."""
 
@@ -41,7 +38,7 @@ def settle(world: World, rate: float) -> float:
     Raises ArithmeticError when the flow does not become steady.
     """
     fluid, state = world.flow()
-    dt = CFL * fluid.grid.spacing
+    dt = fluid.grid.spacing  # the lid crosses a cell in a step
     while world.time < LONGEST:
         before = [state.velocity[axis].copy() for axis in fluid.grid.axes]
         advance(world, dt)

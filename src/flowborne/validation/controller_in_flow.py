@@ -18,10 +18,6 @@ FRAMES_PER_SECOND = 24.0
 STRENGTH = 20.0
 """degrees/s, of the block scenes."""
 
-AREA = 1.0
-STREAM_PRESSURE = 0.5 * 1000.0
-"""rho U^2 / 2 of the NS scenes, Pa."""
-
 
 @dataclass(frozen=True)
 class AngleHistory:
@@ -120,7 +116,7 @@ def block_in_stream(quick: bool) -> list[Finding]:
     angles = np.arange(-90.0, 91.0, 15.0 if quick else 5.0)
     resolution, seconds = (32, 3.0) if quick else (64, 6.0)
     drags = np.array([held_drag(a, resolution, seconds) for a in angles])
-    unit = STREAM_PRESSURE * AREA
+    unit = 0.5 * 1000.0  # rho U^2 L / 2 of the NS scenes, N/m
     lines = [f"{a:>6g} degrees: {d / unit:.4g}" for a, d in zip(angles, drags, strict=True)]
     rise = float(drags[len(angles) // 2] - 0.5 * (drags[0] + drags[-1])) / unit
     title = "drag across the stream less that along it, over rho U^2 L/2"
@@ -213,7 +209,7 @@ def fixed_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Fi
     first, *others = (
         near(f"{scene}: {title}", value, 0.0, absolute=1.0) for title, value in figures.items()
     )
-    return [replace(first, lines=tuple(lines)), *others]
+    return [replace(first, lines=lines), *others]
 
 
 def away_from(scene: str, angle: float) -> float:

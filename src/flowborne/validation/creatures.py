@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -29,18 +29,12 @@ COARSE_SWIMMER = {"domain.resolution": "72"}
 CYCLE = 1.75
 """s, of the swimmer."""
 
-STILL = 0.2
-"""Degrees by which legs at rest may turn in a frame."""
-
 LEAST_GAIN = 1.2
 """Least gain by the legs that the paper claims for its swimmer."""
 
 SWIMMERS = ("swimmer", "swimmer-jet-only", "swimmer-no-control")
 
 STROKE = "swimmer-stroke"
-
-PASSIVE = {"control": "[]", "objectives": "[]", "initial.positions": "{}"}
-"""Settings of a swimmer with its jet alone."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +98,7 @@ def fly(
             return simulation.time, stroke, force[:, 2].sum()
 
         rows = frames_of(simulation, round(cycles * period / simulation.frame_time), figures)
-    time, stroke, lift = np.array(rows).T
+    time, stroke, lift = rows.T
     return Flight(time, stroke, lift, period)
 
 
@@ -156,8 +150,9 @@ class Swim:
         return float(self.height[-1])
 
     def pushed(self, sign: float) -> float:
-        """N, mean upward force while the legs open (sign 1) or close (sign -1)."""
-        turning = sign * np.diff(self.spread) > STILL
+        """N, mean upward force while the legs open (sign 1) or close (sign -1), by more than 0.2
+        degrees a frame."""
+        turning = sign * np.diff(self.spread) > 0.2
         return float(self.push[1:][turning].mean())
 
 
@@ -182,7 +177,7 @@ def swim(scene: str, cycles: float, settings: Mapping[str, str] = MappingProxyTy
             return simulation.time, pose.body_position[head, 2] - start, tilt, push, work, spread
 
         rows = frames_of(simulation, round(cycles * CYCLE / simulation.frame_time), figures)
-    time, height, tilt, push, work, spread = np.array(rows).T
+    time, height, tilt, push, work, spread = rows.T
     return Swim(time, height, tilt, push, np.cumsum(work), spread)
 
 
@@ -213,7 +208,7 @@ def control_is_worth_it(quick: bool) -> list[Finding]:
     ]
 
 
-def legs_gain(scene: str, whole: Swim, jet: Swim, lines: tuple[str, ...]) -> Finding:
+def legs_gain(scene: str, whole: Swim, jet: Swim, lines: Sequence[str]) -> Finding:
     """Rise of a swimmer over that with its jet alone."""
     gain = whole.risen() / jet.risen()
     title = f"{scene}: way up with jet and control over that with the jet alone"
@@ -229,7 +224,7 @@ def legs_are_worth_it(quick: bool) -> list[Finding]:
     force = "swimmer: upward force of the water as legs close over the downward one as they open"
     forces = f"closing {1e-3 * stroke:.1f} kN, opening {1e-3 * opening:.1f} kN"
     return [
-        legs_gain("swimmer", whole, jet, tuple(summary(name, run) for name, run in found.items())),
+        legs_gain("swimmer", whole, jet, [summary(name, run) for name, run in found.items()]),
         above(rise, whole.risen() - neither.risen(), 0.0, "sign"),
         above(force, stroke / abs(opening), 1.0, "more", [forces]),
     ]
@@ -239,8 +234,9 @@ def stroke_is_worth_it(quick: bool) -> list[Finding]:
     """The swimmer with other objectives than the paper's, by the same measure."""
     settings = COARSE_SWIMMER if quick else {}
     whole = swim(STROKE, CYCLES[quick], settings)
-    jet = swim(STROKE, CYCLES[quick], {**settings, **PASSIVE})
-    lines = (summary(STROKE, whole), summary("its jet alone", jet))
+    passive = {"control": "[]", "objectives": "[]", "initial.positions": "{}"}
+    jet = swim(STROKE, CYCLES[quick], settings | passive)
+    lines = [summary(STROKE, whole), summary("its jet alone", jet)]
     return [legs_gain(STROKE, whole, jet, lines)]
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -132,7 +132,7 @@ class Finding:
     tolerance: Value
     passed: bool
     series: GridSeries | None = None
-    lines: tuple[str, ...] = ()
+    lines: Sequence[str] = ()
     plot: Plot | None = None
     confirmed: bool = True
 
@@ -148,8 +148,6 @@ class Finding:
         return "coarse" if coarse and self.series is not None else "fail"
 
 
-FALLING = ", falling from grid to grid"
-
 Measured = float | Sequence[float] | Array | GridSeries
 """A number; figures on several grids, of which the last counts; or a series of them."""
 
@@ -162,23 +160,18 @@ def near(
     *,
     relative: float | None = None,
     absolute: float | None = None,
-    falling: bool = False,
-    lines: Iterable[str] = (),
+    lines: Sequence[str] = (),
 ) -> Finding:
     """A finding that passes within a relative or an absolute tolerance of its reference.
 
-    on       the grids of several figures
-    falling  whether their errors have to fall from grid to grid, too
+    on  the grids of several figures
     """
     figure, series = _figure(value, reference, on)
     bound = relative * abs(reference) if relative is not None else absolute
     assert bound is not None
-    passed = abs(figure - reference) <= bound
+    passed = bool(abs(figure - reference) <= bound)
     tolerance = f"{100.0 * relative:g} %" if relative is not None else f"{bound:g}"
-    if falling:
-        assert series is not None
-        passed, tolerance = passed and series.falls, tolerance + FALLING
-    return Finding(quantity, figure, reference, tolerance, bool(passed), series, tuple(lines))
+    return Finding(quantity, figure, reference, tolerance, passed, series, lines)
 
 
 def within(
@@ -188,18 +181,20 @@ def within(
     interval: tuple[float, float],
     on: Grids,
     *,
-    falling: bool = False,
-    lines: Iterable[str] = (),
+    lines: Sequence[str] = (),
 ) -> Finding:
-    """A finding on several grids whose last value has to lie in an interval.
-
-    falling  whether the errors have to fall from grid to grid, too
-    """
+    """A finding on several grids whose last value has to lie in an interval."""
     value, series = _figure(values, reference, on)
-    (low, high), assured = interval, series is not None and (series.falls or not falling)
-    tolerance = f"[{low:g}, {high:g}]" + (FALLING if falling else "")
-    passed = low <= value <= high and assured
-    return Finding(quantity, value, reference, tolerance, bool(passed), series, tuple(lines))
+    low, high = interval
+    passed = low <= value <= high
+    return Finding(quantity, value, reference, f"[{low:g}, {high:g}]", passed, series, lines)
+
+
+def falling(found: Finding) -> Finding:
+    """The finding, which passes only if its errors fall from grid to grid, too."""
+    assert found.series is not None
+    tolerance = f"{found.tolerance}, falling from grid to grid"
+    return replace(found, tolerance=tolerance, passed=found.passed and found.series.falls)
 
 
 def at_most(
@@ -208,7 +203,7 @@ def at_most(
     bound: float,
     on: Grids | None = None,
     *,
-    lines: Iterable[str] = (),
+    lines: Sequence[str] = (),
 ) -> Finding:
     """A finding whose reference is 0 and whose size may be at most `bound`.
 
@@ -216,15 +211,15 @@ def at_most(
     """
     figure, series = _figure(value, 0.0, on)
     passed = bool(abs(figure) <= bound)
-    return Finding(quantity, figure, 0.0, f"{bound:g}", passed, series, tuple(lines))
+    return Finding(quantity, figure, 0.0, f"{bound:g}", passed, series, lines)
 
 
 def above(
-    quantity: str, value: float, bound: float, tolerance: str, lines: Iterable[str] = ()
+    quantity: str, value: float, bound: float, tolerance: str, lines: Sequence[str] = ()
 ) -> Finding:
     """A finding that passes above a bound; `tolerance` says what that means, such as "sign"."""
     passed = bool(value > bound)
-    return Finding(quantity, value, f"> {bound:g}", tolerance, passed, lines=tuple(lines))
+    return Finding(quantity, value, f"> {bound:g}", tolerance, passed, lines=lines)
 
 
 def _figure(value: Measured, exact: float, on: Grids | None) -> tuple[float, GridSeries | None]:

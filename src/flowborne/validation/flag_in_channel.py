@@ -150,7 +150,7 @@ def march(world: World, flow: Flow, seconds: float) -> Array:
         forces = (report.pressure_wrench + report.viscous_wrench)[:, :2].sum(axis=0)
         return (*forces, *moved(world))
 
-    return np.array(recorded(world, dt, round(seconds / dt), figures))
+    return recorded(world, dt, round(seconds / dt), figures)
 
 
 SHORTER = 0.5

@@ -17,36 +17,24 @@ SWAY, PERIOD, PITCH = 2.8, 4.0, 0.25 * np.pi
 """m from end to end of the motion of the centre, for an ellipse of 1 m; s; rad by which it pitches
 from upright to each side."""
 
-THICKNESS = 0.1
-"""Thickness over chord."""
-
 FASTEST = np.pi * SWAY / PERIOD
 """m/s, of the centre."""
-
-REYNOLDS = 75.0
-
-CFL = 1.0
-"""Cells that the centre crosses in a step at most; the tips are up to 1.4 times as fast."""
-
-TURNING = 0.012
-"""Part of T around each reversal of the stroke in which the published drag is left out: it changes
-its sign there."""
 
 LIFT, DRAG, MEASURED = "CL(t/T) Eldredge", "CD(t/T) Eldredge", "CL experiment Wang"
 
 
 def hover(cells: int, side: int) -> World:
-    """The ellipse upright at one end of its stroke, in still fluid."""
+    """The ellipse, a tenth as thick as long, upright at one end of its stroke, in still fluid."""
     body = (
         '<body name="wing"><joint name="x" type="slide" axis="1 0 0"/>'
         '<joint name="pitch" axis="0 0 1"/>'
-        f'<geom type="ellipsoid" size="0.5 {0.5 * THICKNESS} 1"/></body>'
+        '<geom type="ellipsoid" size="0.5 0.05 1"/></body>'
     )
     motions = (
         TrajectorySinusoid(np.array([0]), 0.5 * SWAY, PERIOD, 0.0, 0.5 * np.pi),
         TrajectorySinusoid(np.array([1]), PITCH, PERIOD, 0.5 * np.pi),
     )
-    grid, viscosity = square(side * cells, side), FASTEST / REYNOLDS
+    grid, viscosity = square(side * cells, side), FASTEST / 75.0
     world = make_world(mjcf(body), grid, viscosity=viscosity, motions=motions, tolerance=1e-7)
     world.solid.q[:], _ = at_start(motions)
     return world
@@ -70,7 +58,8 @@ def flap(cells: int, side: int, strokes: float) -> Array:
              ones; drag is positive against the motion of the wing
     """
     world = hover(cells, side)
-    count, dt = whole_steps(strokes * PERIOD, CFL / cells / FASTEST)
+    # in a step the centre crosses at most a cell; the tips are up to 1.4 times as fast
+    count, dt = whole_steps(strokes * PERIOD, 1.0 / cells / FASTEST)
     lift, drag = largest_quasi_steady()
     rows = []
     for k in range(count):
@@ -102,7 +91,8 @@ def hovering(quick: bool) -> list[Finding]:
         for points in (np.array(reference("S3", name)) for name in (LIFT, DRAG, MEASURED))
     )
     bound = apart(measured[:, 0], measured[:, 1], lift)
-    drag = drag[np.abs((drag[:, 0] + 0.25) % 0.5 - 0.25) > TURNING]
+    # the drag changes its sign at each reversal of the stroke: points there are left out
+    drag = drag[np.abs((drag[:, 0] + 0.25) % 0.5 - 0.25) > 0.012]
     findings = []
     for name, column, published in (("lift", 1, lift), ("drag", 2, drag)):
         away = [apart(run[:, 0], run[:, column], published) for run in runs]

@@ -17,10 +17,10 @@ from flowborne.bodies import (
     static_forces,
     symmetric_factor,
 )
+from flowborne.validation.articulated import frequency
 from flowborne.validation.case import Case, reference, table
 from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, near, order_of
 from flowborne.validation.flesh_bars import Bar, bar_of, equilibrium, tissue_table
-from flowborne.validation.pendulums import frequency
 from flowborne.validation.worlds import Vector
 
 Cells = tuple[int, ...]
@@ -117,10 +117,6 @@ def _bent(cells: Cells, at_tip: bool, loads: Sequence[float]) -> Array:
     return np.array(found)
 
 
-AMPLITUDE = 1e-3
-"""Of D5's vibration in time, m."""
-
-
 def modes(bar: Bar, count: int) -> tuple[Array, Array]:
     """Lowest frequencies about rest, (count,) Hz, and their shapes (nv, count)."""
     model, free = bar.model, np.flatnonzero(~bar.fixed)
@@ -163,12 +159,12 @@ def vibration(quick: bool) -> list[Finding]:
 
 
 def in_time(steps: Sequence[int], periods: int) -> list[Finding]:
-    """Frequency and amplitude of a beam released in its first mode, `steps` in a period."""
+    """Frequency and amplitude of a beam released in its first mode at 1 mm, `steps` in a period."""
     bar = beam((10, 1), 1.0, 0.0)
     (f1,), shape = modes(bar, 1)
     rest = bar.model.mj.qpos0
     reach = abs(bar.end(bar.model.integrate(rest, shape[:, 0], 1.0))[1])
-    q = bar.model.integrate(rest, shape[:, 0], AMPLITUDE / reach)
+    q = bar.model.integrate(rest, shape[:, 0], 1e-3 / reach)
     runs, lost = [], []
     for n in steps:
         dt = 1.0 / (f1 * n)

@@ -63,12 +63,6 @@ def fixed_bodies(grid: Grid) -> str:
     return mjcf(*bodies)
 
 
-def free_bodies(grid: Grid) -> str:
-    """MJCF of bodies that float."""
-    bodies = [placed(name, centre, "<freejoint/>" + geom, grid) for name, centre, geom in SHAPES]
-    return mjcf(*bodies)
-
-
 def displaced(world: World) -> tuple[Array, Array]:
     """Discrete volume of each body for a pressure gradient along each axis, and its centroid.
 
@@ -121,7 +115,7 @@ def still_around_fixed(grid: Grid, gravity: Vector, steps: int) -> tuple[float, 
 def still_around_free(grid: Grid, gravity: Vector, steps: int) -> tuple[float, float]:
     """Neutral free bodies in fluid at rest: max|u| and largest velocity of a body over g dt."""
     world = make_world(
-        free_bodies(grid),
+        mjcf(*(placed(name, centre, "<freejoint/>" + geom, grid) for name, centre, geom in SHAPES)),
         grid,
         gravity=gravity,
         solid_density=DENSITY,

@@ -9,9 +9,9 @@ import numpy as np
 
 from flowborne import Array, Grid
 from flowborne.bodies import WindForce
+from flowborne.validation.articulated import first_angle, passages
 from flowborne.validation.case import Case, Tier, reference, table
-from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, near
-from flowborne.validation.pendulums import first_angle, passages
+from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, falling, near
 from flowborne.validation.worlds import (
     PERIODIC,
     RING,
@@ -157,7 +157,7 @@ def munk_moment(quick: bool) -> list[Finding]:
         moments, forces = zip(*runs, strict=True)
         series = GridSeries.toward(grids, moments, exact, relative=True)
         title = f"M over rho U^2 pi (a^2-b^2)/2 at {degrees:g} degrees"
-        findings.append(near(title, series, exact, relative=0.01, falling=True))
+        findings.append(falling(near(title, series, exact, relative=0.01)))
         title = f"force over rho U^2 2a at {degrees:g} degrees"
         findings.append(at_most(title, forces, 0.02, grids))
     return findings
@@ -185,9 +185,6 @@ class PendulumBox:
         """Ca of the bob in the middle, by I2's table."""
         return float(table("I2", "cylinder in closed square, Ca vs D/L")[2.0 * RADIUS / self.side])
 
-
-WIDEST = 150.0
-"""Largest angle of release of the bob, degrees."""
 
 NARROW = PendulumBox(2.0, ROD, (64, 128, 256, 384))
 """The bob rests in the middle."""
@@ -236,7 +233,7 @@ def pendulum(quick: bool) -> list[Finding]:
     if quick:
         return findings
     for degrees, factor in table("I7", "amplitude factor").items():
-        if not 5.0 < degrees <= WIDEST:
+        if not 5.0 < degrees <= 150.0:
             continue
         box = NARROW if degrees <= 90.0 else WIDE
         exact = small_period(2.0, box.added)

@@ -14,7 +14,7 @@ import numpy as np
 
 from flowborne import Grid, World
 from flowborne.validation.case import Case, Tier, confirmed, reference, table
-from flowborne.validation.findings import Curve, Finding, Grids, Plot, near, within
+from flowborne.validation.findings import Curve, Finding, Grids, Plot, falling, near, within
 from flowborne.validation.shedding import (
     AFTER,
     BEFORE,
@@ -33,9 +33,6 @@ from flowborne.worlds import advance, make_world, velocity_at
 
 OPEN_GRIDS = {True: (4,), False: (8, 16, 24, 32)}
 """Cells across D of B5, B6 and V9, by quick."""
-
-FURTHEST = 6.0
-"""Diameters behind the cylinder's centre within which the backflow ends."""
 
 UPSTREAM, DOWNSTREAM, ASIDE = 6, 16, 5
 """Diameters from the sphere's centre to the sides of its box; the lateral ones slip."""
@@ -65,9 +62,10 @@ def open_water(cells: int, viscosity: float) -> World:
 
 
 def bubble(world: World) -> float:
-    """Length of the backflow behind the cylinder along its axis, in D; 0 where there is none."""
+    """Length of the backflow behind the cylinder along its axis, in D, at most 5.5; 0 where there
+    is none."""
     h = world.flow()[0].grid.spacing
-    x = np.arange(0.5 + h, FURTHEST, 0.05 * h)
+    x = np.arange(0.5 + h, 6.0, 0.05 * h)
     u = velocity_at(world, x[:, None] * np.array(STREAM.velocity))[:, 0]
     if u[0] > 0.0:
         return 0.0
@@ -119,9 +117,9 @@ def shedding_at_100(quick: bool) -> list[Finding]:
     grids = OPEN_GRIDS[quick]
     (drag, lift, strouhal), lines = shed_in_the_open(100.0, 0.165, grids, quick)
     return [
-        judged("B5", "Cd mean", grids, drag, (1.31, 1.39), falling=True, lines=lines),
-        judged("B5", "Cl amplitude", grids, lift, (0.30, 0.345), falling=True),
-        judged("B5", "St", grids, strouhal, (0.160, 0.170), falling=True),
+        falling(judged("B5", "Cd mean", grids, drag, (1.31, 1.39), lines=lines)),
+        falling(judged("B5", "Cl amplitude", grids, lift, (0.30, 0.345))),
+        falling(judged("B5", "St", grids, strouhal, (0.160, 0.170))),
     ]
 
 
@@ -164,7 +162,7 @@ def held_at_185(quick: bool) -> list[Finding]:
         replace(near(f"{name}, held", values, exact, across(grids), relative=0.05), confirmed=sure)
         for (name, exact), values in zip(known.items(), measured, strict=True)
     )
-    return [replace(first, lines=tuple(lines)), *others]
+    return [replace(first, lines=lines), *others]
 
 
 def numbers_of(text: str) -> dict[str, float]:
@@ -252,7 +250,7 @@ def sphere(quick: bool) -> list[Finding]:
         drags, lengths, angles = zip(*rows, strict=True)
         exact = float(reference("B7", f"Cd({reynolds})"))
         title, on = f"Cd at Re {reynolds}", across(grids)
-        findings.append(near(title, drags, exact, on, relative=0.03, falling=True, lines=lines))
+        findings.append(falling(near(title, drags, exact, on, relative=0.03, lines=lines)))
         if reynolds == 100:
             length = float(reference("B7", "L/D(100)"))
             angle = float(reference("B7", "separation angle").removesuffix(" deg"))

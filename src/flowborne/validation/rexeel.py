@@ -21,11 +21,9 @@ Lengths are cm and angles degrees, as published. A link's direction points to th
 from __future__ import annotations
 
 import gzip
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.resources import files
 from time import perf_counter
-from types import MappingProxyType
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -57,23 +55,6 @@ HEADING = 4
 
 TANK_LENGTH = {20: 1.0, 40: 1.25}
 """Length of the tank over that of the scene, by amplitude."""
-
-
-@dataclass(frozen=True)
-class SwimPath:
-    """The robot's path at TIMES.
-
-    mass_centre  (241, 2) cm
-    head         (241, 3) middle of the head link in cm, and its angle in degrees
-    """
-
-    mass_centre: Array
-    head: Array
-
-    def changes(self) -> Array:
-        """(241, 5) QUANTITIES less their values at the start."""
-        values = np.hstack([self.mass_centre, self.head])
-        return np.asarray(values - values[0])
 
 
 def table(name: str) -> dict[str, Array]:
@@ -114,8 +95,9 @@ def mass_centre(head: Array, joints: Array) -> Array:
     return np.asarray(np.average(middles, axis=1, weights=MASS))
 
 
-def measured(amplitude: int, last: int = -2) -> list[SwimPath]:
-    """All runs at an amplitude of the gait in degrees, 20 or 40.
+def measured(amplitude: int, last: int = -2) -> Array:
+    """(runs, 241, 5) QUANTITIES less their values at the start, of all runs at an amplitude of the
+    gait in degrees, 20 or 40.
 
     last  number of the sample that gives the time of the last one: the last but one as published,
           -1 by the logs' times, which are later by 17 ms in the mean
@@ -126,22 +108,22 @@ def measured(amplitude: int, last: int = -2) -> list[SwimPath]:
         mine = log["run"] == run
         sampled = np.stack([log["x_cm"], log["y_cm"], -log["yaw_deg"]], axis=1)[mine]
         head = resampled(sampled, log["time_s"][mine][last])
-        runs.append(SwimPath(mass_centre(head, joints), head))
-    return runs
+        path = np.hstack([mass_centre(head, joints), head])
+        runs.append(path - path[0])
+    return np.array(runs)
 
 
-def rmse(changes: Array, runs: list[SwimPath]) -> Array:
+def rmse(changes: Array, runs: Array) -> Array:
     """(5,) root mean square error of changes (241, 5) over all times of all runs."""
-    off = np.stack([changes - run.changes() for run in runs])
-    return np.asarray(np.sqrt(np.mean(off**2, axis=(0, 1))))
+    return np.asarray(np.sqrt(np.mean((changes - runs) ** 2, axis=(0, 1))))
 
 
-def scatter(runs: list[SwimPath]) -> Array:
+def scatter(runs: Array) -> Array:
     """(5,) rmse of the mean of all runs, the least of any trajectory."""
-    return rmse(np.mean([run.changes() for run in runs], axis=0), runs)
+    return rmse(runs.mean(axis=0), runs)
 
 
-def lag(changes: Array, runs: list[SwimPath]) -> tuple[float, float]:
+def lag(changes: Array, runs: Array) -> tuple[float, float]:
     """Delay of a trajectory's heading in s, to 5 ms, and its rmse without the delay."""
     heading = CubicSpline(TIMES, changes[:, HEADING])
     lags = 0.005 * np.arange(25)
@@ -154,32 +136,25 @@ def lag(changes: Array, runs: list[SwimPath]) -> tuple[float, float]:
     return float(lags[best]), errors[best]
 
 
-def swim(
-    amplitude: int,
-    cells: int,
-    settings: Mapping[str, str] = MappingProxyType({}),
-    scene: str = "eel",
-) -> tuple[SwimPath, float]:
-    """The path of a scene's robot, and the seconds of wall clock of the run.
+def swim(amplitude: int, cells: int, scene: str = "eel") -> tuple[Array, float]:
+    """(241, 5) QUANTITIES of a scene's robot at TIMES, and the seconds of wall clock of the run.
 
-    cells     across the tank
-    settings  in place of the scene's own
-    raises    ArithmeticError when the run blows up
+    cells   across the tank
+    raises  ArithmeticError when the run blows up
     """
     domain = load_scene(scene).domain
     assert domain is not None
     upper = (domain.upper[0], domain.upper[1] * TANK_LENGTH[amplitude], *domain.upper[2:])
-    own = {
+    settings = {
         "constants.amplitude": f"{amplitude}",
         "domain.upper": f"[{', '.join(f'{c:g}' for c in upper)}]",
         "domain.resolution": f"{round(cells * TANK_LENGTH[amplitude])}",
     }
     started = perf_counter()
-    with Simulation(load_scene(scene, {**own, **settings})) as simulation:
+    with Simulation(load_scene(scene, settings)) as simulation:
         first = quantities(simulation)
         later = frames_of(simulation, len(TIMES) - 1, lambda _: quantities(simulation))
-    found = np.array([first, *later])
-    return SwimPath(found[:, :2], found[:, 2:]), perf_counter() - started
+    return np.array([first, *later]), perf_counter() - started
 
 
 def quantities(simulation: Simulation) -> Array:
@@ -195,7 +170,7 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
     """Errors of the robot on some grids, of which the last is judged, and of other simulators."""
     runs = measured(amplitude)
     paths, seconds = zip(*(swim(amplitude, n, scene=scene) for n in cells), strict=True)
-    errors = np.array([rmse(path.changes(), runs) for path in paths])
+    errors = np.array([rmse(path - path[0], runs) for path in paths])
     least, grids = scatter(runs), Grids("cells across the tank", cells)
     times = [
         f"{n:>6} cells across the tank: 4 s in {spent:.0f} s"
@@ -208,7 +183,7 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
             for simulator in ("Aquarium", "Genesis")
         )
         title = f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}"
-        delay = delay_lines(paths[-1].changes(), amplitude, runs) if n == HEADING else []
+        delay = delay_lines(paths[-1] - paths[-1][0], amplitude, runs) if n == HEADING else []
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
         scattered = f"mean of the {len(runs)} runs {least[n]:.3f}"
         lines = [*times, *delay, f"{others}, {scattered}"]
@@ -217,7 +192,7 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
     return findings
 
 
-def delay_lines(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[str]:
+def delay_lines(changes: Array, amplitude: int, runs: Array) -> list[str]:
     """The delay in a heading's error, in words."""
     late, left = lag(changes, runs)
     own = float(rmse(changes, measured(amplitude, last=-1))[HEADING])

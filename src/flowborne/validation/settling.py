@@ -19,10 +19,11 @@ from flowborne.validation.findings import (
     GridSeries,
     Plot,
     at_most,
+    falling,
     near,
     within,
 )
-from flowborne.validation.worlds import PLANAR, mjcf, recorded, whole_steps
+from flowborne.validation.worlds import PLANAR, history, mjcf, recorded, whole_steps
 from flowborne.worlds import Boundaries, BoundaryClosed, BoundaryNoSlip, make_world
 
 CFL = 1.0
@@ -87,9 +88,7 @@ def fastest(fall: Fall, cells: int) -> tuple[float, Array]:
     """Largest Reynolds number, and (n, 2) times in s and Reynolds numbers of all steps."""
     world = box(fall, cells)
     count, dt = whole_steps(fall.duration, CFL * CYLINDER / cells * fall.unit / fall.reynolds)
-    course = np.array(
-        recorded(world, dt, count, lambda _: (world.time, -fall.unit * world.solid.v[1]))
-    )
+    course = recorded(world, dt, count, lambda _: (world.time, -fall.unit * world.solid.v[1]))
     return float(course[:, 1].max()), course
 
 
@@ -110,9 +109,6 @@ DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
 
 HALF, HEIGHT, START = 0.05, 0.16, 0.1275
 """m: half the box's width, its height, and the height from which the sphere's centre falls."""
-
-FREE_FALL = 0.9
-"""Part of the way down before the bottom affects the sphere."""
 
 
 @dataclass(frozen=True)
@@ -173,10 +169,9 @@ def fall(oil: Oil, cells: int, until: float) -> tuple[Array, Array, Array]:
     """Times in s, downward velocities in m/s and heights of the centre in m of every step."""
     world = quarter(oil, cells)
     steps, dt = whole_steps(until, CFL * 0.01 / cells / oil.peak)
-    rows = recorded(
-        world, dt, steps, lambda _: (world.time, -world.solid.v[0], START + world.solid.q[0])
-    )
-    times, velocities, heights = np.array([(0.0, 0.0, START), *rows]).T
+    times, velocities, heights = history(
+        world, dt, steps, lambda: (world.time, -world.solid.v[0], START + world.solid.q[0])
+    ).T
     return times, velocities, heights
 
 
@@ -193,7 +188,7 @@ def settling(quick: bool) -> list[Finding]:
         peaks = [velocity.max() for _, velocity, _ in falls]
         series = GridSeries.toward(grids, peaks, oil.peak, relative=True)
         title = f"{oil.name}, largest velocity, m/s"
-        findings.append(near(title, series, oil.peak, relative=0.03, falling=True))
+        findings.append(falling(near(title, series, oil.peak, relative=0.03)))
         found = [apart(one, times, measured, oil.peak) for one in falls]
         title = f"{oil.name}, farthest from the measured curve over its largest velocity"
         course = at_most(title, [away for away, _ in found], 0.05, grids, lines=found[-1][1])
@@ -214,7 +209,7 @@ def apart(
     and on the part before the bottom affects the sphere."""
     moments, velocity, height = fallen
     away = np.abs(np.interp(times, moments, velocity) - measured) / peak
-    bottom = START - FREE_FALL * (START - 0.5 * DIAMETER)
+    bottom = START - 0.9 * (START - 0.5 * DIAMETER)
     high = np.interp(times, moments, height) > bottom
     lines = [
         f"{label}: {away[part].max():.3g} at {times[part][away[part].argmax()]:.3g} s, "

@@ -143,10 +143,9 @@ def watch(
     fluid, _ = world.flow()
     dt = CFL * fluid.grid.spacing / stream.fastest
     duration = (before + (periods + 1.5) / strouhal) * stream.time
-    rows = recorded(
+    drags, lifts, drops = recorded(
         world, dt, round(duration / dt), lambda report: (*stream.coefficients(report), drop(world))
-    )
-    drags, lifts, drops = np.array(rows).T
+    ).T
     return Oscillation(dt, lifts), drags, drops
 
 
@@ -157,11 +156,10 @@ def judged(
     values: Sequence[float],
     interval: tuple[float, float],
     *,
-    falling: bool = False,
     lines: Sequence[str] = (),
     plot: Plot | None = None,
 ) -> Finding:
     """A quantity of the case `name` on some grids, inside an interval of the list."""
     exact, on = reference(name, quantity), Grids("cells across D", grids)
-    found = within(quantity, values, exact, interval, on, falling=falling, lines=lines)
+    found = within(quantity, values, exact, interval, on, lines=lines)
     return replace(found, plot=plot, confirmed=confirmed(name, quantity))

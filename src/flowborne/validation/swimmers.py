@@ -11,7 +11,7 @@ from flowborne import Array, Grid, World
 from flowborne.bodies import Trajectory, TrajectorySinusoid, halfway_momentum, kinematics
 from flowborne.validation.case import Case, Tier, confirmed, reference
 from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, near
-from flowborne.validation.worlds import RING, at_start, chain, recorded, square, whole_steps
+from flowborne.validation.worlds import RING, at_start, chain, history, square, whole_steps
 from flowborne.worlds import Boundaries, advance, make_world
 
 VISCOSITY = 1.4e-4
@@ -22,9 +22,6 @@ LINKS = 20
 
 TANK_LENGTH, TANK_WIDTH = 8, 2
 """m, of S1's closed box along the eel's path and across."""
-
-CFL = 0.5
-"""Cells that the eel's tail moves to the side in a step at most, at 2 pi / 8 m/s."""
 
 SPEED = "mean forward speed 2D"
 
@@ -122,10 +119,9 @@ def tank(cells: int) -> World:
 def swim(cells: int, periods: int) -> Array:
     """(n+1, 2) times in s and positions of the mass centre along -x in m."""
     world = tank(cells)
-    count, dt = whole_steps(1.0, CFL / cells / (0.25 * np.pi))
-    first = (0.0, -mass_centre(world)[0])
-    later = recorded(world, dt, count * periods, lambda _: (world.time, -mass_centre(world)[0]))
-    return np.array([first, *later])
+    # in a step the tail, at 2 pi / 8 m/s, moves to the side by at most half a cell
+    count, dt = whole_steps(1.0, 0.5 / cells / (0.25 * np.pi))
+    return history(world, dt, count * periods, lambda: (world.time, -mass_centre(world)[0]))
 
 
 def swimming(quick: bool) -> list[Finding]:

@@ -85,22 +85,23 @@ def at_start(motions: Sequence[Trajectory]) -> tuple[Array, Array]:
     return positions, np.array([motion.velocity(0.0)[0] for motion in motions])
 
 
-def recorded(
-    world: World, dt: float, steps: int, figures: Callable[[StepReport], Any]
-) -> list[Any]:
-    """Figures of each of some steps, from its report."""
-    return [figures(advance(world, dt)) for _ in range(steps)]
+def recorded(world: World, dt: float, steps: int, figures: Callable[[StepReport], Any]) -> Array:
+    """(steps, ...) figures of each of some steps, from its report."""
+    return np.array([figures(advance(world, dt)) for _ in range(steps)])
 
 
-def frames_of(
-    simulation: Simulation, frames: int, figures: Callable[[FrameReport], Any]
-) -> list[Any]:
-    """Figures after each of some frames, from the frame's report.
+def history(world: World, dt: float, steps: int, figures: Callable[[], Any]) -> Array:
+    """(steps + 1, ...) figures of a world now and after each of some steps."""
+    return np.array([figures(), *recorded(world, dt, steps, lambda _: figures())])
+
+
+def frames_of(simulation: Simulation, frames: int, figures: Callable[[FrameReport], Any]) -> Array:
+    """(frames, ...) figures after each of some frames, from the frame's report.
 
     raises  ArithmeticError when the run blows up
     """
     try:
-        return [figures(simulation.advance_frame()) for _ in range(frames)]
+        return np.array([figures(simulation.advance_frame()) for _ in range(frames)])
     except BlowUpError as error:
         raise ArithmeticError(f"{simulation.scene.name}: {error}") from error
 

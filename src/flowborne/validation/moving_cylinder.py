@@ -1,4 +1,5 @@
-"""A cylinder that oscillates: driven in still fluid in V3, on a spring across a stream in V5."""
+"""A cylinder that moves: driven in still fluid (V3), on a spring across a stream (V5), turning in
+another cylinder (V8)."""
 
 from __future__ import annotations
 
@@ -7,11 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from flowborne import Array, Grid, World
-from flowborne.bodies import TrajectorySinusoid
+from flowborne.bodies import Trajectory, TrajectoryConstant, TrajectorySinusoid
 from flowborne.validation.case import Case, Tier, confirmed, reference
 from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, near
 from flowborne.validation.shedding import CFL, STREAM, UNBOUNDED, Kicked, Oscillation, amplitude
-from flowborne.validation.worlds import force_on, mjcf, recorded, square, through_flow
+from flowborne.validation.worlds import (
+    force_on,
+    mjcf,
+    recorded,
+    ring_of_boxes,
+    square,
+    through_flow,
+)
 from flowborne.worlds import advance, make_world, set_velocity
 
 PERIOD, KC, REYNOLDS = 5.0, 5.0, 100.0
@@ -19,9 +27,6 @@ PERIOD, KC, REYNOLDS = 5.0, 5.0, 100.0
 
 SIDE = 20
 """Diameters across V3's closed box."""
-
-SWING_CFL = 0.5
-"""Cells that V3's cylinder crosses in a step at most."""
 
 CURVE = "C_D(t/T)=F/(0.5 rho Umax^2 D) digitised"
 
@@ -31,9 +36,6 @@ SPRING_REYNOLDS, MASS = 150.0, 2.0
 LOCKED, UNLOCKED = 5.0, 3.0
 """U / (f_n D) of V5 with the vortices in step with the spring, and out of step; f_n is the
 frequency on the spring in vacuum."""
-
-DURATION, PERIODS = 120.0, 5
-"""Times D/U of V5, and evaluated periods at their end."""
 
 
 def tank(cells: int) -> World:
@@ -54,11 +56,11 @@ def tank(cells: int) -> World:
 def last_cycle(cells: int, cycles: int) -> tuple[Array, Array]:
     """(n,) t/T in the middle of each step of the last cycle, and in-line force coefficients."""
     world = tank(cells)
-    count = int(np.ceil(PERIOD * cells / SWING_CFL))
+    count = int(np.ceil(PERIOD * cells / 0.5))  # the cylinder crosses half a cell a step
     dt = PERIOD / count
     advance(world, dt, (cycles - 1) * count)
     forces = recorded(world, dt, count, lambda report: 2.0 * force_on(report)[0])
-    return (np.arange(count) + 0.5) / count, np.array(forces)
+    return (np.arange(count) + 0.5) / count, forces
 
 
 def morison(phases: Array, forces: Array) -> tuple[float, float]:
@@ -119,14 +121,14 @@ def sprung(cells: int, speed: float) -> World:
 
 
 def vibration(cells: int, speed: float) -> tuple[float, float]:
-    """A/D in the last periods, and their frequency over that of the spring, from a stream with a
-    gust across the cylinder's wake."""
+    """A/D in the last five periods of 120 D/U, and their frequency over that of the spring, from a
+    stream with a gust across the cylinder's wake."""
     world = sprung(cells, speed)
     set_velocity(world, Kicked(STREAM, UNBOUNDED, 0.0, 0.0))
     dt = CFL / cells
-    path = recorded(world, dt, round(DURATION / dt), lambda _: world.solid.q[0])
-    late = np.array(path[len(path) // 2 :])
-    steps, period = Oscillation(dt, late).last(PERIODS)
+    path = recorded(world, dt, round(120.0 / dt), lambda _: world.solid.q[0])
+    late = path[len(path) // 2 :]
+    steps, period = Oscillation(dt, late).last(5)
     return amplitude(late[steps]), speed / period
 
 
@@ -134,10 +136,10 @@ def vibrating(quick: bool) -> list[Finding]:
     """V5: amplitude and frequency in step with the spring, and the amplitude out of step."""
     cells, speeds = (4, (3.0, 5.0, 8.0)) if quick else (16, (3.0, 4.0, 5.0, 6.0, 7.0, 8.0))
     found = {speed: vibration(cells, speed) for speed in speeds}
-    lines = tuple(
+    lines = [
         f"U/(f_n D) = {speed:g}: A/D {size:.3f}, f/f_n {frequency:.3f}"
         for speed, (size, frequency) in found.items()
-    )
+    ]
     size, frequency = found[LOCKED]
     at = f"at U/(f_n D) = {LOCKED:g}"
     peak = Finding(
@@ -158,7 +160,87 @@ def vibrating(quick: bool) -> list[Finding]:
     return [peak, *(replace(finding, confirmed=sure) for finding in locked)]
 
 
+INNER, OUTER = 0.5, 1.0
+"""Radii a and b, m."""
+
+SPIN = 1.0
+"""Omega, rad/s."""
+
+SIDES = 48
+"""Boxes that make the outer cylinder."""
+
+SHELL = 0.1
+"""Half the thickness of the outer cylinder, m; the grids end inside it."""
+
+VISCOSITY = 1.0
+"""Pa s; the fluid's density is 1 kg/m^3."""
+
+HEAVY = 1000.0
+"""kg/m^3, of the inner cylinder: its flow stays quasi-steady as it slows down."""
+
+TORQUE = 4.0 * np.pi * VISCOSITY * INNER**2 * OUTER**2 / (OUTER**2 - INNER**2)
+"""N m per m on the inner cylinder at 1 rad/s."""
+
+RATE = TORQUE / (0.5 * HEAVY * np.pi * INNER**4)
+"""1/s, of the spin-down."""
+
+
+def annulus(cells: int, free: bool) -> World:
+    """The inner cylinder in the outer one, with the prescribed SPIN or free.
+
+    The outer cylinder is a ring of boxes whose inner sides make a regular polygon; its mean radius
+    is that of the cylinder.
+    """
+    h = OUTER / cells
+    side = cells + 2
+    grid = Grid.slab(2 * side, 2 * side, h, (-side * h, -side * h))
+    half = np.pi / SIDES
+    # the mean of apothem / cos(t) over half a side is the radius
+    apothem = OUTER * half / np.log(1.0 / np.cos(half) + np.tan(half))
+    reach = apothem + SHELL
+    ring = ring_of_boxes(SIDES, reach, f"{SHELL} {1.05 * half * (reach + SHELL)} 1")
+    shaft = (
+        '<body name="shaft"><joint name="turn" type="hinge" axis="0 0 1"/>'
+        f'<geom type="cylinder" size="{INNER} 1" density="{HEAVY}"/></body>'
+    )
+    motions: tuple[Trajectory, ...] = ()
+    if not free:
+        motions = (TrajectoryConstant(np.array([0]), 0.0, SPIN),)
+    return make_world(mjcf(ring, shaft), grid, viscosity=VISCOSITY, motions=motions)
+
+
+def measured(cells: int) -> tuple[float, float]:
+    """Torque on the inner cylinder in the steady flow, and the rate of its spin-down from there,
+    both over the exact ones."""
+    dt = OUTER / cells / (SPIN * INNER)
+    driven = annulus(cells, free=False)
+    # in 1 s, 40 times (b - a)^2 / (pi^2 nu), the flow becomes steady
+    report = advance(driven, dt, int(1.0 / dt))
+    torque = force_on(report, -1)[5]
+    freed = annulus(cells, free=True)
+    freed.fluid = driven.fluid
+    freed.solid.v[0] = SPIN
+    steps = int(0.2 / RATE / dt)
+    advance(freed, dt, steps)
+    rate = np.log(SPIN / freed.solid.v[0]) / (steps * dt)
+    return float(-torque / (SPIN * TORQUE)), float(rate / RATE)
+
+
+def between_cylinders(quick: bool) -> list[Finding]:
+    """V8: torque of the steady flow, and the spin-down of the free inner cylinder.
+
+    The list's unbounded cylinder is the limit of the same formula for large b.
+    """
+    grids = Grids("cells across b", (16, 24) if quick else (16, 32, 64, 128))
+    torques, rates = zip(*(measured(n) for n in grids.cells), strict=True)
+    return [
+        near("torque / exact, steady", torques, 1.0, grids, relative=0.01),
+        near("rate of the spin-down / exact", rates, 1.0, grids, relative=0.02),
+    ]
+
+
 CASES = (
     Case("V3", swinging, Tier.HALF_HOUR, coarse=True),
     Case("V5", vibrating, Tier.HALF_HOUR),
+    Case("V8", between_cylinders),
 )
