@@ -111,7 +111,7 @@ def test_the_page_is_sound_and_says_everything(tmp_path: Path) -> None:
 
 def test_a_series_without_an_order_says_so() -> None:
     gained = GridSeries("cells", (8, 16), (0.1, -0.1), (0.1, -0.1))
-    assert gained.lines()[-1] == "observed order none: an error is not > 0"
+    assert gained.lines()[-1] == "no observed order: an error is not positive"
     assert gained.as_dict()["order"] is None
 
 

@@ -67,9 +67,10 @@ class GridSeries:
             f"{cells:>6g} {self.label}: {value:.6g}, error {error:.3g}"
             for cells, value, error in zip(self.cells, self.values, self.errors, strict=True)
         ]
-        if len(self.cells) > 1:
-            order = f"{self.order:.2f}" if np.isfinite(self.order) else "none: an error is not > 0"
-            rows.append(f"observed order {order}")
+        if len(self.cells) > 1 and np.isfinite(self.order):
+            rows.append(f"observed order {self.order:.2f}")
+        elif len(self.cells) > 1:
+            rows.append("no observed order: an error is not positive")
         return rows
 
     def as_dict(self) -> dict[str, Any]:

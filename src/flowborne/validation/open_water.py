@@ -186,18 +186,18 @@ def quarter(cells: int, reynolds: float) -> World:
 
 
 def steady_drag(world: World, duration: float) -> tuple[float, float]:
-    """Drag coefficient of the sphere after some times D/U, and its change over the last one."""
+    """Drag coefficient of the sphere after some times D/U, and its change over the last one.
+
+    Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F.
+    """
     fluid, _ = world.flow()
     steps, dt = whole_steps(duration, CFL * fluid.grid.spacing)
     tail = round(1.0 / dt)
-    before = sphere_drag(world, dt, steps - tail)
-    after = sphere_drag(world, dt, tail)
+    before, after = (
+        float(4.0 * force_on(advance(world, dt, count))[0] * 8.0 / np.pi)
+        for count in (steps - tail, tail)
+    )
     return after, abs(after - before)
-
-
-def sphere_drag(world: World, dt: float, steps: int) -> float:
-    """Cd = F / (rho U^2 / 2  pi D^2 / 4) after some steps; the quarter has a quarter of F."""
-    return float(4.0 * force_on(advance(world, dt, steps))[0] * 8.0 / np.pi)
 
 
 def recirculation(world: World) -> float:
