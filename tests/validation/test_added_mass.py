@@ -7,13 +7,14 @@ import pytest
 
 from flowborne.validation import added_mass as case
 from flowborne.validation.case import table
+from flowborne.validation.worlds import square
 
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5])
 def test_I2_cylinder_in_a_square(ratio: float) -> None:
     exact = table("I2", "cylinder in closed square, Ca vs D/L")[ratio]
     errors = [
-        case.coefficient(case.box(round(n / ratio)), case.round_body(ratio)) / exact - 1.0
+        case.coefficient(square(round(n / ratio)), case.round_body(ratio)) / exact - 1.0
         for n in (16, 32)
     ]
     assert abs(errors[1]) < 0.01
@@ -23,7 +24,7 @@ def test_I2_cylinder_in_a_square(ratio: float) -> None:
 def test_I2_sphere_in_a_cube() -> None:
     exact = table("I2", "sphere in closed cube, Ca vs D/L")[0.3333]
     errors = [
-        case.coefficient(case.box(3 * n, solid=True), case.round_body(1.0 / 3.0)) / exact - 1.0
+        case.coefficient(case.cube(3 * n), case.round_body(1.0 / 3.0)) / exact - 1.0
         for n in (8, 16)
     ]
     assert abs(errors[1]) < 0.01

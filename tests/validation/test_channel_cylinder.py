@@ -11,13 +11,13 @@ from flowborne.validation.channel_cylinder import (
     DIAMETER,
     DURATION,
     HEIGHT,
-    Parabola,
-    Pulse,
     channel,
     pressure_drop,
     pulse,
+    pulsed_inflow,
     recirculation,
 )
+from flowborne.validation.worlds import Parabola
 from flowborne.worlds import set_velocity, start_from
 
 
@@ -57,7 +57,7 @@ def test_refined_flow_is_the_coarse_one():
 def test_B3_the_inflow_swells_and_dies_away():
     y = np.array([0.0, 0.5 * HEIGHT, HEIGHT])
     for time, peak in ((0.0, 0.0), (0.5 * DURATION, 1.5), (DURATION, 0.0)):
-        u, v, _ = Pulse()(np.zeros(3), y, np.zeros(3), time)
+        u, v, _ = pulsed_inflow(np.zeros(3), y, np.zeros(3), time)
         np.testing.assert_allclose(u, [0.0, peak, 0.0], atol=1e-12)
         assert not v.any()
 

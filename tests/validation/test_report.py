@@ -109,6 +109,12 @@ def test_the_page_is_sound_and_says_everything(tmp_path: Path) -> None:
     assert (again / PAGE).read_text() == text
 
 
+def test_a_series_without_an_order_says_so() -> None:
+    gained = GridSeries("cells", (8, 16), (0.1, -0.1), (0.1, -0.1))
+    assert gained.lines()[-1] == "no observed order: an error is not positive"
+    assert gained.as_dict()["order"] is None
+
+
 def test_a_result_comes_back_as_it_was() -> None:
     first = result("B1", "pass", SERIES, ALL)
     assert Result.from_dict(first.as_dict()).as_dict() == first.as_dict()

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 MODULES = {
     "pressure": "pressure",
-    "workers": "scaling",
-    "chain": "scaling",
+    "workers": "speed",
+    "chain": "speed",
     "realtime": "speed",
     "human": "speed",
     "parts": "frame_costs",
     "size": "frame_costs",
     "memory": "frame_costs",
-    "threads": "scaling",
+    "threads": "speed",
     "first-run": "startup",
     "start": "startup",
 }

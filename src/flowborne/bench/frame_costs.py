@@ -17,7 +17,7 @@ from math import prod
 import numpy as np
 
 from flowborne import Scene, Simulation, load_scene
-from flowborne.bench.timing import FRAMES, Result, timed, verdict
+from flowborne.bench.timing import FRAMES, Result, at_most, info, timed
 from flowborne.machine import (
     PARTS,
     cores,
@@ -88,17 +88,12 @@ def shares(scene: Scene, frames: int = FRAMES) -> Result:
     means["rest"] = total - sum(means.values())
     step = total - means["control"]
     shared = {part: "" if part == "control" else f"{s / step:6.1%}" for part, s in means.items()}
-    return Result(
-        "parts",
-        f"{scene.name}: ms a frame, one worker; its parts, shares of the frame and of the step",
-        1e3 * total,
-        "",
-        "info",
-        [
-            f"{part:<10} {1e3 * s:8.2f} ms {s / total:6.1%} {shared[part]}".rstrip()
-            for part, s in means.items()
-        ],
-    )
+    title = f"{scene.name}: ms a frame, one worker; its parts, shares of the frame and of the step"
+    lines = [
+        f"{part:<10} {1e3 * s:8.2f} ms {s / total:6.1%} {shared[part]}".rstrip()
+        for part, s in means.items()
+    ]
+    return info("parts", title, 1e3 * total, lines)
 
 
 def growth(scenes: Sequence[Scene], frames: int = 4) -> Result:
@@ -127,14 +122,8 @@ def growth(scenes: Sequence[Scene], frames: int = 4) -> Result:
         )
     lines.append(iterations_against_memory(shape))
     power = float(np.polyfit(np.log(cells), np.log(seconds), 1)[0]) if len(cells) > 1 else np.nan
-    return Result(
-        "size",
-        f"{scenes[0].name}: power of the number of cells with which the time of a frame grows",
-        power,
-        "",
-        "info",
-        lines,
-    )
+    title = f"{scenes[0].name}: power of the number of cells with which the time of a frame grows"
+    return info("size", title, power, lines)
 
 
 def parts_of(
@@ -175,26 +164,16 @@ def footprint(scene: Scene, early: int = EARLY, late: int = LATE) -> list[Result
     world = Simulation(scene, 1).world
     cells = prod(world.flow()[0].grid.shape)
     ratio = max(after.now / before.now, after.process / before.process)
+    whole = f"{scene.name}: bytes per cell that a run holds at most, libraries left out"
+    state = f"{state_bytes(world) / cells:.0f} of them are one copy of the state"
+    later = f"{scene.name}: memory after {late} frames over that after {early}"
+    lines = [
+        f"{m.frame} frames: {m.now / 1e6:.2f} MB held, {m.process / 1e6:.1f} MB the process"
+        for m in (before, after)
+    ]
     return [
-        Result(
-            "memory",
-            f"{scene.name}: bytes per cell that a run holds at most, libraries left out",
-            after.most / cells,
-            "",
-            "info",
-            [f"{state_bytes(world) / cells:.0f} of them are one copy of the state"],
-        ),
-        Result(
-            "memory",
-            f"{scene.name}: memory after {late} frames over that after {early}",
-            ratio,
-            f"at most {GROWTH:g}",
-            verdict(ratio <= GROWTH),
-            [
-                f"{m.frame} frames: {m.now / 1e6:.2f} MB held, {m.process / 1e6:.1f} MB the process"
-                for m in (before, after)
-            ],
-        ),
+        info("memory", whole, after.most / cells, [state]),
+        at_most("memory", later, ratio, GROWTH, lines),
     ]
 
 

@@ -16,36 +16,24 @@ COMPILING, COMPILED = 60.0, 5.0
 """Most seconds of `--help`, and of a run of one frame with nothing and with everything compiled."""
 
 
-def start() -> Iterator[Result]:
-    """Seconds from the command to its help."""
-    yield help_time()
+def start(repeats: int = 5) -> Iterator[Result]:
+    """Seconds that `flowborne --help` takes, the quickest time of a few."""
+    command = [sys.executable, "-m", "flowborne", "--help"]
+    _, seconds = timed(lambda: subprocess.run(command, check=True, capture_output=True), repeats)
+    yield below("start", "flowborne --help: seconds from the command to its end", seconds, HELP)
 
 
 def first_run(scene: str = "ns-block-drag-max") -> Iterator[Result]:
     """Seconds of a run of one frame, with an empty cache of kernels and with a full one."""
     with TemporaryDirectory() as folder:
         for state, allowed in (("first run", COMPILING), ("later run", COMPILED)):
-            seconds = run_once(scene, Path(folder))
-            yield Result(
-                "first-run",
-                f"{scene}: seconds to the first frame, {state}",
-                seconds,
-                f"below {allowed:g}",
-                verdict(seconds < allowed),
-            )
+            title = f"{scene}: seconds to the first frame, {state}"
+            yield below("first-run", title, run_once(scene, Path(folder)), allowed)
 
 
-def help_time(repeats: int = 5) -> Result:
-    """Seconds that `flowborne --help` takes, the quickest time of a few."""
-    command = [sys.executable, "-m", "flowborne", "--help"]
-    _, seconds = timed(lambda: subprocess.run(command, check=True, capture_output=True), repeats)
-    return Result(
-        "start",
-        "flowborne --help: seconds from the command to its end",
-        seconds,
-        f"below {HELP:g}",
-        verdict(seconds < HELP),
-    )
+def below(name: str, title: str, seconds: float, allowed: float) -> Result:
+    """A time that has to be shorter than allowed."""
+    return Result(name, title, seconds, f"below {allowed:g}", verdict(seconds < allowed))
 
 
 def run_once(scene: str, folder: Path) -> float:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne import Simulation
+from flowborne import Scene, Simulation
 from flowborne.machine import kernel_threads
 
 Array = NDArray[np.float64]
@@ -51,6 +52,21 @@ def verdict(met: bool) -> Verdict:
     return "pass" if met else "fail"
 
 
+def info(name: str, title: str, value: float, lines: list[str]) -> Result:
+    """A figure without a target."""
+    return Result(name, title, value, "", "info", lines)
+
+
+def at_least(name: str, title: str, value: float, bound: float, lines: list[str]) -> Result:
+    """A figure that has to reach a bound."""
+    return Result(name, title, value, f"at least {bound:g}", verdict(value >= bound), lines)
+
+
+def at_most(name: str, title: str, value: float, bound: float, lines: list[str]) -> Result:
+    """A figure that may not exceed a bound."""
+    return Result(name, title, value, f"at most {bound:g}", verdict(value <= bound), lines)
+
+
 def timed(action: Callable[[], T], repeats: int = 1) -> tuple[T, float]:
     """Result of the last call of an action, and the seconds of its quickest call."""
     best = float("inf")
@@ -74,6 +90,12 @@ def frame_times(simulations: Sequence[Simulation], frames: int = FRAMES) -> Arra
             for n, simulation in enumerate(simulations):
                 times[n, frame] = simulation.advance_frame().seconds["total"]
     return times
+
+
+def times_together(runs: Sequence[tuple[Scene, int, str]], frames: int = FRAMES) -> Array:
+    """`frame_times` of scenes, each with a number of workers and their executor."""
+    with ExitStack() as stack:
+        return frame_times([stack.enter_context(Simulation(*run)) for run in runs], frames)
 
 
 def in_words(times: Array) -> str:

@@ -5,7 +5,8 @@ One step from rest is enough: the cases are about the first acceleration.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import trimesh
@@ -14,8 +15,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from flowborne import Array, Grid
 from flowborne.bodies import JointCommand
 from flowborne.validation.case import Case, reference, table
-from flowborne.validation.findings import Finding, GridSeries, at_most, near
-from flowborne.validation.worlds import Vector, mjcf
+from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, falling, near
+from flowborne.validation.worlds import Vector, mjcf, ring_of_boxes, square
 from flowborne.worlds import advance, make_world
 
 DT = 1e-3
@@ -27,15 +28,18 @@ LIGHT = 0.01
 UP: Vector = (0.0, 1.0, 0.0)
 SIDEWAYS: Vector = (1.0, 0.0, 0.0)
 
-Grids = Sequence[int]
+Cells = Sequence[int]
 """Cells across the body, from coarse to fine."""
 
 
-def box(cells: int, solid: bool = False, long: int = 1) -> Grid:
-    """A closed box of width 1 m about the origin, `cells` across; 2D, `long` m high, or a cube."""
-    if solid:
-        return Grid((cells, cells, cells), 1.0 / cells, (-0.5, -0.5, -0.5))
-    return Grid.slab(cells, long * cells, 1.0 / cells, (-0.5, -0.5 * long))
+def oblong(cells: int) -> Grid:
+    """A closed slab of 1 m by 2 m about the origin, `cells` across."""
+    return Grid.slab(cells, 2 * cells, 1.0 / cells, (-0.5, -1.0))
+
+
+def cube(cells: int) -> Grid:
+    """A closed cube of 1 m about the origin, `cells` across."""
+    return Grid((cells, cells, cells), 1.0 / cells, (-0.5, -0.5, -0.5))
 
 
 def round_body(diameter: float) -> str:
@@ -93,33 +97,47 @@ def started(grid: Grid, geom: str, joint: str) -> Array:
     return advance(world, DT, command=command).pressure_wrench[1]
 
 
-def judged(title: str, label: str, grids: Grids, values: Sequence[float], exact: float) -> Finding:
+def judged(title: str, on: Grids, values: Sequence[float], exact: float) -> Finding:
     """A finding within 1 % of its reference on the finest grid."""
-    series = GridSeries.toward(label, grids, values, exact, relative=True)
-    return near(title, series, exact, relative=0.01)
+    return near(title, GridSeries.toward(on, values, exact, relative=True), exact, relative=0.01)
 
 
-ACROSS = "cells across D"
+def contained(
+    title: str,
+    exact: float,
+    cells: Cells,
+    width: float,
+    box: Callable[[int], Grid] = square,
+    direction: Vector = UP,
+    walls: str = "",
+) -> Finding:
+    """Ca of a cylinder or a sphere of a diameter `width` (m) in a container of 1 m."""
+    values = [
+        coefficient(box(round(n / width)), round_body(width), direction, walls) for n in cells
+    ]
+    return judged(f"Ca of a {title}", Grids("cells across D", cells), values, exact)
+
+
 LONGWISE = "cells along the long axis"
+
+
+def across(quick: bool) -> Cells:
+    """Cells across a cylinder in a container."""
+    return (8, 16, 32) if quick else (8, 16, 32, 64)
 
 
 def squares(quick: bool) -> list[Finding]:
     """Cylinder in a square."""
-    grids = (8, 16, 32) if quick else (8, 16, 32, 64)
-    findings = []
-    for ratio, exact in table("I2", "cylinder in closed square, Ca vs D/L").items():
-        if quick and ratio < 0.2:
-            continue
-        width = 1.0 / round(1.0 / ratio)
-        values = [coefficient(box(round(n / width)), round_body(width)) for n in grids]
-        title = f"Ca of a cylinder in a square, D/L = {ratio:g}"
-        findings.append(judged(title, ACROSS, grids, values, exact))
-    return findings
+    rows = table("I2", "cylinder in closed square, Ca vs D/L").items()
+    return [
+        contained(f"cylinder in a square, D/L = {d:g}", exact, across(quick), 1.0 / round(1.0 / d))
+        for d, exact in rows
+        if not (quick and d < 0.2)
+    ]
 
 
 def oblongs(quick: bool) -> list[Finding]:
     """Cylinder in a box twice as long as wide."""
-    grids = (8, 16, 32) if quick else (8, 16, 32, 64)
     name = "cylinder in 1x2 box (width 1): [moving across, moving along the long side]"
     findings = []
     for key, pair in reference("I2", name).items():
@@ -127,12 +145,8 @@ def oblongs(quick: bool) -> list[Finding]:
         if quick and width < 0.5:
             continue
         for side, direction, exact in zip(("across", "along"), (SIDEWAYS, UP), pair, strict=True):
-            values = [
-                coefficient(box(round(n / width), long=2), round_body(width), direction)
-                for n in grids
-            ]
-            title = f"Ca of a cylinder {side} a 1 x 2 box, D/L = {width:g}"
-            findings.append(judged(title, ACROSS, grids, values, exact))
+            title = f"cylinder {side} a 1 x 2 box, D/L = {width:g}"
+            findings.append(contained(title, exact, across(quick), width, oblong, direction))
     return findings
 
 
@@ -142,19 +156,18 @@ LONG, SHORT = 0.1, 0.05
 
 def ellipse_in_box(quick: bool) -> list[Finding]:
     """Ellipse along both axes and turning."""
-    grids = (16, 32, 64) if quick else (16, 32, 64, 128)
-    along, across, turning = reference("I2", "ellipse 2:1 (a=0.1,b=0.05) in unit box")
+    grids = Grids(LONGWISE, (16, 32, 64) if quick else (16, 32, 64, 128))
+    along, broadside, rotating = reference("I2", "ellipse 2:1 (a=0.1,b=0.05) in unit box")
     unbounded = np.pi / 8.0 * (LONG**2 - SHORT**2) ** 2
-    spaces = [box(round(n / (2.0 * LONG))) for n in grids]
+    boxes = [square(round(n / (2.0 * LONG))) for n in grids.cells]
     geom = ellipse(LONG, SHORT)
     rows = (
-        ("Ca along its long axis", along, [coefficient(g, geom, SIDEWAYS) for g in spaces]),
-        ("Ca across", across, [coefficient(g, geom, UP) for g in spaces]),
-        ("I_a over the unbounded one", turning, [turned(g, geom) / unbounded for g in spaces]),
+        ("Ca along its long axis", along, [coefficient(g, geom, SIDEWAYS) for g in boxes]),
+        ("Ca across", broadside, [coefficient(g, geom, UP) for g in boxes]),
+        ("I_a over the unbounded one", rotating, [turned(g, geom) / unbounded for g in boxes]),
     )
     return [
-        judged(f"ellipse in a box, {label}", LONGWISE, grids, values, exact)
-        for label, exact, values in rows
+        judged(f"ellipse in a box, {label}", grids, values, exact) for label, exact, values in rows
     ]
 
 
@@ -162,27 +175,20 @@ def cubes(quick: bool) -> list[Finding]:
     """Sphere in a cube; the finest grid of the smallest sphere has 160^3 cells."""
     findings = []
     for ratio, exact in table("I2", "sphere in closed cube, Ca vs D/L").items():
-        grids: Grids = (8, 16) if quick or ratio < 0.15 else (8, 16, 32)
         if quick and ratio < 0.3:
             continue
-        width = 1.0 / round(1.0 / ratio)
-        values = [coefficient(box(round(n / width), solid=True), round_body(width)) for n in grids]
-        title = f"Ca of a sphere in a cube, D/L = {ratio:g}"
-        findings.append(judged(title, ACROSS, grids, values, exact))
+        cells = (8, 16) if quick or ratio < 0.15 else (8, 16, 32)
+        title = f"sphere in a cube, D/L = {ratio:g}"
+        findings.append(contained(title, exact, cells, 1.0 / round(1.0 / ratio), cube))
     return findings
 
 
-def ring_of_boxes(radius: float, sides: int = 128) -> str:
+def round_wall(radius: float, sides: int = 128) -> str:
     """Fixed boxes around the origin whose inner edges enclose the area of a circle."""
     turn = np.pi / sides
     inner = radius * float(np.sqrt(turn / np.tan(turn)))
     half = 0.05 * radius
-    size = f"{half} {(inner + 2.0 * half) * np.tan(turn)} 1"
-    geoms = []
-    for angle in 2.0 * turn * np.arange(sides):
-        x, y = (inner + half) * np.cos(angle), (inner + half) * np.sin(angle)
-        geoms.append(f'<geom type="box" size="{size}" pos="{x} {y} 0" euler="0 0 {angle}"/>')
-    return "".join(geoms)
+    return ring_of_boxes(sides, inner + half, f"{half} {(inner + 2.0 * half) * np.tan(turn)} 1")
 
 
 def ball_of_boxes(radius: float) -> str:
@@ -205,24 +211,16 @@ def shells(quick: bool) -> list[Finding]:
     """Cylinder and sphere in the middle of a fixed shell."""
     findings = []
     outer = 0.4
+    ring = round_wall(outer)
     for ratio in (2.0,) if quick else (2.0, 3.0, 4.0):
-        grids = (8, 16, 32) if quick else (8, 16, 32, 64)
-        width = 2.0 * outer / ratio
         exact = (ratio**2 + 1.0) / (ratio**2 - 1.0)
-        walls = ring_of_boxes(outer)
-        values = [coefficient(box(round(n / width)), round_body(width), walls=walls) for n in grids]
-        title = f"Ca of a cylinder in a concentric shell, b/a = {ratio:g}"
-        findings.append(judged(title, ACROSS, grids, values, exact))
+        title = f"cylinder in a concentric shell, b/a = {ratio:g}"
+        width = 2.0 * outer / ratio
+        findings.append(contained(title, exact, across(quick), width, walls=ring))
     if not quick:
-        grids = (8, 16, 32)
         exact = (2.0**3 + 2.0) / (2.0 * (2.0**3 - 1.0))
-        walls = ball_of_boxes(outer)
-        values = [
-            coefficient(box(round(n / outer), solid=True), round_body(outer), walls=walls)
-            for n in grids
-        ]
-        title = "Ca of a sphere in a concentric shell, b/a = 2"
-        findings.append(judged(title, ACROSS, grids, values, exact))
+        title, ball = "sphere in a concentric shell, b/a = 2", ball_of_boxes(outer)
+        findings.append(contained(title, exact, (8, 16, 32), outer, cube, walls=ball))
     return findings
 
 
@@ -263,7 +261,7 @@ def density_ratios(quick: bool) -> list[Finding]:
         if quick and solid:
             continue
         width = 1.0 / 3.0 if solid else 0.25
-        grid = box(round(32 / width), solid)
+        grid = (cube if solid else square)(round(32 / width))
         displaced = np.pi * width**3 / 6.0 if solid else np.pi * width**2 / 4.0
         rows = table("I1", f"table a/g {'(down +) ' if not solid else ''}{name}")
         for ratio, exact in (rows | {1e-6: limit, 1e6: 1.0}).items():
@@ -279,21 +277,19 @@ def density_ratios(quick: bool) -> list[Finding]:
 
 def ellipses(quick: bool) -> list[Finding]:
     """Rise of an ellipse along both axes, and its added moment of inertia."""
-    grids = (16, 32) if quick else (32, 64, 128)
+    grids = Grids(LONGWISE, (16, 32) if quick else (32, 64, 128))
     geom, area = ellipse(LONG, SHORT), np.pi * LONG * SHORT
-    spaces = [box(round(n / (2.0 * LONG))) for n in grids]
+    boxes = [square(round(n / (2.0 * LONG))) for n in grids.cells]
     rows = reference("I1", "rise a/g for rho_s/rho_f=0.01")
     findings = []
     for axis, direction in (("a=2b along long axis", SIDEWAYS), ("across", UP)):
-        exact = rows[f"ellipse {axis}"]
-        boxed = [rise(space, geom, LIGHT, direction) for space in spaces]
-        values = [free_rise(found, LIGHT, area, False) for found in boxed]
+        rises = [rise(box, geom, LIGHT, direction) for box in boxes]
+        values = [free_rise(found, LIGHT, area, False) for found in rises]
         title = f"rise over g of an ellipse {axis}"
-        findings.append(judged(title, LONGWISE, grids, values, exact))
+        findings.append(judged(title, grids, values, rows[f"ellipse {axis}"]))
     inertia = turning(LONG, SHORT)
-    values = [free_turning(turned(space, geom), LONG, SHORT) / inertia for space in spaces]
-    title = "I_a of an ellipse over rho pi/8 (a^2-b^2)^2"
-    return [*findings, judged(title, LONGWISE, grids, values, 1.0)]
+    values = [free_turning(turned(box, geom), LONG, SHORT) / inertia for box in boxes]
+    return [*findings, judged("I_a of an ellipse over rho pi/8 (a^2-b^2)^2", grids, values, 1.0)]
 
 
 def turning(a: float, b: float) -> float:
@@ -318,19 +314,16 @@ def free_turning(boxed: float, a: float, b: float) -> float:
 
 def spheroid(quick: bool) -> list[Finding]:
     """A prolate spheroid twice as long as wide, along its axis."""
-    grids = (16, 32) if quick else (16, 32, 64)
+    grids = Grids("cells along the axis", (16, 32) if quick else (16, 32, 64))
     length, width = 0.4, 0.2
     e = np.sqrt(1.0 - (width / length) ** 2)
     a0 = 2.0 * (1.0 - e**2) / e**3 * (np.arctanh(e) - e)
     exact = float(a0 / (2.0 - a0))
     volume = np.pi / 6.0 * length * width**2
     geom = f'<geom type="ellipsoid" size="{0.5 * width} {0.5 * length} {0.5 * width}"/>'
-    values = []
-    for n in grids:
-        boxed = coefficient(box(round(n / length), solid=True), geom)
-        values.append(unbounded(boxed * volume, volume, solid=True) / volume)
-    title = "Ca of a prolate spheroid 2:1 along its axis"
-    return [judged(title, "cells along the axis", grids, values, exact)]
+    boxed = [coefficient(cube(round(n / length)), geom) for n in grids.cells]
+    values = [unbounded(ca * volume, volume, solid=True) / volume for ca in boxed]
+    return [judged("Ca of a prolate spheroid 2:1 along its axis", grids, values, exact)]
 
 
 THIN = 1e-4
@@ -340,21 +333,20 @@ THIN = 1e-4
 def plates(quick: bool) -> list[Finding]:
     """A plate across, along and turning; in the fluid it is 1.4 cells thick, so the order is 1."""
     half = 0.2
-    grids = (16, 32, 64) if quick else (64, 128, 256, 512, 1024)
+    cells = (16, 32, 64) if quick else (64, 128, 256, 512, 1024)
+    grids = Grids("cells across the plate", cells)
     geom = f'<geom type="box" size="{half} {THIN} 1"/>'
     displaced, circle = 4.0 * half * THIN, np.pi * half**2
-    across, along, rounds = [], [], []
-    for n in grids:
-        space = box(round(n / (2.0 * half)))
-        across.append(unbounded(pushed(space, geom, UP), displaced) / circle)
-        along.append(unbounded(pushed(space, geom, SIDEWAYS), displaced) / circle)
-        rounds.append(free_turning(turned(space, geom), half, 0.0) / turning(half, 0.0))
-    label = "cells across the plate"
-    lengthwise = GridSeries.toward(label, grids, along, 0.0)
+    boxes = [square(round(n / (2.0 * half))) for n in cells]
+    broadside, along = (
+        [unbounded(pushed(box, geom, direction), displaced) / circle for box in boxes]
+        for direction in (UP, SIDEWAYS)
+    )
+    rotating = [free_turning(turned(box, geom), half, 0.0) / turning(half, 0.0) for box in boxes]
     return [
-        judged("m_a of a plate across over rho pi a^2", label, grids, across, 1.0),
-        judged("I_a of a plate over rho pi a^4/8", label, grids, rounds, 1.0),
-        at_most("m_a of a plate along over rho pi a^2", lengthwise, 0.01),
+        judged("m_a of a plate across over rho pi a^2", grids, broadside, 1.0),
+        judged("I_a of a plate over rho pi a^4/8", grids, rotating, 1.0),
+        at_most("m_a of a plate along over rho pi a^2", along, 0.01, grids),
     ]
 
 
@@ -364,13 +356,13 @@ def quarter(cells: int) -> Grid:
     return Grid((cells // 2, cells, cells // 2), 1.0 / cells, (0.0, -0.5, 0.0))
 
 
-def without_thickness(grids: Grids, values: Sequence[float]) -> float:
+def without_thickness(cells: Cells, values: Sequence[float]) -> float:
     """Limit of values on three grids for no thickness in the fluid, which is proportional to
     e = 1/cells.
 
     The flow round a thin rim of any shape adds terms in e ln e and e.
     """
-    e = 1.0 / np.array(grids)
+    e = 1.0 / np.array(cells)
     return float(np.linalg.solve(np.column_stack([e**0, e * np.log(e), e]), values)[0])
 
 
@@ -381,24 +373,16 @@ def disc(quick: bool) -> list[Finding]:
     series.
     """
     half = 0.2
-    grids = (16, 32, 64) if quick else (32, 64, 128)
+    cells = (16, 32, 64) if quick else (32, 64, 128)
     geom = f'<geom type="cylinder" size="{half} {THIN}" zaxis="0 1 0"/>'
     displaced, exact = 2.0 * THIN * np.pi * half**2, 8.0 / 3.0 * half**3
-    values = []
-    for n in grids:
-        added = 4.0 * pushed(quarter(round(n / (2.0 * half))), geom, UP)
-        values.append(unbounded(added, displaced, solid=True) / exact)
+    added = [4.0 * pushed(quarter(round(n / (2.0 * half))), geom, UP) for n in cells]
+    values = [unbounded(mass, displaced, solid=True) / exact for mass in added]
     title = "m_a of a disc broadside over 8/3 rho a^3"
-    thick = judged(title, "cells across the disc", grids, values, 1.0)
-    limit = near(
-        f"{title}, continued to no thickness",
-        without_thickness(grids, values),
-        1.0,
-        relative=0.01,
-        falling=True,
-        series=thick.series,
-    )
-    return [thick, limit]
+    thick = judged(title, Grids("cells across the disc", cells), values, 1.0)
+    name, value = f"{title}, continued to no thickness", without_thickness(cells, values)
+    limit = near(name, value, 1.0, relative=0.01)
+    return [thick, falling(replace(limit, series=thick.series))]
 
 
 def unbounded_bodies(quick: bool) -> list[Finding]:

@@ -1,25 +1,180 @@
-"""Chains held against gravity (A3), and free chains (A4)."""
+"""Bodies with joints: pendulums (A1, A2), chains held against gravity (A3), free chains (A4)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from flowborne import Array, Grid, SolidModel, SolidState, World
+from flowborne import Array, SolidModel, SolidState, World
 from flowborne.bodies import (
-    JointCommand,
     TrajectorySinusoid,
     halfway_momentum,
     holding,
     kinematics,
+    kinetic_energy,
     mass_matrix,
+    potential_energy,
 )
-from flowborne.validation.case import Case
-from flowborne.validation.findings import Finding, GridSeries, at_most, near
-from flowborne.validation.pendulums import DOWN, G
-from flowborne.validation.worlds import mjcf
-from flowborne.worlds import advance, make_world
+from flowborne.validation.case import Case, reference, table
+from flowborne.validation.findings import Finding, Grids, at_most, near
+from flowborne.validation.worlds import PLANAR, at_start, chain, history, hold_all, mjcf, square
+from flowborne.worlds import advance, make_world, start
+
+G = 9.81
+DOWN = (0.0, -G, 0.0)
+
+
+def bar(length: float, width: float) -> str:
+    """A bar that hangs at the middle of its short edge."""
+    size = f"{0.5 * width} {0.5 * length} 1"
+    return mjcf(
+        '<body name="bar"><joint name="pivot" axis="0 0 1"/>'
+        f'<geom type="box" size="{size}" pos="0 {-0.5 * length} 0"/></body>'
+    )
+
+
+def small_period(length: float, width: float) -> float:
+    """T0 of `bar`, s."""
+    return 2.0 * float(np.pi * np.sqrt((length**2 / 3.0 + width**2 / 12.0) / (0.5 * G * length)))
+
+
+def period(model: str, amplitude: float, dt: float, longest: float) -> float:
+    """Period of a pendulum released at `amplitude` rad, from its passages through its lowest point.
+
+    longest  s, at least 5/4 of the period
+    """
+    world = make_world(model, slab=True, gravity=DOWN)
+    world.solid.q[0] = amplitude
+    times = passages(first_angle(world, dt, int(longest / dt)), dt)
+    return float(times[2] - times[0])
+
+
+def first_angle(world: World, dt: float, steps: int) -> Array:
+    """(steps + 1,) position of the first joint, after the start from rest."""
+    start(world, dt)
+    return history(world, dt, steps, lambda: world.solid.q[0])
+
+
+def passages(angles: Array, dt: float) -> Array:
+    """Times (s) at which angles sampled every dt pass through 0."""
+    k = np.flatnonzero(angles[:-1] * angles[1:] < 0.0)
+    return np.asarray(dt * (k + angles[k] / (angles[k] - angles[k + 1])))
+
+
+def frequency(heights: Array, dt: float) -> float:
+    """Mean frequency of a signal sampled every dt (s), from its passages through 0, Hz."""
+    return float(1.0 / (2.0 * np.diff(passages(heights, dt)).mean()))
+
+
+def pendulum_period(quick: bool) -> list[Finding]:
+    """A1: a block at ten amplitudes, and T0 of the block and of a thin rod."""
+    length, width = 1.2, 0.3
+    t0 = small_period(length, width)
+    steps = (25, 50, 100) if quick else (100, 200, 400, 800)
+    findings = []
+    for degrees, ratio in table("A1", "T/T0").items():
+        runs = [
+            period(bar(length, width), np.radians(degrees), t0 / n, 1.3 * ratio * t0) / t0
+            for n in steps
+        ]
+        title, grids = f"T/T0 let go at {degrees:g} degrees", Grids("steps in T0", steps)
+        findings.append(near(title, runs, ratio, grids, relative=1e-3))
+    swing = np.radians(5.0)
+    factor = table("A1", "T/T0")[5.0]
+    for label, wide in (("block 1.2 x 0.3", width), ("thin rod", 1e-4 * length)):
+        exact = small_period(length, wide)
+        found = period(bar(length, wide), swing, exact / steps[-1], 1.3 * exact) / factor
+        findings.append(near(f"T0 of a {label}, s", found, exact, relative=1e-3))
+    return findings
+
+
+DOUBLE = mjcf(
+    '<body name="upper"><joint name="shoulder" axis="0 0 1"/>'
+    '<geom type="sphere" size=".001" pos="0 -1 0" mass="1"/>'
+    '<body name="lower" pos="0 -1 0"><joint name="elbow" axis="0 0 1"/>'
+    '<geom type="sphere" size=".001" pos="0 -1 0" mass="1"/></body></body>'
+)
+"""Two links of 1 m with 1 kg at the end of each."""
+
+
+def double_pendulum(first: float, second: float) -> World:
+    """World of DOUBLE at rest; angles in rad, the second relative to the first."""
+    world = make_world(DOUBLE, slab=True, gravity=DOWN)
+    world.solid.q[:] = first, second
+    return world
+
+
+def mode(number: int, steps: int) -> float:
+    """omega / sqrt(g/L) of a mode released in its own shape, `steps` in its period."""
+    sign = 1.0 - 2.0 * number
+    expected = float(reference("A2", "modes")[number]) * np.sqrt(G)
+    dt = 2.0 * np.pi / (expected * steps)
+    world = double_pendulum(0.002, 0.002 * (sign * np.sqrt(2.0) - 1.0))
+    times = passages(first_angle(world, dt, int(4.3 * steps)), dt)
+    return float(np.pi / np.diff(times).mean() / np.sqrt(G))
+
+
+def energy(world: World, dt: float) -> float:
+    """J above the lowest, in the middle of the coming step."""
+    model, state = world.setup.solid, world.solid
+    half = SolidState(model.integrate(state.q, state.v, 0.5 * dt), state.v)
+    lowest = potential_energy(model, model.rest())
+    return kinetic_energy(model, half) + potential_energy(model, half) - lowest
+
+
+def swings(steps: int, periods: float) -> tuple[float, float]:
+    """Drift of the energy and largest error of a joint's position, m, `steps` in a period of 2 s.
+
+    The drift is that of the mean over a tenth of the run, from the first tenth to the last.
+    """
+    dt = 2.0 / steps
+    world = double_pendulum(0.5, 0.4)
+    start(world, dt)
+    first = energy(world, dt)
+    model = world.setup.solid
+    energies, apart = [], 0.0
+    for _ in range(int(periods * steps)):
+        advance(world, dt)
+        energies.append(energy(world, dt))
+        pose = kinematics(model, world.solid.q)
+        for body in (1, 2):
+            link = pose.mass_centre[body] - (pose.mass_centre[1] if body == 2 else 0.0)
+            apart = max(apart, abs(float(np.linalg.norm(link)) - 1.0))
+    tenth = len(energies) // 10
+    drift = float(np.mean(energies[-tenth:]) - np.mean(energies[:tenth])) / first
+    return drift, apart
+
+
+def turning(dt: float, seconds: float) -> float:
+    """Largest difference of L - L0 and the integral of gravity's torque, over the largest |L|."""
+    world = double_pendulum(0.8, 0.4)
+    model = world.setup.solid
+    start = halfway_momentum(model, world.solid, dt)[1, 2]
+    turned, largest, wrong = 0.0, 0.0, 0.0
+    for _ in range(int(seconds / dt)):
+        advance(world, dt)
+        turned += dt * -G * float(kinematics(model, world.solid.q).mass_centre[1:, 0].sum())
+        found = halfway_momentum(model, world.solid, dt)[1, 2] - start
+        largest = max(largest, abs(found))
+        wrong = max(wrong, abs(found - turned))
+    return wrong / largest
+
+
+def double_pendulum_case(quick: bool) -> list[Finding]:
+    """A2: modes, energy and joints over 100 periods, angular momentum about the pivot."""
+    findings = []
+    steps = (25, 50, 100) if quick else (100, 200, 400)
+    for number, expected in enumerate(reference("A2", "modes")):
+        runs = [mode(number, n) for n in steps]
+        title, on = f"omega of mode {number + 1} over sqrt(g/L)", Grids("steps in a period", steps)
+        findings.append(near(title, runs, expected, on, relative=1e-3))
+    drift, apart = swings(100, 10.0 if quick else 100.0)
+    span = f"{10 if quick else 100} periods"
+    findings.append(at_most(f"drift of the energy over {span}", drift, 1e-3))
+    findings.append(at_most(f"error of the joints' places over L, {span}", apart, 1e-6))
+    torque = "L - L0 - gravity's torque added up, over the largest |L|"
+    findings.append(at_most(torque, turning(0.005, 1.0 if quick else 10.0), 1e-6))
+    return findings
+
 
 LINKS, LINK = 4, 0.7
 ARM_DENSITY = 1000.0
@@ -27,15 +182,15 @@ ARM_DENSITY = 1000.0
 
 def arm() -> str:
     """A chain of LINKS boxes along x, the root hinged at the origin."""
-    body = ""
-    for k in reversed(range(LINKS)):
-        size = f"{0.5 * LINK} {0.05 + 0.01 * k} 1"
-        body = (
-            f'<body name="link{k}" pos="{LINK if k else 0.0} 0 0"><joint name="j{k}" axis="0 0 1"/>'
-            f'<geom type="box" size="{size}" pos="{0.5 * LINK} 0 0" density="{ARM_DENSITY}"/>'
-            f"{body}</body>"
-        )
-    return mjcf(body)
+    return chain(
+        [
+            f'<joint name="j{k}" axis="0 0 1"/>'
+            f'<geom type="box" size="{0.5 * LINK} {0.05 + 0.01 * k} 1" pos="{0.5 * LINK} 0 0" '
+            f'density="{ARM_DENSITY}"/>'
+            for k in range(LINKS)
+        ],
+        LINK,
+    )
 
 
 def statics(model: SolidModel, q: Array, weight: Array) -> Array:
@@ -51,9 +206,7 @@ def statics(model: SolidModel, q: Array, weight: Array) -> Array:
 def held(world: World, q: Array, dt: float) -> Array:
     """(LINKS,) torques of the drives that hold a pose for a step, N m."""
     world.solid.q[:] = q
-    command = JointCommand.none(LINKS)
-    command.set(np.arange(LINKS), 0.0, 0.0)
-    return advance(world, dt, command=command).actuator
+    return advance(world, dt, command=hold_all(LINKS)).actuator
 
 
 def static_chain(quick: bool) -> list[Finding]:
@@ -76,28 +229,18 @@ def static_chain(quick: bool) -> list[Finding]:
         at_most("error of tau_k over m g L", wrong / scale, 1e-6),
         at_most("error of the effort over m g L dt", effort / scale, 1e-6),
     ]
-    side, density = 2.2 * LINKS * LINK, 1300.0
-    cells = 48
-    grid = Grid.slab(cells, cells, side / cells, (-0.5 * side, -0.5 * side))
-    wet = make_world(arm(), grid, gravity=DOWN, density=density)
-    volume = model.volume[1:]
-    buoyed = G * (ARM_DENSITY - density) * volume
+    density = 1300.0
+    wet = make_world(arm(), square(48, 2.2 * LINKS * LINK), gravity=DOWN, density=density)
+    buoyed = G * (ARM_DENSITY - density) * model.volume[1:]
     wrong = max(
         float(np.abs(held(wet.copy(), q, 0.01) - statics(model, q, buoyed)).max()) for q in poses
     )
     findings.append(at_most("in fluid at rest, error of tau_k over m g L", wrong / scale, 1e-6))
     balanced, leaning = balance(model, poses)
-    findings += [
-        at_most("tau_k over m g L with the outboard centre of mass below joint k", balanced, 1e-6),
-        Finding(
-            "least |tau_k| over m g L, 0.01 rad from there",
-            leaning,
-            "> 0",
-            "not zero",
-            leaning > 1e-4,
-        ),
-    ]
-    return findings
+    title = "tau_k over m g L with the outboard centre of mass below joint k"
+    findings.append(at_most(title, balanced, 1e-6))
+    title = "least |tau_k| over m g L, 0.01 rad from there"
+    return [*findings, Finding(title, leaning, "> 0", "not zero", leaning > 1e-4)]
 
 
 def balance(model: SolidModel, poses: Array) -> tuple[float, float]:
@@ -127,17 +270,15 @@ def torque_at(model: SolidModel, q: Array, joint: int) -> float:
 
 def floating(flat: bool) -> str:
     """A free chain of LINKS boxes of different densities; in 3D its joints' axes alternate."""
-    body = ""
-    for k in reversed(range(LINKS)):
+    links = []
+    for k in range(LINKS):
         axis = "0 0 1" if flat or k % 2 else "0 1 0"
         joint = f'<joint name="j{k}" axis="{axis}"/>' if k else '<freejoint name="root"/>'
-        size = f"{0.5 * LINK} {0.05 + 0.02 * k} .1"
-        body = (
-            f'<body name="link{k}" pos="{LINK if k else 0.0} 0 0">{joint}'
-            f'<geom type="box" size="{size}" pos="{0.5 * LINK} 0 0" density="{1000 - 100 * k}"/>'
-            f"{body}</body>"
+        links.append(
+            f'{joint}<geom type="box" size="{0.5 * LINK} {0.05 + 0.02 * k} .1" '
+            f'pos="{0.5 * LINK} 0 0" density="{1000 - 100 * k}"/>'
         )
-    return mjcf(body)
+    return chain(links, LINK)
 
 
 def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
@@ -152,8 +293,7 @@ def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
     world = make_world(floating(flat), slab=flat, motions=motions)
     state = world.solid
     state.v[:6] = [0.3, -0.2, 0.0, 0.0, 0.0, 0.7] if flat else [0.3, -0.2, 0.1, 0.2, 0.5, 0.7]
-    for k, motion in enumerate(motions):
-        state.q[7 + k], state.v[6 + k] = motion.position(0.0)[0], motion.velocity(0.0)[0]
+    state.q[7:], state.v[6:] = at_start(motions)
     model = world.setup.solid
     first = halfway_momentum(model, state, dt)
     change = np.zeros(2)
@@ -166,9 +306,7 @@ def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
 
 
 CAT = mjcf(
-    '<body name="middle"><joint name="x" type="slide" axis="1 0 0"/>'
-    '<joint name="y" type="slide" axis="0 1 0"/><joint name="turn" axis="0 0 1"/>'
-    '<geom type="box" size=".5 .1 1" density="1"/>'
+    f'<body name="middle">{PLANAR}<geom type="box" size=".5 .1 1" density="1"/>'
     '<body name="front" pos=".5 0 0"><joint name="front" axis="0 0 1"/>'
     '<geom type="box" size=".4 .1 1" pos=".4 0 0" density="1"/></body>'
     '<body name="rear" pos="-.5 0 0"><joint name="rear" axis="0 0 1"/>'
@@ -186,8 +324,7 @@ def cat_turn(steps: int, seconds: float) -> float:
     )
     world = make_world(CAT, slab=True, motions=motions)
     state, dt = world.solid, seconds / steps
-    for k, motion in enumerate(motions):
-        state.q[3 + k], state.v[3 + k] = motion.position(0.0)[0], motion.velocity(0.0)[0]
+    state.q[3:], state.v[3:] = at_start(motions)
     state.v[:3] = unmoved(world.setup.solid, state.q[3:] + 0.5 * dt * state.v[3:], state.v[3:])
     advance(world, dt, steps)
     return float(world.solid.q[2])
@@ -222,13 +359,18 @@ def free_chain(quick: bool) -> list[Finding]:
         findings.append(at_most(f"change of linear {title}", linear, 1e-10))
         findings.append(at_most(f"change of angular {title}", angular, 1e-10))
     exact = cat_turn_by_geometry()
-    steps: Sequence[int] = (100, 200, 400) if quick else (200, 400, 800, 1600)
-    turns = [cat_turn(n, 1.0) for n in steps]
-    series = GridSeries.toward("steps in a loop", steps, turns, exact)
-    findings.append(near("falling cat's turn in a loop, rad", series, exact, relative=1e-3))
+    steps = (100, 200, 400) if quick else (200, 400, 800, 1600)
+    turns, grids = [cat_turn(n, 1.0) for n in steps], Grids("steps in a loop", steps)
+    title = "falling cat's turn in a loop, rad"
+    findings.append(near(title, turns, exact, grids, relative=1e-3))
     slow = cat_turn(steps[-1], 10.0)
     findings.append(at_most("the same ten times slower, difference, rad", slow - turns[-1], 1e-10))
     return findings
 
 
-CASES = (Case("A3", static_chain), Case("A4", free_chain))
+CASES = (
+    Case("A1", pendulum_period),
+    Case("A2", double_pendulum_case),
+    Case("A3", static_chain),
+    Case("A4", free_chain),
+)

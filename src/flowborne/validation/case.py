@@ -51,14 +51,15 @@ class Entry:
 
 
 @cache
-def _entries() -> dict[str, Entry]:
+def entries() -> dict[str, Entry]:
+    """All cases by their ids, in the order of the list."""
     text = files("flowborne.validation").joinpath("references.json").read_text(encoding="utf-8")
     return {case["id"]: Entry(**case) for case in json.loads(text)["cases"]}
 
 
 def entry(case: str) -> Entry:
     """The entry of a case. Raises KeyError for an unknown id."""
-    return _entries()[case]
+    return entries()[case]
 
 
 def reference(case: str, quantity: str) -> Any:
@@ -108,39 +109,23 @@ class Result:
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON; a value that is not finite becomes its name."""
-        row: dict[str, Any] = {
-            "id": self.id,
-            "tier": self.tier.value,
-            "title": self.title,
-            "quantity": self.quantity,
-            "value": _plain(self.value),
-            "reference": _plain(self.reference),
-            "tolerance": _plain(self.tolerance),
-            "verdict": self.verdict,
-            "lines": self.lines,
-            "seconds": self.seconds,
-            "grid": self.grid,
-            "finest": self.finest,
-        }
-        if self.series is not None:
-            row["series"] = self.series.as_dict()
-        if self.plot is not None:
-            row["plot"] = self.plot.as_dict()
-        return row
+        names = ["id", "tier", "title", "quantity", "value", "reference", "tolerance", "verdict"]
+        names += ["lines", "seconds", "grid", "finest"]
+        row = {name: _plain(getattr(self, name)) for name in names}
+        parts = {"series": self.series, "plot": self.plot}
+        return row | {name: part.as_dict() for name, part in parts.items() if part is not None}
 
     @classmethod
     def from_dict(cls, row: dict[str, Any]) -> Result:
         """The result that `as_dict` gave."""
         found = {name: value for name, value in row.items() if name != "grid"}
-        if "series" in found:
-            series = {
-                name: found["series"][name] for name in ("label", "cells", "values", "errors")
-            }
-            found["series"] = GridSeries(**series)
-        if "plot" in found:
-            plot = found["plot"]
+        if "series" in row:
+            names = ("label", "cells", "values", "errors")
+            found["series"] = GridSeries(*(row["series"][name] for name in names))
+        if "plot" in row:
+            plot = row["plot"]
             found["plot"] = Plot(plot["x"], plot["y"], [Curve(**curve) for curve in plot["curves"]])
-        return cls(**{**found, "tier": Tier(found["tier"])})
+        return cls(**{**found, "tier": Tier(row["tier"])})
 
 
 @dataclass(frozen=True)
@@ -166,10 +151,6 @@ class Case:
     def title(self) -> str:
         return entry(self.id).name
 
-    @property
-    def source(self) -> str:
-        return entry(self.id).source
-
     def tier_in(self, wanted: Tier) -> Tier | None:
         """The largest of the case's tiers within `wanted`; None if there is none."""
         has = (self.full, self.quick)
@@ -191,7 +172,7 @@ class Case:
 
     def _result(self, finding: Finding, quick: bool, seconds: float) -> Result:
         verdict = finding.verdict(coarse=quick and self.coarse)
-        lines = list(finding.series.lines()) if finding.series is not None else []
+        lines = [] if finding.series is None else finding.series.lines()
         if verdict == "coarse":
             lines.append(f"coarse: the case is judged on finer grids, by --tier {self.full.value}")
         return Result(
@@ -203,7 +184,7 @@ class Case:
             finding.reference,
             finding.tolerance,
             verdict,
-            lines + list(finding.lines),
+            [*lines, *finding.lines],
             seconds,
             not quick,
             finding.series,
@@ -219,7 +200,6 @@ def _cause(error: Exception) -> str:
     return f"{type(error).__name__}: {error} ({Path(last.filename).name}, line {last.lineno})"
 
 
-def _plain(value: Value) -> Value:
-    if isinstance(value, str) or np.isfinite(value):
-        return value
-    return str(value)
+def _plain(value: Any) -> Any:
+    """The value, or the name of a number that is not finite."""
+    return str(value) if isinstance(value, float) and not np.isfinite(value) else value

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from flowborne import Array, Grid, World
+from flowborne import Array, Grid, StepReport, World
 from flowborne.validation.case import Case, Tier, reference
-from flowborne.validation.findings import Curve, Finding, Plot
+from flowborne.validation.findings import Curve, Finding, Plot, falling
 from flowborne.validation.shedding import (
     AFTER,
     BEFORE,
@@ -21,7 +19,7 @@ from flowborne.validation.shedding import (
     judged,
     watch,
 )
-from flowborne.validation.worlds import refined
+from flowborne.validation.worlds import Parabola, recorded, refined, whole_steps
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -41,15 +39,8 @@ LENGTH, HEIGHT = 2.2, 0.41
 VISCOSITY = 1e-3
 """Pa s; the fluid's density is 1 kg/m^3."""
 
-STEADY_GRIDS = {True: (10,), False: (20, 40, 80)}
-SHEDDING_GRIDS = {True: (10,), False: (10, 20, 40)}
-"""Cells across D of B1, and of B2 and B3, by quick; multiples of 10 fit the channel."""
-
-STEADY = {True: 1e-2, False: 2e-5}
-"""Change of a coefficient in a time D/U below which B1's flow is steady, by quick."""
-
-LONGEST = 40
-"""Longest time of B1 on one grid, times D/U."""
+GRIDS = {True: (10,), False: (10, 20, 40)}
+"""Cells across D of B2 and B3, by quick; multiples of 10 fit the channel."""
 
 CREEPING = Stream(DIAMETER, 0.2, 0.3)
 SHEDDING = Stream(DIAMETER, 1.0, 1.5)
@@ -58,29 +49,10 @@ SHEDDING = Stream(DIAMETER, 1.0, 1.5)
 DURATION = 8.0
 """s of B3, half a period of the inflow."""
 
-DRAG_AT, LIFT_AT = 3.93625, 5.693125
-"""s at which B3's published drag and lift are largest."""
 
-
-@dataclass(frozen=True)
-class Parabola:
-    """Inflow of the channel with the largest velocity `peak` (m/s), as a profile and as a field."""
-
-    peak: float
-
-    def __call__(
-        self, x: Array, y: Array, z: Array, time: float = 0.0
-    ) -> tuple[Array, Array, Array]:
-        none = 0.0 * (x + y + z)
-        return 4.0 * self.peak * y * (HEIGHT - y) / HEIGHT**2 + none, none, none
-
-
-@dataclass(frozen=True)
-class Pulse:
+def pulsed_inflow(x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
     """Inflow of the channel that starts and ends at rest, as a profile."""
-
-    def __call__(self, x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
-        return Parabola(SHEDDING.fastest * np.sin(np.pi * time / DURATION))(x, y, z)
+    return Parabola(SHEDDING.fastest * np.sin(np.pi * time / DURATION))(x, y, z)
 
 
 def channel(cells: int, inflow: Profile) -> World:
@@ -125,11 +97,12 @@ def recirculation(world: World) -> float:
 
 
 def steady_flow(world: World, change: float) -> tuple[float, float]:
-    """Drag and lift coefficient of B1, when they change by less than `change` in a time D/U."""
+    """Drag and lift coefficient of B1, when they change by less than `change` in a time D/U, or
+    after 40 D/U."""
     fluid, _ = world.flow()
     dt = CFL * fluid.grid.spacing / CREEPING.fastest
     old = np.full(2, np.inf)
-    for _ in range(LONGEST):
+    for _ in range(40):
         new = np.array(CREEPING.coefficients(advance(world, dt, round(CREEPING.time / dt))))
         if np.abs(new - old).max() < change:
             break
@@ -139,15 +112,15 @@ def steady_flow(world: World, change: float) -> tuple[float, float]:
 
 def steady_cylinder(quick: bool) -> list[Finding]:
     """B1: from the undisturbed flow on the coarsest grid, from the coarser one's on the others."""
-    grids, inflow = STEADY_GRIDS[quick], Parabola(CREEPING.fastest)
+    grids, inflow = (10,) if quick else (20, 40, 80), Parabola(CREEPING.fastest)
     rows = []
     for _, world, _ in refined(grids, lambda n: channel(n, inflow), inflow):
-        forces = steady_flow(world, STEADY[quick])
+        forces = steady_flow(world, 1e-2 if quick else 2e-5)
         rows.append((*forces, pressure_drop(world), recirculation(world)))
     drag, lift, drop, length = zip(*rows, strict=True)
     return [
-        judged("B1", "cD", grids, drag, (5.57, 5.59), falling=True),
-        judged("B1", "cL", grids, lift, (0.0104, 0.0110), falling=True),
+        falling(judged("B1", "cD", grids, drag, (5.57, 5.59))),
+        falling(judged("B1", "cL", grids, lift, (0.0104, 0.0110))),
         judged("B1", "dp", grids, drop, (0.1172, 0.1176)),
         judged("B1", "La", grids, length, (0.0842, 0.0852)),
     ]
@@ -156,7 +129,7 @@ def steady_cylinder(quick: bool) -> list[Finding]:
 def shedding_in_channel(quick: bool) -> list[Finding]:
     """B2: largest coefficients over some periods, frequency, and the pressure drop half a period
     after the largest lift."""
-    grids, periods = SHEDDING_GRIDS[quick], PERIODS[quick]
+    grids, periods = GRIDS[quick], PERIODS[quick]
     inflow = Parabola(SHEDDING.fastest)
     field = Kicked(inflow, SHEDDING, CENTRE, CENTRE)
     rows, lines = [], []
@@ -171,34 +144,33 @@ def shedding_in_channel(quick: bool) -> list[Finding]:
         lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
     drag, lift, strouhal, drop = zip(*rows, strict=True)
     return [
-        judged("B2", "cD max", grids, drag, (3.22, 3.24), falling=True, lines=lines),
-        judged("B2", "cL max", grids, lift, (0.99, 1.01), falling=True),
-        judged("B2", "St", grids, strouhal, (0.295, 0.305), falling=True),
+        falling(judged("B2", "cD max", grids, drag, (3.22, 3.24), lines=lines)),
+        falling(judged("B2", "cL max", grids, lift, (0.99, 1.01))),
+        falling(judged("B2", "St", grids, strouhal, (0.295, 0.305))),
         judged("B2", "dp", grids, drop, (2.46, 2.50)),
     ]
 
 
 def pulse(cells: int, duration: float = DURATION) -> Array:
     """(n, 4) time in s, drag and lift coefficient, pressure drop in Pa, from a fluid at rest."""
-    world = channel(cells, Pulse())
-    fluid, _ = world.flow()
-    count = int(np.ceil(duration * SHEDDING.fastest / (CFL * fluid.grid.spacing)))
-    dt = duration / count
-    rows = []
-    for _ in range(count):
-        drag, lift = SHEDDING.coefficients(advance(world, dt))
-        rows.append((world.time, drag, lift, pressure_drop(world)))
-    return np.array(rows)
+    world = channel(cells, pulsed_inflow)
+    steps, dt = whole_steps(duration, CFL * DIAMETER / cells / SHEDDING.fastest)
+
+    def figures(report: StepReport) -> tuple[float, ...]:
+        return (world.time, *SHEDDING.coefficients(report), pressure_drop(world))
+
+    return recorded(world, dt, steps, figures)
 
 
 def swelling_inflow(quick: bool) -> list[Finding]:
     """B3: largest drag and lift in the pulse, and the pressure drop at its end."""
-    grids = SHEDDING_GRIDS[quick]
+    grids = GRIDS[quick]
     runs = [pulse(n) for n in grids]
     drags, lifts = ([crest(run[:, column])[0] for run in runs] for column in (1, 2))
     drops = [float(run[-1, 3]) for run in runs]
-    drag = course(runs[-1], 1, "drag coefficient", DRAG_AT, reference("B3", "cD max"))
-    lift = course(runs[-1], 2, "lift coefficient", LIFT_AT, reference("B3", "cL max"))
+    # s at which the published drag and lift are largest
+    drag = course(runs[-1], 1, "drag coefficient", 3.93625, reference("B3", "cD max"))
+    lift = course(runs[-1], 2, "lift coefficient", 5.693125, reference("B3", "cL max"))
     drop = course(runs[-1], 3, "pressure drop (Pa)", DURATION, reference("B3", "dp(t=8)"))
     return [
         judged("B3", "cD max", grids, drags, (2.93, 2.97), plot=drag),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,7 +20,7 @@ from flowborne.parts import (
 )
 from flowborne.validation.case import Case
 from flowborne.validation.findings import Finding, at_most, near
-from flowborne.validation.worlds import Vector, mjcf
+from flowborne.validation.worlds import Vector, frames_of, mjcf
 from flowborne.worlds import make_world
 
 G = 9.81
@@ -32,6 +31,9 @@ WEIGHT = DENSITY * LENGTH * WIDTH * G
 
 PROBE = 1.0
 """Displacement of the central difference, degrees."""
+
+SPEED, AIR = 5.0, 1.2
+"""m/s and kg/m^3 of the wind on faces."""
 
 HINGE = np.array([0])
 
@@ -97,16 +99,15 @@ def uniform_wind(quick: bool) -> list[Finding]:
     effort = controller_of(ObjectiveEffort(HINGE), 1.0, pace, "present")
     tolerance = 0.5 + pace
     findings = []
-    shares: Sequence[float] = (0.5, 1.0) if quick else (0.1, 0.25, 0.5, 1.0, 2.0)
-    for share in shares:
+    for share in (0.5, 1.0) if quick else (0.1, 0.25, 0.5, 1.0, 2.0):
         wind = WindForce((share * WEIGHT, 0.0, 0.0))
         best = float(np.degrees(np.arctan(share)))
         frames = round((best + 20.0) / pace) + 20
         found = settled(block(0.0, G, wind), effort, frames)
         title = f"angle of least effort at F_w = {share:g} m g, degrees"
         findings.append(near(title, found, best, absolute=tolerance))
-    found = settled(block(best + 180.0 - 60.0, G, wind), effort, round(60.0 / pace) + 20)
     title = "the same from near the far root, degrees"
+    found = settled(block(best + 180.0 - 60.0, G, wind), effort, round(60.0 / pace) + 20)
     findings.append(near(title, found, best + 180.0, absolute=tolerance))
     size = 0.5 * LENGTH * WEIGHT * FRAME
     world = block(0.0, G, wind)
@@ -127,13 +128,11 @@ def faces_wind(quick: bool) -> list[Finding]:
     for load, exact in ((0.25, 13.655), (0.5, 24.470), (1.0, 38.173), (2.0, 51.332)):
         if quick and load != 1.0:
             continue
-        rho = 1.2
-        speed = float(np.sqrt(load * WEIGHT / (2.0 * rho * LENGTH)))
-        wind = WindFaces((speed, 0.0, 0.0), rho, ("block",))
+        speed = float(np.sqrt(load * WEIGHT / (2.0 * AIR * LENGTH)))
+        wind = WindFaces((speed, 0.0, 0.0), AIR, ("block",))
         world = block(exact - 5.0, G, wind)
-        found = settled(world, effort, 90)
         title = f"angle of least effort at Lam = {load:g}, degrees"
-        findings.append(near(title, found, exact, absolute=0.2))
+        findings.append(near(title, settled(world, effort, 90), exact, absolute=0.2))
         model, state = world.setup.solid, world.solid
         pose = kinematics(model, state.q)
         force = wind.wrench(model, pose, np.zeros(model.nv), 0.0)[1, :2] + [0.0, -WEIGHT]
@@ -142,9 +141,6 @@ def faces_wind(quick: bool) -> list[Finding]:
         title = f"net force off the block's axis at Lam = {load:g}, degrees"
         findings.append(at_most(title, float(off), 1.0))
     return findings
-
-
-SPEED, AIR = 5.0, 1.2
 
 
 def wind_towards(degrees: float) -> tuple[Vector, WindFaces]:
@@ -213,17 +209,22 @@ def drag_of_slender_blocks(quick: bool) -> list[Finding]:
                     "initial.positions.hinge": f"{angle - 34.3:g}",
                 }
                 with Simulation(load_scene("block-drag-min", settings), workers=1) as simulation:
-                    angles = [at_hinge(simulation) for _ in range(simulation.frames)]
+                    found = float(hinge_angles(simulation, simulation.frames)[-10:].mean())
                 title = f"{aspect:g}:1, angle of {goal} drag with the scene's defaults, degrees"
-                found = float(np.mean(angles[-10:]))
                 findings.append(near(title, found, angle, absolute=0.1))
     return findings
 
 
-def at_hinge(simulation: Simulation) -> float:
-    """Angle after the next frame, degrees."""
-    simulation.advance_frame()
-    return float(np.degrees(simulation.world.solid.q[0]))
+def hinge_angles(simulation: Simulation, frames: int) -> Array:
+    """(frames + 1,) degrees of a scene's only joint, at the start and after each frame.
+
+    raises  ArithmeticError when the run blows up
+    """
+
+    def angle(_: object = None) -> float:
+        return float(simulation.world.solid.q[0])
+
+    return np.degrees([angle(), *frames_of(simulation, frames, angle)])
 
 
 def drag_in_motion(quick: bool) -> list[Finding]:
@@ -232,15 +233,13 @@ def drag_in_motion(quick: bool) -> list[Finding]:
     along, wind = wind_towards(0.0)
     drag = ObjectiveWindDrag(np.array([1]), along)
     frames = 60 if quick else 160
-    findings: list[Finding] = []
-    rows: tuple[tuple[str, float, float], ...] = (("most", -1.0, -1.0), ("least", 1.0, 1.0))
-    for kind, weight, towards in rows:
-        world = block(-towards * 70.0, 0.0, wind)
-        rates = np.diff(path(world, controller_of(drag, weight, pace, "probe"), frames)) / pace
-        where = "against" if towards < 0.0 else "with"
+    findings = []
+    for kind, where, sign in (("most", "against", -1.0), ("least", "with", 1.0)):
+        controller = controller_of(drag, sign, pace, "probe")
+        rates = np.diff(path(block(-sign * 70.0, 0.0, wind), controller, frames)) / pace
         for extreme, rate in (("slowest", rates.min()), ("fastest", rates.max())):
             title = f"{kind} drag: {extreme} rate over strength, + is {where} the wind"
-            findings.append(near(title, float(rate * towards), 1.0, relative=0.01))
+            findings.append(near(title, float(rate * sign), 1.0, relative=0.01))
     return findings
 
 

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
-from flowborne import Array, BlowUpError, Simulation, load_scene
-from flowborne.bodies import JointCommand
+from flowborne import Array, Simulation, load_scene
 from flowborne.validation.case import Case, Tier, reference
-from flowborne.validation.findings import Finding, GridSeries, near
+from flowborne.validation.controller import hinge_angles
+from flowborne.validation.findings import Finding, Grids, above, near
+from flowborne.validation.worlds import hold_all
 from flowborne.worlds import advance
 
 FRAMES_PER_SECOND = 24.0
 STRENGTH = 20.0
 """degrees/s, of the block scenes."""
-
-AREA = 1.0
-STREAM_PRESSURE = 0.5 * 1000.0
-"""rho U^2 / 2 of the NS scenes, Pa."""
 
 
 @dataclass(frozen=True)
@@ -69,14 +66,8 @@ def course(
     if rule is not None:
         settings["controller.rule.kind"] = rule
     with Simulation(load_scene(scene, settings), workers=1) as simulation:
-        angles = [float(simulation.world.solid.q[0])]
-        try:
-            for _ in range(simulation.frames if frames is None else frames):
-                simulation.advance_frame()
-                angles.append(float(simulation.world.solid.q[0]))
-        except BlowUpError as error:
-            raise ArithmeticError(f"{scene}: {error}") from error
-    return judged(np.degrees(angles), strength / FRAMES_PER_SECOND)
+        angles = hinge_angles(simulation, simulation.frames if frames is None else frames)
+    return judged(angles, strength / FRAMES_PER_SECOND)
 
 
 def judged(angles: Array, step: float) -> AngleHistory:
@@ -99,11 +90,10 @@ def held_drag(degrees: float, resolution: int, seconds: float) -> float:
     """
     settings = {"domain.resolution": str(resolution), "initial.positions.hinge": str(degrees)}
     world = Simulation(load_scene("ns-block-drag-max", settings)).world
-    command = JointCommand.none(1)
-    command.set(np.array([0]), 0.0, 0.0)
+    command = hold_all(1)
     dt = 0.25 * world.flow()[0].grid.spacing
     count = round(seconds / dt)
-    drags = [float(advance(world, dt, command=command).pressure_wrench[1, 0]) for _ in range(count)]
+    drags = [advance(world, dt, command=command).pressure_wrench[1, 0] for _ in range(count)]
     return float(np.mean(drags[count // 2 :]))
 
 
@@ -114,31 +104,26 @@ def from_wind(angle: float) -> float:
 
 def block_in_stream(quick: bool) -> list[Finding]:
     """K5: final angles by most and least drag, and the drag of held blocks every 5 degrees."""
-    grids = (48,) if quick else (64, 128)
+    grids = Grids("cells a side", (48,) if quick else (64, 128))
     findings: list[Finding] = []
-    goals = {"ns-block-drag-max": 90.0, "ns-block-drag-min": 0.0}
     finals = {}
-    for scene, goal in goals.items():
-        runs = [course(scene, resolution=n) for n in grids]
-        values = [from_wind(run.final) for run in runs]
-        series = GridSeries.toward("cells a side", grids, values, goal)
+    for scene, goal in (("ns-block-drag-max", 90.0), ("ns-block-drag-min", 0.0)):
+        runs = [course(scene, resolution=n) for n in grids.cells]
         finals[scene] = runs[-1].final
+        values = [from_wind(run.final) for run in runs]
         title = f"{scene}: final angle to the stream, degrees"
-        findings.append(near(title, series, goal, absolute=15.0))
+        findings.append(near(title, values, goal, grids, absolute=15.0))
     angles = np.arange(-90.0, 91.0, 15.0 if quick else 5.0)
     resolution, seconds = (32, 3.0) if quick else (64, 6.0)
     drags = np.array([held_drag(a, resolution, seconds) for a in angles])
-    unit = STREAM_PRESSURE * AREA
+    unit = 0.5 * 1000.0  # rho U^2 L / 2 of the NS scenes, N/m
     lines = [f"{a:>6g} degrees: {d / unit:.4g}" for a, d in zip(angles, drags, strict=True)]
-    middle = len(angles) // 2
-    rise = float(drags[middle] - 0.5 * (drags[0] + drags[-1])) / unit
+    rise = float(drags[len(angles) // 2] - 0.5 * (drags[0] + drags[-1])) / unit
     title = "drag across the stream less that along it, over rho U^2 L/2"
-    findings.append(Finding(title, rise, "> 0", "sign", rise > 0.0, lines=tuple(lines)))
-    for scene, best in (
-        ("ns-block-drag-max", angles[drags.argmax()]),
-        ("ns-block-drag-min", angles[drags.argmin()]),
-    ):
-        apart = abs((finals[scene] - best + 90.0) % 180.0 - 90.0)
+    findings.append(above(title, rise, 0.0, "sign", lines))
+    best = (angles[drags.argmax()], angles[drags.argmin()])
+    for (scene, final), angle in zip(finals.items(), best, strict=True):
+        apart = abs((final - angle + 90.0) % 180.0 - 90.0)
         title = f"{scene}: final angle from that of held blocks, degrees"
         findings.append(near(title, apart, 0.0, absolute=float(angles[1] - angles[0])))
     return findings
@@ -184,33 +169,7 @@ def frames_and_strength(quick: bool) -> list[Finding]:
     for scene, optimum in OPTIMA.items():
         findings += own_rule(scene, optimum, strengths)
         best = balanced_corner() if scene == "block-drag-min" else optimum
-        start = float(np.degrees(Simulation(scene).world.solid.q[0]))
-        runs = [
-            course(scene, frames_enough(abs(start - best), s), s, rule="fixed") for s in strengths
-        ]
-        lines = []
-        off = 0.0
-        for s, run in zip(strengths, runs, strict=True):
-            law = int(np.ceil(abs(start - best) / run.step))
-            off = max(off, abs(run.frames - law))
-            lines.append(
-                f"{s:g} degrees/s: {run.frames} frames, law {law}, final {run.final:.3f} degrees, "
-                f"chatter {run.chatter:.2f} steps"
-            )
-        title = f"{scene}: frames less ceil(|phi0 - phi*| / (strength dt)), largest"
-        findings.append(near(title, off, 0.0, absolute=1.0, lines=lines))
-        products = [run.frames * s for s, run in zip(strengths, runs, strict=True)]
-        rounds = [
-            abs(p - products[0]) / max(s, strengths[0])
-            for s, p in zip(strengths, products, strict=True)
-        ]
-        title = f"{scene}: N x strength, largest difference in frames"
-        findings.append(near(title, max(rounds), 0.0, absolute=1.0))
-        apart = max(abs(run.final - best) / run.step for run in runs)
-        title = f"{scene}: final angle from the optimum, in steps"
-        findings.append(near(title, apart, 0.0, absolute=1.0))
-        chatter = max(run.chatter for run in runs)
-        findings.append(near(f"{scene}: chatter, in steps", chatter, 0.0, absolute=1.0))
+        findings += fixed_rule(scene, best, strengths)
     if quick:
         return findings
     paper = reference("K6", "paper frames")
@@ -223,6 +182,41 @@ def frames_and_strength(quick: bool) -> list[Finding]:
     return [*findings, near(title, flow / simple, 1.0, relative=0.1, lines=lines)]
 
 
+def fixed_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Finding]:
+    """Frames and accuracy with which the rule `fixed` arrives at an optimum (degrees)."""
+    away = away_from(scene, best)
+    runs = [course(scene, frames_enough(away, s), s, rule="fixed") for s in strengths]
+    laws = [int(np.ceil(away / run.step)) for run in runs]
+    lines = [
+        f"{s:g} degrees/s: {run.frames} frames, law {law}, final {run.final:.3f} degrees, "
+        f"chatter {run.chatter:.2f} steps"
+        for s, run, law in zip(strengths, runs, laws, strict=True)
+    ]
+    products = [run.frames * s for s, run in zip(strengths, runs, strict=True)]
+    figures = {
+        "frames less ceil(|phi0 - phi*| / (strength dt)), largest": max(
+            abs(run.frames - law) for run, law in zip(runs, laws, strict=True)
+        ),
+        "N x strength, largest difference in frames": max(
+            abs(p - products[0]) / max(s, strengths[0])
+            for s, p in zip(strengths, products, strict=True)
+        ),
+        "final angle from the optimum, in steps": max(
+            abs(run.final - best) / run.step for run in runs
+        ),
+        "chatter, in steps": max(run.chatter for run in runs),
+    }
+    first, *others = (
+        near(f"{scene}: {title}", value, 0.0, absolute=1.0) for title, value in figures.items()
+    )
+    return [replace(first, lines=lines), *others]
+
+
+def away_from(scene: str, angle: float) -> float:
+    """Angle between a scene's block at the start and `angle`, degrees."""
+    return abs(float(np.degrees(Simulation(scene).world.solid.q[0])) - angle)
+
+
 def frames_enough(away: float, strength: float) -> int:
     """Frames to turn by some degrees at a strength in degrees/s, and to settle."""
     return round(1.2 * away * FRAMES_PER_SECOND / strength) + 30
@@ -231,18 +225,19 @@ def frames_enough(away: float, strength: float) -> int:
 def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Finding]:
     """Frames and accuracy with which a scene's own rule arrives at its optimum (degrees)."""
     late, off, chatter = 0.0, 0.0, 0.0
+    away = away_from(scene, best)
     for strength in strengths:
-        away = abs(float(np.degrees(Simulation(scene).world.solid.q[0])) - best)
         run = course(scene, frames_enough(away, strength), strength)
         near_it = int(np.argmax(np.abs(run.angles - best) <= PROBE))
         late = max(late, near_it - float(np.ceil((away - PROBE) / run.step)))
         off = max(off, abs(run.final - best))
         chatter = max(chatter, run.chatter)
-    title = f"{scene}, own rule: frames to a probe's width of the optimum, more than the law's"
+    own = f"{scene}, own rule"
+    title = f"{own}: frames to a probe's width of the optimum, more than the law's"
     return [
         near(title, late, 0.0, absolute=1.0),
-        near(f"{scene}, own rule: final angle from the optimum, degrees", off, 0.0, absolute=0.1),
-        near(f"{scene}, own rule: chatter, in steps", chatter, 0.0, absolute=0.1),
+        near(f"{own}: final angle from the optimum, degrees", off, 0.0, absolute=0.1),
+        near(f"{own}: chatter, in steps", chatter, 0.0, absolute=0.1),
     ]
 
 

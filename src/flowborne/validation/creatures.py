@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
-from flowborne import Array, BlowUpError, Scene, Simulation, load_scene
+from flowborne import Array, FrameReport, Scene, Simulation, load_scene
 from flowborne.bodies import kinematics
 from flowborne.validation.case import Case, Tier
-from flowborne.validation.findings import Finding
+from flowborne.validation.findings import Finding, above
+from flowborne.validation.worlds import frames_of
 
 STROKES = {True: 1, False: 5}
 CYCLES = {True: 1, False: 3}
@@ -28,18 +29,12 @@ COARSE_SWIMMER = {"domain.resolution": "72"}
 CYCLE = 1.75
 """s, of the swimmer."""
 
-STILL = 0.2
-"""Degrees by which legs at rest may turn in a frame."""
-
 LEAST_GAIN = 1.2
 """Least gain by the legs that the paper claims for its swimmer."""
 
 SWIMMERS = ("swimmer", "swimmer-jet-only", "swimmer-no-control")
 
 STROKE = "swimmer-stroke"
-
-PASSIVE = {"control": "[]", "objectives": "[]", "initial.positions": "{}"}
-"""Settings of a swimmer with its jet alone."""
 
 
 @dataclass(frozen=True)
@@ -94,18 +89,16 @@ def fly(
     if not controlled:
         loaded = held(loaded)
     period = next(table.period for table in loaded.motion if table.kind == "sinusoid")
-    rows = []
     with Simulation(loaded, workers=1) as simulation:
         joint = simulation.world.setup.solid.positions_of("left_stroke")[0]
-        try:
-            for _ in range(round(cycles * period / simulation.frame_time)):
-                step = simulation.advance_frame().step
-                stroke = np.degrees(simulation.world.solid.q[joint])
-                force = step.pressure_wrench + step.viscous_wrench
-                rows.append((simulation.time, stroke, force[:, 2].sum()))
-        except BlowUpError as error:
-            raise ArithmeticError(f"{scene}: {error}") from error
-    time, stroke, lift = np.array(rows).T
+
+        def figures(report: FrameReport) -> tuple[float, float, float]:
+            stroke = np.degrees(simulation.world.solid.q[joint])
+            force = report.step.pressure_wrench + report.step.viscous_wrench
+            return simulation.time, stroke, force[:, 2].sum()
+
+        rows = frames_of(simulation, round(cycles * period / simulation.frame_time), figures)
+    time, stroke, lift = rows.T
     return Flight(time, stroke, lift, period)
 
 
@@ -125,22 +118,11 @@ def flyer_gain(name: str, controlled: Flight, without: Flight) -> list[Finding]:
         for n, (c, b) in enumerate(zip(ours, others, strict=True))
     ]
     down, up = np.abs(ours).mean(axis=0)
+    title = f"{name}: upward impulse of a stroke with control less that without, N s"
+    halves = f"{name}: drag impulse of the downstroke over that of the upstroke, with control"
     return [
-        Finding(
-            f"{name}: upward impulse of a stroke with control less that without, N s",
-            gain,
-            "> 0",
-            "sign",
-            gain > 0.0,
-            lines=tuple(lines),
-        ),
-        Finding(
-            f"{name}: drag impulse of the downstroke over that of the upstroke, with control",
-            float(down / up),
-            "> 1",
-            "more",
-            bool(down > up),
-        ),
+        above(title, gain, 0.0, "sign", lines),
+        above(halves, float(down / up), 1.0, "more"),
     ]
 
 
@@ -168,8 +150,9 @@ class Swim:
         return float(self.height[-1])
 
     def pushed(self, sign: float) -> float:
-        """N, mean upward force while the legs open (sign 1) or close (sign -1)."""
-        turning = sign * np.diff(self.spread) > STILL
+        """N, mean upward force while the legs open (sign 1) or close (sign -1), by more than 0.2
+        degrees a frame."""
+        turning = sign * np.diff(self.spread) > 0.2
         return float(self.push[1:][turning].mean())
 
 
@@ -179,25 +162,23 @@ def swim(scene: str, cycles: float, settings: Mapping[str, str] = MappingProxyTy
     settings  in place of the scene's own
     raises    ArithmeticError when the run blows up
     """
-    rows, work = [], 0.0
     with Simulation(load_scene(scene, settings)) as simulation:
         model = simulation.world.setup.solid
         head = model.body("head")
         legs = [model.positions_of(f"leg_{n}")[0] for n in range(1, 6)]
         start = kinematics(model, simulation.world.solid.q).body_position[head, 2]
-        try:
-            for _ in range(round(cycles * CYCLE / simulation.frame_time)):
-                steps = simulation.advance_frame().steps
-                pose = kinematics(model, simulation.world.solid.q)
-                work += sum(step.work for step in steps)
-                tilt = np.degrees(np.arccos(np.clip(pose.body_rotation[head, 2, 2], -1.0, 1.0)))
-                push = np.mean([step.pressure_wrench[:, 2].sum() for step in steps])
-                rise = pose.body_position[head, 2] - start
-                spread = np.degrees(simulation.world.solid.q[legs].mean())
-                rows.append((simulation.time, rise, tilt, push, work, spread))
-        except BlowUpError as error:
-            raise ArithmeticError(f"{scene}: {error}") from error
-    return Swim(*np.array(rows).T)
+
+        def figures(report: FrameReport) -> tuple[float, ...]:
+            pose = kinematics(model, simulation.world.solid.q)
+            tilt = np.degrees(np.arccos(np.clip(pose.body_rotation[head, 2, 2], -1.0, 1.0)))
+            push = np.mean([step.pressure_wrench[:, 2].sum() for step in report.steps])
+            work = sum(step.work for step in report.steps)
+            spread = np.degrees(simulation.world.solid.q[legs].mean())
+            return simulation.time, pose.body_position[head, 2] - start, tilt, push, work, spread
+
+        rows = frames_of(simulation, round(cycles * CYCLE / simulation.frame_time), figures)
+    time, height, tilt, push, work, spread = rows.T
+    return Swim(time, height, tilt, push, np.cumsum(work), spread)
 
 
 def swims(quick: bool) -> dict[str, Swim]:
@@ -227,7 +208,7 @@ def control_is_worth_it(quick: bool) -> list[Finding]:
     ]
 
 
-def legs_gain(scene: str, whole: Swim, jet: Swim, lines: tuple[str, ...]) -> Finding:
+def legs_gain(scene: str, whole: Swim, jet: Swim, lines: Sequence[str]) -> Finding:
     """Rise of a swimmer over that with its jet alone."""
     gain = whole.risen() / jet.risen()
     title = f"{scene}: way up with jet and control over that with the jet alone"
@@ -239,24 +220,13 @@ def legs_are_worth_it(quick: bool) -> list[Finding]:
     found = swims(quick)
     whole, jet, neither = (found[name] for name in SWIMMERS)
     stroke, opening = whole.pushed(-1.0), whole.pushed(1.0)
-    lines = tuple(summary(name, run) for name, run in found.items())
+    rise = "swimmer: way up with jet and control less that with neither, m"
+    force = "swimmer: upward force of the water as legs close over the downward one as they open"
+    forces = f"closing {1e-3 * stroke:.1f} kN, opening {1e-3 * opening:.1f} kN"
     return [
-        legs_gain("swimmer", whole, jet, lines),
-        Finding(
-            "swimmer: way up with jet and control less that with neither, m",
-            whole.risen() - neither.risen(),
-            "> 0",
-            "sign",
-            whole.risen() > neither.risen(),
-        ),
-        Finding(
-            "swimmer: upward force of the water as legs close over the downward one as they open",
-            stroke / abs(opening),
-            "> 1",
-            "more",
-            stroke > abs(opening),
-            lines=(f"closing {1e-3 * stroke:.1f} kN, opening {1e-3 * opening:.1f} kN",),
-        ),
+        legs_gain("swimmer", whole, jet, [summary(name, run) for name, run in found.items()]),
+        above(rise, whole.risen() - neither.risen(), 0.0, "sign"),
+        above(force, stroke / abs(opening), 1.0, "more", [forces]),
     ]
 
 
@@ -264,8 +234,9 @@ def stroke_is_worth_it(quick: bool) -> list[Finding]:
     """The swimmer with other objectives than the paper's, by the same measure."""
     settings = COARSE_SWIMMER if quick else {}
     whole = swim(STROKE, CYCLES[quick], settings)
-    jet = swim(STROKE, CYCLES[quick], {**settings, **PASSIVE})
-    lines = (summary(STROKE, whole), summary("its jet alone", jet))
+    passive = {"control": "[]", "objectives": "[]", "initial.positions": "{}"}
+    jet = swim(STROKE, CYCLES[quick], settings | passive)
+    lines = [summary(STROKE, whole), summary("its jet alone", jet)]
     return [legs_gain(STROKE, whole, jet, lines)]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,11 +23,7 @@ from flowborne.validation.controller_in_flow import SCENES, course
 from flowborne.validation.creatures import flights, swims
 
 PAPER_SERIAL = {1: 14.0, 2: 29.0, 3: 43.0, 4: 58.0}
-PAPER_PARALLEL = (14.0, 15.0)
-"""s per frame in Fig. 10 on the authors' machines; parallel: least and most."""
-
-CHAIN_FRAMES = 20
-"""Timed frames of each chain, after the first; their median is taken."""
+"""s per frame in Fig. 10 on the authors' machines; in parallel it is 14 to 15."""
 
 ARMS_SCENE = "human-gravity-arms"
 ARM = ("upper_arm", "forearm", "hand")
@@ -71,28 +66,16 @@ def make_figures(
 def convergence_figure(out: Path, console: Console) -> None:
     """Fig. 2: the frame in which the block arrives, for each wind and objective."""
     paper = reference("K6", "paper frames")
-    columns = (
-        "run",
-        "scene",
-        "reached in frame",
-        "stays from frame",
-        "frames in the paper",
-        "final angle",
-        "chatter in steps",
-    )
+    columns = ["run", "scene", "reached in frame", "stays from frame", "frames in the paper"]
+    columns += ["final angle", "chatter in steps"]
     rows = []
     for row, scene in SCENES.items():
         found = course(scene)
         stays = str(found.frames) if found.arrived else "never"
         final, chatter = f"{found.final:.1f}", f"{found.chatter:.2f}"
         rows.append((row, scene, found.reached, stays, paper[row], final, chatter))
-    finish(
-        "Fig. 2: frames until the block is within a step of its final angle",
-        columns,
-        rows,
-        out / "figure-2.csv",
-        console,
-    )
+    title = "Fig. 2: frames until the block is within a step of its final angle"
+    finish(title, columns, rows, out / "figure-2.csv", console)
 
 
 def swimmer_figure(out: Path, console: Console) -> None:
@@ -104,12 +87,11 @@ def swimmer_figure(out: Path, console: Console) -> None:
         for name, run in found.items()
     ]
     finish("Fig. 7: three cycles of the swimmer", columns, rows, out / "figure-7.csv", console)
+    runs = found.items()
     strips = {
-        "height of the head (m)": {name: (run.time, run.height) for name, run in found.items()},
-        "tilt (degrees)": {name: (run.time, run.tilt) for name, run in found.items()},
-        "work of the drives (kJ)": {
-            name: (run.time, 1e-3 * run.work) for name, run in found.items()
-        },
+        "height of the head (m)": {name: (run.time, run.height) for name, run in runs},
+        "tilt (degrees)": {name: (run.time, run.tilt) for name, run in runs},
+        "work of the drives (kJ)": {name: (run.time, 1e-3 * run.work) for name, run in runs},
     }
     plot_courses(strips, out / "figure-7.png")
 
@@ -124,14 +106,8 @@ def arms_figure(out: Path, console: Console) -> None:
 def chain_figure(out: Path, console: Console) -> None:
     """Fig. 10: seconds per frame of chains with 1 to 4 joints."""
     costs = [ChainCost(n, frame_seconds(n, 1), frame_seconds(n, cores())) for n in PAPER_SERIAL]
-    columns = (
-        "joints",
-        "serial s",
-        "parallel s",
-        "workers",
-        "serial s in the paper",
-        "parallel s in the paper",
-    )
+    columns = ["joints", "serial s", "parallel s", "workers"]
+    columns += ["serial s in the paper", "parallel s in the paper"]
     rows = [
         (
             c.joints,
@@ -139,7 +115,7 @@ def chain_figure(out: Path, console: Console) -> None:
             f"{c.parallel:.4f}",
             cores(),
             PAPER_SERIAL[c.joints],
-            "{:g} to {:g}".format(*PAPER_PARALLEL),
+            "14 to 15",
         )
         for c in costs
     ]
@@ -150,12 +126,8 @@ def chain_figure(out: Path, console: Console) -> None:
 def flyer_figure(out: Path, console: Console) -> None:
     """Figs. 11 and 12: upward force on a flyer with and without twisting wings."""
     found = flights(quick=False)
-    rows = [
-        (n + 1, *(f"{value:.1f}" for pair in both for value in pair))
-        for n, both in enumerate(
-            zip(found["twist"].impulses(), found["base"].impulses(), strict=True)
-        )
-    ]
+    strokes = np.hstack([found["twist"].impulses(), found["base"].impulses()])
+    rows = [(n, *(f"{value:.1f}" for value in row)) for n, row in enumerate(strokes, 1)]
     columns = ("stroke", "down N s", "up N s", "down without N s", "up without N s")
     finish("Fig. 11: upward impulse with twist", columns, rows, out / "figure-11.csv", console)
     curves = {
@@ -165,29 +137,6 @@ def flyer_figure(out: Path, console: Console) -> None:
     plot_forces("upward force of the air (N)", curves, out / "figure-11.png")
 
 
-@dataclass(frozen=True)
-class Walk:
-    """Positions of arms and torso in a walk whose thighs are in the way of the hands.
-
-    ahead    (frames, 2) m, centre of mass of the left and of the right arm ahead of its shoulder
-    torso    (frames, 2) m, centre of mass of the bodies above the back's joint without the arms,
-             ahead and to the left of the joint
-    twist    (frames,) degrees of the thorax about the vertical, to the left
-    touched  (frames,) whether an arm touched the body
-    """
-
-    ahead: Array
-    torso: Array
-    twist: Array
-    touched: Array
-
-    def means(self) -> list[float]:
-        """Means over all but the first frames: arms and torso, mm; twist, degrees; part touched."""
-        late = slice(round(SETTLED * len(self.twist)), None)
-        lengths = 1e3 * np.concatenate([self.ahead[late], self.torso[late]], axis=1).mean(axis=0)
-        return [*lengths.tolist(), float(self.twist[late].mean()), float(self.touched.mean())]
-
-
 def blocked_rows(frames: int | None = None) -> tuple[list[Sequence[object]], int]:
     """Rows of `ARMS_COLUMNS` with and without collisions, and the frame with the largest difference
     between the arms.
@@ -195,33 +144,42 @@ def blocked_rows(frames: int | None = None) -> tuple[list[Sequence[object]], int
     frames  number of frames; that of the scene when None
     """
     walks = {"arms collide": walk(True, frames), "arms pass through": walk(False, frames)}
+    blocked = walks["arms collide"]
+    late = round(SETTLED * len(blocked))
     rows: list[Sequence[object]] = []
     for name, found in walks.items():
-        *numbers, part = found.means()
-        rows.append((name, *(f"{number:.1f}" for number in numbers), f"{100.0 * part:.0f} %"))
-    blocked = walks["arms collide"]
-    apart = np.abs(blocked.ahead[:, 0] - blocked.ahead[:, 1])
-    late = round(SETTLED * len(apart))
-    return rows, int(apart[late:].argmax()) + late + 1
+        *lengths, twist = found[late:, :5].mean(axis=0)
+        numbers = [f"{1e3 * length:.1f}" for length in lengths]
+        rows.append((name, *numbers, f"{twist:.1f}", f"{100.0 * found[:, 5].mean():.0f} %"))
+    apart = np.abs(blocked[late:, 0] - blocked[late:, 1])
+    return rows, int(apart.argmax()) + late + 1
 
 
-def walk(collisions: bool, frames: int | None = None) -> Walk:
-    """Run the scene with or without collisions of the arms."""
-    rows: list[tuple[Array, Array, float, bool]] = []
+def walk(collisions: bool, frames: int | None = None) -> Array:
+    """Run the scene with or without collisions of the arms.
+
+    returns  (frames, 6) the two arms ahead, the torso ahead and to the left, m, and the twist in
+             degrees as in `posture`; whether an arm touched the body
+    """
+    rows = []
     with Simulation(load_scene(ARMS_SCENE), workers=1) as simulation:
         model = simulation.world.setup.solid
         if not collisions:
             model.mj.geom_contype[:] = 0
         for _ in range(simulation.frames if frames is None else frames):
             report = simulation.advance_frame()
-            touched = any(step.contacts > 0 for step in report.steps)
-            rows.append((*posture(model, simulation.world.solid.q), touched))
-    ahead, torso, twist, touches = zip(*rows, strict=True)
-    return Walk(np.array(ahead), np.array(torso), np.array(twist), np.array(touches, float))
+            ahead, torso, twist = posture(model, simulation.world.solid.q)
+            rows.append((*ahead, *torso, twist, any(step.contacts > 0 for step in report.steps)))
+    return np.array(rows, float)
 
 
 def posture(model: SolidModel, q: Array) -> tuple[Array, Array, float]:
-    """(2,) arms ahead, (2,) torso ahead and to the left, m, and twist in degrees of a pose."""
+    """Positions of arms and torso in a pose.
+
+    returns  (2,) m, centre of mass of the left and of the right arm ahead of its shoulder; (2,) m,
+             that of the bodies above the back's joint without the arms, ahead and to the left of
+             the joint; degrees of the thorax about the vertical, to the left
+    """
     pose = kinematics(model, q)
 
     def centre(bodies: Sequence[int]) -> Array:
@@ -254,7 +212,7 @@ def draw_frame(frame: int, path: Path) -> None:
     write_atomically(path, lambda file: imageio.imwrite(file, pixels, extension=".png"))
 
 
-def frame_seconds(joints: int, workers: int, frames: int = CHAIN_FRAMES) -> float:
+def frame_seconds(joints: int, workers: int, frames: int = 20) -> float:
     """Median time of a frame of ns-chain-`joints`, s; several workers are processes."""
     executor = "serial" if workers == 1 else "processes"
     with Simulation(load_scene(f"ns-chain-{joints}"), workers, executor) as simulation:

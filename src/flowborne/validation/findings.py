@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,18 @@ Verdict = Literal["pass", "coarse", "fail", "unconfirmed"]
 case is judged on its finest grids. A figure inside its tolerance passes on any grid."""
 
 
+class Grids(NamedTuple):
+    """Resolutions from coarse to fine, with their unit, such as "cells across D"."""
+
+    label: str
+    cells: Sequence[Any]
+
+
 @dataclass(frozen=True)
 class GridSeries:
-    """A figure and its error from grid to grid.
+    """A figure and its error from grid to grid; label and cells as in `Grids`.
 
-    label   unit of the resolution, such as "cells across D"
-    cells   resolutions, from coarse to fine
-    values  the figure on each
+    values  the figure on each grid
     errors  its error on each, not negative
     """
 
@@ -33,16 +38,11 @@ class GridSeries:
 
     @classmethod
     def toward(
-        cls,
-        label: str,
-        cells: Sequence[float],
-        values: Sequence[float] | Array,
-        exact: float,
-        relative: bool = False,
+        cls, grids: Grids, values: Sequence[float] | Array, exact: float, relative: bool = False
     ) -> GridSeries:
         """A series with the errors |value - exact|, or, if `relative`, |value / exact - 1|."""
         errors = [abs(value / exact - 1.0 if relative else value - exact) for value in values]
-        return cls(label, cells, list(values), errors)
+        return cls(*grids, list(values), errors)
 
     @property
     def order(self) -> float:
@@ -67,8 +67,10 @@ class GridSeries:
             f"{cells:>6g} {self.label}: {value:.6g}, error {error:.3g}"
             for cells, value, error in zip(self.cells, self.values, self.errors, strict=True)
         ]
-        if len(self.cells) > 1:
+        if len(self.cells) > 1 and np.isfinite(self.order):
             rows.append(f"observed order {self.order:.2f}")
+        elif len(self.cells) > 1:
+            rows.append("no observed order: an error is not positive")
         return rows
 
     def as_dict(self) -> dict[str, Any]:
@@ -131,7 +133,7 @@ class Finding:
     tolerance: Value
     passed: bool
     series: GridSeries | None = None
-    lines: tuple[str, ...] = ()
+    lines: Sequence[str] = ()
     plot: Plot | None = None
     confirmed: bool = True
 
@@ -147,85 +149,89 @@ class Finding:
         return "coarse" if coarse and self.series is not None else "fail"
 
 
-FALLING = ", falling from grid to grid"
+Measured = float | Sequence[float] | Array | GridSeries
+"""A number; figures on several grids, of which the last counts; or a series of them."""
 
 
 def near(
     quantity: str,
-    value: float | GridSeries,
+    value: Measured,
     reference: float,
+    on: Grids | None = None,
     *,
     relative: float | None = None,
     absolute: float | None = None,
-    falling: bool = False,
-    series: GridSeries | None = None,
-    lines: Iterable[str] = (),
+    lines: Sequence[str] = (),
 ) -> Finding:
     """A finding that passes within a relative or an absolute tolerance of its reference.
 
-    value    a number, or a series of which the last value counts
-    falling  whether the errors of the series have to fall from grid to grid, too
-    series   shown with a number
+    on  the grids of several figures
     """
-    value, series = _last_of(value, series)
+    figure, series = _figure(value, reference, on)
     bound = relative * abs(reference) if relative is not None else absolute
     assert bound is not None
-    passed = abs(value - reference) <= bound
+    passed = bool(abs(figure - reference) <= bound)
     tolerance = f"{100.0 * relative:g} %" if relative is not None else f"{bound:g}"
-    if falling:
-        assert series is not None
-        passed, tolerance = passed and series.falls, tolerance + FALLING
-    return Finding(quantity, value, reference, tolerance, bool(passed), series, tuple(lines))
+    return Finding(quantity, figure, reference, tolerance, passed, series, lines)
 
 
 def within(
     quantity: str,
-    series: GridSeries,
+    values: Sequence[float] | Array,
     reference: float,
     interval: tuple[float, float],
+    on: Grids,
     *,
-    falling: bool = False,
-    lines: Iterable[str] = (),
-    plot: Plot | None = None,
-    confirmed: bool = True,
+    lines: Sequence[str] = (),
 ) -> Finding:
-    """A finding whose last value has to lie in an interval.
+    """A finding on several grids whose last value has to lie in an interval."""
+    value, series = _figure(values, reference, on)
+    low, high = interval
+    passed = low <= value <= high
+    return Finding(quantity, value, reference, f"[{low:g}, {high:g}]", passed, series, lines)
 
-    falling  whether the errors of the series have to fall from grid to grid, too
-    """
-    value, (low, high) = series.values[-1], interval
-    tolerance = f"[{low:g}, {high:g}]" + (FALLING if falling else "")
-    passed = low <= value <= high and (series.falls or not falling)
-    return Finding(
-        quantity, value, reference, tolerance, passed, series, tuple(lines), plot, confirmed
-    )
+
+def falling(found: Finding) -> Finding:
+    """The finding, which passes only if its errors fall from grid to grid, too."""
+    assert found.series is not None
+    tolerance = f"{found.tolerance}, falling from grid to grid"
+    return replace(found, tolerance=tolerance, passed=found.passed and found.series.falls)
 
 
 def at_most(
     quantity: str,
-    value: float | GridSeries,
+    value: Measured,
     bound: float,
+    on: Grids | None = None,
     *,
-    series: GridSeries | None = None,
-    lines: Iterable[str] = (),
+    lines: Sequence[str] = (),
 ) -> Finding:
     """A finding whose reference is 0 and whose size may be at most `bound`.
 
-    value   a number, or a series of which the last value counts
-    series  shown with a number
+    on  the grids of several figures
     """
-    value, series = _last_of(value, series)
-    return Finding(
-        quantity, value, 0.0, f"{bound:g}", bool(abs(value) <= bound), series, tuple(lines)
-    )
+    figure, series = _figure(value, 0.0, on)
+    passed = bool(abs(figure) <= bound)
+    return Finding(quantity, figure, 0.0, f"{bound:g}", passed, series, lines)
 
 
-def _last_of(
-    value: float | GridSeries, series: GridSeries | None
-) -> tuple[float, GridSeries | None]:
+def above(
+    quantity: str, value: float, bound: float, tolerance: str, lines: Sequence[str] = ()
+) -> Finding:
+    """A finding that passes above a bound; `tolerance` says what that means, such as "sign"."""
+    passed = bool(value > bound)
+    return Finding(quantity, value, f"> {bound:g}", tolerance, passed, lines=lines)
+
+
+def _figure(value: Measured, exact: float, on: Grids | None) -> tuple[float, GridSeries | None]:
+    """The figure that counts, and its series."""
+    if on is not None:
+        assert isinstance(value, Sequence | np.ndarray)
+        value = GridSeries.toward(on, value, exact)
     if isinstance(value, GridSeries):
         return float(value.values[-1]), value
-    return float(value), series
+    assert not isinstance(value, Sequence | np.ndarray)
+    return float(value), None
 
 
 def order_of(
@@ -234,12 +240,11 @@ def order_of(
     *,
     least: float | None = None,
     expected: float | None = None,
-    within: float = 0.2,
 ) -> Finding:
-    """A finding about an order of convergence: at least `least`, or `expected` to a margin."""
+    """A finding about an order of convergence: at least `least`, or `expected` to 0.2."""
     order = series.order
     if least is not None:
         return Finding(quantity, order, 2.0, f">= {least:g}", bool(order >= least), series)
     assert expected is not None
-    passed = bool(abs(order - expected) <= within and series.falls)
-    return Finding(quantity, order, expected, f"{within:g}", passed, series)
+    passed = bool(abs(order - expected) <= 0.2 and series.falls)
+    return Finding(quantity, order, expected, "0.2", passed, series)

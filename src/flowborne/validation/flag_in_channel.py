@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, StepReport, World
 from flowborne.bodies import FleshMesh, FleshTable
 from flowborne.validation.case import Case, Tier, reference
-from flowborne.validation.channel_cylinder import Parabola
-from flowborne.validation.findings import Finding, GridSeries, near
+from flowborne.validation.findings import Finding, Grids, near, within
 from flowborne.validation.flesh import round_root
 from flowborne.validation.flesh_bars import flat_mesh, grown_from, tissue_table
 from flowborne.validation.shedding import Oscillation, amplitude, crest
-from flowborne.validation.worlds import NOWHERE, begin, mjcf
-from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen, advance
+from flowborne.validation.worlds import NOWHERE, Parabola, mjcf, recorded, refined
+from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
 
 LENGTH, HEIGHT = 2.5, 0.41
 """m, of the channel."""
@@ -132,11 +132,6 @@ def time_step(world: World, flow: Flow) -> float:
     return CFL * world.flow()[0].grid.spacing / flow.peak
 
 
-def force(report: StepReport) -> Array:
-    """(2,) drag and lift of cylinder and flag together, N/m."""
-    return np.asarray((report.pressure_wrench + report.viscous_wrench)[:, :2].sum(axis=0))
-
-
 def moved(world: World) -> Array:
     """(2,) displacement of A, m; zero for a rigid flag."""
     flesh = world.setup.solid.flesh
@@ -147,21 +142,15 @@ def moved(world: World) -> Array:
     return np.asarray(flesh.vertices(world.solid.q)[a] - flesh.rest[a])[:2]
 
 
-def start(world: World, flow: Flow, coarser: World | None) -> None:
-    """Begin from the inflow everywhere, or from flow and flag on a coarser grid."""
-    begin(world, coarser, Parabola(flow.peak))
-    if coarser is not None:
-        world.solid.q[:], world.solid.v[:] = coarser.solid.q, coarser.solid.v
-
-
 def march(world: World, flow: Flow, seconds: float) -> Array:
-    """(steps, 4) drag, lift and displacement of A, step by step."""
+    """(steps, 4) drag and lift of cylinder and flag together, N/m, and displacement of A, m."""
     dt = time_step(world, flow)
-    rows = []
-    for _ in range(round(seconds / dt)):
-        forces = force(advance(world, dt))
-        rows.append((*forces, *moved(world)))
-    return np.array(rows)
+
+    def figures(report: StepReport) -> tuple[float, ...]:
+        forces = (report.pressure_wrench + report.viscous_wrench)[:, :2].sum(axis=0)
+        return (*forces, *moved(world))
+
+    return recorded(world, dt, round(seconds / dt), figures)
 
 
 SHORTER = 0.5
@@ -173,22 +162,15 @@ LAST = 0.1
 
 def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[str]]:
     """(grids, 4) drag, lift and displacement of A in a steady flow, and their changes as text."""
-    found, lines, coarser = [], [], None
-    for n in grids:
-        world = channel(n, flow)
-        start(world, flow, coarser)
-        seconds = flow.longest * (SHORTER if coarser or quick else 1.0)
-        rows = march(world, flow, seconds)
+    found, lines = [], []
+    for n, world, first in refined(grids, partial(channel, flow=flow), Parabola(flow.peak)):
+        rows = march(world, flow, flow.longest * (1.0 if first and not quick else SHORTER))
         last = rows[-max(2, round(LAST * len(rows))) :]
         found.append(last.mean(axis=0))
         drag, lift, *_ = np.ptp(last, axis=0)
         title = f"drag still changes by {drag:.2g}, lift by {lift:.2g}"
         lines.append(f"{n:>6g} cells across the channel: {title}")
-        coarser = world
     return np.array(found), lines
-
-
-LABEL = "cells across the channel"
 
 
 def judged(
@@ -200,9 +182,8 @@ def judged(
     lines: Sequence[str] = (),
 ) -> Finding:
     """A figure within a relative tolerance of the published one."""
-    exact = reference(flow.case, flow.name)[quantity]
-    series = GridSeries.toward(LABEL, grids, values, exact)
-    return near(f"{flow.name}, {quantity}", series, exact, relative=relative, lines=lines)
+    exact, on = reference(flow.case, flow.name)[quantity], Grids("cells across the channel", grids)
+    return near(f"{flow.name}, {quantity}", values, exact, on, relative=relative, lines=lines)
 
 
 def between(
@@ -210,10 +191,9 @@ def between(
 ) -> Finding:
     """A figure within the range of published ones."""
     exact, low, high = reference(flow.case, flow.name)[quantity]
-    value = float(values[-1])
-    series, title = GridSeries.toward(LABEL, grids, values, exact), f"{flow.name}, {quantity}"
-    inside = bool(low <= value <= high)
-    return Finding(title, value, exact, f"{low:g} to {high:g}", inside, series, tuple(lines))
+    on = Grids("cells across the channel", grids)
+    found = within(f"{flow.name}, {quantity}", values, exact, (low, high), on, lines=lines)
+    return replace(found, tolerance=f"{low:g} to {high:g}")
 
 
 PERIODS = 4
@@ -260,16 +240,11 @@ def flutter(rows: Array, dt: float) -> Flutter:
 
 def periodic(flow: Flow, grids: Sequence[int]) -> list[Flutter]:
     """A flow that flutters, grid after grid."""
-    found: list[Flutter] = []
-    coarser = None
-    for n in grids:
-        world = channel(n, flow)
-        start(world, flow, coarser)
-        seconds = flow.longest * (SHORTER if coarser else 1.0)
-        seen = flutter(march(world, flow, seconds), time_step(world, flow))
-        line = f"{n:>6g} cells across the channel: {seen.line}"
-        found.append(replace(seen, line=line))
-        coarser = world
+    found = []
+    for n, world, first in refined(grids, partial(channel, flow=flow), Parabola(flow.peak)):
+        rows = march(world, flow, flow.longest * (1.0 if first else SHORTER))
+        seen = flutter(rows, time_step(world, flow))
+        found.append(replace(seen, line=f"{n:>6g} cells across the channel: {seen.line}"))
     return found
 
 
@@ -283,13 +258,11 @@ def rigid_flag(quick: bool) -> list[Finding]:
     if quick:
         return findings
     seen = periodic(CFD[2], grids)
+    means, swings, frequencies = figures_of(seen)
     lines = [s.line for s in seen]
     for axis, name in enumerate(("drag", "lift")):
-        means = np.array([s.means[axis] for s in seen])
-        swings = np.array([s.amplitudes[axis] for s in seen])
-        findings.append(judged(CFD[2], f"{name} mean", grids, means, 0.02, lines))
-        findings.append(judged(CFD[2], f"{name} amplitude", grids, swings, 0.05))
-    frequencies = np.array([s.frequency for s in seen])
+        findings.append(judged(CFD[2], f"{name} mean", grids, means[:, axis], 0.02, lines))
+        findings.append(judged(CFD[2], f"{name} amplitude", grids, swings[:, axis], 0.05))
     return [*findings, judged(CFD[2], "frequency", grids, frequencies, 0.01)]
 
 
@@ -302,18 +275,25 @@ def flag_of_flesh(quick: bool) -> list[Finding]:
     grids = FLUTTERING
     for flow in () if quick else FSI[1:]:
         seen = periodic(flow, grids)
-        means = np.array([s.means for s in seen])
-        swings = np.array([s.amplitudes for s in seen])
-        lines = [s.line for s in seen]
+        means, swings, frequencies = figures_of(seen)
         for axis, name in enumerate(("drag", "lift", "ux", "uy")):
             exact = reference("D3", flow.name)[f"{name} mean"]
             found = ", ".join(f"{v:.4g}" for v in means[:, axis])
-            shown = [f"mean {found} from grid to grid, published {exact:g}"]
+            lines = [f"mean {found} from grid to grid, published {exact:g}"]
+            lines += [s.line for s in seen]
             title = f"{name} amplitude"
-            findings.append(judged(flow, title, grids, swings[:, axis], 0.05, shown + lines))
-        frequencies = np.array([s.frequency for s in seen])
+            findings.append(judged(flow, title, grids, swings[:, axis], 0.05, lines))
         findings.append(judged(flow, "frequency", grids, frequencies, 0.03))
     return findings
+
+
+def figures_of(seen: Sequence[Flutter]) -> tuple[Array, Array, Array]:
+    """Means (grids, 4), amplitudes (grids, 4) and frequencies (grids,)."""
+    return (
+        np.array([s.means for s in seen]),
+        np.array([s.amplitudes for s in seen]),
+        np.array([s.frequency for s in seen]),
+    )
 
 
 CASES = (

@@ -2,65 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from flowborne import Array, Grid, World
+from flowborne import Array, World
 from flowborne.bodies import TrajectorySinusoid
 from flowborne.validation.case import Case, Tier, reference
-from flowborne.validation.findings import Curve, Finding, GridSeries, Plot
-from flowborne.validation.worlds import mjcf, whole_steps
+from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most
+from flowborne.validation.worlds import at_start, force_on, mjcf, square, whole_steps
 from flowborne.worlds import advance, make_world
 
 SWAY, PERIOD, PITCH = 2.8, 4.0, 0.25 * np.pi
 """m from end to end of the motion of the centre, for an ellipse of 1 m; s; rad by which it pitches
 from upright to each side."""
 
-THICKNESS = 0.1
-"""Thickness over chord."""
-
 FASTEST = np.pi * SWAY / PERIOD
 """m/s, of the centre."""
-
-REYNOLDS = 75.0
-
-GRIDS = {True: (10, 20), False: (20, 40)}
-"""Cells across the chord, by quick."""
-
-SIDE = {True: 10, False: 30}
-"""Chords across the closed box, by quick."""
-
-STROKES = {True: 1.0, False: 4.0}
-"""Simulated periods from rest, by quick."""
-
-CFL = 1.0
-"""Cells that the centre crosses in a step at most; the tips are up to 1.4 times as fast."""
-
-TURNING = 0.012
-"""Part of T around each reversal of the stroke in which the published drag is left out: it changes
-its sign there."""
 
 LIFT, DRAG, MEASURED = "CL(t/T) Eldredge", "CD(t/T) Eldredge", "CL experiment Wang"
 
 
 def hover(cells: int, side: int) -> World:
-    """The ellipse upright at one end of its stroke, in still fluid."""
+    """The ellipse, a tenth as thick as long, upright at one end of its stroke, in still fluid."""
     body = (
         '<body name="wing"><joint name="x" type="slide" axis="1 0 0"/>'
         '<joint name="pitch" axis="0 0 1"/>'
-        f'<geom type="ellipsoid" size="0.5 {0.5 * THICKNESS} 1"/></body>'
+        '<geom type="ellipsoid" size="0.5 0.05 1"/></body>'
     )
     motions = (
         TrajectorySinusoid(np.array([0]), 0.5 * SWAY, PERIOD, 0.0, 0.5 * np.pi),
         TrajectorySinusoid(np.array([1]), PITCH, PERIOD, 0.5 * np.pi),
     )
-    world = make_world(
-        mjcf(body),
-        Grid.slab(side * cells, side * cells, 1.0 / cells, (-0.5 * side, -0.5 * side)),
-        viscosity=FASTEST / REYNOLDS,
-        motions=motions,
-        tolerance=1e-7,
-    )
-    world.solid.q[:] = [motion.position(0.0)[0] for motion in motions]
+    grid, viscosity = square(side * cells, side), FASTEST / 75.0
+    world = make_world(mjcf(body), grid, viscosity=viscosity, motions=motions, tolerance=1e-7)
+    world.solid.q[:], _ = at_start(motions)
     return world
 
 
@@ -76,15 +52,18 @@ def largest_quasi_steady() -> tuple[float, float]:
 
 
 def flap(cells: int, side: int, strokes: float) -> Array:
-    """(n, 3) t/T in the middle of every step, and lift and drag over the largest quasi-steady ones;
-    drag is positive against the motion of the wing."""
+    """Flap from rest for some periods, in a closed box `side` chords wide.
+
+    returns  (n, 3) t/T in the middle of every step, and lift and drag over the largest quasi-steady
+             ones; drag is positive against the motion of the wing
+    """
     world = hover(cells, side)
-    count, dt = whole_steps(strokes * PERIOD, CFL / cells / FASTEST)
+    # in a step the centre crosses at most a cell; the tips are up to 1.4 times as fast
+    count, dt = whole_steps(strokes * PERIOD, 1.0 / cells / FASTEST)
     lift, drag = largest_quasi_steady()
     rows = []
     for k in range(count):
-        report = advance(world, dt)
-        force = (report.pressure_wrench + report.viscous_wrench)[1]
+        force = force_on(advance(world, dt))
         phase = (k + 0.5) * dt / PERIOD
         onward = -np.sign(np.sin(2.0 * np.pi * phase))
         rows.append((phase, force[1] / lift, -onward * force[0] / drag))
@@ -104,18 +83,19 @@ def hovering(quick: bool) -> list[Finding]:
     The list has no tolerance. The distance of the measured lift from that solver's is the tolerance
     of ours, and of the drag, which was not measured.
     """
-    grids = GRIDS[quick]
-    runs = [flap(n, SIDE[quick], STROKES[quick]) for n in grids]
+    cells, side, strokes = ((10, 20), 10, 1.0) if quick else ((20, 40), 30, 4.0)
+    grids = Grids("cells across the chord", cells)
+    runs = [flap(n, side, strokes) for n in cells]
     lift, drag, measured = (
-        points[points[:, 0] <= STROKES[quick]]
+        points[points[:, 0] <= strokes]
         for points in (np.array(reference("S3", name)) for name in (LIFT, DRAG, MEASURED))
     )
     bound = apart(measured[:, 0], measured[:, 1], lift)
-    drag = drag[np.abs((drag[:, 0] + 0.25) % 0.5 - 0.25) > TURNING]
+    # the drag changes its sign at each reversal of the stroke: points there are left out
+    drag = drag[np.abs((drag[:, 0] + 0.25) % 0.5 - 0.25) > 0.012]
     findings = []
     for name, column, published in (("lift", 1, lift), ("drag", 2, drag)):
         away = [apart(run[:, 0], run[:, column], published) for run in runs]
-        series = GridSeries.toward("cells across the chord", grids, away, 0.0)
         run = runs[-1][:: max(1, len(runs[-1]) // 500)]
         curves = [
             Curve("Eldredge", published[:, 0], published[:, 1], True),
@@ -123,17 +103,10 @@ def hovering(quick: bool) -> list[Finding]:
         ]
         if name == "lift":
             curves.append(Curve("measured by Wang", measured[:, 0], measured[:, 1], True))
-        findings.append(
-            Finding(
-                f"{name}, mean distance from Eldredge's",
-                away[-1],
-                bound,
-                "at most the experiment's in lift",
-                away[-1] <= bound,
-                series,
-                plot=Plot("t/T", f"{name} over the largest quasi-steady one", curves),
-            )
-        )
+        found = at_most(f"{name}, mean distance from Eldredge's", away, bound, grids)
+        tolerance = "at most the experiment's in lift"
+        plot = Plot("t/T", f"{name} over the largest quasi-steady one", curves)
+        findings.append(replace(found, reference=bound, tolerance=tolerance, plot=plot))
     return findings
 
 

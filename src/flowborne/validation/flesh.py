@@ -17,14 +17,13 @@ from flowborne.bodies import (
     static_forces,
     symmetric_factor,
 )
+from flowborne.validation.articulated import frequency
 from flowborne.validation.case import Case, reference, table
-from flowborne.validation.findings import Finding, GridSeries, at_most, near, order_of
+from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, near, order_of
 from flowborne.validation.flesh_bars import Bar, bar_of, equilibrium, tissue_table
-from flowborne.validation.pendulums import passages
 from flowborne.validation.worlds import Vector
 
 Cells = tuple[int, ...]
-ALONG = "cells along the bar"
 
 FLAG = (0.35, 0.02)
 """Length and thickness of Turek and Hron's bar, m."""
@@ -56,26 +55,26 @@ def sunk(build: Callable[[Cells], Bar], cells: Sequence[Cells]) -> Array:
 def flags(quick: bool) -> list[Finding]:
     """D1: CSM1 and CSM2 in a slab, and CSM1 in a room, one cell deep."""
     findings = []
-    flat = FLAG_CELLS[:3] if quick else FLAG_CELLS
     deep = tuple((*cells, 1) for cells in FLAG_CELLS[:3])
-    for name, label, young, grids in (
-        ("CSM1", "triangles", 1.4e6, flat),
-        ("CSM2", "triangles", 5.6e6, flat),
+    for name, label, young, cells in (
+        ("CSM1", "triangles", 1.4e6, FLAG_CELLS[: 3 if quick else None]),
+        ("CSM2", "triangles", 5.6e6, FLAG_CELLS[: 3 if quick else None]),
         ("CSM1", "tetrahedra", 1.4e6, deep),
     ):
         build = partial(
             bar_of, size=FLAG, tissue=flag_tissue(young), gravity=FLAG_DOWN, root=round_root
         )
-        findings += _of_end(f"{name} A, {label}", name, sunk(build, grids), grids)
+        found = sunk(build, cells).T
+        exact = reference("D1", f"{name} A [1e-3]")
+        for (quantity, value), values in zip(exact.items(), found, strict=True):
+            title = f"{name} A, {label}, {quantity} in mm"
+            findings.append(near(title, values, value, along(cells), relative=0.02))
     return findings
 
 
-def _of_end(label: str, name: str, found: Array, grids: Sequence[Cells]) -> list[Finding]:
-    findings = []
-    for axis, (quantity, exact) in enumerate(reference("D1", f"{name} A [1e-3]").items()):
-        series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, axis], exact)
-        findings.append(near(f"{label}, {quantity} in mm", series, exact, relative=0.02))
-    return findings
+def along(cells: Sequence[Cells]) -> Grids:
+    """Grids by their cells along the bar."""
+    return Grids("cells along the bar", [grid[0] for grid in cells])
 
 
 SLENDER = (1.0, 1.0 / 40.0)
@@ -101,9 +100,8 @@ def elastica(quick: bool) -> list[Finding]:
         found = np.array([_bent(grid, label.startswith("tip"), chosen) for grid in grids])
         for i, load in enumerate(chosen):
             for j, quantity in enumerate(("w/L", "u/L", "angle of the tip in degrees")):
-                value, title = exact[load][j], f"{label} = {load:g}, {quantity}"
-                series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, i, j], value)
-                findings.append(near(title, series, value, relative=0.01))
+                title, values = f"{label} = {load:g}, {quantity}", found[:, i, j]
+                findings.append(near(title, values, exact[load][j], along(grids), relative=0.01))
     return findings
 
 
@@ -117,10 +115,6 @@ def _bent(cells: Cells, at_tip: bool, loads: Sequence[float]) -> Array:
         x, y, _ = bar.end(q)
         found.append((-y, -x, -np.degrees(bar.turned(q))))
     return np.array(found)
-
-
-AMPLITUDE = 1e-3
-"""Of D5's vibration in time, m."""
 
 
 def modes(bar: Bar, count: int) -> tuple[Array, Array]:
@@ -158,27 +152,26 @@ def vibration(quick: bool) -> list[Finding]:
     grids: tuple[Cells, ...] = ((5, 1), (10, 1), (20, 1)) if quick else ((10, 1), (20, 1), (40, 1))
     found = np.array([modes(beam(grid, 1.0, 0.0), 3)[0] for grid in grids])
     for mode in range(3):
-        series = GridSeries.toward(ALONG, [g[0] for g in grids], found[:, mode], exact[mode])
-        findings.append(near(f"f{mode + 1} of a beam, Hz", series, exact[mode], relative=0.02))
+        title, values = f"f{mode + 1} of a beam, Hz", found[:, mode]
+        findings.append(near(title, values, exact[mode], along(grids), relative=0.02))
     findings += in_time((20, 40) if quick else (25, 50, 100), 3 if quick else 10)
     return findings + flag_in_time(quick)
 
 
 def in_time(steps: Sequence[int], periods: int) -> list[Finding]:
-    """Frequency and amplitude of a beam released in its first mode, `steps` in a period."""
+    """Frequency and amplitude of a beam released in its first mode at 1 mm, `steps` in a period."""
     bar = beam((10, 1), 1.0, 0.0)
     (f1,), shape = modes(bar, 1)
     rest = bar.model.mj.qpos0
     reach = abs(bar.end(bar.model.integrate(rest, shape[:, 0], 1.0))[1])
-    q = bar.model.integrate(rest, shape[:, 0], AMPLITUDE / reach)
+    q = bar.model.integrate(rest, shape[:, 0], 1e-3 / reach)
     runs, lost = [], []
     for n in steps:
         dt = 1.0 / (f1 * n)
         heights = swing(bar, q, dt, int((periods + 0.5) * n))
-        times = passages(heights, dt)
-        runs.append(float(1.0 / (2.0 * np.diff(times).mean())))
+        runs.append(frequency(heights, dt))
         lost.append(1.0 - float(np.abs(heights[-n:]).max() / np.abs(heights[0])))
-    series = GridSeries.toward("steps in a period", steps, runs, f1)
+    series = GridSeries.toward(Grids("steps in a period", steps), runs, f1)
     return [
         order_of("order in time of f1", series, expected=2.0),
         near("f1 in time over that of the mode", runs[-1] / f1, 1.0, relative=0.02),
@@ -197,18 +190,15 @@ def flag_in_time(quick: bool) -> list[Finding]:
     grids = FLAG_CELLS[:2] if quick else FLAG_CELLS[:3]
     bars = [bar_of(g, FLAG, flag_tissue(1.4e6), FLAG_DOWN, round_root) for g in grids]
     values = [float(modes(bar, 1)[0][0]) for bar in bars]
-    series = GridSeries.toward(ALONG, [g[0] for g in grids], values, small)
-    findings = [near("f1 of CSM3's bar, Hz", series, small, relative=0.02)]
+    slow = near("f1 of CSM3's bar, Hz", values, small, along(grids), relative=0.02)
     steps, seconds = ((50, 100), 3.0) if quick else ((100, 200), 10.0)
     runs = []
     for n in steps:
         heights = swing(bars[1], bars[1].model.rest().q, 1.0 / n, int(seconds * n))
-        times = passages(heights - heights.mean(), 1.0 / n)
-        runs.append(float(1.0 / (2.0 * np.diff(times).mean())))
-    series = GridSeries.toward("steps a second", steps, runs, large)
+        runs.append(frequency(heights - heights.mean(), 1.0 / n))
     lines = [f"the end swings between {1e3 * heights.min():.1f} and {1e3 * heights.max():.1f} mm"]
-    title = "CSM3 at large amplitude, Hz"
-    return [*findings, near(title, series, large, relative=0.02, lines=lines)]
+    on, title = Grids("steps a second", steps), "CSM3 at large amplitude, Hz"
+    return [slow, near(title, runs, large, on, relative=0.02, lines=lines)]
 
 
 CASES = (Case("D1", flags), Case("D4", elastica), Case("D5", vibration))

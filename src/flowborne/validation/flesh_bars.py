@@ -36,9 +36,6 @@ SPLIT = np.array(
 )
 """Six right-handed tetrahedra of a cell whose corner b is at (b & 1, b >> 1 & 1, b >> 2)."""
 
-CLAMP = '<mujoco><worldbody>{others}<body name="clamp"/></worldbody></mujoco>'
-"""A fixed body that holds a bar."""
-
 
 def bar_mesh(
     cells: tuple[int, int, int], size: tuple[float, float, float]
@@ -116,17 +113,12 @@ class Bar:
         return np.isclose(x, x.max())
 
 
-def straight(y: Array) -> Array:
-    """The root of a bar that starts at x = 0, at heights y (n,)."""
-    return np.zeros_like(y)
-
-
 def bar_of(
     cells: tuple[int, ...],
     size: tuple[float, float],
     tissue: FleshTable,
     gravity: Vector,
-    root: Root = straight,
+    root: Root = np.zeros_like,
 ) -> Bar:
     """A bar that is held at its root.
 
@@ -150,12 +142,13 @@ def bar_of(
 
 
 def grown_from(mesh: FleshMesh, tissue: FleshTable, others: str, gravity: Vector) -> SolidModel:
-    """A model with the flesh of a table and a mesh that "clamp" holds.
+    """A model with the flesh of a table and a mesh that the fixed body "clamp" holds.
 
     others  MJCF of other elements of the world body
     """
     slab = mesh.elements.shape[1] == 3
-    spec = read_spec(CLAMP.format(others=others))
+    clamp = f'<mujoco><worldbody>{others}<body name="clamp"/></worldbody></mujoco>'
+    spec = read_spec(clamp)
     with TemporaryDirectory() as folder:
         (Path(folder) / "bar.npz").write_bytes(mesh_bytes(mesh, ""))
         grown = grow(spec, (tissue,), Path(folder))

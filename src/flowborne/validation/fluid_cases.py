@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,33 +10,30 @@ from flowborne import Array, Grid, World
 from flowborne.bodies import Trajectory, TrajectoryConstant
 from flowborne.validation.case import Case, Tier, reference
 from flowborne.validation.findings import (
-    FALLING,
     Curve,
     Finding,
+    Grids,
     GridSeries,
     Plot,
     at_most,
+    falling,
     near,
     order_of,
     within,
 )
-from flowborne.validation.worlds import PERIODIC, RING, Uniform, all_inflow, mjcf, whole_steps
+from flowborne.validation.worlds import (
+    PERIODIC,
+    PLANAR,
+    RING,
+    Uniform,
+    all_inflow,
+    components,
+    history,
+    mjcf,
+    square,
+    whole_steps,
+)
 from flowborne.worlds import Boundaries, advance, kinetic_energy, make_world, set_velocity
-
-
-@dataclass(frozen=True)
-class FlatVortices:
-    """Taylor-Green vortices on a mean flow (mean, mean)."""
-
-    mean: float
-
-    def __call__(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-        return (
-            np.sin(x) * np.cos(y) + self.mean + 0.0 * z,
-            -np.cos(x) * np.sin(y) + self.mean + 0.0 * z,
-            0.0 * (x + y + z),
-        )
-
 
 QUARTER = 0.5 * np.pi
 """s in which a mean flow of 1 m/s moves the pattern by a quarter of the box, whole cells on every
@@ -45,9 +42,14 @@ grid."""
 
 def taylor_green(cells: int, viscosity: float, mean: float) -> tuple[float, float]:
     """Energy and largest velocity of the pattern after QUARTER, over their first values."""
+
+    def vortices(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        u, v = np.sin(x) * np.cos(y) + mean, -np.cos(x) * np.sin(y) + mean
+        return components(x, y, z, u, v)
+
     grid = Grid.slab(cells, cells, 2.0 * np.pi / cells, (0.0, 0.0))
     world = make_world(grid=grid, viscosity=viscosity, boundaries=RING, tolerance=1e-11)
-    set_velocity(world, FlatVortices(mean))
+    set_velocity(world, vortices)
     energy, fastest = pattern(world, mean)
     count, dt = whole_steps(QUARTER, 0.5 * grid.spacing / (1.0 + mean))
     advance(world, dt, count)
@@ -64,15 +66,13 @@ def pattern(world: World, mean: float) -> tuple[float, float]:
 
 def vortex_decay(quick: bool) -> list[Finding]:
     """F1: energy and largest velocity, with and without viscosity and mean advection."""
-    grids = (16, 32, 64) if quick else (32, 64, 128, 256, 512)
+    grids = Grids("cells a side", (16, 32, 64) if quick else (32, 64, 128, 256, 512))
     findings = []
     for mean in (0.0, 1.0):
         for nu in (0.01, 0.0):
-            runs = [taylor_green(n, nu, mean) for n in grids]
-            exact = (float(np.exp(-4.0 * nu * QUARTER)), float(np.exp(-2.0 * nu * QUARTER)))
-            for m, name in enumerate(("E(t)/E(0)", "max|u|(t)")):
-                values = [run[m] for run in runs]
-                series = GridSeries.toward("cells a side", grids, values, exact[m])
+            energy, fastest = zip(*(taylor_green(n, nu, mean) for n in grids.cells), strict=True)
+            for name, rate, values in (("E(t)/E(0)", 4.0, energy), ("max|u|(t)", 2.0, fastest)):
+                series = GridSeries.toward(grids, values, float(np.exp(-rate * nu * QUARTER)))
                 title = f"order of {name}, nu = {nu:g}, mean flow ({mean:g}, {mean:g})"
                 findings.append(order_of(title, series, least=1.9))
     return findings
@@ -83,29 +83,14 @@ REYNOLDS = 1600.0
 SIDE = 2.0 * np.pi
 """m, of F3's box."""
 
-TAYLOR_GREEN_GRIDS = {True: (32, 64), False: (32, 64, 128)}
-"""Cells a side of F3, by quick."""
-
-DURATION = 20.0
-"""s."""
-
-CFL = 0.5
-"""Cells that the fastest fluid crosses in a step."""
-
 ENERGY, DISSIPATION = 0.125, 2.0 / REYNOLDS * 0.375
 """E in m^2/s^2 and -dE/dt in m^2/s^3 at the start."""
 
 
-@dataclass(frozen=True)
-class SolidVortices:
+def solid_vortices(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
     """Taylor-Green vortices in three dimensions, at the start of F3."""
-
-    def __call__(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-        return (
-            np.sin(x) * np.cos(y) * np.cos(z),
-            -np.cos(x) * np.sin(y) * np.cos(z),
-            0.0 * (x + y + z),
-        )
+    u, v = np.sin(x) * np.cos(y) * np.cos(z), -np.cos(x) * np.sin(y) * np.cos(z)
+    return components(x, y, z, u, v)
 
 
 def vortices(cells: int) -> World:
@@ -114,28 +99,26 @@ def vortices(cells: int) -> World:
     world = make_world(
         grid=grid,
         viscosity=1.0 / REYNOLDS,
-        boundaries=Boundaries(PERIODIC, PERIODIC, PERIODIC, PERIODIC, PERIODIC, PERIODIC),
+        boundaries=Boundaries(*(PERIODIC,) * 6),
         tolerance=1e-7,
     )
-    set_velocity(world, SolidVortices())
+    set_velocity(world, solid_vortices)
     return world
 
 
 def decay(cells: int, duration: float) -> tuple[Array, Array, Array]:
-    """Decay of F3's vortices.
+    """Decay of F3's vortices over `duration` s.
 
     returns  (n+1,) energy per mass at the ends of all steps, m^2/s^2; (n-1,) times, s, and rates
              -dE/dt, m^2/s^3, in the middle of all steps but the first, which has no earlier
              acceleration
     """
     world = vortices(cells)
-    count, dt = whole_steps(duration, CFL * SIDE / cells)
-    energies = [kinetic_energy(world) / SIDE**3]
-    for _ in range(count):
-        advance(world, dt)
-        energies.append(kinetic_energy(world) / SIDE**3)
+    # in a step the fastest fluid crosses half a cell
+    count, dt = whole_steps(duration, 0.5 * SIDE / cells)
+    energies = history(world, dt, count, lambda: kinetic_energy(world) / SIDE**3)
     times = np.linspace(0.5 * dt, duration - 0.5 * dt, count)
-    return np.array(energies), times[1:], -np.diff(energies)[1:] / dt
+    return energies, times[1:], -np.diff(energies)[1:] / dt
 
 
 def vortices_break_up(quick: bool) -> list[Finding]:
@@ -144,45 +127,36 @@ def vortices_break_up(quick: bool) -> list[Finding]:
     The list has the course to within 5 % on 256 cells a side; coarser grids fail by their distance
     from it.
     """
-    grids = TAYLOR_GREEN_GRIDS[quick]
-    runs = [decay(n, DURATION) for n in grids]
-    peaks = [float(rates.max()) for _, _, rates in runs]
-    moments = [float(times[rates.argmax()]) for _, times, rates in runs]
+    grids = Grids("cells a side", (32, 64) if quick else (32, 64, 128))
+    runs = [decay(n, 20.0) for n in grids.cells]
+    peaks = [rates.max() for _, _, rates in runs]
+    moments = [times[rates.argmax()] for _, times, rates in runs]
+    early = [rates[0] for _, _, rates in runs]
     moment, published = np.array(reference("F3", "curve t,-dE/dt (digitised)")).T
     away = [
-        float(np.abs(np.interp(moment, times, rates) / published - 1.0).max())
-        for _, times, rates in runs
+        np.abs(np.interp(moment, times, rates) / published - 1.0).max() for _, times, rates in runs
     ]
     curves = [Curve("spectral, 512 cells a side", moment, published, True)]
     curves += [
         Curve(f"{n} cells a side", times[::4], rates[::4])
-        for n, (_, times, rates) in zip(grids, runs, strict=True)
+        for n, (_, times, rates) in zip(grids.cells, runs, strict=True)
     ]
     plot = Plot("t (s)", "-dE/dt (m^2/s^3)", curves)
-    label, name, when = "cells a side", "-dE_k/dt peak value", "time of peak"
+    name, when = "-dE_k/dt peak value", "time of peak"
     peak, time = float(reference("F3", name)), float(reference("F3", when))
-    high = GridSeries.toward(label, grids, peaks, peak)
-    late = GridSeries.toward(label, grids, moments, time)
-    course = GridSeries.toward(label, grids, away, 0.0)
-    early = [float(rates[0]) for _, _, rates in runs]
-    begun = GridSeries.toward(label, grids, early, DISSIPATION)
+    begun = "-dE/dt in the second step, m^2/s^3"
+    course = at_most("farthest from the published course, relative", away, 0.05, grids)
+    course = replace(course, tolerance="5 %")
     lines = [
         f"{n:>6g} cells a side: the first step loses {1.0 - energies[1] / energies[0]:.2g} of E"
-        for n, (energies, _, _) in zip(grids, runs, strict=True)
+        for n, (energies, _, _) in zip(grids.cells, runs, strict=True)
     ]
     return [
         near("E(0), m^2/s^2", runs[-1][0][0], ENERGY, relative=0.01),
-        near("-dE/dt in the second step, m^2/s^3", begun, DISSIPATION, relative=0.01, lines=lines),
-        within(name, high, peak, (0.0125, 0.0130), plot=plot),
-        within(when, late, time, (8.8, 9.1)),
-        Finding(
-            "farthest from the published course, relative",
-            away[-1],
-            0.0,
-            f"5 %{FALLING}",
-            away[-1] <= 0.05 and course.falls,
-            course,
-        ),
+        near(begun, early, DISSIPATION, grids, relative=0.01, lines=lines),
+        replace(within(name, peaks, peak, (0.0125, 0.0130), grids), plot=plot),
+        within(when, moments, time, (8.8, 9.1), grids),
+        falling(course),
     ]
 
 
@@ -198,11 +172,9 @@ def carried_body(driven: bool, steps: int, pace: float = 1.0) -> tuple[float, fl
 
     pace  the body's velocity over the stream's; any other than 1 is a disturbance
     """
-    grid = Grid.slab(32, 32, 0.125, (-2.0, -2.0))
+    grid = square(32, 4.0)
     body = (
-        '<body name="disc" pos="-0.9 0.031 0"><joint name="x" type="slide" axis="1 0 0"/>'
-        '<joint name="y" type="slide" axis="0 1 0"/>'
-        '<joint name="turn" type="hinge" axis="0 0 1"/>'
+        f'<body name="disc" pos="-0.9 0.031 0">{PLANAR}'
         f'<geom type="sphere" size="{0.5 * DIAMETER}" density="1"/></body>'
     )
     motions: tuple[Trajectory, ...] = ()
@@ -243,33 +215,28 @@ DECAY = 0.5 * RE - float(np.sqrt(0.25 * RE**2 + 4.0 * np.pi**2))
 """lambda of Kovasznay's flow, 1/m."""
 
 
-@dataclass(frozen=True)
-class Kovasznay:
+def kovasznay_flow(x: Array, y: Array, z: Array, time: float = 0.0) -> tuple[Array, Array, Array]:
     """The exact flow behind a row of cylinders at Re 40, as a profile and as a field."""
-
-    def __call__(
-        self, x: Array, y: Array, z: Array, time: float = 0.0
-    ) -> tuple[Array, Array, Array]:
-        wake = np.exp(DECAY * x)
-        u = 1.0 - wake * np.cos(2.0 * np.pi * y) + 0.0 * z
-        v = DECAY / (2.0 * np.pi) * wake * np.sin(2.0 * np.pi * y) + 0.0 * z
-        return u, v, 0.0 * (x + y + z)
+    wake = np.exp(DECAY * x)
+    u = 1.0 - wake * np.cos(2.0 * np.pi * y)
+    v = DECAY / (2.0 * np.pi) * wake * np.sin(2.0 * np.pi * y)
+    return components(x, y, z, u, v)
 
 
 def kovasznay_error(cells: int, duration: float) -> float:
     """Root of the mean square error of the velocity, in m/s, after `duration` s from the exact
     flow, with `cells` per m."""
     grid = Grid.slab(3 * cells // 2, 2 * cells, 1.0 / cells, (-0.5, -0.5))
-    exact = Kovasznay()
-    world = make_world(grid=grid, viscosity=1.0 / RE, boundaries=all_inflow(exact), tolerance=1e-10)
-    set_velocity(world, exact)
+    sides = all_inflow(kovasznay_flow)
+    world = make_world(grid=grid, viscosity=1.0 / RE, boundaries=sides, tolerance=1e-10)
+    set_velocity(world, kovasznay_flow)
     count, dt = whole_steps(duration, 0.25 * grid.spacing)
     advance(world, dt, count)
     _, state = world.flow()
     squares, number = 0.0, 0
     for axis in grid.axes:
         x, y, z = np.meshgrid(*grid.face_coordinates(axis), indexing="ij")
-        squares += float(((state.velocity[axis] - exact(x, y, z)[axis]) ** 2).sum())
+        squares += float(((state.velocity[axis] - kovasznay_flow(x, y, z)[axis]) ** 2).sum())
         number += x.size
     return float(np.sqrt(squares / number))
 
@@ -278,7 +245,7 @@ def kovasznay(quick: bool) -> list[Finding]:
     """F7: order of the velocity's error, with the exact velocity on all sides."""
     grids, duration = ((8, 16, 32), 1.0) if quick else ((16, 32, 64, 128), 4.0)
     errors = [kovasznay_error(n, duration) for n in grids]
-    series = GridSeries.toward("cells per m", grids, errors, 0.0)
+    series = GridSeries.toward(Grids("cells per m", grids), errors, 0.0)
     return [order_of("order of the velocity's L2 error", series, expected=2.0)]
 
 

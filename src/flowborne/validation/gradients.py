@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from time import perf_counter, process_time
 
 import numpy as np
 
-from flowborne import Controller, Grid, Hypothesis, Measurement, Simulation, World, load_scene, step
+from flowborne import Controller, Hypothesis, Measurement, Simulation, World, load_scene, step
 from flowborne.bodies import WindFaces, WindForce
 from flowborne.machine import Serial, cores, kernel_threads
 from flowborne.parts import (
@@ -21,8 +20,8 @@ from flowborne.parts import (
 )
 from flowborne.validation.case import Case, Tier
 from flowborne.validation.controller import AIR, HINGE, LENGTH, SPEED, WIDTH, block
-from flowborne.validation.findings import Finding, GridSeries, at_most, near, order_of
-from flowborne.validation.worlds import Vector, mjcf
+from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, near, order_of
+from flowborne.validation.worlds import Vector, mjcf, square
 from flowborne.worlds import make_world
 
 FRAME = 1.0 / 24.0
@@ -70,27 +69,17 @@ def difference_error(quick: bool) -> list[Finding]:
         ("one-sided", GradientOneSided, 1.0),
     ):
         found = slopes(kind, sizes, LEANING)
-        inverse = [1.0 / size for size in sizes]
-        series = GridSeries.toward("h^-1 in 1/degree", inverse, found, exact, relative=True)
+        inverse = Grids("h^-1 in 1/degree", [1.0 / size for size in sizes])
+        series = GridSeries.toward(inverse, found, exact, relative=True)
         findings.append(order_of(f"order of {label} differences", series, expected=order))
     scale = 2.0 * AIR * SPEED**2 * LENGTH
     level = slopes(GradientCentral, [5.0], 0.0)[0] / scale
     biased = slopes(GradientOneSided, [5.0], 0.0)[0] / scale
-    findings.append(at_most("central gradient at the most drag over 2 rho U^2 L", level, 1e-10))
-    found_bias = Finding(
-        "one-sided gradient there", biased, "< 0", "biased by O(h)", biased < -1e-3
-    )
-    return [*findings, found_bias]
-
-
-@dataclass(frozen=True)
-class Angle:
-    """Objective whose value is a joint's position at the end of the trial."""
-
-    dof: int
-
-    def __call__(self, measurement: Measurement) -> float:
-        return float(measurement.joint_positions(np.array([self.dof]))[0])
+    return [
+        *findings,
+        at_most("central gradient at the most drag over 2 rho U^2 L", level, 1e-10),
+        Finding("one-sided gradient there", biased, "< 0", "biased by O(h)", biased < -1e-3),
+    ]
 
 
 def pushed_arm(force: Vector) -> World:
@@ -103,10 +92,9 @@ def pushed_arm(force: Vector) -> World:
         '<body name="upper"><joint name="shoulder" axis="0 0 1"/>'
         f'<geom type="box" size=".1 .25 1" pos="0 -.25 0"/>{lower}</body>'
     )
-    grid = Grid.slab(32, 32, 3.0 / 32, (-1.5, -1.5))
     return make_world(
         model,
-        grid,
+        square(32, 3.0),
         gravity=(0.0, -9.81, 0.0),
         solid_density=3.0,
         density=1.0,
@@ -125,9 +113,13 @@ def exact_position(quick: bool) -> list[Finding]:
         world.solid.v[:] = rng.uniform(-1.0, 1.0, 2)
         start, asked = world.solid.q.copy(), rng.uniform(-0.3, 0.3, 2)
         for dof in (0, 1):
+
+            def end_position(measurement: Measurement, dof: int = dof) -> float:
+                return float(measurement.joint_positions(np.array([dof]))[0])
+
             controller = Controller(
                 np.array([0, 1]),
-                ObjectiveSum.of(ObjectiveCallable(Angle(dof))),
+                ObjectiveSum.of(ObjectiveCallable(end_position)),
                 Hypothesis(FRAME, steps=2),
                 1.0,
                 executor=Serial(),

@@ -7,7 +7,7 @@ import numpy as np
 from flowborne import Array, Grid, World
 from flowborne.validation.case import Case
 from flowborne.validation.findings import Finding, at_most
-from flowborne.validation.worlds import Vector, mjcf
+from flowborne.validation.worlds import Vector, mjcf, square
 from flowborne.worlds import advance, cut_by_bodies, make_world
 
 GRAVITY: Vector = (751.0, 83.6, 0.0)
@@ -23,7 +23,7 @@ DT = 1e-3
 SOLVE = 1e-13
 """Relative residual of the pressure solve, below the tolerance of the velocity."""
 
-SLAB = Grid.slab(48, 48, 1.0 / 48.0, (-0.5, -0.5))
+SLAB = square(48)
 BOX = Grid((20, 20, 20), 1.0 / 20.0, (-0.5, -0.5, -0.5))
 
 SHAPES = (
@@ -33,29 +33,20 @@ SHAPES = (
 )
 """Name, position and geometry of bodies; the grids cut them all."""
 
-HOLLOW = "".join(
-    f'<geom type="box" size="{size}" pos="{centre}"/>'
-    for size, centre in (
-        ("0.161 0.041 0.161", "0 0.12 0"),
-        ("0.161 0.041 0.161", "0 -0.12 0"),
-        ("0.041 0.161 0.161", "0.12 0 0"),
-        ("0.041 0.161 0.161", "-0.12 0 0"),
-        ("0.161 0.161 0.041", "0 0 0.12"),
-        ("0.161 0.161 0.041", "0 0 -0.12"),
-    )
-)
-"""A box around a closed pore."""
 
-FRAME = "".join(
-    f'<geom type="box" size="{size}" pos="{centre}"/>'
-    for size, centre in (
-        ("0.161 0.041 1", "0 0.12 0"),
-        ("0.161 0.041 1", "0 -0.12 0"),
-        ("0.041 0.161 1", "0.12 0 0"),
-        ("0.041 0.161 1", "-0.12 0 0"),
-    )
-)
-"""The same in a slab."""
+def hollow(depth: float, *ends: float) -> str:
+    """Geoms of walls around a pore: four of a half depth, and `ends` across z at these heights."""
+    walls = [
+        (f"{a} {b} {depth}", f"{x} {y} 0")
+        for a, b, x, y in (
+            (0.161, 0.041, 0, 0.12),
+            (0.161, 0.041, 0, -0.12),
+            (0.041, 0.161, 0.12, 0),
+            (0.041, 0.161, -0.12, 0),
+        )
+    ]
+    walls += [("0.161 0.161 0.041", f"0 0 {z}") for z in ends]
+    return "".join(f'<geom type="box" size="{size}" pos="{at}"/>' for size, at in walls)
 
 
 def placed(name: str, centre: Vector, content: str, grid: Grid, turned: str = "") -> str:
@@ -67,14 +58,8 @@ def placed(name: str, centre: Vector, content: str, grid: Grid, turned: str = ""
 def fixed_bodies(grid: Grid) -> str:
     """MJCF of bodies without joints, one of them hollow."""
     bodies = [placed(name, centre, geom, grid) for name, centre, geom in SHAPES]
-    pore = FRAME if grid.is_slab else HOLLOW
-    hollow = placed("hollow", (-0.243, 0.228, 0.01), pore, grid, 'euler="0 0 0.3"')
-    return mjcf(*bodies, hollow)
-
-
-def free_bodies(grid: Grid) -> str:
-    """MJCF of bodies that float."""
-    bodies = [placed(name, centre, "<freejoint/>" + geom, grid) for name, centre, geom in SHAPES]
+    pore = hollow(1) if grid.is_slab else hollow(0.161, 0.12, -0.12)
+    bodies.append(placed("hollow", (-0.243, 0.228, 0.01), pore, grid, 'euler="0 0 0.3"'))
     return mjcf(*bodies)
 
 
@@ -130,7 +115,7 @@ def still_around_fixed(grid: Grid, gravity: Vector, steps: int) -> tuple[float, 
 def still_around_free(grid: Grid, gravity: Vector, steps: int) -> tuple[float, float]:
     """Neutral free bodies in fluid at rest: max|u| and largest velocity of a body over g dt."""
     world = make_world(
-        free_bodies(grid),
+        mjcf(*(placed(name, centre, "<freejoint/>" + geom, grid) for name, centre, geom in SHAPES)),
         grid,
         gravity=gravity,
         solid_density=DENSITY,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flowborne import Array, Grid
 from flowborne.bodies import WindForce
+from flowborne.validation.articulated import first_angle, passages
 from flowborne.validation.case import Case, Tier, reference, table
-from flowborne.validation.findings import Finding, GridSeries, at_most, near
-from flowborne.validation.pendulums import passages
+from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, falling, near
 from flowborne.validation.worlds import (
     PERIODIC,
     RING,
@@ -19,6 +19,7 @@ from flowborne.validation.worlds import (
     Vector,
     all_inflow,
     mjcf,
+    square,
     start_at_once,
 )
 from flowborne.worlds import (
@@ -28,7 +29,6 @@ from flowborne.worlds import (
     kinetic_energy,
     make_world,
     set_velocity,
-    start,
 )
 
 G = 9.81
@@ -85,7 +85,7 @@ def neutral(
 def neutrally_buoyant(quick: bool) -> list[Finding]:
     """I4: bodies of many shapes stay at rest, or move with the stream."""
     steps = 100 if quick else 1000
-    flat = Grid.slab(32, 32, 2.0 / 32, (-1.0, -1.0))
+    flat = square(32, 2.0)
     solid = Grid((16, 16, 16), 2.0 / 16, (-1.0, -1.0, -1.0))
     findings = []
     for label, grid, bodies in (("2D", flat, FLAT_BODIES), ("3D", solid, SOLID_BODIES)):
@@ -102,6 +102,8 @@ def neutrally_buoyant(quick: bool) -> list[Finding]:
     findings.append(at_most("slip in a uniform stream of 0.46 m/s, m/s", slip, 1e-8))
     return findings
 
+
+LONGWISE = "cells along the long axis"
 
 LONG, SHORT = 0.5, 0.25
 """Semi-axes of I6's ellipse, m."""
@@ -135,9 +137,7 @@ def held_ellipse(cells: int, incidence: float) -> tuple[float, float]:
 
     cells  across the long axis, in a box of 3 m whose sides have the unbounded flow's velocity
     """
-    side = 3.0
-    count = round(cells * side)
-    grid = Grid.slab(count, count, side / count, (-0.5 * side, -0.5 * side))
+    grid = square(3 * cells, 3.0)
     model = mjcf(f'<geom type="ellipsoid" size="{LONG} {SHORT} 1"/>')
     world = make_world(model, grid, boundaries=all_inflow(PotentialFlow(incidence)))
     dt = 0.25 * grid.spacing
@@ -149,19 +149,17 @@ def held_ellipse(cells: int, incidence: float) -> tuple[float, float]:
 
 def munk_moment(quick: bool) -> list[Finding]:
     """I6: moment and force on the ellipse at three incidences."""
-    grids = (32, 64, 128) if quick else (16, 32, 64, 128, 256)
-    label = "cells along the long axis"
+    grids = Grids(LONGWISE, (32, 64, 128) if quick else (16, 32, 64, 128, 256))
     findings = []
     for degrees in (45.0,) if quick else (10.0, 30.0, 45.0):
         exact = float(np.sin(2.0 * np.radians(degrees)))
-        runs = [held_ellipse(n, np.radians(degrees)) for n in grids]
-        moments, forces = [run[0] for run in runs], [run[1] for run in runs]
-        series = GridSeries.toward(label, grids, moments, exact, relative=True)
+        runs = [held_ellipse(n, np.radians(degrees)) for n in grids.cells]
+        moments, forces = zip(*runs, strict=True)
+        series = GridSeries.toward(grids, moments, exact, relative=True)
         title = f"M over rho U^2 pi (a^2-b^2)/2 at {degrees:g} degrees"
-        findings.append(near(title, series, exact, relative=0.01, falling=True))
-        series = GridSeries.toward(label, grids, forces, 0.0)
+        findings.append(falling(near(title, series, exact, relative=0.01)))
         title = f"force over rho U^2 2a at {degrees:g} degrees"
-        findings.append(at_most(title, series, 0.02))
+        findings.append(at_most(title, forces, 0.02, grids))
     return findings
 
 
@@ -188,9 +186,6 @@ class PendulumBox:
         return float(table("I2", "cylinder in closed square, Ca vs D/L")[2.0 * RADIUS / self.side])
 
 
-WIDEST = 150.0
-"""Largest angle of release of the bob, degrees."""
-
 NARROW = PendulumBox(2.0, ROD, (64, 128, 256, 384))
 """The bob rests in the middle."""
 
@@ -211,7 +206,7 @@ def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: fl
     ratio   density over the fluid's: the rod stands on its pivot below 1, and hangs above
     period  expected, s; the step is a hundredth of it, and shorter for a fast bob
     """
-    grid = Grid.slab(cells, cells, box.side / cells, (-0.5 * box.side, -0.5 * box.side))
+    grid = square(cells, box.side)
     up = 1.0 if ratio > 1.0 else -1.0
     bob = f'<geom type="sphere" size="{RADIUS}" pos="0 {-up * ROD} 0" density="{ratio}"/>'
     body = f'<body pos="0 {up * box.above} 0"><joint name="pivot" axis="0 0 1"/>{bob}</body>'
@@ -219,12 +214,7 @@ def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: fl
     world.solid.q[0] = np.radians(degrees)
     fastest = 2.0 * np.pi / period * ROD * np.radians(degrees)
     dt = min(0.01 * period, 0.5 * grid.spacing / fastest)
-    start(world, dt)
-    angles = [float(world.solid.q[0])]
-    for _ in range(int(1.35 * period / dt)):
-        advance(world, dt)
-        angles.append(float(world.solid.q[0]))
-    times = passages(np.array(angles), dt)
+    times = passages(first_angle(world, dt, int(1.35 * period / dt)), dt)
     if times.size < 3:
         raise ArithmeticError(f"the pendulum let go at {degrees:g} degrees has no full swing")
     return float(times[2] - times[0])
@@ -237,20 +227,20 @@ def pendulum(quick: bool) -> list[Finding]:
     for ratio in (2.0, 0.5) if quick else (2.0, 0.5, 0.01):
         exact = small_period(ratio, NARROW.added)
         found = [swing(NARROW, n, ratio, 5.0, exact) for n in grids]
-        series = GridSeries.toward("cells a side", grids, found, exact, relative=True)
+        series = GridSeries.toward(Grids("cells a side", grids), found, exact, relative=True)
         title = f"period at rho_s/rho_f = {ratio:g} let go at 5 degrees, s"
         findings.append(near(title, series, exact, relative=0.02))
     if quick:
         return findings
     for degrees, factor in table("I7", "amplitude factor").items():
-        if not 5.0 < degrees <= WIDEST:
+        if not 5.0 < degrees <= 150.0:
             continue
         box = NARROW if degrees <= 90.0 else WIDE
         exact = small_period(2.0, box.added)
         values = [swing(box, n, 2.0, degrees, factor * exact) / exact for n in box.grids]
-        series = GridSeries.toward("cells a side", box.grids, values, factor)
         title = f"T/T0 at rho_s/rho_f = 2 let go at {degrees:g} degrees"
-        findings.append(near(title, series, factor, relative=0.02))
+        on = Grids("cells a side", box.grids)
+        findings.append(near(title, values, factor, on, relative=0.02))
     return findings
 
 
@@ -265,13 +255,11 @@ def slug(cells: int, plug: float, mass: float, sides: Boundaries, steps: int, so
     plug   its length, m
     mass   its mass, kg
     """
-    h = 1.0 / cells
-    corner = (-0.5 * LENGTH, -0.5, -0.5)
-    grid = (
-        Grid((round(LENGTH) * cells, cells, cells), h, corner)
-        if solid
-        else Grid.slab(round(LENGTH) * cells, cells, h, corner[:2])
-    )
+    h, long = 1.0 / cells, round(LENGTH) * cells
+    if solid:
+        grid = Grid((long, cells, cells), h, (-0.5 * LENGTH, -0.5, -0.5))
+    else:
+        grid = Grid.slab(long, cells, h, (-0.5 * LENGTH, -0.5))
     geom = f'<geom type="box" size="{0.5 * plug} 1 1" mass="{mass}"/>'
     body = f'<body name="plug" pos=".0123 0 0"><joint type="slide" axis="1 0 0"/>{geom}</body>'
     force = WindForce((1.0, 0.0, 0.0))
@@ -283,7 +271,7 @@ def slug(cells: int, plug: float, mass: float, sides: Boundaries, steps: int, so
 
 def piston(quick: bool) -> list[Finding]:
     """I8: a plug between open ends and in a ring, in the first step and over many."""
-    grids: Sequence[int] = (8, 16) if quick else (8, 16, 32, 64)
+    grids = (8, 16) if quick else (8, 16, 32, 64)
     steps = 10 if quick else 100
     ends = BoundaryOpen()
     findings = []
@@ -298,11 +286,9 @@ def piston(quick: bool) -> list[Finding]:
                     wrong = max(wrong, abs(slug(n, 0.5, mass, sides, count, False) - 1.0))
                 wrong = max(wrong, abs(slug(8, 0.5, mass, sides, min(count, 10), True) - 1.0))
         between = [slug(n, 0.53, 1.0, sides, 1, False) for n in grids]
-        series = GridSeries.toward("cells across", grids, between, 1.0)
-        lines = [
-            "a plug 0.53 m long, no whole number of cells, displaces whole faces:",
-            *series.lines(),
-        ]
+        series = GridSeries.toward(Grids("cells across", grids), between, 1.0)
+        lines = ["a plug 0.53 m long, no whole number of cells, displaces whole faces:"]
+        lines += series.lines()
         title = f"largest error of (m + M_f) a / F, {label}, plug of whole cells"
         findings.append(at_most(title, wrong, 1e-6, lines=lines))
     return findings
@@ -320,9 +306,7 @@ def turning(cells: int) -> Array:
 
     cells  along the long axis; a tip moves half a cell a step
     """
-    side = 3.0
-    count = round(cells * side)
-    grid = Grid.slab(count, count, side / count, (-0.5 * side, -0.5 * side))
+    grid = square(3 * cells, 3.0)
     geom = f'<geom type="ellipsoid" size="{TURNING[0]} {TURNING[1]} 1"/>'
     world = make_world(mjcf(f"<body><freejoint/>{geom}</body>"), grid, solid_density=1.0)
     world.solid.q[:2] = -0.0123, 0.0177
@@ -344,13 +328,12 @@ def free_turn(quick: bool) -> list[Finding]:
     grids = tuple(allowed)[:2] if quick else tuple(allowed)
     runs = [turning(n) for n in grids]
     lost = [float(1.0 - run[-1]) for run in runs]
-    series = GridSeries("cells along the long axis", grids, lost, lost)
-    findings = [
-        at_most(
-            f"part of the energy lost in half a turn, {n} cells", part, allowed[n], series=series
-        )
-        for n, part in zip(grids, lost, strict=True)
-    ]
+    series = GridSeries(LONGWISE, grids, lost, lost)
+    findings = []
+    for n, part in zip(grids, lost, strict=True):
+        title = f"part of the energy lost in half a turn, {n} cells"
+        lines = [] if part >= 0.0 else ["the energy is larger than at the start"]
+        findings.append(replace(at_most(title, part, allowed[n], lines=lines), series=series))
     most = float(max(run.max() for run in runs))
     return [*findings, at_most("largest energy over that at the start", most, 1.0)]
 

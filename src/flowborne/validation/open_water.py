@@ -14,7 +14,7 @@ import numpy as np
 
 from flowborne import Grid, World
 from flowborne.validation.case import Case, Tier, confirmed, reference, table
-from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, near, within
+from flowborne.validation.findings import Curve, Finding, Grids, Plot, falling, near, within
 from flowborne.validation.shedding import (
     AFTER,
     BEFORE,
@@ -28,30 +28,11 @@ from flowborne.validation.shedding import (
     judged,
     watch,
 )
-from flowborne.validation.worlds import Vector, mjcf, refined, whole_steps
-from flowborne.worlds import (
-    Boundaries,
-    BoundaryInflow,
-    BoundaryOpen,
-    advance,
-    make_world,
-    velocity_at,
-)
+from flowborne.validation.worlds import Vector, force_on, mjcf, refined, through_flow, whole_steps
+from flowborne.worlds import advance, make_world, velocity_at
 
-STEADY_GRIDS = {True: (4, 8), False: (8, 16, 24, 32)}
 OPEN_GRIDS = {True: (4,), False: (8, 16, 24, 32)}
-GERRIS_GRIDS = (8, 16)
-SPHERE_GRIDS = {True: (4,), False: (6, 8, 12)}
-"""Cells across D, by quick: of B4; of B5, B6 and V9; of B6's frequencies over the Reynolds number;
-of B7."""
-
-FIRST, NEXT = {True: 30.0, False: 60.0}, 15.0
-SPHERE_FIRST, SPHERE_NEXT = {True: 6.0, False: 16.0}, 6.0
-"""Times D/U in which B4 and B7 become steady: on the first grid, by quick, from the undisturbed
-flow, and on the others from that of the coarser grid."""
-
-FURTHEST = 6.0
-"""Diameters behind the cylinder's centre within which the backflow ends."""
+"""Cells across D of B5, B6 and V9, by quick."""
 
 UPSTREAM, DOWNSTREAM, ASIDE = 6, 16, 5
 """Diameters from the sphere's centre to the sides of its box; the lateral ones slip."""
@@ -59,7 +40,9 @@ UPSTREAM, DOWNSTREAM, ASIDE = 6, 16, 5
 BETWEEN: Vector = (0.0, np.sqrt(0.5), np.sqrt(0.5))
 """Between y and z, away from the planes of symmetry."""
 
-LABEL = "cells across D"
+
+def across(cells: Sequence[int]) -> Grids:
+    return Grids("cells across D", cells)
 
 
 def open_water(cells: int, viscosity: float) -> World:
@@ -73,15 +56,16 @@ def open_water(cells: int, viscosity: float) -> World:
         cylinder(1.0, 0.0, 0.0),
         grid,
         viscosity=viscosity,
-        boundaries=Boundaries(BoundaryInflow(STREAM), BoundaryOpen()),
+        boundaries=through_flow(STREAM),
         tolerance=1e-7,
     )
 
 
 def bubble(world: World) -> float:
-    """Length of the backflow behind the cylinder along its axis, in D; 0 where there is none."""
+    """Length of the backflow behind the cylinder along its axis, in D, at most 5.5; 0 where there
+    is none."""
     h = world.flow()[0].grid.spacing
-    x = np.arange(0.5 + h, FURTHEST, 0.05 * h)
+    x = np.arange(0.5 + h, 6.0, 0.05 * h)
     u = velocity_at(world, x[:, None] * np.array(STREAM.velocity))[:, 0]
     if u[0] > 0.0:
         return 0.0
@@ -90,11 +74,12 @@ def bubble(world: World) -> float:
 
 def steady_cylinder(quick: bool) -> list[Finding]:
     """B4: drag, length of the backflow and the angle at which the flow leaves the cylinder."""
-    grids = STEADY_GRIDS[quick]
+    grids = (4, 8) if quick else (8, 16, 24, 32)
+    undisturbed = 30.0 if quick else 60.0
     rows, lines = [], []
     for n, world, first in refined(grids, lambda n: open_water(n, 1.0 / 40.0), STREAM):
         dt = CFL / n
-        steps = round((FIRST[quick] if first else NEXT) / dt)
+        steps = round((undisturbed if first else 15.0) / dt)
         before, _ = UNBOUNDED.coefficients(advance(world, dt, steps - n))
         drag, _ = UNBOUNDED.coefficients(advance(world, dt, n))
         rows.append((drag, bubble(world), 180.0 - separation(world, (0.0, 1.0, 0.0))))
@@ -109,7 +94,7 @@ def steady_cylinder(quick: bool) -> list[Finding]:
 
 def shed_in_the_open(
     reynolds: float, strouhal: float, grids: Sequence[int], quick: bool
-) -> tuple[list[list[float]], list[str]]:
+) -> tuple[list[tuple[float, ...]], list[str]]:
     """Mean drag, amplitude of the lift and frequency from grid to grid, and lines for people.
 
     strouhal  rough value of the expected frequency
@@ -124,7 +109,7 @@ def shed_in_the_open(
         mean = float(drags[steps].mean())
         rows.append((mean, amplitude(seen.signal[steps]), UNBOUNDED.time / period))
         lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
-    return [list(column) for column in zip(*rows, strict=True)], lines
+    return list(zip(*rows, strict=True)), lines
 
 
 def shedding_at_100(quick: bool) -> list[Finding]:
@@ -132,9 +117,9 @@ def shedding_at_100(quick: bool) -> list[Finding]:
     grids = OPEN_GRIDS[quick]
     (drag, lift, strouhal), lines = shed_in_the_open(100.0, 0.165, grids, quick)
     return [
-        judged("B5", "Cd mean", grids, drag, (1.31, 1.39), falling=True, lines=lines),
-        judged("B5", "Cl amplitude", grids, lift, (0.30, 0.345), falling=True),
-        judged("B5", "St", grids, strouhal, (0.160, 0.170), falling=True),
+        falling(judged("B5", "Cd mean", grids, drag, (1.31, 1.39), lines=lines)),
+        falling(judged("B5", "Cl amplitude", grids, lift, (0.30, 0.345))),
+        falling(judged("B5", "St", grids, strouhal, (0.160, 0.170))),
     ]
 
 
@@ -143,28 +128,27 @@ def shedding_at_200(quick: bool) -> list[Finding]:
     at Re 250 to 500."""
     grids = OPEN_GRIDS[quick]
     (drag, lift, strouhal), lines = shed_in_the_open(200.0, 0.197, grids, quick)
-    findings = [
+    return [
         judged("B6", "Cd mean", grids, drag, (1.17, 1.41), lines=lines),
         judged("B6", "Cl amplitude", grids, lift, (0.50, 0.70)),
         judged("B6", "St", grids, strouhal, (0.190, 0.203)),
+        *([] if quick else frequencies()),
     ]
-    return findings if quick else findings + frequencies()
 
 
 def frequencies() -> list[Finding]:
     """Frequency over the Reynolds number, against Gerris's."""
-    known = table("B6", "St(Re) Gerris 250..500")
-    found = {re: shed_in_the_open(re, st, GERRIS_GRIDS, False)[0][2] for re, st in known.items()}
+    known, grids = table("B6", "St(Re) Gerris 250..500"), (8, 16)
+    found = {re: shed_in_the_open(re, st, grids, False)[0][2] for re, st in known.items()}
     curves = (
         Curve("Gerris", list(known), list(known.values()), True),
         Curve("flowborne", list(known), [values[-1] for values in found.values()]),
     )
-    plot = Plot("Reynolds number", "Strouhal number", curves)
-    findings = []
-    for reynolds, exact in known.items():
-        series = GridSeries.toward(LABEL, GERRIS_GRIDS, found[reynolds], exact)
-        findings.append(near(f"St at Re {reynolds:g}", series, exact, relative=0.03))
-    return [replace(findings[0], plot=plot), *findings[1:]]
+    first, *others = (
+        near(f"St at Re {reynolds:g}", found[reynolds], exact, across(grids), relative=0.03)
+        for reynolds, exact in known.items()
+    )
+    return [replace(first, plot=Plot("Reynolds number", "Strouhal number", curves)), *others]
 
 
 def held_at_185(quick: bool) -> list[Finding]:
@@ -173,13 +157,12 @@ def held_at_185(quick: bool) -> list[Finding]:
     grids = OPEN_GRIDS[quick]
     (drag, lift, strouhal), lines = shed_in_the_open(185.0, 0.195, grids, quick)
     measured = (drag, [value * np.sqrt(0.5) for value in lift], strouhal)
-    findings = []
-    for (name, exact), values in zip(known.items(), measured, strict=True):
-        series = GridSeries.toward(LABEL, grids, values, exact)
-        findings.append(near(f"{name}, held", series, exact, relative=0.05))
     sure = confirmed("V9", "fixed cylinder Re=185")
-    findings[0] = replace(findings[0], lines=tuple(lines))
-    return [replace(finding, confirmed=sure) for finding in findings]
+    first, *others = (
+        replace(near(f"{name}, held", values, exact, across(grids), relative=0.05), confirmed=sure)
+        for (name, exact), values in zip(known.items(), measured, strict=True)
+    )
+    return [replace(first, lines=lines), *others]
 
 
 def numbers_of(text: str) -> dict[str, float]:
@@ -197,26 +180,24 @@ def quarter(cells: int, reynolds: float) -> World:
         mjcf(sphere),
         grid,
         viscosity=1.0 / reynolds,
-        boundaries=Boundaries(BoundaryInflow(STREAM), BoundaryOpen()),
+        boundaries=through_flow(STREAM),
         tolerance=1e-7,
     )
 
 
 def steady_drag(world: World, duration: float) -> tuple[float, float]:
-    """Drag coefficient of the sphere after some times D/U, and its change over the last one."""
+    """Drag coefficient of the sphere after some times D/U, and its change over the last one.
+
+    Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F.
+    """
     fluid, _ = world.flow()
     steps, dt = whole_steps(duration, CFL * fluid.grid.spacing)
     tail = round(1.0 / dt)
-    before = sphere_drag(world, dt, steps - tail)
-    after = sphere_drag(world, dt, tail)
+    before, after = (
+        float(4.0 * force_on(advance(world, dt, count))[0] * 8.0 / np.pi)
+        for count in (steps - tail, tail)
+    )
     return after, abs(after - before)
-
-
-def sphere_drag(world: World, dt: float, steps: int) -> float:
-    """Cd = F / (rho U^2 / 2  pi D^2 / 4) after some steps; the quarter has a quarter of F."""
-    report = advance(world, dt, steps)
-    force = (report.pressure_wrench + report.viscous_wrench)[1, 0]
-    return float(4.0 * force * 8.0 / np.pi)
 
 
 def recirculation(world: World) -> float:
@@ -256,38 +237,28 @@ def separation(world: World, aside: Vector) -> float:
 
 def sphere(quick: bool) -> list[Finding]:
     """B7: drag at Re 100 and 150, and the bubble behind the sphere at Re 100."""
-    grids = SPHERE_GRIDS[quick]
+    grids = (4,) if quick else (6, 8, 12)
+    undisturbed = 6.0 if quick else 16.0
     findings = []
     for reynolds in (100, 150):
         rows, lines = [], []
         build = partial(quarter, reynolds=reynolds)
         for n, world, first in refined(grids, build, STREAM):
-            duration = SPHERE_FIRST[quick] if first else SPHERE_NEXT
-            coefficient, change = steady_drag(world, duration)
+            coefficient, change = steady_drag(world, undisturbed if first else 6.0)
             rows.append((coefficient, recirculation(world), separation(world, BETWEEN)))
             lines.append(f"{n:>6g} cells across D: Cd changes by {change:.2g} in the last D/U")
         drags, lengths, angles = zip(*rows, strict=True)
         exact = float(reference("B7", f"Cd({reynolds})"))
-        series = GridSeries.toward(LABEL, grids, drags, exact)
-        title = f"Cd at Re {reynolds}"
-        findings.append(near(title, series, exact, relative=0.03, falling=True, lines=lines))
+        title, on = f"Cd at Re {reynolds}", across(grids)
+        findings.append(falling(near(title, drags, exact, on, relative=0.03, lines=lines)))
         if reynolds == 100:
-            findings += sphere_bubble(grids, lengths, angles)
+            length = float(reference("B7", "L/D(100)"))
+            angle = float(reference("B7", "separation angle").removesuffix(" deg"))
+            findings += [
+                within("L/D at Re 100", lengths, length, (0.85, 0.90), on),
+                near("separation angle at Re 100", angles, angle, on, absolute=2.0),
+            ]
     return findings
-
-
-def sphere_bubble(
-    grids: tuple[int, ...], lengths: tuple[float, ...], angles: tuple[float, ...]
-) -> list[Finding]:
-    """The findings about the bubble at Re 100."""
-    length = float(reference("B7", "L/D(100)"))
-    angle = float(reference("B7", "separation angle").removesuffix(" deg"))
-    long = GridSeries.toward(LABEL, grids, lengths, length)
-    turned = GridSeries.toward(LABEL, grids, angles, angle)
-    return [
-        within("L/D at Re 100", long, length, (0.85, 0.90)),
-        near("separation angle at Re 100", turned, angle, absolute=2.0),
-    ]
 
 
 CASES = (

@@ -21,19 +21,18 @@ Lengths are cm and angles degrees, as published. A link's direction points to th
 from __future__ import annotations
 
 import gzip
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from importlib.resources import files
 from time import perf_counter
-from types import MappingProxyType
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flowborne import Array, BlowUpError, Simulation, load_scene
+from flowborne import Array, Simulation, load_scene
 from flowborne.bodies import kinematics
 from flowborne.validation.case import Case, reference
-from flowborne.validation.findings import Finding, GridSeries
+from flowborne.validation.findings import Finding, Grids, at_most
+from flowborne.validation.worlds import frames_of
 
 LINK_LENGTH = np.array([12.0, 9.8, 9.8, 9.8, 9.8, 9.8])
 """cm of each link, head first."""
@@ -54,32 +53,8 @@ QUANTITIES = (
 HEADING = 4
 """Compared quantities, and the number of the heading."""
 
-GRIDS = {True: (122,), False: (122, 183, 244)}
-ROOM_GRIDS = (61, 92, 122)
-"""Cells across the tank, by quick; and across the tank of `eel-room`, unless quick."""
-
-AMPLITUDES = {True: (20,), False: (20, 40)}
-"""Degrees of the gait, by quick."""
-
 TANK_LENGTH = {20: 1.0, 40: 1.25}
 """Length of the tank over that of the scene, by amplitude."""
-
-
-@dataclass(frozen=True)
-class SwimPath:
-    """The robot's path at TIMES.
-
-    mass_centre  (241, 2) cm
-    head         (241, 3) middle of the head link in cm, and its angle in degrees
-    """
-
-    mass_centre: Array
-    head: Array
-
-    def changes(self) -> Array:
-        """(241, 5) QUANTITIES less their values at the start."""
-        values = np.hstack([self.mass_centre, self.head])
-        return np.asarray(values - values[0])
 
 
 def table(name: str) -> dict[str, Array]:
@@ -120,8 +95,9 @@ def mass_centre(head: Array, joints: Array) -> Array:
     return np.asarray(np.average(middles, axis=1, weights=MASS))
 
 
-def measured(amplitude: int, last: int = -2) -> list[SwimPath]:
-    """All runs at an amplitude of the gait in degrees, 20 or 40.
+def measured(amplitude: int, last: int = -2) -> Array:
+    """(runs, 241, 5) QUANTITIES less their values at the start, of all runs at an amplitude of the
+    gait in degrees, 20 or 40.
 
     last  number of the sample that gives the time of the last one: the last but one as published,
           -1 by the logs' times, which are later by 17 ms in the mean
@@ -132,22 +108,22 @@ def measured(amplitude: int, last: int = -2) -> list[SwimPath]:
         mine = log["run"] == run
         sampled = np.stack([log["x_cm"], log["y_cm"], -log["yaw_deg"]], axis=1)[mine]
         head = resampled(sampled, log["time_s"][mine][last])
-        runs.append(SwimPath(mass_centre(head, joints), head))
-    return runs
+        path = np.hstack([mass_centre(head, joints), head])
+        runs.append(path - path[0])
+    return np.array(runs)
 
 
-def rmse(changes: Array, runs: list[SwimPath]) -> Array:
+def rmse(changes: Array, runs: Array) -> Array:
     """(5,) root mean square error of changes (241, 5) over all times of all runs."""
-    off = np.stack([changes - run.changes() for run in runs])
-    return np.asarray(np.sqrt(np.mean(off**2, axis=(0, 1))))
+    return np.asarray(np.sqrt(np.mean((changes - runs) ** 2, axis=(0, 1))))
 
 
-def scatter(runs: list[SwimPath]) -> Array:
+def scatter(runs: Array) -> Array:
     """(5,) rmse of the mean of all runs, the least of any trajectory."""
-    return rmse(np.mean([run.changes() for run in runs], axis=0), runs)
+    return rmse(runs.mean(axis=0), runs)
 
 
-def lag(changes: Array, runs: list[SwimPath]) -> tuple[float, float]:
+def lag(changes: Array, runs: Array) -> tuple[float, float]:
     """Delay of a trajectory's heading in s, to 5 ms, and its rmse without the delay."""
     heading = CubicSpline(TIMES, changes[:, HEADING])
     lags = 0.005 * np.arange(25)
@@ -160,49 +136,25 @@ def lag(changes: Array, runs: list[SwimPath]) -> tuple[float, float]:
     return float(lags[best]), errors[best]
 
 
-@dataclass(frozen=True)
-class Swim:
-    """A run of the scene.
+def swim(amplitude: int, cells: int, scene: str = "eel") -> tuple[Array, float]:
+    """(241, 5) QUANTITIES of a scene's robot at TIMES, and the seconds of wall clock of the run.
 
-    path     at TIMES
-    seconds  of wall clock
-    """
-
-    path: SwimPath
-    seconds: float
-
-
-def swim(
-    amplitude: int,
-    cells: int,
-    settings: Mapping[str, str] = MappingProxyType({}),
-    scene: str = "eel",
-) -> Swim:
-    """Run the robot of a scene.
-
-    cells     across the tank
-    settings  in place of the scene's own
-    raises    ArithmeticError when the run blows up
+    cells   across the tank
+    raises  ArithmeticError when the run blows up
     """
     domain = load_scene(scene).domain
     assert domain is not None
     upper = (domain.upper[0], domain.upper[1] * TANK_LENGTH[amplitude], *domain.upper[2:])
-    own = {
+    settings = {
         "constants.amplitude": f"{amplitude}",
         "domain.upper": f"[{', '.join(f'{c:g}' for c in upper)}]",
         "domain.resolution": f"{round(cells * TANK_LENGTH[amplitude])}",
     }
     started = perf_counter()
-    with Simulation(load_scene(scene, {**own, **settings})) as simulation:
-        rows = [quantities(simulation)]
-        try:
-            for _ in TIMES[1:]:
-                simulation.advance_frame()
-                rows.append(quantities(simulation))
-        except BlowUpError as error:
-            raise ArithmeticError(f"{scene} on {cells} cells: {error}") from error
-    found = np.array(rows)
-    return Swim(SwimPath(found[:, :2], found[:, 2:]), perf_counter() - started)
+    with Simulation(load_scene(scene, settings)) as simulation:
+        first = quantities(simulation)
+        later = frames_of(simulation, len(TIMES) - 1, lambda _: quantities(simulation))
+    return np.array([first, *later]), perf_counter() - started
 
 
 def quantities(simulation: Simulation) -> Array:
@@ -217,39 +169,30 @@ def quantities(simulation: Simulation) -> Array:
 def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list[Finding]:
     """Errors of the robot on some grids, of which the last is judged, and of other simulators."""
     runs = measured(amplitude)
-    swims = [swim(amplitude, count, scene=scene) for count in cells]
-    errors = np.array([rmse(one.path.changes(), runs) for one in swims])
-    least = scatter(runs)
+    paths, seconds = zip(*(swim(amplitude, n, scene=scene) for n in cells), strict=True)
+    errors = np.array([rmse(path - path[0], runs) for path in paths])
+    least, grids = scatter(runs), Grids("cells across the tank", cells)
+    times = [
+        f"{n:>6} cells across the tank: 4 s in {spent:.0f} s"
+        for n, spent in zip(cells, seconds, strict=True)
+    ]
     findings = []
     for n, quantity in enumerate(QUANTITIES):
         aquarium, genesis = (
             reference("R1", simulator)[str(amplitude)][quantity]
             for simulator in ("Aquarium", "Genesis")
         )
-        found = [float(error) for error in errors[:, n]]
-        value = found[-1]
-        lines = [
-            f"{count:>6} cells across the tank: 4 s in {one.seconds:.0f} s"
-            for count, one in zip(cells, swims, strict=True)
-        ]
-        if n == HEADING:
-            lines += delay_lines(swims[-1].path.changes(), amplitude, runs)
+        title = f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}"
+        delay = delay_lines(paths[-1] - paths[-1][0], amplitude, runs) if n == HEADING else []
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
-        findings.append(
-            Finding(
-                f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}",
-                value,
-                aquarium,
-                "at most",
-                value <= aquarium,
-                GridSeries("cells across the tank", cells, found, found),
-                lines=(*lines, f"{others}, mean of the {len(runs)} runs {least[n]:.3f}"),
-            )
-        )
+        scattered = f"mean of the {len(runs)} runs {least[n]:.3f}"
+        lines = [*times, *delay, f"{others}, {scattered}"]
+        found = at_most(title, errors[:, n], aquarium, grids, lines=lines)
+        findings.append(replace(found, reference=aquarium, tolerance="at most"))
     return findings
 
 
-def delay_lines(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[str]:
+def delay_lines(changes: Array, amplitude: int, runs: Array) -> list[str]:
     """The delay in a heading's error, in words."""
     late, left = lag(changes, runs)
     own = float(rmse(changes, measured(amplitude, last=-1))[HEADING])
@@ -261,10 +204,15 @@ def delay_lines(changes: Array, amplitude: int, runs: list[SwimPath]) -> list[st
 
 def robot(quick: bool) -> list[Finding]:
     """R1: errors at most those of the robot's own simulator, Aquarium."""
-    cases = [(amplitude, GRIDS[quick], "eel") for amplitude in AMPLITUDES[quick]]
-    if not quick:
-        cases += [(amplitude, ROOM_GRIDS, "eel-room") for amplitude in AMPLITUDES[quick]]
-    return [finding for case in cases for finding in compared(*case)]
+    if quick:
+        return compared(20, (122,))
+    runs = (("eel", (122, 183, 244)), ("eel-room", (61, 92, 122)))
+    return [
+        finding
+        for scene, cells in runs
+        for amplitude in (20, 40)
+        for finding in compared(amplitude, cells, scene)
+    ]
 
 
 CASES = (Case("R1", robot, coarse=True),)

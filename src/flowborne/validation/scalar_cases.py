@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from flowborne import Array, Faces, Grid
 from flowborne.validation.case import Case
-from flowborne.validation.findings import Finding, GridSeries, order_of
+from flowborne.validation.findings import Finding, Grids, GridSeries, order_of
 from flowborne.validation.worlds import whole_steps
 from flowborne.worlds import (
     CENTRE,
@@ -33,31 +32,9 @@ WALLS, OPEN = Boundaries(), Boundaries(*(BoundaryOpen(),) * 4)
 BOUNDS = 0.0, 1.0
 """Least and largest value of all shapes; the cells' values of a blob are a little below 1."""
 
-TURN_GRIDS = {True: (32, 64, 128), False: (64, 128, 256, 512)}
-SMEARED_GRIDS = {True: (64, 128, 256), False: (64, 128, 256, 512)}
-SWIRL_GRIDS = {True: (64, 128), False: (128, 256, 512)}
-DISC_GRIDS = {True: (50, 100), False: (50, 100, 200, 400)}
-"""Cells a side, by quick: the blob in a turn, the same with the semi-Lagrangian scheme, the blob in
-the swirl, the disc."""
-
-SWIRL_PERIOD = {True: 2.0, False: 8.0}
-"""s, by quick."""
-
 SHORT_PERIOD = 2.0
 """s, of the swirl with the semi-Lagrangian scheme: in 8 s it would smear LeVeque's thread away on
 every affordable grid, without an observable order."""
-
-
-class Flow(Protocol):
-    """A flow in the plane without sources."""
-
-    def __call__(self, x: Array, y: Array, time: float) -> tuple[Array, Array]:
-        """Velocity, m/s."""
-        ...
-
-    def stream(self, x: Array, y: Array, time: float) -> Array:
-        """Stream function psi, m^2/s: (u, v) = (d psi/dy, -d psi/dx)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -90,6 +67,11 @@ class Swirl:
     def stream(self, x: Array, y: Array, time: float) -> Array:
         strength = np.cos(np.pi * time / self.period) / np.pi
         return np.asarray(strength * np.sin(np.pi * x) ** 2 * np.sin(np.pi * y) ** 2)
+
+
+Flow = Turn | Swirl
+"""A flow in the plane without sources: velocity (m/s), and stream function psi (m^2/s) with
+(u, v) = (d psi/dy, -d psi/dx)."""
 
 
 @dataclass(frozen=True)
@@ -173,8 +155,12 @@ def lost(before: Array, after: Array) -> float:
     return float(np.abs(after - before).sum() / before.sum())
 
 
-def unit_box(cells: int) -> Grid:
-    return Grid.slab(cells, cells, 1.0 / cells, (0.0, 0.0))
+def box(cells: int, side: float = 1.0) -> Grid:
+    return Grid.slab(cells, cells, side / cells, (0.0, 0.0))
+
+
+def on(cells: Sequence[int]) -> Grids:
+    return Grids("cells a side", cells)
 
 
 def blob_in_turn(grids: Sequence[int], flux_form: bool) -> tuple[GridSeries, GridSeries]:
@@ -183,43 +169,37 @@ def blob_in_turn(grids: Sequence[int], flux_form: bool) -> tuple[GridSeries, Gri
     for n in grids:
         courant = 2.0 if flux_form else 4.0
         blob, turn = Blob(0.7, 0.1), Turn(0.5, 1.0)
-        before, after = carried_back(turn, blob, 1.0, unit_box(n), courant, flux_form)
+        before, after = carried_back(turn, blob, 1.0, box(n), courant, flux_form)
         errors.append(lost(before, after))
         peaks.append(float(after.max() / before.max()))
-    return (
-        GridSeries.toward("cells a side", grids, errors, 0.0),
-        GridSeries.toward("cells a side", grids, peaks, 1.0),
-    )
+    return GridSeries.toward(on(grids), errors, 0.0), GridSeries.toward(on(grids), peaks, 1.0)
 
 
 def blob_in_swirl(grids: Sequence[int], period: float, flux_form: bool) -> GridSeries:
     """Error of the blob after the swirl has reversed."""
     errors = [
-        lost(*carried_back(Swirl(period), Blob(0.75, 0.2), period, unit_box(n), 4.0, flux_form))
+        lost(*carried_back(Swirl(period), Blob(0.75, 0.2), period, box(n), 4.0, flux_form))
         for n in grids
     ]
-    return GridSeries.toward("cells a side", grids, errors, 0.0)
+    return GridSeries.toward(on(grids), errors, 0.0)
 
 
 def disc_in_turn(grids: Sequence[int]) -> tuple[GridSeries, Array]:
     """Error of Zalesak's disc after one turn, and the disc on the finest grid."""
-    errors = []
-    for n in grids:
-        grid = Grid.slab(n, n, 100.0 / n, (0.0, 0.0))
-        before, after = carried_back(Turn(50.0, 628.0), slotted_disc, 628.0, grid, 2.0, True)
-        errors.append(lost(before, after))
-    return GridSeries.toward("cells a side", grids, errors, 0.0), after
+    turn = Turn(50.0, 628.0)
+    runs = [carried_back(turn, slotted_disc, 628.0, box(n, 100.0), 2.0, True) for n in grids]
+    return GridSeries.toward(on(grids), [lost(*run) for run in runs], 0.0), runs[-1][1]
 
 
 def scalars_carried(quick: bool) -> list[Finding]:
     """F4: orders of both schemes, the peak after a turn, and Zalesak's disc."""
-    turn, peak = blob_in_turn(TURN_GRIDS[quick], True)
-    smeared, _ = blob_in_turn(SMEARED_GRIDS[quick], False)
-    period = SWIRL_PERIOD[quick]
-    swirl = blob_in_swirl(SWIRL_GRIDS[quick], period, True)
-    short = blob_in_swirl(SWIRL_GRIDS[quick], SHORT_PERIOD, False)
-    disc, after = disc_in_turn(DISC_GRIDS[quick])
-    falls = "falling from grid to grid"
+    turn, peak = blob_in_turn((32, 64, 128) if quick else (64, 128, 256, 512), True)
+    smeared, _ = blob_in_turn((64, 128, 256) if quick else (64, 128, 256, 512), False)
+    cells = (64, 128) if quick else (128, 256, 512)
+    swirl = blob_in_swirl(cells, 2.0 if quick else 8.0, True)
+    short = blob_in_swirl(cells, SHORT_PERIOD, False)
+    disc, after = disc_in_turn((50, 100) if quick else (50, 100, 200, 400))
+    falls, area = "falling from grid to grid", "error of Zalesak's disc / its area"
     extremes = f"after the turn the disc's values lie in [{after.min():.3f}, {after.max():.3f}]"
     return [
         order_of("order of the flux form, blob after a turn", turn, least=1.9),
@@ -227,15 +207,7 @@ def scalars_carried(quick: bool) -> list[Finding]:
         order_of("order of semi-Lagrangian, blob after a turn", smeared, expected=1.0),
         order_of("order of semi-Lagrangian, blob in the swirl", short, expected=1.0),
         Finding("peak of the blob after a turn", peak.values[-1], 1.0, falls, peak.falls, peak),
-        Finding(
-            "error of Zalesak's disc / its area",
-            disc.values[-1],
-            0.0,
-            falls,
-            disc.falls,
-            disc,
-            (extremes,),
-        ),
+        Finding(area, disc.values[-1], 0.0, falls, disc.falls, disc, (extremes,)),
     ]
 
 

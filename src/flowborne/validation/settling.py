@@ -12,9 +12,19 @@ import numpy as np
 from flowborne import Array, Grid, World
 from flowborne.bodies import WindForce
 from flowborne.validation.case import Case, confirmed, reference
-from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most, near, within
-from flowborne.validation.worlds import mjcf, whole_steps
-from flowborne.worlds import Boundaries, BoundaryClosed, BoundaryNoSlip, advance, make_world
+from flowborne.validation.findings import (
+    Curve,
+    Finding,
+    Grids,
+    GridSeries,
+    Plot,
+    at_most,
+    falling,
+    near,
+    within,
+)
+from flowborne.validation.worlds import PLANAR, history, mjcf, recorded, whole_steps
+from flowborne.worlds import Boundaries, BoundaryClosed, BoundaryNoSlip, make_world
 
 CFL = 1.0
 """Cells that a body falls in a step at most. A step eight times shorter changes the largest
@@ -22,9 +32,6 @@ velocity of V2's E1 by 0.3 %."""
 
 CYLINDER, CYLINDER_GRAVITY = 0.25, 980.0
 """Diameter in cm and cm/s^2, of V1."""
-
-CYLINDER_GRIDS = {True: (4, 6), False: (8, 16, 32)}
-"""Cells across the cylinder, by quick; multiples of 2 fit the box."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +71,7 @@ def box(fall: Fall, cells: int) -> World:
     h = CYLINDER / cells
     wall = BoundaryNoSlip()
     disc = (
-        '<body name="disc" pos="1 4 0"><joint name="x" type="slide" axis="1 0 0"/>'
-        '<joint name="y" type="slide" axis="0 1 0"/><joint name="turn" axis="0 0 1"/>'
+        f'<body name="disc" pos="1 4 0">{PLANAR}'
         f'<geom type="cylinder" size="{0.5 * CYLINDER} 1"/></body>'
     )
     return make_world(
@@ -82,24 +88,19 @@ def fastest(fall: Fall, cells: int) -> tuple[float, Array]:
     """Largest Reynolds number, and (n, 2) times in s and Reynolds numbers of all steps."""
     world = box(fall, cells)
     count, dt = whole_steps(fall.duration, CFL * CYLINDER / cells * fall.unit / fall.reynolds)
-    rows = []
-    for _ in range(count):
-        advance(world, dt)
-        rows.append((world.time, -fall.unit * float(world.solid.v[1])))
-    course = np.array(rows)
+    course = recorded(world, dt, count, lambda _: (world.time, -fall.unit * world.solid.v[1]))
     return float(course[:, 1].max()), course
 
 
 def settling_cylinder(quick: bool) -> list[Finding]:
     """V1: the largest Reynolds number of the light and slow and of the heavy and fast cylinder."""
     findings = []
+    grids = Grids("cells across D", (4, 6) if quick else (8, 16, 32))
     for fall in FALLS:
-        values = [fastest(fall, n)[0] for n in CYLINDER_GRIDS[quick]]
-        exact = fall.reynolds
-        series = GridSeries.toward("cells across D", CYLINDER_GRIDS[quick], values, exact)
-        sure = confirmed("V1", f"{fall.name} max Re")
-        title = f"{fall.name}, largest Re"
-        findings.append(within(title, series, exact, (fall.low, fall.high), confirmed=sure))
+        values = [fastest(fall, n)[0] for n in grids.cells]
+        title, interval = f"{fall.name}, largest Re", (fall.low, fall.high)
+        found = within(title, values, fall.reynolds, interval, grids)
+        findings.append(replace(found, confirmed=confirmed("V1", f"{fall.name} max Re")))
     return findings
 
 
@@ -108,12 +109,6 @@ DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
 
 HALF, HEIGHT, START = 0.05, 0.16, 0.1275
 """m: half the box's width, its height, and the height from which the sphere's centre falls."""
-
-GRIDS = {True: (3, 4), False: (4, 6, 8, 10)}
-"""Cells in 10 mm, of which the box is a whole number; 1.5 times as many are across the sphere."""
-
-FREE_FALL = 0.9
-"""Part of the way down before the bottom affects the sphere."""
 
 
 @dataclass(frozen=True)
@@ -174,39 +169,36 @@ def fall(oil: Oil, cells: int, until: float) -> tuple[Array, Array, Array]:
     """Times in s, downward velocities in m/s and heights of the centre in m of every step."""
     world = quarter(oil, cells)
     steps, dt = whole_steps(until, CFL * 0.01 / cells / oil.peak)
-    rows = [(0.0, 0.0, START)]
-    for _ in range(steps):
-        advance(world, dt)
-        rows.append((world.time, -float(world.solid.v[0]), START + float(world.solid.q[0])))
-    times, velocities, heights = np.array(rows).T
+    times, velocities, heights = history(
+        world, dt, steps, lambda: (world.time, -world.solid.v[0], START + world.solid.q[0])
+    ).T
     return times, velocities, heights
 
 
 def settling(quick: bool) -> list[Finding]:
     """V2: the largest velocity, and the whole curve from release to the bottom."""
-    findings, label = [], "cells across the sphere"
+    findings = []
+    cells = (3, 4) if quick else (4, 6, 8, 10)
+    grids = Grids("cells across the sphere", [100.0 * DIAMETER * n for n in cells])
     for oil in OILS:
         times, measured = oil.curve
         until = 0.4 * times[-1] if quick else times[-1]
         times, measured = times[times <= until], measured[times <= until]
-        falls = [fall(oil, cells, until) for cells in GRIDS[quick]]
-        peaks = [float(velocity.max()) for _, velocity, _ in falls]
-        across = [100.0 * DIAMETER * cells for cells in GRIDS[quick]]
-        series = GridSeries.toward(label, across, peaks, oil.peak, relative=True)
+        falls = [fall(oil, n, until) for n in cells]
+        peaks = [velocity.max() for _, velocity, _ in falls]
+        series = GridSeries.toward(grids, peaks, oil.peak, relative=True)
         title = f"{oil.name}, largest velocity, m/s"
-        findings.append(near(title, series, oil.peak, relative=0.03, falling=True))
+        findings.append(falling(near(title, series, oil.peak, relative=0.03)))
         found = [apart(one, times, measured, oil.peak) for one in falls]
-        course = GridSeries.toward(label, across, [away for away, _ in found], 0.0)
         title = f"{oil.name}, farthest from the measured curve over its largest velocity"
+        course = at_most(title, [away for away, _ in found], 0.05, grids, lines=found[-1][1])
         moments, velocity, _ = falls[-1]
         thin = slice(None, None, max(1, len(moments) // 200))
         curves = (
             Curve("measured", times, measured, True),
             Curve("flowborne", moments[thin], velocity[thin]),
         )
-        plot = Plot("t (s)", "downward velocity (m/s)", curves)
-        bounded = at_most(title, course, 0.05, lines=found[-1][1])
-        findings.append(replace(bounded, plot=plot))
+        findings.append(replace(course, plot=Plot("t (s)", "downward velocity (m/s)", curves)))
     return findings
 
 
@@ -217,7 +209,7 @@ def apart(
     and on the part before the bottom affects the sphere."""
     moments, velocity, height = fallen
     away = np.abs(np.interp(times, moments, velocity) - measured) / peak
-    bottom = START - FREE_FALL * (START - 0.5 * DIAMETER)
+    bottom = START - 0.9 * (START - 0.5 * DIAMETER)
     high = np.interp(times, moments, height) > bottom
     lines = [
         f"{label}: {away[part].max():.3g} at {times[part][away[part].argmax()]:.3g} s, "

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flowborne import Array, StepReport, World
 from flowborne.validation.case import confirmed, reference
-from flowborne.validation.findings import Finding, GridSeries, Plot, within
-from flowborne.validation.worlds import Uniform, mjcf
-from flowborne.worlds import Field, advance
+from flowborne.validation.findings import Finding, Grids, Plot, within
+from flowborne.validation.worlds import Uniform, force_on, mjcf, recorded
+from flowborne.worlds import Field
 
 BEFORE = {True: 20.0, False: 40.0}
 AFTER = 15.0
@@ -40,8 +40,7 @@ class Stream:
 
     def coefficients(self, report: StepReport) -> tuple[float, float]:
         """Drag and lift coefficient, 2 F / (rho U^2 D)."""
-        force = (report.pressure_wrench + report.viscous_wrench)[1]
-        drag, lift = 2.0 * force[:2] / (self.speed**2 * self.diameter)
+        drag, lift = 2.0 * force_on(report)[:2] / (self.speed**2 * self.diameter)
         return float(drag), float(lift)
 
     @property
@@ -144,11 +143,9 @@ def watch(
     fluid, _ = world.flow()
     dt = CFL * fluid.grid.spacing / stream.fastest
     duration = (before + (periods + 1.5) / strouhal) * stream.time
-    rows = []
-    for _ in range(round(duration / dt)):
-        drag, lift = stream.coefficients(advance(world, dt))
-        rows.append((drag, lift, drop(world)))
-    drags, lifts, drops = np.array(rows).T
+    drags, lifts, drops = recorded(
+        world, dt, round(duration / dt), lambda report: (*stream.coefficients(report), drop(world))
+    ).T
     return Oscillation(dt, lifts), drags, drops
 
 
@@ -159,20 +156,10 @@ def judged(
     values: Sequence[float],
     interval: tuple[float, float],
     *,
-    falling: bool = False,
     lines: Sequence[str] = (),
     plot: Plot | None = None,
 ) -> Finding:
     """A quantity of the case `name` on some grids, inside an interval of the list."""
-    exact = reference(name, quantity)
-    series = GridSeries.toward("cells across D", grids, values, exact)
-    return within(
-        quantity,
-        series,
-        exact,
-        interval,
-        falling=falling,
-        lines=lines,
-        plot=plot,
-        confirmed=confirmed(name, quantity),
-    )
+    exact, on = reference(name, quantity), Grids("cells across D", grids)
+    found = within(quantity, values, exact, interval, on, lines=lines)
+    return replace(found, plot=plot, confirmed=confirmed(name, quantity))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from flowborne import Array, Grid, World
 from flowborne.bodies import Trajectory, TrajectorySinusoid, halfway_momentum, kinematics
 from flowborne.validation.case import Case, Tier, confirmed, reference
-from flowborne.validation.findings import Curve, Finding, GridSeries, Plot, at_most
-from flowborne.validation.worlds import RING, mjcf, whole_steps
+from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, near
+from flowborne.validation.worlds import RING, at_start, chain, history, square, whole_steps
 from flowborne.worlds import Boundaries, advance, make_world
 
 VISCOSITY = 1.4e-4
@@ -22,15 +22,6 @@ LINKS = 20
 
 TANK_LENGTH, TANK_WIDTH = 8, 2
 """m, of S1's closed box along the eel's path and across."""
-
-GRIDS = {True: (48, 64), False: (64, 128, 256)}
-"""Cells in the eel's length, by quick."""
-
-PERIODS = {True: 6, False: 8}
-"""Simulated periods of the eel from rest, by quick; the last one is evaluated."""
-
-CFL = 0.5
-"""Cells that the eel's tail moves to the side in a step at most, at 2 pi / 8 m/s."""
 
 SPEED = "mean forward speed 2D"
 
@@ -94,21 +85,19 @@ def eel() -> str:
 
     Neighbours overlap; each link has the mass of its part of the outline.
     """
-    size = 1.0 / LINKS
-    body = ""
-    for k in reversed(range(LINKS)):
+    size, links = 1.0 / LINKS, []
+    for k in range(LINKS):
         width = half_width((k + 0.5) * size)
         start = width if k == 0 else 0.0
         stop = size - width if k == LINKS - 1 else size
         half = 0.5 * (stop - start)
         density = 2.0 * width * size / (4.0 * width * half + np.pi * width**2)
         joint = f'<joint name="j{k}" axis="0 0 1"/>' if k else '<freejoint name="root"/>'
-        body = (
-            f'<body name="link{k}" pos="{size if k else 0.0} 0 0">{joint}'
-            f'<geom type="capsule" size="{width} {half}" pos="{start + half} 0 0" zaxis="1 0 0" '
-            f'density="{density}"/>{body}</body>'
+        links.append(
+            f'{joint}<geom type="capsule" size="{width} {half}" pos="{start + half} 0 0" '
+            f'zaxis="1 0 0" density="{density}"/>'
         )
-    return mjcf(body)
+    return chain(links, size)
 
 
 def tank(cells: int) -> World:
@@ -130,26 +119,18 @@ def tank(cells: int) -> World:
 def swim(cells: int, periods: int) -> Array:
     """(n+1, 2) times in s and positions of the mass centre along -x in m."""
     world = tank(cells)
-    count, dt = whole_steps(1.0, CFL / cells / (0.25 * np.pi))
-    rows = [(0.0, -float(mass_centre(world)[0]))]
-    for _ in range(count * periods):
-        advance(world, dt)
-        rows.append((world.time, -float(mass_centre(world)[0])))
-    return np.array(rows)
-
-
-def last_speed(path: Array, periods: int) -> float:
-    """Mean speed in the last period, m/s."""
-    return float(path[-1, 1] - path[-1 - (len(path) - 1) // periods, 1])
+    # in a step the tail, at 2 pi / 8 m/s, moves to the side by at most half a cell
+    count, dt = whole_steps(1.0, 0.5 / cells / (0.25 * np.pi))
+    return history(world, dt, count * periods, lambda: (world.time, -mass_centre(world)[0]))
 
 
 def swimming(quick: bool) -> list[Finding]:
     """S1: mean speed of the eel in its last period."""
-    grids, periods = GRIDS[quick], PERIODS[quick]
-    paths = [swim(n, periods) for n in grids]
-    speeds = [last_speed(path, periods) for path in paths]
+    grids = Grids("cells in the length", (48, 64) if quick else (64, 128, 256))
+    periods = 6 if quick else 8
+    paths = [swim(n, periods) for n in grids.cells]
+    speeds = [path[-1, 1] - path[-1 - (len(path) - 1) // periods, 1] for path in paths]
     exact = float(reference("S1", SPEED).removesuffix(" L/T"))
-    series = GridSeries.toward("cells in the length", grids, speeds, exact)
     period = (len(paths[-1]) - 1) // periods
     mean = paths[-1][period:, 1] - paths[-1][:-period, 1]
     times = paths[-1][period:, 0] - 0.5
@@ -157,32 +138,23 @@ def swimming(quick: bool) -> list[Finding]:
         Curve("published", (times[0], times[-1]), (exact, exact), True),
         Curve("flowborne, mean of a period", times[::8], mean[::8]),
     )
-    return [
-        Finding(
-            "mean forward speed, L/T",
-            speeds[-1],
-            exact,
-            "10 %",
-            abs(speeds[-1] / exact - 1.0) <= 0.1,
-            series,
-            plot=Plot("t/T", "forward speed (L/T)", curves),
-            confirmed=confirmed("S1", SPEED),
-        )
-    ]
+    plot = Plot("t/T", "forward speed (L/T)", curves)
+    found = near("mean forward speed, L/T", speeds, exact, grids, relative=0.1)
+    return [replace(found, plot=plot, confirmed=confirmed("S1", SPEED))]
 
 
-def chain(links: int) -> str:
+def capsules(links: int) -> str:
     """S5's free chain of capsules along x about the origin."""
-    body = ""
-    for k in reversed(range(links)):
-        joint = f'<joint name="j{k}" axis="0 0 1"/>' if k else '<freejoint name="root"/>'
-        size = f"{0.5 * WIDTH} {0.5 * LINK - 0.02}"
-        body = (
-            f'<body name="link{k}" pos="{LINK if k else -0.5 * links * LINK} 0 0">{joint}'
-            f'<geom type="capsule" size="{size}" pos="{0.5 * LINK} 0 0" zaxis="1 0 0"/>'
-            f"{body}</body>"
-        )
-    return mjcf(body)
+    return chain(
+        [
+            (f'<joint name="j{k}" axis="0 0 1"/>' if k else '<freejoint name="root"/>')
+            + f'<geom type="capsule" size="{0.5 * WIDTH} {0.5 * LINK - 0.02}" '
+            f'pos="{0.5 * LINK} 0 0" zaxis="1 0 0"/>'
+            for k in range(links)
+        ],
+        LINK,
+        -0.5 * links * LINK,
+    )
 
 
 def swimmer(cells: int, gait: tuple[TrajectorySinusoid, ...], sides: Boundaries | None) -> World:
@@ -191,17 +163,15 @@ def swimmer(cells: int, gait: tuple[TrajectorySinusoid, ...], sides: Boundaries 
     cells  across the box
     gait   motion of each joint
     """
-    grid = Grid.slab(cells, cells, BOX / cells, (-0.5 * BOX, -0.5 * BOX))
     world = make_world(
-        chain(len(gait) + 1),
-        grid,
+        capsules(len(gait) + 1),
+        square(cells, BOX),
         boundaries=sides or Boundaries(),
         solid_density=1.0,
         motions=gait,
         tolerance=1e-11,
     )
-    for k, motion in enumerate(gait):
-        world.solid.q[7 + k] = motion.position(0.0)[0]
+    world.solid.q[7:], _ = at_start(gait)
     return world
 
 
@@ -248,20 +218,16 @@ def scallop(cells: int, steps: int, cycles: int) -> float:
 
 def invariants(quick: bool) -> list[Finding]:
     """S5: momentum in a periodic box, and the scallop, which does not advance."""
-    grids = (48,) if quick else (48, 96, 192)
-    runs = [momentum_kept(n, 2 * n) for n in grids]
-    label = "cells a side"
-    changes, exchanges = (list(values) for values in zip(*runs, strict=True))
-    drifts = [scallop(n, n, 1 if quick else 2) for n in grids]
+    grids = Grids("cells a side", (48,) if quick else (48, 96, 192))
+    runs = [momentum_kept(n, 2 * n) for n in grids.cells]
+    changes, exchanges = zip(*runs, strict=True)
+    drifts = [scallop(n, n, 1 if quick else 2) for n in grids.cells]
     rows = (
         ("change of the total momentum in a cycle, over the creature's", changes, 1e-8),
         ("momentum that a coupled solve makes or loses, relative", exchanges, 1e-10),
         ("drift of a one-hinge swimmer in a cycle over its length", drifts, 1e-3),
     )
-    return [
-        at_most(title, GridSeries.toward(label, grids, values, 0.0), bound)
-        for title, values, bound in rows
-    ]
+    return [at_most(title, values, bound, grids) for title, values, bound in rows]
 
 
 CASES = (

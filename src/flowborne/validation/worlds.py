@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from flowborne import Array, StepReport, World
+from flowborne import Array, BlowUpError, FrameReport, Grid, Simulation, StepReport, World
+from flowborne.bodies import JointCommand, Trajectory
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
+    BoundaryOpen,
     BoundaryPeriodic,
     Field,
     Profile,
@@ -27,12 +30,85 @@ RING = Boundaries(PERIODIC, PERIODIC, PERIODIC, PERIODIC)
 """Periodic in x and y."""
 
 
+PLANAR = (
+    '<joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>'
+    '<joint name="turn" axis="0 0 1"/>'
+)
+"""MJCF of the joints of a body that moves freely in the plane."""
+
+
 def mjcf(*elements: str, options: str = "") -> str:
     """An MJCF model of world-body elements; angles in radians, no contact."""
     return (
         '<mujoco><compiler angle="radian"/><default><geom contype="0" conaffinity="0"/></default>'
         f"{options}<worldbody>{''.join(elements)}</worldbody></mujoco>"
     )
+
+
+def chain(links: Sequence[str], length: float, start: float = 0.0) -> str:
+    """MJCF of a chain along x: each body is a child of the one before.
+
+    links   joint and geom of each body
+    length  from one body to the next, m
+    start   x of the first body, m
+    """
+    body = ""
+    for k, link in reversed(list(enumerate(links))):
+        body = f'<body name="link{k}" pos="{length if k else start} 0 0">{link}{body}</body>'
+    return mjcf(body)
+
+
+def ring_of_boxes(count: int, radius: float, size: str) -> str:
+    """MJCF of fixed boxes around the origin, with their middles at a radius in m."""
+    geoms = []
+    for angle in 2.0 * np.pi / count * np.arange(count):
+        x, y = radius * np.cos(angle), radius * np.sin(angle)
+        geoms.append(f'<geom type="box" size="{size}" pos="{x} {y} 0" euler="0 0 {angle}"/>')
+    return "".join(geoms)
+
+
+def square(cells: int, side: float = 1.0) -> Grid:
+    """A slab of `cells` x `cells` with its middle in the origin; `side` in m."""
+    return Grid.slab(cells, cells, side / cells, (-0.5 * side, -0.5 * side))
+
+
+def hold_all(count: int) -> JointCommand:
+    """A command that holds all of `count` dofs."""
+    command = JointCommand.none(count)
+    command.set(np.arange(count), 0.0, 0.0)
+    return command
+
+
+def at_start(motions: Sequence[Trajectory]) -> tuple[Array, Array]:
+    """Positions and velocities at time 0 of joints with one dof each."""
+    positions = np.array([motion.position(0.0)[0] for motion in motions])
+    return positions, np.array([motion.velocity(0.0)[0] for motion in motions])
+
+
+def recorded(world: World, dt: float, steps: int, figures: Callable[[StepReport], Any]) -> Array:
+    """(steps, ...) figures of each of some steps, from its report."""
+    return np.array([figures(advance(world, dt)) for _ in range(steps)])
+
+
+def history(world: World, dt: float, steps: int, figures: Callable[[], Any]) -> Array:
+    """(steps + 1, ...) figures of a world now and after each of some steps."""
+    return np.array([figures(), *recorded(world, dt, steps, lambda _: figures())])
+
+
+def frames_of(simulation: Simulation, frames: int, figures: Callable[[FrameReport], Any]) -> Array:
+    """(frames, ...) figures after each of some frames, from the frame's report.
+
+    raises  ArithmeticError when the run blows up
+    """
+    try:
+        return np.array([figures(simulation.advance_frame()) for _ in range(frames)])
+    except BlowUpError as error:
+        raise ArithmeticError(f"{simulation.scene.name}: {error}") from error
+
+
+def force_on(report: StepReport, body: int = 1) -> Array:
+    """(6,) force and torque of the fluid on a body, N and N m (per m in a slab)."""
+    return np.asarray(report.pressure_wrench[body] + report.viscous_wrench[body])
 
 
 def start_at_once(world: World, dt: float) -> StepReport:
@@ -47,6 +123,14 @@ def start_at_once(world: World, dt: float) -> StepReport:
     return report
 
 
+def components(
+    x: Array, y: Array, z: Array, u: Array | float, v: Array | float, w: Array | float = 0.0
+) -> tuple[Array, Array, Array]:
+    """Components of a velocity as arrays of the points' shape."""
+    zero = 0.0 * (x + y + z)
+    return u + zero, v + zero, w + zero
+
+
 @dataclass(frozen=True)
 class Uniform:
     """The same velocity everywhere, as a profile and as a field."""
@@ -56,8 +140,22 @@ class Uniform:
     def __call__(
         self, x: Array, y: Array, z: Array, time: float = 0.0
     ) -> tuple[Array, Array, Array]:
-        same = 0.0 * (x + y + z)
-        return same + self.velocity[0], same + self.velocity[1], same + self.velocity[2]
+        return components(x, y, z, *self.velocity)
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """Parallel flow along x in a channel from y = 0 to `height` (m) with the largest velocity
+    `peak` (m/s), as a profile and as a field."""
+
+    peak: float
+    height: float = 0.41
+
+    def __call__(
+        self, x: Array, y: Array, z: Array, time: float = 0.0
+    ) -> tuple[Array, Array, Array]:
+        u = 4.0 * self.peak * y * (self.height - y) / self.height**2
+        return components(x, y, z, u, 0.0)
 
 
 def all_inflow(profile: Profile) -> Boundaries:
@@ -66,12 +164,9 @@ def all_inflow(profile: Profile) -> Boundaries:
     return Boundaries(side, side, side, side)
 
 
-def begin(world: World, coarser: World | None, field: Field) -> None:
-    """Start from the flow on a coarser grid, or without one from a field."""
-    if coarser is None:
-        set_velocity(world, field)
-    else:
-        start_from(coarser, world)
+def through_flow(profile: Profile) -> Boundaries:
+    """Inflow at the lower x side and an open upper x side; the lateral sides slip."""
+    return Boundaries(BoundaryInflow(profile), BoundaryOpen())
 
 
 def refined(
@@ -79,14 +174,18 @@ def refined(
 ) -> Iterator[tuple[int, World, bool]]:
     """A world for each grid, from coarse to fine.
 
-    The first starts from a field, the others from the last flow on the coarser grid.
+    The first starts from a field, the others from the last flow and bodies on the coarser grid.
 
     yields  (cells, world, whether it is the first)
     """
     coarser = None
     for cells in grids:
         world = build(cells)
-        begin(world, coarser, field)
+        if coarser is None:
+            set_velocity(world, field)
+        else:
+            start_from(coarser, world)
+            world.solid.q[:], world.solid.v[:] = coarser.solid.q, coarser.solid.v
         yield cells, world, coarser is None
         coarser = world
 
