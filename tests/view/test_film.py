@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flowborne.fits import straight_line
 from flowborne.runs.run_folder import RunFolderError
 from flowborne.view import drawing
 from flowborne.view.drawing import drawn_frames
@@ -106,13 +105,12 @@ def test_a_wide_and_a_high_run_have_even_sides(write_run: Write) -> None:
 
 
 def test_the_cost_of_chains_is_plotted_with_its_line(tmp_path: Path) -> None:
-    rows = [ChainCost(n, 0.1 + 0.2 * n, 0.3) for n in (1, 2, 3, 4)]
+    seconds = (0.3, 0.5, 0.7, 1.0)  # by 0.05 + 0.23 n; the first is off by 0.02 / 0.28
+    rows = [ChainCost(n, serial, 0.3) for n, serial in enumerate(seconds, start=1)]
     plot_chain_cost(rows, tmp_path / "cost.svg")
-    assert (tmp_path / "cost.svg").read_text().startswith("<?xml")
-    slope, start, off = straight_line(np.array([1.0, 2, 3, 4]), np.array([0.3, 0.5, 0.7, 1.0]))
-    assert (slope, start) == pytest.approx((0.23, 0.05))
-    assert off == pytest.approx(0.02 / 0.28, rel=1e-6)
-    with pytest.raises(ValueError, match="two different x"):
+    drawn = (tmp_path / "cost.svg").read_text()
+    assert "230 ms a joint, within 7.1 %" in drawn
+    with pytest.raises(ValueError, match="chains of two lengths"):
         plot_chain_cost(rows[:1], tmp_path / "one.svg")
 
 

@@ -17,7 +17,6 @@ from flowborne.bench.timing import (
     times_together,
     verdict,
 )
-from flowborne.fits import straight_line
 from flowborne.machine import cores, kernel_threads
 
 BLOCK = "ns-block-drag-max"
@@ -109,7 +108,10 @@ def straightness(scenes: Sequence[Scene], frames: int = FRAMES) -> Result:
     """Largest deviation of the quickest frames of scenes with 1, 2, ... joints from a line."""
     times = times_together([(scene, 1, "serial") for scene in scenes], frames)
     joints = np.arange(1.0, len(scenes) + 1.0)
-    slope, start, deviation = straight_line(joints, times.min(axis=1))
+    quickest = times.min(axis=1)
+    slope, start = np.polyfit(joints, quickest, 1)
+    line = slope * joints + start
+    deviation = float((np.abs(quickest - line) / line).max())
     title = "largest deviation of the serial time of a frame from a line in the joints, part of it"
     lines = [f"{scene.name} {in_words(row)}" for scene, row in zip(scenes, times, strict=True)]
     lines.append(f"line {1e3 * start:.1f} ms + {1e3 * slope:.1f} ms a joint")
