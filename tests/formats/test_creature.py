@@ -72,5 +72,5 @@ def test_a_run_that_was_stopped_gives_the_frames_that_it_has(chain: Path, tmp_pa
     assert len(fb.export(tmp_path / "run", tmp_path / "out.vdb").files) == 3
     for path in (tmp_path / "run" / "states").iterdir():
         path.unlink()
-    with pytest.raises(fb.RunFolderError, match=r"has no frame yet; let the run go on with"):
+    with pytest.raises(fb.RunFolderError, match=r"has no frame yet; continue the run with"):
         fb.export(tmp_path / "run", tmp_path / "none.vdb")

@@ -54,7 +54,7 @@ class OpenRun:
             self.grid = _grid(self._model["grid"])
             self._states = tuple(files.state_files())
         if not self._states:
-            raise RunFolderError(f"{folder} has no frame yet; let the run go on with --resume")
+            raise RunFolderError(f"{folder} has no frame yet; continue the run with --resume")
         self.frames = tuple(int(path.stem) for path in self._states)
 
     def __len__(self) -> int:

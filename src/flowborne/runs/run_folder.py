@@ -179,7 +179,7 @@ class RunFolder:
         if self.is_run():
             if not replace:
                 raise RunFolderError(
-                    f"{path} holds an earlier run; go on with it with --resume, start it again "
+                    f"{path} holds an earlier run; continue it with --resume, start it again "
                     "with --replace, or name another folder with --out"
                 )
         elif not self._is_empty():

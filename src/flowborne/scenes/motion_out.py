@@ -50,7 +50,7 @@ def export_bvh(run: Path, path: Path) -> str:
         )
     states = sorted(p for p in folder.states.iterdir() if STATE_NAME.fullmatch(p.name))
     if len(states) < 2:
-        raise SceneError(f"{run} has no motion yet. Let the run go on with --resume.")
+        raise SceneError(f"{run} has no motion yet. Continue the run with --resume.")
     times, q = _poses(states)
     model = load_model(scene)
     if scene.clip.file is None:

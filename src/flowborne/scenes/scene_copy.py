@@ -59,7 +59,7 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
     ] or [f"the file {other} differs" for other in sorted(ours) if ours[other] != theirs.get(other)]
     raise RunFolderError(
         f"{folder.path} holds a run of another scene ({'; '.join(differing[:3])}); "
-        f"go on with that one (flowborne run {folder.scene} --out {folder.path} --resume), or "
+        f"continue that one (flowborne run {folder.scene} --out {folder.path} --resume), or "
         "name another folder with --out"
     )
 

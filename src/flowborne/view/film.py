@@ -59,7 +59,7 @@ def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | No
     if len(numbers) < 2:
         raise ValueError(
             f"{folder} has one frame, which makes a picture and no film; "
-            "let the run go on with --resume"
+            "continue the run with --resume"
         )
     write_film(run, files.film, progress, shot)
 
