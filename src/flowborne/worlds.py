@@ -23,21 +23,19 @@ from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.stream import Sampled
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.advection import CENTRE, carry, cells_per_step
-from flowborne.fluid.boundary import (
-    Boundaries,
-    Boundary,
-    BoundaryClosed,
-    BoundaryInflow,
-    BoundaryNoSlip,
-    BoundaryOpen,
-    BoundaryPeriodic,
-    Profile,
-    Source,
-)
+from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.dye import Passage, nothing_brought
 from flowborne.fluid.ghosts import pad_cells
 from flowborne.fluid.grid import Array, Grid, faces_of
+from flowborne.fluid.momentum import face_masses
+from flowborne.fluid.momentum import kinetic_energy as kinetic_energy_of_fluid
+from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.inflow import BoundaryInflow
+from flowborne.fluid.sides.no_slip import BoundaryNoSlip
+from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.side import Boundary, Profile
 from flowborne.fluid.transport import Transport
 from flowborne.solids import momentum
 from flowborne.solids.model import SolidModel
@@ -167,8 +165,8 @@ def kinetic_energy(world: World) -> float:
     if world.fluid is None:
         return energy
     fluid, state = world.flow()
-    mass = flow.face_masses(flow.volumes_of(world, cut_by_bodies(world)), fluid.density)
-    return energy + flow.kinetic_energy(state.velocity, mass, fluid.grid, fluid.boundaries)
+    mass = face_masses(flow.volumes_of(world, cut_by_bodies(world)), fluid.density)
+    return energy + kinetic_energy_of_fluid(state.velocity, mass, fluid.grid, fluid.boundaries)
 
 
 def start_from(coarse: World, fine: World) -> None:

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flowborne.coupling.flow import face_masses, volumes_of
+from flowborne.coupling.flow import volumes_of
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import World
 from flowborne.fluid import transport
 from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.momentum import face_masses
 from flowborne.kernels.flux import GHOSTS
 
 from ..kernels.references.flux import line_flux_reference, side_fluxes_reference

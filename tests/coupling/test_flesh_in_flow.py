@@ -13,8 +13,10 @@ from flowborne.coupling.operators import add_flux, boundary_velocity, leak_proof
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import cut_by_bodies, step
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen, BoundaryPeriodic
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import SolidModel

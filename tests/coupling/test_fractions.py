@@ -9,8 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryOpen
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.sides.inflow import BoundaryInflow
+from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.kernels.closed_fractions import add_closed, closed_fraction
 
 Cut = Callable[..., Geometry]

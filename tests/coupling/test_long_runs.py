@@ -7,9 +7,10 @@ import pytest
 
 from flowborne import Array, Grid, Simulation, World, load_scene, step
 from flowborne.bodies import TrajectoryConstant, TrajectorySinusoid, kinetic_energy
-from flowborne.coupling import flow
-from flowborne.coupling.flow import face_masses, volumes_of
+from flowborne.coupling.flow import volumes_of
 from flowborne.coupling.fractions import Geometry
+from flowborne.fluid import momentum as of_fluid
+from flowborne.fluid.momentum import face_masses
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import (
     Boundaries,
@@ -62,7 +63,7 @@ def energy(world: World) -> float:
     """Kinetic energy of fluid and bodies, J per metre of depth."""
     fluid, state = world.flow()
     mass = face_masses(volumes_of(world, cut_by_bodies(world)), fluid.density)
-    moving = flow.kinetic_energy(state.velocity, mass, fluid.grid, fluid.boundaries)
+    moving = of_fluid.kinetic_energy(state.velocity, mass, fluid.grid, fluid.boundaries)
     return moving + kinetic_energy(world.setup.solid, world.solid)
 
 

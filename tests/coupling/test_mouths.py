@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, Tissue, World, step
-from flowborne.coupling.flow import face_masses, fluid_momentum, volumes_of
+from flowborne.coupling.flow import volumes_of
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.step import jets_at
+from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorSteady
 from flowborne.solids.tissue.growth import Law, add_flesh

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flowborne.coupling.flow import face_masses
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import (
     add_flux,
@@ -19,6 +18,7 @@ from flowborne.coupling.operators import (
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.momentum import face_masses
 from flowborne.kernels.outflow import outflow
 
 Cut = Callable[..., Geometry]

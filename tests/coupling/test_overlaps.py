@@ -15,8 +15,9 @@ from flowborne.coupling.operators import generalised, pressure_push
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import cut_by_bodies, step
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.advection import CENTRE, OFFSETS, carry, cells_per_step
-from flowborne.fluid.boundary import Boundaries, BoundaryPeriodic
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import pad_cells, pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
 
 RING = BoundaryPeriodic()
 TORUS = Boundaries(RING, RING, RING, RING, RING, RING)

@@ -2,8 +2,10 @@
 
 import pytest
 
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen, BoundaryPeriodic
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
 
 
 def test_periodic_sides_come_in_pairs() -> None:

@@ -7,11 +7,12 @@ import pytest
 
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import Boundaries, BoundaryOpen
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import means
 from flowborne.fluid.crossing import crossings
 from flowborne.fluid.ghosts import fill_ghosts
 from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.fluid.transport import marks_of
 from flowborne.kernels.flux import GHOSTS
 from flowborne.solids.model import SolidModel

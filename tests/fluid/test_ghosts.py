@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.fluid.boundary import (
-    Boundaries,
-    Boundary,
-    BoundaryClosed,
-    BoundaryInflow,
-    BoundaryNoSlip,
-    BoundaryOpen,
-    BoundaryPeriodic,
-)
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import impose_sides, pad_cells, pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.inflow import BoundaryInflow
+from flowborne.fluid.sides.no_slip import BoundaryNoSlip
+from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.side import Boundary
 
 SLAB = Grid.slab(6, 5, 0.5, (0.0, 1.0))
 CUBE = Grid((6, 5, 4), 0.5, (0.0, 1.0, -1.0))

@@ -9,18 +9,15 @@ from flowborne.coupling.flow import source_rate
 from flowborne.coupling.fractions import uncut
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import (
-    Boundaries,
-    BoundaryClosed,
-    BoundaryInflow,
-    BoundaryNoSlip,
-    BoundaryOpen,
-    BoundaryPeriodic,
-    Source,
-)
+from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import accelerated, face_weights, subtract_pressure_gradient
+from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.inflow import BoundaryInflow
+from flowborne.fluid.sides.no_slip import BoundaryNoSlip
+from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.model import SolidModel
 from flowborne.solvers.pressure import PressureSystem
@@ -75,14 +72,14 @@ def project(velocity: Faces, opened: Faces, grid: Grid, sides: Boundaries, rate:
     """Make `velocity` free of divergence but for the sources, in place; gives p^."""
     mass = masses_of(opened, grid, sides)
     system = PressureSystem(
-        face_weights(opened, accelerated(opened, mass, grid), grid, sides), sides.periodic()
+        face_weights(opened, accelerated(opened, mass, grid, sides), grid), sides.periodic()
     )
     need = rate - net_outflow(velocity, opened, grid)
     solution = system.solve(need, tolerance=TOLERANCE)
     assert solution.converged
     assert solution.residual < TOLERANCE
     subtract_pressure_gradient(
-        velocity, accelerated(opened, mass, grid), solution.pressure, grid, sides, 1.0
+        velocity, accelerated(opened, mass, grid, sides), solution.pressure, grid, sides, 1.0
     )
     return solution.pressure
 

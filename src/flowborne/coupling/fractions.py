@@ -13,7 +13,6 @@ from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import side_codes
 from flowborne.kernels.arrays import Integers, Rows
 from flowborne.kernels.closed_fractions import add_closed, count_beside, list_closed, share_closed
 from flowborne.kernels.coupling_rows import COVERED, NARROW, flesh_rows, kinds_of_cells, list_cells
@@ -183,7 +182,7 @@ def geometry(
     nx, ny, nz = grid.shape
     shape, flat = np.array(grid.shape), grid.is_slab
     h, area = grid.spacing, grid.face_area
-    walls = (side_codes(boundaries) == CLOSED).astype(np.int64)
+    walls = (boundaries.codes() == CLOSED).astype(np.int64)
     distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
     nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
     beside = beside_sides(shape, walls)
@@ -217,7 +216,7 @@ def geometry(
     open_cells = kind >= NARROW
     bones = [share for share in shares if share[0] < first_skin]
     rows = bone_rows(bones, open_cells, grid)
-    common = bone_rows([] if boundaries.has_open_side(grid) else bones, kind == COVERED, grid)
+    common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED, grid)
     if flat:
         oz[:] = 0.0
     volume = np.empty(grid.shape)

@@ -50,7 +50,7 @@ def diffuse(
         return velocity, np.zeros(size), True
     grid, sides = fluid.grid, fluid.boundaries
     pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
-    rate = accelerated(cut.open, mass, grid)
+    rate = accelerated(cut.open, mass, grid, sides)
     subtract_pressure_gradient(pushed, rate, state.pressure, grid, sides, dt)
     earlier = pressure_push(cut, dt * state.pressure, size)
     moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))

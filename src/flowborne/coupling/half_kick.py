@@ -18,12 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.flow import face_masses, fluid_momentum, moved_since
+from flowborne.coupling.flow import moved_since
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import pressure_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
 
 
@@ -47,7 +48,7 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     """Half of the last pressure, on the grid `cut` and its control volumes.
 
     None of it where the bodies have been put elsewhere since, in the paper's own scheme, and in a
-    domain with an open side: what comes in there brings energy of its own, which the plain step
+    domain with a free side: what comes in there brings energy of its own, which the plain step
     damps and this one does not.
 
     What is left of it stays in the state, as what the solve is expected to find.
@@ -57,11 +58,11 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     mass = face_masses(volumes, fluid.density)
     start = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + cut.skins.vertices.size
-    plain = fluid.advection == "semi-lagrangian" or fluid.boundaries.has_open_side(fluid.grid)
+    plain = sides.has_free_side(grid) or not fluid.advection.half_kick
     if plain or moved_since(world):
         return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
     pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
-    rate = accelerated(cut.open, mass, grid)
+    rate = accelerated(cut.open, mass, grid, sides)
     kick, before = grid.zeros_faces(), grid.zeros_faces()
     subtract_pressure_gradient(kick, rate, pressure, grid, sides, dt)
     subtract_pressure_gradient(before, rate, earlier, grid, sides, dt)

@@ -22,8 +22,8 @@ import numpy as np
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.swept import swept_cells
 from flowborne.coupling.world import Fluid
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow
-from flowborne.fluid.ghosts import edge, impose_sides
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import subtract_pressure_gradient
 from flowborne.kernels.faces import mean_flux
@@ -93,13 +93,12 @@ def drive_sides(flux: Faces, weights: Faces, grid: Grid, sides: Boundaries, time
     Half a control volume belongs to a face on a side; one whose flux is prescribed has no weight.
     """
     impose_sides(flux, grid, sides, time)
-    for axis in grid.axes:
-        for end, side in enumerate(sides.pair(axis)):
-            layer = edge(axis, -end)
-            if isinstance(side, BoundaryInflow):
-                flux[axis][layer] *= weights[axis][layer] * (grid.face_area / stiffness(grid))
-            if side.kind != "periodic":
-                weights[axis][layer] *= 2.0 if side.kind == "open" else 0.0
+    for place, side in sides.around(grid):
+        through, weight = (field[place.axis][place.layer] for field in (flux, weights))
+        if side.prescribes:
+            through *= weight * (grid.face_area / stiffness(grid))
+        if not side.joined:
+            weight *= 2.0 * side.pressure_weight(place)
 
 
 def volume_rates(

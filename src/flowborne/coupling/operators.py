@@ -9,8 +9,6 @@ generalised velocities are related by the Jacobians of the kinematics, T.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
@@ -106,50 +104,9 @@ def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: flo
 
 
 def side_push(pressure: Array, grid: Grid, boundaries: Boundaries) -> Array:
-    """(3,) force of the solid and inflow sides on the fluid for a pressure field, N."""
+    """(3,) force of the sides on the fluid for a pressure field, N."""
     force = np.zeros(3)
-    for axis in grid.axes:
-        low, high = boundaries.pair(axis)
-        if low.kind not in ("open", "periodic"):
-            force[axis] += grid.face_area * float(pressure.take(0, axis).sum())
-        if high.kind not in ("open", "periodic"):
-            force[axis] -= grid.face_area * float(pressure.take(-1, axis).sum())
+    for place, side in boundaries.around(grid):
+        on_side = (1.0 - side.pressure_weight(place)) * pressure[place.layer]
+        force[place.axis] += (1 - 2 * place.upper) * grid.face_area * float(on_side.sum())
     return force
-
-
-def carried_in(
-    velocity: Faces, opened: Faces, grid: Grid, boundaries: Boundaries, density: float
-) -> Array:
-    """(3,) momentum per time that the flow itself carries in through the sides, N."""
-    inward = np.zeros(3)
-    for flux, beside in through_sides(velocity, opened, grid, boundaries, density):
-        for axis, (low, high) in beside.items():
-            inward[axis] += float((flux * (0.5 * (low + high))).sum())
-    return inward
-
-
-def through_sides(
-    velocity: Faces, opened: Faces, grid: Grid, boundaries: Boundaries, density: float
-) -> Iterator[tuple[Array, dict[int, tuple[Array, Array]]]]:
-    """What flows through each open or inflow side.
-
-    yields  mass per time that comes in through every face of the side, kg/s, and for each axis the
-            velocity along it at both edges of the face, m/s (across the side the face's own, twice)
-    """
-    for axis in grid.axes:
-        for end, side in enumerate(boundaries.pair(axis)):
-            if side.kind not in ("open", "inflow"):
-                continue
-            layer, sign = (-1, -1.0) if end else (0, 1.0)
-            normal: Array = np.asarray(velocity[axis].take(layer, axis))
-            flux = sign * density * grid.face_area * (normal * opened[axis].take(layer, axis))
-            beside = {axis: (normal, normal)}
-            for other in grid.axes:
-                if other != axis:
-                    tangential = velocity[other].take(layer, axis)
-                    along = other - 1 if other > axis else other
-                    beside[other] = (
-                        np.delete(tangential, -1, along),
-                        np.delete(tangential, 0, along),
-                    )
-            yield flux, beside

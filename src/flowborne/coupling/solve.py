@@ -171,8 +171,8 @@ def solve_together(
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    moved_by = accelerated(cut.open, mass, fluid.grid)
-    weights = face_weights(cut.open, moved_by, fluid.grid, fluid.boundaries)
+    moved_by = accelerated(cut.open, mass, fluid.grid, fluid.boundaries)
+    weights = face_weights(cut.open, moved_by, fluid.grid)
     mobility = driven.mobility(pose)
     yielding = give_way(cut, mobility, fluid.grid)
     matrix = PressureSystem(weights, fluid.boundaries.periodic(), reaction=yielding)

@@ -6,17 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from flowborne.coupling.advection.scheme import Carried
 from flowborne.coupling.flesh import hydrostatic_push, skins_on
-from flowborne.coupling.flow import (
-    Carried,
-    carry_fluid,
-    face_masses,
-    fluid_momentum,
-    forced,
-    momentum_change,
-    settle_state,
-    volumes_of,
-)
+from flowborne.coupling.flow import carry_fluid, forced, settle_state, volumes_of
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.half_kick import Kick, half_kick
 from flowborne.coupling.motion import JointCommand, Trajectory, velocity_after
@@ -36,6 +28,7 @@ from flowborne.coupling.stream import winds_on
 from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.momentum import face_masses, fluid_momentum, momentum_change
 from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.following import follow
@@ -92,7 +85,7 @@ def step_together(world: World, dt: float, command: JointCommand, timer: Timer) 
     cut = cut_by_bodies(world, pose)
     timer.lap("geometry")
     # velocity and scalars are carried by the leak-proof field
-    carried = carry_fluid(world, kick.velocity, before.q, cut_before, start, cut, blown, dt)
+    carried, dyed = carry_fluid(world, kick.velocity, before, cut_before, start, cut, blown, dt)
     blown, mass = carried.jets, face_masses(carried.volumes, fluid.density)
     velocity = forced(carried.velocity, cut.open, mass, fluid, world.time + dt, dt)
     timer.lap("advection")
@@ -121,14 +114,14 @@ def step_together(world: World, dt: float, command: JointCommand, timer: Timer) 
     settle_state(world, carried, kick.velocity, solved.projected.velocity, leak_free, dt)
     state.earlier[:] = state.pressure + kick.pressure
     state.pressure[:] = kick.pressure + solved.projected.pressure
-    state.scalars = carried.dyed.scalars
+    state.scalars = dyed.scalars
     advance_clock(world, dt)
     balance = momentum_balance(world, mass, kick, carried, solved)
     timer.lap("advection")
     done = report(
         world, pose, with_kick(solved, kick), buoyancy, wind, reaction, balance, dt, timer
     )
-    done.expelled, done.dye_error = dt * sum(jet.rate for jet in blown), carried.dyed.error
+    done.expelled, done.dye_error = dt * sum(jet.rate for jet in blown), dyed.error
     return done
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.coupling.advection.flux_form import FluxForm
+from flowborne.coupling.advection.scheme import Advection
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.mouths import Mouth
@@ -34,7 +36,7 @@ class Fluid:
     sources       interior sources
     scalars       names of the carried scalars
     body_force    (3,) uniform force per mass on the fluid, m/s^2, besides gravity
-    advection     "flux", which keeps momentum, or "semi-lagrangian", the paper's
+    advection     scheme that carries the velocity
     tolerance     relative residual of the pressure solve
     one_way       whether the fluid does not feel the bodies, and pushes them as a wind alone
     """
@@ -46,7 +48,7 @@ class Fluid:
     sources: tuple[Source, ...] = ()
     scalars: tuple[str, ...] = ()
     body_force: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    advection: str = "flux"
+    advection: Advection = field(default_factory=FluxForm)
     tolerance: float = 1e-9
     one_way: bool = False
 

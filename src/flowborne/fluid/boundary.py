@@ -1,73 +1,25 @@
-"""What happens at each side of the domain, and what enters inside it.
+"""The six sides of a domain, and what enters inside it.
 
-The six sides are named x_min, x_max, y_min, y_max, z_min, z_max. Each is one of
-
-  closed    free slip: nothing crosses, nothing sticks
-  no-slip   the wall's own velocity (a lid may slide)
-  open      dynamic pressure 0 at the side; what leaves has its own velocity, what comes in the mean
-            of the side
-  inflow    a given velocity, in space and time
-  periodic  joined to the opposite side
+The sides are named x_min, x_max, y_min, y_max, z_min, z_max; `sides` has what each may be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.side import Boundary, Place
+from flowborne.kernels.arrays import Integers, Marks
+from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
+
+WALL = BoundaryClosed()
 
 SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
-
-Profile = Callable[[Array, Array, Array, float], tuple[Array, Array, Array]]
-"""velocity(x, y, z, time) -> (u, v, w): broadcasting arrays in m and s to m/s."""
-
-
-class Boundary:
-    """One side of the domain."""
-
-    kind: str = ""
-
-
-@dataclass(frozen=True)
-class BoundaryClosed(Boundary):
-    """Free-slip wall."""
-
-    kind = "closed"
-
-
-@dataclass(frozen=True)
-class BoundaryNoSlip(Boundary):
-    """Wall that the fluid sticks to; it may slide in its own plane with `velocity` (m/s)."""
-
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    kind = "no-slip"
-
-
-@dataclass(frozen=True)
-class BoundaryOpen(Boundary):
-    """Dynamic pressure is zero here; fluid leaves and enters freely."""
-
-    kind = "open"
-
-
-@dataclass(frozen=True)
-class BoundaryInflow(Boundary):
-    """Velocity given by `profile`; carried scalars enter with the values in `scalars`."""
-
-    profile: Profile
-    scalars: dict[str, Callable[[Array, Array, Array, float], Array]] = field(default_factory=dict)
-    kind = "inflow"
-
-
-@dataclass(frozen=True)
-class BoundaryPeriodic(Boundary):
-    """Joined to the opposite side."""
-
-    kind = "periodic"
 
 
 @dataclass(frozen=True)
@@ -100,17 +52,17 @@ class Boundaries:
             side that is not closed or periodic is given in z of a slab
     """
 
-    x_min: Boundary = BoundaryClosed()
-    x_max: Boundary = BoundaryClosed()
-    y_min: Boundary = BoundaryClosed()
-    y_max: Boundary = BoundaryClosed()
-    z_min: Boundary = BoundaryClosed()
-    z_max: Boundary = BoundaryClosed()
+    x_min: Boundary = WALL
+    x_max: Boundary = WALL
+    y_min: Boundary = WALL
+    y_max: Boundary = WALL
+    z_min: Boundary = WALL
+    z_max: Boundary = WALL
 
     def __post_init__(self) -> None:
         for axis, name in enumerate("xyz"):
             low, high = self.pair(axis)
-            if (low.kind == "periodic") != (high.kind == "periodic"):
+            if low.joined != high.joined:
                 raise ValueError(
                     f"boundaries {name}_min is {low.kind} and {name}_max is {high.kind}: "
                     "make both of them periodic or neither"
@@ -130,18 +82,44 @@ class Boundaries:
 
     @cached_property
     def _periodic(self) -> tuple[bool, bool, bool]:
-        x, y, z = (low.kind == "periodic" for low, _ in self._pairs)
+        x, y, z = (low.joined for low, _ in self._pairs)
         return x, y, z
 
-    def has_open_side(self, grid: Grid) -> bool:
-        return any(side.kind == "open" for axis in grid.axes for side in self.pair(axis))
+    def around(self, grid: Grid) -> Iterator[tuple[Place, Boundary]]:
+        """Every side of a grid, with its place: along each axis the lower and then the upper."""
+        for place in places(grid):
+            yield place, self._pairs[place.axis][place.upper]
+
+    def prescribed(self, axis: int) -> Marks:
+        """(2,) 1 where the lower or upper side across an axis prescribes what crosses it."""
+        return np.array([side.prescribes for side in self.pair(axis)], np.uint8)
+
+    def codes(self) -> Integers:
+        """(3, 2) what the lower and upper side of each axis are to the pressure: CLOSED, OPEN or
+        PERIODIC."""
+        return self._codes
+
+    @cached_property
+    def _codes(self) -> Integers:
+        code = {(False, False): CLOSED, (True, False): OPEN, (False, True): PERIODIC}
+        return np.array([[code[side.free, side.joined] for side in pair] for pair in self._pairs])
+
+    def has_free_side(self, grid: Grid) -> bool:
+        """Whether the pressure decides what crosses one of the sides."""
+        return any(side.free for _, side in self.around(grid))
 
     def check(self, grid: Grid) -> None:
         """Raise ValueError when a slab's z sides are not closed."""
-        if grid.is_slab and any(side.kind != "closed" for side in self.pair(2)):
+        if grid.is_slab and self.pair(2) != (WALL, WALL):
             raise ValueError(
                 "a two-dimensional domain has no sides in z: leave z_min and z_max closed"
             )
+
+
+@lru_cache(maxsize=64)
+def places(grid: Grid) -> tuple[Place, ...]:
+    """Where the sides of a grid lie: along each axis the lower and then the upper."""
+    return tuple(Place(grid, axis, upper) for axis in grid.axes for upper in (False, True))
 
 
 def cells_in(source: Source, grid: Grid) -> tuple[slice, slice, slice]:

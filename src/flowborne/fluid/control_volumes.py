@@ -91,12 +91,6 @@ def wrapping(component: int, grid: Grid, boundaries: Boundaries) -> Integers:
     return counts * np.array(boundaries.periodic(), np.int64)
 
 
-def prescribed_ends(component: int, boundaries: Boundaries) -> Marks:
-    """(2,) 1 where the lower or upper side across an axis prescribes the normal velocity."""
-    kinds = [side.kind for side in boundaries.pair(component)]
-    return np.array([kind not in ("open", "periodic") for kind in kinds], np.uint8)
-
-
 def control_volumes(
     cells: Array, opened: Faces, grid: Grid, boundaries: Boundaries
 ) -> ControlVolumes:
@@ -111,7 +105,7 @@ def control_volumes(
         if axis in grid.axes:
             wraps, driven = wrapping(axis, grid, boundaries), np.empty(volume.shape, np.uint8)
             narrow, nothing = NARROW * grid.cell_volume, NOTHING * grid.cell_volume
-            told, ring = prescribed_ends(axis, boundaries), periodic[axis]
+            told, ring = boundaries.prescribed(axis), periodic[axis]
             own, part = find_small(driven, opened[axis], volume, axis, told, ring, narrow, nothing)
             target, share = find_targets(own, driven, volume, cells, axis, wraps)
             share *= part[:, None]

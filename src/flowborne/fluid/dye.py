@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, Source, cells_in
+from flowborne.fluid.boundary import Boundaries, Source, cells_in
 from flowborne.fluid.control_volumes import WHOLE as UNCUT
 from flowborne.fluid.ghosts import Scalar, edge
 from flowborne.fluid.grid import Array, Grid, faces_of, inner_product
+from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, pass_on, sort_cells
@@ -160,17 +161,12 @@ class Passage:
         return min(float(a.min()) for a in found), max(float(a.max()) for a in found)
 
     def beyond(self, name: str, field: Array, axis: int, upper: int) -> Array:
-        """Values that come in through a side across `axis`, in the order of `along`: what an inflow
-        prescribes, elsewhere those beside it."""
-        side, layer = self.sides.pair(axis)[upper], edge(axis, -1 if upper else 0)
-        values = field[layer]
-        if isinstance(side, BoundaryInflow) and name in side.scalars:
-            x, y, z = np.meshgrid(*self.grid.cell_coordinates(), indexing="ij", sparse=True)
-            at = np.full((1, 1, 1), self.grid.upper[axis] if upper else self.grid.origin[axis])
-            x, y, z = (at if a == axis else place for a, place in enumerate((x, y, z)))
-            given = side.scalars[name](x, y, z, self.transport.time + self.transport.dt)
-            shape = [1 if a == axis else n for a, n in enumerate(self.grid.shape)]
-            values = np.broadcast_to(given, shape)[edge(axis, 0)]
+        """Values that come in through a side across `axis`, in the order of `along`: what the side
+        prescribes, or those beside it."""
+        place, time = Place(self.grid, axis, bool(upper)), self.transport.time + self.transport.dt
+        given = self.sides.pair(axis)[upper].entering_scalar(name, place, time)
+        layer = field[place.layer]
+        values = (layer if given is None else np.broadcast_to(given, layer.shape))[edge(axis, 0)]
         return values.T if self.grid.is_slab else values
 
     def pass_on(self, name: str, field: Array, volume: Array, bounds: tuple[float, float]) -> float:

@@ -13,43 +13,32 @@ what its two cells push with.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.faces import accelerate, weigh
 from flowborne.kernels.pressure_gradient import subtract_gradient
-from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 
-def side_codes(boundaries: Boundaries) -> NDArray[np.int64]:
-    """(3, 2) CLOSED, OPEN or PERIODIC for the lower and upper side of each axis."""
-    code = {"open": OPEN, "periodic": PERIODIC}
-    return np.array(
-        [[code.get(side.kind, CLOSED) for side in boundaries.pair(axis)] for axis in range(3)]
-    )
-
-
-def accelerated(opened: Faces, mass: Faces, grid: Grid) -> Faces:
-    """a A / m of each face: what a difference of pressures accelerates it by, 1/(kg/m^2).
+def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) -> Faces:
+    """a A / m of each face: what a difference of pressures accelerates it by, 1/(kg/m^2); on the
+    sides of the domain the part of it that they leave to the pressure.
 
     mass  of each face, kg; 0 where no pressure acts
     """
     rates = faces_of([np.empty(o.shape) for o in opened])
     for rate, part, m in zip(rates, opened, mass, strict=True):
         accelerate(rate, part, m, grid.face_area)
+    for place, side in boundaries.around(grid):
+        rates[place.axis][place.layer] *= side.pressure_weight(place)
     return rates
 
 
-def face_weights(opened: Faces, rate: Faces, grid: Grid, boundaries: Boundaries) -> Faces:
+def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
-    codes, weights = side_codes(boundaries), faces_of([np.empty(o.shape) for o in opened])
+    weights = faces_of([np.empty(o.shape) for o in opened])
     for axis in range(3):
         weigh(weights[axis], opened[axis], rate[axis], grid.face_area)
-        for end in (0, 1):
-            if codes[axis, end] == CLOSED:
-                weights[axis][edge(axis, -end)] = 0.0
     return weights
 
 
@@ -62,6 +51,6 @@ def subtract_pressure_gradient(
     scale: float,
 ) -> None:
     """Subtract scale rate (p_upper - p_lower) on every face, in place; see `subtract_gradient`."""
-    codes = side_codes(boundaries)
+    codes = boundaries.codes()
     for axis in grid.axes:
         subtract_gradient(velocity[axis], rate[axis], pressure, axis, scale, codes)

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import (
     NOTHING,
     ControlVolumes,
@@ -37,8 +37,9 @@ from flowborne.fluid.fleeting import (
     left_or_taken_up,
     side_rates,
 )
-from flowborne.fluid.ghosts import Scalar, edge, fill_ghosts, wall_velocity, wrap_deep
+from flowborne.fluid.ghosts import Scalar, edge, fill_ghosts
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.sides.side import Layers
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import (
     fill_empty,
@@ -194,20 +195,20 @@ def plane(values: NDArray[Scalar], grid: Grid) -> NDArray[Scalar]:
 
 def marks_of(listed: Integers, component: int, grid: Grid, sides: Boundaries) -> Marks:
     """Padded marks of the control volumes: CLEAR where no cut one is among the next two along an
-    axis, UPSTREAM on an open side of the domain, where means would draw in ever more, else CUT."""
+    axis, UPSTREAM on a free side of the domain, where means would draw in ever more, else CUT."""
     depth = [GHOSTS * (axis in grid.axes) for axis in range(3)]
     shape = grid.face_shape(component)
     padded = np.full([n + 2 * d for n, d in zip(shape, depth, strict=True)], CLEAR, np.uint8)
     mark_cut(padded, listed, np.array(shape), wrapping(component, grid, sides))
-    for axis in grid.axes:
-        if sides.periodic()[axis]:
-            wrap_deep(padded, axis, grid.shape[axis])
+    for place, side in sides.around(grid):
+        layers = Layers(place, GHOSTS)
+        if side.joined:
+            side.fill(padded, layers, None)
             continue
-        for end, side in enumerate(sides.pair(axis)):
-            padded[edge(axis, slice(-GHOSTS, None) if end else slice(GHOSTS))] = CUT
-            if axis == component:
-                at = -1 - GHOSTS if end else GHOSTS
-                padded[edge(axis, at)] = UPSTREAM if side.kind == "open" else CUT
+        for n in range(GHOSTS):
+            padded[layers.outside(n)] = CUT
+        if place.axis == component:
+            padded[layers.inside(0)] = UPSTREAM if side.free else CUT
     return padded
 
 
@@ -323,13 +324,11 @@ class Flow:
         exp(1) while the flow crosses a cell.
         """
         given, axis = 0.0, self.component
-        for upper, side in enumerate(self.sides.pair(axis)):
-            if isinstance(side, BoundaryInflow):
-                layer = edge(axis, slice(-1, None) if upper else slice(1))
-                clock = self.transport.time + time
-                wall = wall_velocity(side, self.grid, axis, bool(upper), axis, clock)
-                given += float((self.high[layer] * (wall - u[layer])).sum())
-                u[layer] = wall
+        for place, side in self.sides.around(self.grid):
+            if side.supplies and place.axis == axis:
+                before = u[place.layer].copy()
+                side.impose(u, place, self.transport.time + time)
+                given += float((self.high[place.layer] * (u[place.layer] - before)).sum())
         return given
 
     def begin(self, u: Array, early: float, late: float) -> None:

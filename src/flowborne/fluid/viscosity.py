@@ -30,10 +30,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.fluid.boundary import Boundaries, BoundaryInflow, BoundaryNoSlip
-from flowborne.fluid.ghosts import edge, wall_velocity
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import side_codes
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.viscosity import (
     INACTIVE,
@@ -52,7 +50,7 @@ NEAR = 2.0
 """Mean distance of a face's corners from bodies beyond which it is not beside one, cells."""
 
 SIDE_MASS = 0.75
-"""Part of the mass of the faces along a no-slip or inflow side that its friction slows down: what
+"""Part of the mass of the faces along a side with friction that this slows down: what
 lies nearer to them than to the side. With it a parabola is exact."""
 
 
@@ -116,7 +114,7 @@ def assemble_viscosity(
     masses    Faces, of the fluid that belongs to each face, kg
     time      s, of the sides' prescribed velocities
     """
-    codes = side_codes(boundaries)
+    codes = boundaries.codes()
     periodic = boundaries.periodic()
     h = grid.spacing
     stiffness = viscosity * grid.face_area / h
@@ -179,14 +177,10 @@ def stick_to_sides(
     """Friction of the domain's sides on the faces across `axis`, kg/s, and the force of moving
     ones, N."""
     friction, given = np.zeros(kind.shape), np.zeros(kind.shape)
-    for d in grid.axes:
-        for end, side in enumerate(boundaries.pair(d)):
-            if d != axis and isinstance(side, (BoundaryInflow, BoundaryNoSlip)):
-                layer = edge(d, -1 if end else 0)
-                wall = wall_velocity(side, grid, d, bool(end), axis, time)
-                if isinstance(wall, np.ndarray):
-                    wall = wall[edge(d, 0)]
-                coefficient = 2.0 * stiffness * (kind[layer] == UNKNOWN)
-                friction[layer] += coefficient
-                given[layer] += coefficient * wall
+    for place, side in boundaries.around(grid):
+        wall = None if place.axis == axis else side.prescribed_velocity(place, axis, time)
+        if wall is not None:
+            coefficient = 2.0 * stiffness * (kind[place.layer] == UNKNOWN)
+            friction[place.layer] += coefficient
+            given[place.layer] += coefficient * wall
     return friction, given

@@ -8,6 +8,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from flowborne.coupling.advection.flux_form import FluxForm
+from flowborne.coupling.advection.scheme import Advection
+from flowborne.coupling.advection.semi_lagrangian import SemiLagrangian
 from flowborne.fluid.grid import Grid
 from flowborne.runs.summary import machine_memory
 from flowborne.tables import Corner, Count, NotNegative, Places, Positive, Table, Vector
@@ -144,6 +147,10 @@ class FluidTable(Table):
     advection: Literal["flux", "semi-lagrangian"] = "flux"
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
     coupling: Literal["two-way", "one-way", "none"] = "two-way"
+
+    def scheme(self) -> Advection:
+        """The scheme that carries the velocity."""
+        return FluxForm() if self.advection == "flux" else SemiLagrangian()
 
 
 def fits_memory(counts: list[int]) -> bool:

@@ -177,7 +177,7 @@ def check_bands(
         if not isinstance(dye, DyeBands):
             continue
         where = places.at("dye", index)
-        if sides[dye.side].kind != "inflow":
+        if not sides[dye.side].boundary.supplies:
             yield (
                 f"{where}: side {dye.side} is {sides[dye.side].kind}, and dye enters with an "
                 "inflow. Choose an inflow side, or use a dye of kind 'box'."

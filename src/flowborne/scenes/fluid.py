@@ -40,7 +40,7 @@ def fluid_of(scene: Scene) -> Fluid | None:
         sources=sources,
         scalars=scene.scalars(),
         body_force=triple(table.body_force),
-        advection=table.advection,
+        advection=table.scheme(),
         tolerance=table.tolerance,
         one_way=table.coupling == "one-way",
     )
@@ -118,8 +118,8 @@ def check_fluid(draft: Draft) -> Iterator[str]:
     yield from check_memory(draft, scene.domain)
     if scene.boundaries is not None and draft.sound("boundaries"):
         yield from check_sides(draft, scene.boundaries, slab=scene.is_slab)
-        kinds = {side.kind for _, side in scene.boundaries}
-        if scene.mouths and scene.is_two_way and "open" not in kinds:
+        free = any(side.boundary.free for _, side in scene.boundaries)
+        if scene.mouths and scene.is_two_way and not free:
             yield (
                 f"{draft.at('boundaries')}: what a mouth expels has nowhere to go, as no side is "
                 "open. Make a side open."

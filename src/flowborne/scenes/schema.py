@@ -28,7 +28,7 @@ from flowborne.scenes.schema_bodies import (
     SolidsTable,
 )
 from flowborne.scenes.schema_film import FilmTable
-from flowborne.scenes.sides import BoundariesTable, InflowSide
+from flowborne.scenes.sides import BoundariesTable
 from flowborne.scenes.wind import WindTable
 from flowborne.tables import (
     Count,
@@ -284,7 +284,7 @@ class Scene(Table):
         None when all of it is at rest.
         """
         sides = [] if self.boundaries is None else [side for _, side in self.boundaries]
-        found = [side.velocity for side in sides if isinstance(side, InflowSide)]
+        found = [stream for side in sides if (stream := side.stream()) is not None]
         for key in ("velocity", "force"):
             found += [getattr(wind, key) for wind in self.wind if hasattr(wind, key)]
         found += [] if self.fluid is None else [self.fluid.velocity]

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
-from flowborne.fluid.boundary import (
-    Boundary,
-    BoundaryClosed,
-    BoundaryInflow,
-    BoundaryNoSlip,
-    BoundaryOpen,
-    BoundaryPeriodic,
-)
 from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.inflow import BoundaryInflow
+from flowborne.fluid.sides.no_slip import BoundaryNoSlip
+from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.side import Boundary
 from flowborne.motion.inflow import FactorRamp, FactorSteady, InflowProfile
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.factors import FactorsTable
@@ -29,18 +27,30 @@ Side = Literal["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
 class AnySideTable(Table):
     """What every side has."""
 
+    boundary: ClassVar[type[Boundary]]
+
     def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> Boundary:
         """The boundary across the axis `normal` of a grid, with the dyes that enter there."""
-        raise NotImplementedError
+        return self.boundary()
+
+    def check(self, normal: int) -> Iterator[str]:
+        """What is wrong with it across the axis `normal`."""
+        return iter(())
+
+    def stream(self) -> Vector | None:
+        """Mean velocity with which fluid comes in, m/s; None where the side gives it none."""
+        return None
+
+    def fastest(self, dimensions: int) -> float:
+        """Largest speed of that at any time, the axes added up, m/s."""
+        return 0.0
 
 
 class ClosedSide(AnySideTable):
     """Free-slip wall."""
 
+    boundary = BoundaryClosed
     kind: Literal["closed"]
-
-    def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> BoundaryClosed:
-        return BoundaryClosed()
 
 
 class NoSlipSide(AnySideTable):
@@ -49,29 +59,33 @@ class NoSlipSide(AnySideTable):
     velocity  m/s with which it slides in its own plane
     """
 
+    boundary = BoundaryNoSlip
     kind: Literal["no-slip"]
     velocity: Vector = (0.0, 0.0, 0.0)
 
     def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> BoundaryNoSlip:
         return BoundaryNoSlip(triple(self.velocity))
 
+    def check(self, normal: int) -> Iterator[str]:
+        if self.velocity[normal] != 0.0:
+            yield (
+                f"velocity {list(self.velocity)} moves the wall out of its place. "
+                f"Make its {'xyz'[normal]} component 0."
+            )
+
 
 class OpenSide(AnySideTable):
     """Fluid leaves and enters freely."""
 
+    boundary = BoundaryOpen
     kind: Literal["open"]
-
-    def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> BoundaryOpen:
-        return BoundaryOpen()
 
 
 class PeriodicSide(AnySideTable):
     """Joined to the opposite side."""
 
+    boundary = BoundaryPeriodic
     kind: Literal["periodic"]
-
-    def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> BoundaryPeriodic:
-        return BoundaryPeriodic()
 
 
 class InflowSide(AnySideTable, FactorsTable):
@@ -83,6 +97,7 @@ class InflowSide(AnySideTable, FactorsTable):
     times     s, instead of ramp: keyframes between which `factors` of the velocity change smoothly
     """
 
+    boundary = BoundaryInflow
     kind: Literal["inflow"]
     velocity: Vector
     profile: Literal["uniform", "parabolic"] = "uniform"
@@ -102,6 +117,14 @@ class InflowSide(AnySideTable, FactorsTable):
             (axis, grid.origin[axis], grid.upper[axis]) for axis in grid.axes if axis != normal
         )
         return BoundaryInflow(InflowProfile(triple(self.velocity), factor, spans), dyes)
+
+    def stream(self) -> Vector:
+        return self.velocity
+
+    def fastest(self, dimensions: int) -> float:
+        peak = 1.5 ** (dimensions - 1) if self.profile == "parabolic" else 1.0
+        factor = max(map(abs, self.factors)) if self.factors else 1.0
+        return peak * factor * sum(map(abs, self.velocity))
 
 
 BoundarySide = Annotated[ClosedSide | NoSlipSide | OpenSide | InflowSide | PeriodicSide, *ByKind]
@@ -125,31 +148,23 @@ class BoundariesTable(Table):
     z_max: BoundarySide = _CLOSED
 
 
-def _half_periodic(low: str, high: str) -> bool:
-    """Whether just one of two opposite kinds of sides is periodic."""
-    return (low == "periodic") != (high == "periodic")
-
-
 def check_sides(places: Places, boundaries: BoundariesTable, *, slab: bool) -> Iterator[str]:
     sides = dict(boundaries)
     for axis, name in enumerate("xyz"):
         low, high = sides[f"{name}_min"], sides[f"{name}_max"]
-        if _half_periodic(low.kind, high.kind):
+        if low.boundary.joined != high.boundary.joined:
             yield (
                 f"{places.at('boundaries')}: {name}_min is {low.kind} and {name}_max is "
                 f"{high.kind}. Make both of them periodic or neither."
             )
         for side, table in ((f"{name}_min", low), (f"{name}_max", high)):
-            if axis == 2 and slab and table.kind != "closed":
+            if axis == 2 and slab and table != _CLOSED:
                 yield (
                     f"{places.at('boundaries', side)} is {table.kind}, but a scene of 2 dimensions "
                     "has no sides in z. Drop it."
                 )
-            if isinstance(table, NoSlipSide) and table.velocity[axis] != 0.0:
-                yield (
-                    f"{places.at('boundaries', side)}: velocity {list(table.velocity)} moves the "
-                    f"wall out of its place. Make its {name} component 0."
-                )
+            for problem in table.check(axis):
+                yield f"{places.at('boundaries', side)}: {problem}"
 
 
 def check_outlet(
@@ -159,17 +174,18 @@ def check_outlet(
 
     rates  volume rates of the sources, m^3/s
     """
-    kinds = {name: side.kind for name, side in boundaries}
-    unclear = any(_half_periodic(kinds[f"{a}_min"], kinds[f"{a}_max"]) for a in "xyz")
-    if unclear or "open" in kinds.values():
+    kinds = {name: side.boundary for name, side in boundaries}
+    unclear = any(kinds[f"{a}_min"].joined != kinds[f"{a}_max"].joined for a in "xyz")
+    if unclear or any(kind.free for kind in kinds.values()):
         return
     total, largest = 0.0, 0.0
     for name, side in boundaries:
-        if isinstance(side, InflowSide):
+        stream = side.stream()
+        if stream is not None:
             axis = "xyz".index(name[0])
             others = [e for i, e in enumerate(domain.extent()) if i != axis]
             inward = 1.0 if name.endswith("min") else -1.0
-            flux = inward * side.velocity[axis] * math.prod(others)
+            flux = inward * stream[axis] * math.prod(others)
             total, largest = total + flux, max(largest, abs(flux))
     for rate in rates:
         total, largest = total + rate, max(largest, abs(rate))

@@ -17,7 +17,6 @@ from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.sides import InflowSide
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.surfaces import Outline
 from flowborne.tables import MOST_STEPS
@@ -199,10 +198,7 @@ def _streams(scene: Scene) -> Iterator[tuple[str, float]]:
     """Speeds in m/s, the axes added up, of the flow at the start, at the sides and in sources."""
     yield "the initial flow", _added(scene.fluid.velocity if scene.fluid else ())
     for name, side in scene.boundaries or ():
-        if isinstance(side, InflowSide):
-            peak = 1.5 ** (scene.dimensions - 1) if side.profile == "parabolic" else 1.0
-            factor = max(map(abs, side.factors)) if side.factors else 1.0
-            yield f"the stream at {name}", peak * factor * _added(side.velocity)
+        yield f"the stream at {name}", side.fastest(scene.dimensions)
     for number, source in enumerate(scene.sources, start=1):
         yield f"the flow of [[sources]] {number}", _added(source.velocity or ())
 

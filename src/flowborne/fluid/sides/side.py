@@ -1,0 +1,169 @@
+"""What every side of the domain does, and where it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flowborne.fluid.grid import Array, Grid
+
+Profile = Callable[[Array, Array, Array, float], tuple[Array, Array, Array]]
+"""velocity(x, y, z, time) -> (u, v, w): broadcasting arrays in m and s to m/s."""
+
+ScalarProfile = Callable[[Array, Array, Array, float], Array]
+"""value(x, y, z, time) of a carried scalar: broadcasting arrays in m and s."""
+
+Slices = tuple[slice, ...]
+Field = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a side lies: at the lower or the upper end of an axis of a grid."""
+
+    grid: Grid
+    axis: int
+    upper: bool
+
+    @property
+    def layer(self) -> Slices:
+        """Index of the layer of a field that is next to the side, or of the faces on it."""
+        layers = [slice(None)] * 3
+        layers[self.axis] = slice(-1, None) if self.upper else slice(1)
+        return tuple(layers)
+
+    def face_coordinates(self, component: int) -> tuple[Array, Array, Array]:
+        """x, y, z on the side at which a component of velocity lives, m; not to be written."""
+        return _face_coordinates(self, component)
+
+    def cell_coordinates(self) -> tuple[Array, Array, Array]:
+        """x, y, z of the middles of the cells' faces on the side, m; broadcasting."""
+        return self._on_side(self.grid.cell_coordinates(), sparse=True)
+
+    def _on_side(
+        self, coordinates: tuple[Array, Array, Array], sparse: bool
+    ) -> tuple[Array, Array, Array]:
+        along, end = list(coordinates), self.grid.upper if self.upper else self.grid.origin
+        along[self.axis] = np.array([end[self.axis]])
+        x, y, z = np.meshgrid(*along, indexing="ij", sparse=sparse)
+        return x, y, z
+
+
+@lru_cache(maxsize=64)
+def _face_coordinates(place: Place, component: int) -> tuple[Array, Array, Array]:
+    found = place._on_side(place.grid.face_coordinates(component), sparse=False)
+    for coordinates in found:
+        coordinates.flags.writeable = False
+    return found
+
+
+@dataclass(slots=True)
+class Layers:
+    """Layers of a padded field on both sides of a side of the domain.
+
+    depth  number of layers of ghosts
+    span   of each layer along the other axes
+    """
+
+    place: Place
+    depth: int
+    span: Slices = (slice(None),) * 3
+
+    def inside(self, n: int) -> Slices:
+        """Index of the layer that is the n-th inside the side, from 0."""
+        return self._at(self.depth + n)
+
+    def outside(self, n: int) -> Slices:
+        """Index of the layer of ghosts that is the n-th outside the side, from 0."""
+        return self._at(self.depth - 1 - n)
+
+    def across(self, n: int) -> Slices:
+        """Index of the layer a period away from that outside."""
+        return self._at(self.depth - 1 - n + self.place.grid.shape[self.place.axis])
+
+    def _at(self, layer: int) -> Slices:
+        """Index of a layer, counted from the outermost ghosts."""
+        index = list(self.span)
+        stop = -layer or None
+        index[self.place.axis] = (
+            slice(-1 - layer, stop) if self.place.upper else slice(layer, layer + 1)
+        )
+        return tuple(index)
+
+
+class Boundary:
+    """One side of the domain; by default a wall that nothing crosses and nothing sticks to.
+
+    A kind of side overrides what it does otherwise. Fields and layers are indexed as in `Place` and
+    `Layers`.
+
+    kind      its name in scenes and messages
+    free      whether the pressure determines the flux through it; otherwise the side prescribes it
+    supplies  whether it prescribes a velocity at which fluid enters
+    joined    whether the fluid continues at the opposite side
+    """
+
+    kind: ClassVar[str]
+    free: ClassVar[bool] = False
+    supplies: ClassVar[bool] = False
+    joined: ClassVar[bool] = False
+
+    @property
+    def prescribes(self) -> bool:
+        """Whether it prescribes the flux through it, so that no pressure acts on its faces."""
+        return not (self.free or self.joined)
+
+    def prescribed_velocity(
+        self, place: Place, component: int, time: float
+    ) -> Array | float | None:
+        """Component of velocity that it prescribes at `time` (s), m/s; None where it prescribes
+        none. Broadcasts over the layer at the side. A viscous fluid has friction with a side that
+        prescribes a tangential velocity.
+        """
+        return 0.0 if component == place.axis else None
+
+    def impose(self, field: Array, place: Place, time: float) -> None:
+        """Set the normal velocity on its faces, in place, if it prescribes one."""
+        across = self.prescribed_velocity(place, place.axis, time)
+        if across is not None:
+            field[place.layer] = across
+
+    def fill(self, field: Field, layers: Layers, wall: Array | float | None) -> None:
+        """Set the ghosts of a field beyond the side, in place.
+
+        wall  value at the side, half-way between field and ghosts; None mirrors the field
+        """
+        for n in range(layers.depth):
+            inner = field[layers.inside(n)]
+            field[layers.outside(n)] = inner if wall is None else 2.0 * wall - inner
+
+    def pressure_weight(self, place: Place) -> Array | float:
+        """Acceleration of its faces by the pressure in the cells next to it, relative to that with
+        p = 0 on the side: 0 if the flux is prescribed, 1 on an open side, (h/2) / (h/2 + l) with a
+        column of fluid of length l beyond. The pressure on the side is (1 - weight) times that in
+        the cell. Broadcasts over the layer at the side.
+        """
+        return 1.0 if self.free or self.joined else 0.0
+
+    def entering(self, beside: Array, share: Array) -> Array | float | None:
+        """Velocity of fluid that enters, m/s; None where it is the mean of field and ghosts.
+
+        beside  velocity of the control volumes at the side, m/s
+        share   of each in the volume of all of them
+        """
+        return None
+
+    def entering_scalar(self, name: str, place: Place, time: float) -> Array | None:
+        """Values of a scalar in fluid that enters; None for those in the cells at the side."""
+        return None
+
+
+def hold(field: Field, layers: Layers) -> None:
+    """Set the ghosts of a field to its values at the side, in place."""
+    for n in range(layers.depth):
+        field[layers.outside(n)] = field[layers.inside(0)]

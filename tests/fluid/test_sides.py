@@ -1,0 +1,96 @@
+"""The contract of the sides: every kind does all that the solvers ask of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.inflow import BoundaryInflow
+from flowborne.fluid.sides.no_slip import BoundaryNoSlip
+from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.side import Boundary, Layers
+from flowborne.scenes import sides as tables
+
+CUBE = Grid((6, 5, 4), 0.5, (0.0, 1.0, -1.0))
+
+
+def profile(x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
+    return 1.0 + y + time + 0 * x, x + z, x * y
+
+
+ALL: list[Boundary] = [
+    BoundaryClosed(),
+    BoundaryNoSlip((1.0, 2.0, 3.0)),
+    BoundaryOpen(),
+    BoundaryInflow(profile, {"dye": lambda x, y, z, time: y + time + 0 * (x + z)}),
+    BoundaryPeriodic(),
+]
+KINDS = pytest.mark.parametrize("side", ALL, ids=lambda side: side.kind)
+
+
+def places(side: Boundary):
+    return [place for place, _ in Boundaries(*(side,) * 6).around(CUBE)]
+
+
+@KINDS
+def test_pressure_acts_where_the_flux_is_not_prescribed(side: Boundary) -> None:
+    for place in places(side):
+        weight = side.pressure_weight(place)
+        across = side.prescribed_velocity(place, place.axis, 0.0)
+        assert (weight == 0.0) == side.prescribes == (across is not None)
+        assert side.free + side.joined + side.prescribes == 1
+
+
+@KINDS
+def test_ghosts_meet_what_the_side_prescribes_in_layers_of_any_depth(side: Boundary) -> None:
+    """Half-way to the n-th ghost lies the side."""
+    for place in places(side):
+        for component in {0, 1, 2} - {place.axis}:
+            wall = side.prescribed_velocity(place, component, 0.7)
+            if wall is None:
+                continue
+            span = tuple(slice(None) if a == place.axis else slice(2, -2) for a in range(3))
+            field = np.random.default_rng(1).normal(
+                size=[n + 4 for n in CUBE.face_shape(component)]
+            )
+            layers = Layers(place, 2, span)
+            side.fill(field, layers, wall)
+            for n in (0, 1):
+                middle = 0.5 * (field[layers.inside(n)] + field[layers.outside(n)])
+                np.testing.assert_allclose(middle, np.broadcast_to(wall, middle.shape), atol=1e-14)
+
+
+@KINDS
+def test_a_field_that_meets_it_stays_when_a_side_is_imposed_again(side: Boundary) -> None:
+    for place in places(side):
+        field = np.random.default_rng(2).normal(size=CUBE.face_shape(place.axis))
+        side.impose(field, place, 0.3)
+        again = field.copy()
+        side.impose(again, place, 0.3)
+        np.testing.assert_array_equal(again, field)
+
+
+@KINDS
+def test_what_enters_is_of_the_shape_of_the_side(side: Boundary) -> None:
+    for place in places(side):
+        cells = np.zeros(CUBE.shape)[place.layer]
+        scalar = side.entering_scalar("dye", place, 0.5)
+        assert side.entering_scalar("smoke", place, 0.5) is None
+        assert scalar is None or np.broadcast_to(scalar, cells.shape).shape == cells.shape
+        if scalar is not None and place.axis == 0:
+            np.testing.assert_allclose(scalar[0, :, 0], CUBE.cell_coordinates()[1] + 0.5)
+        beside, share = np.random.default_rng(3).random((2, *cells.shape))
+        velocity = side.entering(beside, share / share.sum())
+        assert velocity is None or beside.min() <= velocity <= beside.max()
+
+
+def test_every_side_of_scenes_is_of_a_kind_of_its_name() -> None:
+    found = {
+        table.boundary.kind: table.model_fields["kind"].annotation.__args__[0]
+        for table in tables.AnySideTable.__subclasses__()
+    }
+    assert found == {side.kind: side.kind for side in ALL}
