@@ -23,6 +23,7 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import pressure_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
 
@@ -65,8 +66,11 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     kick, before = grid.zeros_faces(), grid.zeros_faces()
     subtract_pressure_gradient(kick, rate, pressure, grid, sides, dt)
     subtract_pressure_gradient(before, rate, earlier, grid, sides, dt)
-    both = sum(float((m * k * b).sum()) for m, k, b in zip(mass, kick, before, strict=True))
-    square = sum(float((m * k * k).sum()) for m, k in zip(mass, kick, strict=True))
+    # the last faces along a periodic axis are the first ones
+    own = [edge(a, slice(None, -1 if ring else None)) for a, ring in enumerate(sides.periodic())]
+    fields = list(zip(own, mass, kick, before, strict=True))
+    both = sum(float((m * k * b)[once].sum()) for once, m, k, b in fields)
+    square = sum(float((m * k * k)[once].sum()) for once, m, k, _ in fields)
     part = 0.5 * likely(both / square) if square > 0.0 else 0.0
     half = part * pressure
     state.pressure -= half

@@ -65,7 +65,6 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
     """
     first = moving.size - geometry.skins.vertices.size
     carried = [opened * u for opened, u in zip(geometry.open, velocity, strict=True)]
-    origin = np.array(grid.origin)
     for axis in grid.axes:
         add_body_velocity(
             carried[axis],
@@ -74,13 +73,11 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
             geometry.face,
             geometry.body,
             geometry.closed,
+            geometry.place,
             geometry.corner,
             geometry.weight,
             moving[:first].reshape(-1, 6),
             moving[first:].reshape(-1, 3),
-            origin,
-            grid.spacing,
-            grid.is_slab,
         )
     return carried[0], carried[1], carried[2]
 

@@ -203,7 +203,7 @@ def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
         setup.shapes,
         pose.geom_position[setup.shapes.source],
         pose.geom_rotation[setup.shapes.source],
-        skins_on(setup.fluid.grid, seen, pose.vertices),
+        skins_on(setup.fluid.grid, setup.fluid.boundaries, seen, pose.vertices),
         setup.solid.nbody,
         setup.fluid.grid,
         setup.fluid.boundaries,

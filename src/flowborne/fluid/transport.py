@@ -201,6 +201,8 @@ def marks_of(listed: Integers, component: int, grid: Grid, sides: Boundaries) ->
     mark_cut(padded, listed, np.array(shape), wrapping(component, grid, sides))
     for axis in grid.axes:
         if sides.periodic()[axis]:
+            if axis == component:  # the last faces are the first ones
+                padded[edge(axis, -1 - GHOSTS)] = padded[edge(axis, GHOSTS)]
             wrap_deep(padded, axis, grid.shape[axis])
             continue
         for end, side in enumerate(sides.pair(axis)):

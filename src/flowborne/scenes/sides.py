@@ -124,6 +124,10 @@ class BoundariesTable(Table):
     z_min: BoundarySide = _CLOSED
     z_max: BoundarySide = _CLOSED
 
+    def periodic(self, axis: int) -> bool:
+        """Whether bodies may cross the sides across an axis."""
+        return getattr(self, f"{'xyz'[axis]}_min").kind == "periodic"
+
 
 def _half_periodic(low: str, high: str) -> bool:
     """Whether just one of two opposite kinds of sides is periodic."""
