@@ -20,7 +20,7 @@ import numpy as np
 
 from flowborne.coupling.flow import face_masses, fluid_momentum, moved_since
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.operators import pressure_push
+from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.ghosts import edge
@@ -35,12 +35,14 @@ class Kick:
     velocity  Faces of the fluid with it, m/s
     pressure  (nx, ny, nz) that gives it, Pa
     impulse   (k,) on the bodies, see `Projected`
+    sides     (3,) impulse of the sides on the fluid, N s
     start     (3,) momentum of the fluid without it, N s
     """
 
     velocity: Faces
     pressure: Array
     impulse: Array
+    sides: Array
     start: Array
 
 
@@ -60,7 +62,7 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     size = 6 * world.setup.solid.nbody + cut.skins.vertices.size
     plain = fluid.advection == "semi-lagrangian" or fluid.boundaries.has_open_side(fluid.grid)
     if plain or moved_since(world):
-        return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
+        return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), np.zeros(3), start)
     pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
     rate = accelerated(cut.open, mass, grid)
     kick, before = grid.zeros_faces(), grid.zeros_faces()
@@ -76,7 +78,8 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     state.pressure -= half
     velocity = faces_of([u + part * k for u, k in zip(state.velocity, kick, strict=True)])
     volumes.follow(velocity, grid)
-    return Kick(velocity, half, pressure_push(cut, dt * half, size), start)
+    pushed = dt * side_push(half, cut.open, grid, sides)
+    return Kick(velocity, half, pressure_push(cut, dt * half, size), pushed, start)
 
 
 def likely(earlier: float) -> float:

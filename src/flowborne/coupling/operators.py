@@ -12,9 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
@@ -102,16 +104,35 @@ def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: flo
     return np.concatenate([force, np.cross(centroid, force)], axis=1)
 
 
-def side_push(pressure: Array, grid: Grid, boundaries: Boundaries) -> Array:
-    """(3,) force of the solid and inflow sides on the fluid for a pressure field, N."""
+def side_push(pressure: Array, opened: Faces, grid: Grid, boundaries: Boundaries) -> Array:
+    """(3,) force of the solid and inflow sides on the fluid for a pressure field, N.
+
+    A cell that bodies and sides close in pushes nothing: the pressure it had before stays in it.
+
+    opened  Faces, open part of each
+    """
     force = np.zeros(3)
     for axis in grid.axes:
-        low, high = boundaries.pair(axis)
-        if low.kind not in ("open", "periodic"):
-            force[axis] += grid.face_area * float(pressure.take(0, axis).sum())
-        if high.kind not in ("open", "periodic"):
-            force[axis] -= grid.face_area * float(pressure.take(-1, axis).sum())
+        for end, side in enumerate(boundaries.pair(axis)):
+            if side.kind not in ("open", "periodic"):
+                layer = edge(axis, slice(-1, None) if end else slice(1))
+                met = pressure[layer] * beside_open(layer, opened, grid, boundaries)
+                force[axis] += (1 - 2 * end) * grid.face_area * float(met.sum())
     return force
+
+
+def beside_open(
+    layer: tuple[int | slice, ...], opened: Faces, grid: Grid, boundaries: Boundaries
+) -> NDArray[np.bool_]:
+    """Which cells of a layer have an open face that is on no solid side."""
+    count = np.zeros(grid.shape, np.int8)[layer]
+    for axis in grid.axes:
+        low, high = (side.kind in ("open", "periodic") for side in boundaries.pair(axis))
+        free = (opened[axis] > 0.0).astype(np.int8)
+        free[edge(axis, 0)] *= low
+        free[edge(axis, -1)] *= high
+        count += free[edge(axis, slice(-1))][layer] + free[edge(axis, slice(1, None))][layer]
+    return np.asarray(count > 0)
 
 
 def carried_in(
