@@ -18,11 +18,14 @@ from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import PartError, SceneError, described
+from flowborne.fluid.boundary import SIDES
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
 from flowborne.runs.frame_report import PARTS, FrameReport
+from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, SLIDE
+from flowborne.solids.surfaces import geom_boxes
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
@@ -312,6 +315,9 @@ def trouble(world: World, report: StepReport) -> str | None:
         return torn.sentence()
     if fluid is None or properties is None:
         return None
+    left = departed(world, report)
+    if left:
+        return left
     grid = properties.grid
     if not all(np.isfinite(values).all() for values in (*fluid.velocity, fluid.pressure)):
         return Outcome.NOT_FINITE.value
@@ -321,6 +327,35 @@ def trouble(world: World, report: StepReport) -> str | None:
             f"the fluid moves {moved:.3g} m in one step, farther than the domain is long "
             f"({longest:.3g} m)"
         )
+    return None
+
+
+def departed(world: World, report: StepReport) -> str | None:
+    """Which body is where there is no fluid, beyond a side that lets nothing through, or None.
+
+    Its centre of mass is there, or it reaches there by more than a cell and momentum is lost.
+    """
+    model, fluid = world.setup.solid, world.setup.fluid
+    if fluid is None or fluid.one_way:
+        return None
+    grid, h = fluid.grid, fluid.grid.spacing
+    body, low = np.arange(model.nbody), report.centre
+    high = low
+    if report.momentum.budget_error > BUDGET_OPEN:
+        first, last = geom_boxes(model, world.solid.q)
+        body = np.append(body, model.geom_body)
+        low, high = np.concatenate([low, first + h]), np.concatenate([high, last - h])
+    met = (model.moving & (model.volume > 0.0))[body]
+    for axis in grid.axes:
+        gone = low[:, axis] < grid.origin[axis], high[:, axis] > grid.upper[axis]
+        for end, side in enumerate(fluid.boundaries.pair(axis)):
+            found = np.flatnonzero(met & gone[end])
+            if found.size and side.kind not in ("open", "periodic"):
+                return (
+                    f"body '{model.body_names[body[found[0]]]}' has left the domain through its "
+                    f"{side.kind} side {SIDES[2 * axis + end]}; enlarge [domain], or put a plane "
+                    "with contact into the model where the side is"
+                )
     return None
 
 

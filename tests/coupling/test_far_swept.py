@@ -121,6 +121,19 @@ def test_a_stream_stays_uniform_past_a_plate_that_goes_with_it(grid: Grid) -> No
             assert np.abs(u - (speed if axis == 0 else 0.0)).max() < 1e-10 * speed
 
 
+@pytest.mark.parametrize("grid", [slab(24), room(20)], ids=["slab", "room"])
+def test_a_stream_stays_uniform_past_a_plate_wherever_the_plate_is(grid: Grid) -> None:
+    """It crosses the periodic side in steps of 0.75 cells."""
+    dt, speed = 0.02 / 12.0, 9.0 * grid.spacing / 0.02
+    world = plate("slides", grid, RING if grid.is_slab else AROUND)
+    world.solid.v[0] = speed
+    set_velocity(world, lambda x, y, z: (speed + 0.0 * x, 0.0 * x, 0.0 * x))
+    for _ in range(26):
+        swept(world, dt, speed, held=False)
+        for axis, u in enumerate(world.flow()[1].velocity):
+            assert np.abs(u - (speed if axis == 0 else 0.0)).max() < 1e-12 * speed
+
+
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_a_velocity_that_is_no_number_is_told_before_the_solve(wrong: float) -> None:
     world = plate("slides", slab(16), Boundaries())

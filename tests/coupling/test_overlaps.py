@@ -86,7 +86,7 @@ def test_covered_cells_take_the_mean_of_those_nearer_to_the_fluid() -> None:
     kind[0], kind[:, 3], kind[4, 0] = WIDE, ENCLOSED, WIDE
     kind[1, 0] = NARROW
     rows = np.array([4, 8]), np.array([0, 2, 3]), np.array([7, 1, 7]), np.array([1.0, 2.0, 3.0])
-    cells, start, columns, values = handed_on(rows, kind, 9)
+    cells, start, columns, values = handed_on(rows, kind, 9, (False, False, False))
     # (1, 0) has the pressure of (0, 0); (2, 0) half that and half that of (1, 0)'s like, (3, 0)
     np.testing.assert_array_equal(cells, [0, 16])
     np.testing.assert_array_equal(start, [0, 2, 3])
@@ -94,11 +94,19 @@ def test_covered_cells_take_the_mean_of_those_nearer_to_the_fluid() -> None:
     np.testing.assert_allclose(values, [2.0, 2.5, 1.5])
 
 
+def test_covered_cells_take_the_pressure_from_across_a_periodic_side() -> None:
+    kind = np.full((4, 3, 1), ENCLOSED, np.int8)
+    kind[0, 1], kind[3, 1] = COVERED, WIDE
+    rows = np.array([1]), np.array([0, 1]), np.array([2]), np.array([5.0])
+    cells, _, columns, values = handed_on(rows, kind, 6, (True, False, False))
+    assert (cells, columns, values) == ([10], [2], [5.0])
+
+
 def test_cells_that_no_way_leads_out_of_have_no_pressure() -> None:
     kind = np.full((3, 3, 1), ENCLOSED, np.int8)
     kind[1, 1] = COVERED
     rows = np.array([4]), np.array([0, 1]), np.array([0]), np.array([1.0])
-    assert handed_on(rows, kind, 6)[0].size == 0
+    assert handed_on(rows, kind, 6, (False, False, False))[0].size == 0
 
 
 FREE = np.arange(3, 8)

@@ -105,7 +105,7 @@ def case_of(
     mobility = np.zeros((size, size)) if mobility is None else mobility
     system = ViscousSystem(
         parts,
-        walls_of(parts, cut.distance, cut.nearest, grid),
+        walls_of(parts, cut, grid),
         size,
         size // 6,
         lambda drag: DenseAnswer(mobility, drag.toarray()),

@@ -15,6 +15,7 @@ from flowborne.kernels.closed_fractions import (
     list_closed,
     share_closed,
 )
+from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.closed_fractions import (
@@ -57,19 +58,21 @@ def test_count_beside(shape: tuple[int, int, int]) -> None:
 
 
 @pytest.mark.parametrize(("shape", "axis"), AXES)
-@pytest.mark.parametrize("walls", [(0, 0), (1, 0), (0, 1)])
+@pytest.mark.parametrize(
+    "sides", [(OPEN, OPEN), (CLOSED, OPEN), (OPEN, CLOSED), (PERIODIC, PERIODIC)]
+)
 def test_shares_and_their_list(
-    shape: tuple[int, int, int], axis: int, walls: tuple[int, int]
+    shape: tuple[int, int, int], axis: int, sides: tuple[int, int]
 ) -> None:
     """Some faces in a crease and just below its limit."""
-    made, solid, random = cut(shape), np.array(walls), np.random.default_rng(3)
+    made, codes, random = cut(shape), np.array(sides), np.random.default_rng(3)
     beside = random.integers(0, 3, shape)
     total = add_closed_reference(np.zeros(face_shape(shape, axis)), made.phi, made.box, axis)
     total *= random.uniform(1.0, 2.0, total.shape)
     opened = np.ones(total.shape)
     union = face_closed_reference(made.distance, axis)
     assert ((union > 1.0 - 10.0 * CREASE) & (union < 1.0)).any()
-    parts = opened, total, made.distance, beside, made.phi, made.box, axis, solid
+    parts = opened, total, made.distance, beside, made.phi, made.box, axis, codes
     expected, opening = share_closed_reference(*parts)
     share = np.empty(expected.shape)
     count = share_closed(share, *parts)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from flowborne import Grid
+from flowborne import BlowUpError, Grid, Simulation
 from flowborne.cli import BLAS_THREADS, main
 from flowborne.coupling.world import Fluid
 from flowborne.running import RunOutcome
@@ -110,3 +110,23 @@ def test_a_run_that_leaves_its_domain_is_not_done_when_resumed_either(
         main(["run", str(scene), "--out", str(out), "--resume", "--frames", "9", "--no-film"])
     assert left.value.code == 3
     assert "left the fluid's domain in frame 6" in capsys.readouterr().err
+
+
+def advance_frames(scene, count):
+    with Simulation(scene, workers=1) as simulation:
+        for _ in range(count):
+            simulation.advance_frame()
+
+
+@pytest.mark.parametrize("kind", ["closed", "no-slip"])
+def test_a_run_stops_when_a_body_leaves_through_a_side_that_lets_nothing_through(tmp_path, kind):
+    (tmp_path / "ball.xml").write_text(MODEL)
+    scene = tmp_path / "leaving.toml"
+    scene.write_text(SCENE.replace('x_max = "open"', f'x_max = "{kind}"'))
+    with pytest.raises(BlowUpError) as left:
+        advance_frames(scene, 8)
+    assert 3 <= left.value.frame <= 5  # from 0.2 s on it reaches there, its middle after 0.43 s
+    assert left.value.cause == (
+        f"body 'ball' has left the domain through its {kind} side x_max; enlarge [domain], or put "
+        "a plane with contact into the model where the side is"
+    )

@@ -214,6 +214,28 @@ def test_one_fault_gives_one_clear_message(write: Write, fault: str) -> None:
     assert message in problems[0]
 
 
+PERIODIC_Y = {
+    "resolution = 16": "cells = [16, 12]",
+    'x_max = "open"': 'x_max = "open"\ny_min = "periodic"\ny_max = "periodic"',
+}
+
+
+def test_a_body_may_start_across_periodic_sides(write: Write) -> None:
+    problems = check_scene(write({"lower = [-1.0, -1.0]": "lower = [-1.0, -0.5]"} | PERIODIC_Y))
+    assert not problems
+
+
+def test_a_body_across_periodic_sides_is_shorter_than_the_domain(write: Write) -> None:
+    short = {
+        "lower = [-1.0, -1.0]": "lower = [-1.0, -0.05]",
+        "upper = [1.0, 1.0]": "upper = [1.0, 0.05]",
+        "resolution = 16": "cells = [160, 8]",
+    }
+    problems = check_scene(write(PERIODIC_Y | short))
+    assert len(problems) == 1
+    assert "m in y at the start, outside the domain from -0.05 to 0.05 m" in problems[0]
+
+
 MOUTH = """
 [[mouths]]
 body = "hand"

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.coupling.images import displaced
 from flowborne.coupling.shapes import WATERTIGHT
+from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.node_distance import BAND
@@ -23,47 +25,57 @@ from flowborne.solids.flesh import Flesh
 class Skins:
     """The skin of every flesh at the nodes of the grid.
 
-    box       (nf, 3, 2) node ranges around each flesh
-    distance  signed distances to each at the nodes of its box, one flesh after the other, m;
+    flesh     (ni,) which flesh, once for each of its images that reaches the grid
+    box       (ni, 3, 2) node ranges around each
+    distance  signed distances to each at the nodes of its box, one image after the other, m;
               flesh too thin to be watertight (`shapes.WATERTIGHT`) is seen as thick as that
-    start     (nf,) where those of each begin
+    start     (ni,) where those of each begin
+    middle    (nf, 3) of the box around each flesh, m
     vertices  (n, 3) m;  triangles  (k, 3)
     """
 
+    flesh: Integers
     box: Integers
     distance: Array
     start: Integers
+    middle: Array
     vertices: Array
     triangles: Integers
 
 
-def skins_on(grid: Grid, flesh: Flesh | None, vertices: Array) -> Skins:
+def skins_on(grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array) -> Skins:
     """The skins of flesh whose vertices are at `vertices` (n, 3)."""
     if flesh is None:
         none, no_corners = np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
         no_boxes = np.zeros((0, 3, 2), np.int64)
-        return Skins(no_boxes, np.zeros(0), none, vertices, no_corners)
-    origin = np.array(grid.origin)
+        return Skins(none, no_boxes, np.zeros(0), none, np.zeros((0, 3)), vertices, no_corners)
     thinnest = 2.0 * WATERTIGHT[grid.is_slab] * grid.spacing
-    boxes, starts, distances, first = [], [], [], 0
+    fleshes, boxes, starts, distances, middles, first = [], [], [], [], [], 0
     for f in range(len(flesh.names)):
         own = np.flatnonzero(flesh.of_surface == f)
         triangles = flesh.surface[own]
         inside = vertices[np.unique(triangles)]
-        box = skin_box(inside, origin, grid.spacing, np.array(grid.shape))
-        if grid.is_slab:
-            box[2] = 0, 2
-        if np.any(box[:, 1] - box[:, 0] < 2):
-            box[:] = 0
-        phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab, BAND)
-        boxes.append(box)
-        starts.append(first)
-        distances.append(phi.ravel() - max(0.0, 0.5 * (thinnest - flesh.thickness[f])))
-        first += phi.size
+        low, high = inside.min(axis=0), inside.max(axis=0)
+        middles.append(0.5 * (low + high))
+        for image in displaced(grid, sides, low, high):
+            origin = np.array(image.origin)
+            box = skin_box(inside, origin, grid.spacing, np.array(grid.shape))
+            if grid.is_slab:
+                box[2] = 0, 2
+            if np.any(box[:, 1] - box[:, 0] < 2):
+                box[:] = 0
+            phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab, BAND)
+            fleshes.append(f)
+            boxes.append(box)
+            starts.append(first)
+            distances.append(phi.ravel() - max(0.0, 0.5 * (thinnest - flesh.thickness[f])))
+            first += phi.size
     return Skins(
+        np.array(fleshes),
         np.array(boxes),
         np.concatenate(distances),
         np.array(starts),
+        np.array(middles),
         vertices,
         flesh.surface,
     )

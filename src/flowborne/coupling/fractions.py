@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.flesh import Skins, face_centres, skin_at, skins_on
+from flowborne.coupling.images import Images, displaced, periods
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Rows
 from flowborne.kernels.closed_fractions import add_closed, count_beside, list_closed, share_closed
@@ -27,6 +29,9 @@ from flowborne.kernels.node_distance import (
 from flowborne.kernels.sides import CLOSED
 from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.volumes import open_parts
+
+RIM = 2
+"""Nodes beyond a periodic side that the curvature of a body at the side is measured with."""
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
@@ -49,7 +54,8 @@ class Geometry:
     axis       (n,) closed parts of faces, one entry per face and body: axis of the face,
     face       (n,) its flat index among the faces across that axis,
     body       (n,) the body,
-    closed     (n,) the fraction that this body closes
+    closed     (n,) the fraction that this body closes,
+    place      (n, 3) its centre, at the body itself where an image closes it, m
     corner     (nf, 3) vertices that move the last nf of them, closed by flesh,
     weight     (nf, 3) and how much each does
     cells      (m,) flat index of cells beside closed parts, one row per cell and body; of flesh,
@@ -61,6 +67,7 @@ class Geometry:
     columns    entries of the motion: 6 body + component, then 3 vertex + component
     values     what unit pressure in the cell exerts on each: wrench about the origin, force; m^2
     skins      the skins at the nodes
+    images     of bodies across periodic sides
     """
 
     distance: Array
@@ -72,6 +79,7 @@ class Geometry:
     face: Integers
     body: Integers
     closed: Array
+    place: Array
     corner: Integers
     weight: Array
     cells: Integers
@@ -81,6 +89,7 @@ class Geometry:
     columns: Integers
     values: Array
     skins: Skins
+    images: Images
 
 
 def beside_sides(shape: Integers, walls: Integers) -> Integers:
@@ -106,30 +115,72 @@ def around_bodies(
     skins: Skins,
     first_skin: int,
     grid: Grid,
-) -> Iterator[tuple[int, Integers, Array]]:
-    """The distance to each body and flesh at the nodes around it.
+    boundaries: Boundaries,
+) -> Iterator[tuple[int, Grid, Integers, Array]]:
+    """The distance to each body and flesh at the nodes around it and around its images.
 
-    yields  its number; (3, 2) ranges of nodes; the distances there, m
+    yields  its number; the grid displaced such that the body itself is there; (3, 2) ranges of
+            nodes, up to RIM beyond periodic sides of a room; the distances there, m
     """
-    shape, origin, h = np.array(grid.shape), np.array(grid.origin), grid.spacing
+    shape, h = np.array(grid.shape), grid.spacing
+    rim = RIM * np.array(boundaries.periodic()) * (not grid.is_slab)
     for body in np.unique(shapes.body):
         geoms = np.flatnonzero(shapes.body == body)
-        box = node_box(geoms, position, rotation, shapes.reach, origin, h, shape)
-        if grid.is_slab:
-            box[2] = 0, 2
-        if np.any(box[:, 1] - box[:, 0] < 2):
-            box[:] = 0
         plain = np.array([g for g in geoms if g not in shapes.skins], np.int64)
-        phi = sampled(shapes, plain, box, position, rotation, grid)
-        for g in np.setdiff1d(geoms, plain):
-            own = skin_distance(shapes, g, box, position, rotation, grid)
-            np.minimum(phi, own, out=phi)
-        yield int(body), box, phi
+        low, high = body_box(shapes, geoms, position, rotation)
+        for image in displaced(grid, boundaries, low, high):
+            origin = np.array(image.origin) - h * rim
+            box = node_box(geoms, position, rotation, shapes.reach, origin, h, shape + 2 * rim)
+            box -= rim[:, None]
+            if grid.is_slab:
+                box[2] = 0, 2
+            if np.any(box[:, 1] - box[:, 0] < 2):
+                continue
+            phi = sampled(shapes, plain, box, position, rotation, image)
+            for g in np.setdiff1d(geoms, plain):
+                own = skin_distance(shapes, g, box, position, rotation, image)
+                np.minimum(phi, own, out=phi)
+            yield int(body), image, box, phi
     for n, start in enumerate(skins.start):
         box = np.ascontiguousarray(skins.box[n])
         counts = box[:, 1] - box[:, 0]
         phi = skins.distance[start : start + counts.prod()].reshape(counts)
-        yield first_skin + n, box, phi
+        yield first_skin + int(skins.flesh[n]), grid, box, phi
+
+
+def body_box(
+    shapes: Shapes, geoms: Integers, position: Array, rotation: Array
+) -> tuple[Array, Array]:
+    """(3,) corners of the box around some geometries, m."""
+    reach = np.einsum("gij,gj->gi", np.abs(rotation[geoms]), shapes.reach[geoms])
+    return (position[geoms] - reach).min(axis=0), (position[geoms] + reach).max(axis=0)
+
+
+def within(box: Integers, phi: Array, grid: Grid) -> tuple[Integers, Array]:
+    """Ranges of nodes and the distances there, without those beyond the sides of the domain."""
+    inside = np.clip(box, 0, np.array(grid.shape)[:, None] + 1)
+    first, last = (inside - box[:, :1]).T
+    i, j, k = (slice(a, b) for a, b in zip(first, last, strict=True))
+    return inside, np.ascontiguousarray(phi[i, j, k])
+
+
+def join_faces(opened: list[Array], boundaries: Boundaries) -> None:
+    """Make the open parts of the faces on both sides across a periodic axis alike, in place."""
+    for d, faces in enumerate(opened):
+        if boundaries.periodic()[d]:
+            first, last = edge(d, 0), edge(d, -1)
+            faces[first] = faces[last] = np.minimum(faces[first], faces[last])
+
+
+def joined_ends(distance: Array, boundaries: Boundaries) -> Array:
+    """Distance at the nodes with those on both sides across a periodic axis alike, and RIM more of
+    them beyond each."""
+    for axis in np.flatnonzero(boundaries.periodic()):
+        ends = np.minimum(distance.take([0], axis), distance.take([-1], axis))
+        inner = distance.take(range(1, distance.shape[axis] - 1), axis)
+        deep = [(RIM, RIM + 1) if a == axis else (0, 0) for a in range(3)]
+        distance = np.pad(np.concatenate([ends, inner], axis), deep, mode="wrap")
+    return distance
 
 
 def sampled(
@@ -182,39 +233,57 @@ def geometry(
     nx, ny, nz = grid.shape
     shape, flat = np.array(grid.shape), grid.is_slab
     h, area = grid.spacing, grid.face_area
-    walls = (boundaries.codes() == CLOSED).astype(np.int64)
+    codes = boundaries.codes()
+    walls = (codes == CLOSED).astype(np.int64)
     distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
     nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
     beside = beside_sides(shape, walls)
     ox, oy, oz = opened = [np.ones(grid.face_shape(d)) for d in range(3)]
     total = grid.zeros_faces()
     pieces = []
-    for body, box, phi in around_bodies(shapes, position, rotation, skins, first_skin, grid):
+    around = around_bodies(shapes, position, rotation, skins, first_skin, grid, boundaries)
+    for body, image, wide, found in around:
+        box, phi = within(wide, found, grid)
         merge(distance, nearest, phi, box, body)
         count_beside(beside, phi, box, 1 if body < first_skin else ITS_FOLDS)
-        curved = allow_for_curvature(phi, h)
+        _, curved = within(wide, allow_for_curvature(found, h), grid)
         for d in grid.axes:
             add_closed(total[d], curved, box, d)
-        pieces.append((body, box, curved))
+        pieces.append((body, image, box, curved))
     parts, shares = 0, []
-    of_all = allow_for_curvature(distance, h)
-    for body, box, curved in pieces:
+    if any(boundaries.periodic()):
+        around_ring = joined_ends(distance, boundaries)
+        rim = np.outer(RIM * np.array(boundaries.periodic()), [-1, 1])
+        ends = rim + np.stack([np.zeros(3, np.int64), shape + 1], axis=1)
+        _, distance = within(ends, around_ring, grid)
+        _, of_all = within(ends, allow_for_curvature(around_ring, h), grid)
+    else:
+        of_all = allow_for_curvature(distance, h)
+    for body, image, box, curved in pieces:
         inside = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
         share = [np.zeros(inside + (np.arange(3) == d)) for d in range(3)]
         for d in grid.axes:
             parts += share_closed(
-                share[d], opened[d], total[d], of_all, beside, curved, box, d, walls[d]
+                share[d], opened[d], total[d], of_all, beside, curved, box, d, codes[d]
             )
-        shares.append((body, box, share))
+        shares.append((body, image, box, share))
+    join_faces(opened, boundaries)
     axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
     closed, at = np.empty(parts), 0
-    for body, box, share in shares:
+    for body, _, box, share in shares:
         for d in grid.axes:
             counts = np.array(grid.face_shape(d))
             at = list_closed(share[d], box, d, body, counts, at, axis, face, part_body, closed)
     kind = kinds_of_cells(ox, oy, oz, walls)
     open_cells = kind >= NARROW
     bones = [share for share in shares if share[0] < first_skin]
+    middle = np.zeros((first_skin, 3))
+    for body in np.unique(shapes.body):
+        geoms = np.flatnonzero(shapes.body == body)
+        middle[body] = np.mean(body_box(shapes, geoms, position, rotation), axis=0)
+    images = Images(periods(grid, boundaries), np.concatenate([middle, skins.middle]))
+    centres, index = face_centres(axis, face, grid)
+    place = images.at_bodies(centres, part_body)
     rows = bone_rows(bones, open_cells, grid)
     common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED, grid)
     if flat:
@@ -226,9 +295,8 @@ def geometry(
     first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else axis.size
     corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
     if first < axis.size:
-        place, index = face_centres(axis[first:], face[first:], grid)
-        corner, weight = skin_at(skins, place, grid)
-        skin = axis[first:], index, closed[first:], corner, weight, 6 * first_skin, area
+        corner, weight = skin_at(skins, place[first:], grid)
+        skin = axis[first:], index[first:], closed[first:], corner, weight, 6 * first_skin, area
         part, of_skin = flesh_rows(*skin, open_cells)
         across = (of_skin[2][::3] - 6 * first_skin) % 3
         push = of_skin[3].reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
@@ -240,7 +308,8 @@ def geometry(
             beside_bones.flat[common[0]] = True
             common = joined(common, flesh_rows(*skin, beside_bones)[1])
     if common[0].size:
-        lent = handed_on(common, kind, 6 * first_skin + skins.vertices.size)
+        columns = 6 * first_skin + skins.vertices.size
+        lent = handed_on(common, kind, columns, boundaries.periodic())
         owner = np.append(owner, np.full(lent[0].size, -1))
         force = np.concatenate([force, np.zeros((lent[0].size, 3))])
         rows = joined(rows, lent)
@@ -254,6 +323,7 @@ def geometry(
         face,
         part_body,
         closed,
+        place,
         corner,
         weight,
         rows[0],
@@ -261,21 +331,23 @@ def geometry(
         force,
         *rows[1:],
         skins,
+        images,
     )
 
 
 def bone_rows(
-    bones: list[tuple[int, Integers, list[Array]]], listed: NDArray[np.bool_], grid: Grid
+    bones: list[tuple[int, Grid, Integers, list[Array]]], listed: NDArray[np.bool_], grid: Grid
 ) -> Rows:
     """Rows of J of bones in listed cells.
 
-    bones   number of each, (3, 2) ranges of nodes around it, and what it closes of the faces there
+    bones   number of each, the grid displaced such that it is there itself, (3, 2) ranges of nodes
+            around it, and what it closes of the faces there
     listed  (nx, ny, nz)
     """
-    origin, none, counts = np.array(grid.origin), np.zeros(0, np.int64), [0]
+    none, counts, size = np.zeros(0, np.int64), [0], (grid.spacing, grid.face_area, grid.is_slab)
     given = [
-        (*share, listed, box, body, origin, grid.spacing, grid.face_area, grid.is_slab)
-        for body, box, share in bones
+        (*share, listed, box, body, np.array(image.origin), *size)
+        for body, image, box, share in bones
     ]
     for bone in given:
         counts.append(list_cells(*bone, counts[-1], none, none, np.zeros(0)))
@@ -320,6 +392,7 @@ def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
         none,
         none,
         np.zeros(0),
+        np.zeros((0, 3)),
         np.zeros((0, 3), np.int64),
         np.zeros((0, 3)),
         none,
@@ -328,5 +401,6 @@ def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
         np.zeros(1, np.int64),
         none,
         np.zeros(0),
-        skins_on(grid, None, vertices),
+        skins_on(grid, Boundaries(), None, vertices),
+        Images(np.zeros(3), np.zeros((0, 3))),
     )

@@ -64,7 +64,7 @@ def diffuse(
         dt,
         world.time + dt,
     )
-    walls = on_flesh(walls_of(parts, cut.distance, cut.nearest, grid), cut, bodies, grid)
+    walls = on_flesh(walls_of(parts, cut, grid), cut, bodies, grid)
     system = ViscousSystem(
         parts, walls, size, bodies, lambda drag: driven.answering(pose, drag), grid, sides, dt
     )

@@ -20,9 +20,10 @@ import numpy as np
 
 from flowborne.coupling.flow import moved_since
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.operators import pressure_push
+from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
@@ -35,12 +36,14 @@ class Kick:
     velocity  Faces of the fluid with it, m/s
     pressure  (nx, ny, nz) that gives it, Pa
     impulse   (k,) on the bodies, see `Projected`
+    sides     (3,) impulse of the sides on the fluid, N s
     start     (3,) momentum of the fluid without it, N s
     """
 
     velocity: Faces
     pressure: Array
     impulse: Array
+    sides: Array
     start: Array
 
 
@@ -60,20 +63,24 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     size = 6 * world.setup.solid.nbody + cut.skins.vertices.size
     plain = sides.has_free_side(grid) or not fluid.advection.half_kick
     if plain or moved_since(world):
-        return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), start)
+        return Kick(state.velocity, np.zeros(grid.shape), np.zeros(size), np.zeros(3), start)
     pressure, earlier = driving(state.pressure, fluid), driving(state.earlier, fluid)
     rate = accelerated(cut.open, mass, grid, sides)
     kick, before = grid.zeros_faces(), grid.zeros_faces()
     subtract_pressure_gradient(kick, rate, pressure, grid, sides, dt)
     subtract_pressure_gradient(before, rate, earlier, grid, sides, dt)
-    both = sum(float((m * k * b).sum()) for m, k, b in zip(mass, kick, before, strict=True))
-    square = sum(float((m * k * k).sum()) for m, k in zip(mass, kick, strict=True))
+    # the last faces along a periodic axis are the first ones
+    own = [edge(a, slice(None, -1 if ring else None)) for a, ring in enumerate(sides.periodic())]
+    fields = list(zip(own, mass, kick, before, strict=True))
+    both = sum(float((m * k * b)[once].sum()) for once, m, k, b in fields)
+    square = sum(float((m * k * k)[once].sum()) for once, m, k, _ in fields)
     part = 0.5 * likely(both / square) if square > 0.0 else 0.0
     half = part * pressure
     state.pressure -= half
     velocity = faces_of([u + part * k for u, k in zip(state.velocity, kick, strict=True)])
     volumes.follow(velocity, grid)
-    return Kick(velocity, half, pressure_push(cut, dt * half, size), start)
+    pushed = dt * side_push(half, cut.open, grid, sides)
+    return Kick(velocity, half, pressure_push(cut, dt * half, size), pushed, start)
 
 
 def likely(earlier: float) -> float:

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from flowborne.coupling.flesh import face_centres
 from flowborne.coupling.fractions import Geometry
 from flowborne.errors import BreakdownError
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -123,7 +122,8 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     at = np.stack(np.unravel_index(cells, grid.shape), axis=1)
     skin = np.zeros(len(cells))
     np.add.at(skin, row, -cut.area[rows] @ along)
-    skin *= covered(places(at, 0.5, grid), mouth, centre, along, grid) * (skin > 0.0)
+    place = cut.images.at_bodies(places(at, 0.5, grid), np.full(len(at), mouth.body))
+    skin *= covered(place, mouth, centre, along, grid) * (skin > 0.0)
     here = skin > 0.0
     if not here.any():
         raise BreakdownError(
@@ -131,8 +131,7 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
             "position on the body's skin, inside the domain, with the direction out of the body"
         )
     own = np.flatnonzero(skin_of(mouth, cut.body, bodies))
-    place, _ = face_centres(cut.axis[own], cut.face[own], grid)
-    share = share_of(place, mouth, centre, along, cut, grid)
+    share = share_of(cut.place[own], mouth, centre, along, cut, grid)
     face = own[share > 0.0]
     twist = pose.twist_jacobian[mouth.body] @ v
     return Jet(
@@ -191,7 +190,10 @@ def share_of(
 
 def distance_at(x: Array, cut: Geometry, grid: Grid) -> Array:
     """(n,) distance to the bodies at places x (n, 3), m."""
-    at = ((x - np.array(grid.origin)) / grid.spacing).T
+    inside = x - np.array(grid.origin)
+    for axis in np.flatnonzero(cut.images.period):
+        inside[:, axis] %= cut.images.period[axis]
+    at = (inside / grid.spacing).T
     return np.asarray(map_coordinates(cut.distance, at, order=1, mode="nearest"))
 
 

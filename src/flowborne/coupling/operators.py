@@ -10,10 +10,13 @@ generalised velocities are related by the Jacobians of the kinematics, T.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.sides.side import Place
 from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
@@ -63,7 +66,6 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
     """
     first = moving.size - geometry.skins.vertices.size
     carried = [opened * u for opened, u in zip(geometry.open, velocity, strict=True)]
-    origin = np.array(grid.origin)
     for axis in grid.axes:
         add_body_velocity(
             carried[axis],
@@ -72,13 +74,11 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
             geometry.face,
             geometry.body,
             geometry.closed,
+            geometry.place,
             geometry.corner,
             geometry.weight,
             moving[:first].reshape(-1, 6),
             moving[first:].reshape(-1, 3),
-            origin,
-            grid.spacing,
-            grid.is_slab,
         )
     return carried[0], carried[1], carried[2]
 
@@ -103,10 +103,32 @@ def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: flo
     return np.concatenate([force, np.cross(centroid, force)], axis=1)
 
 
-def side_push(pressure: Array, grid: Grid, boundaries: Boundaries) -> Array:
-    """(3,) force of the sides on the fluid for a pressure field, N."""
+def side_push(pressure: Array, opened: Faces, grid: Grid, boundaries: Boundaries) -> Array:
+    """(3,) force of the sides on the fluid for a pressure field, N.
+
+    A cell that bodies and sides close in pushes nothing: the pressure it had before stays in it.
+
+    opened  Faces, open part of each
+    """
     force = np.zeros(3)
     for place, side in boundaries.around(grid):
-        on_side = (1.0 - side.pressure_weight(place)) * pressure[place.layer]
-        force[place.axis] += (1 - 2 * place.upper) * grid.face_area * float(on_side.sum())
+        met = pressure[place.layer] * beside_open(place, opened, boundaries)
+        met *= 1.0 - side.pressure_weight(place)
+        force[place.axis] += (1 - 2 * place.upper) * grid.face_area * float(met.sum())
     return force
+
+
+def beside_open(place: Place, opened: Faces, boundaries: Boundaries) -> NDArray[np.bool_]:
+    """Which cells next to a side have an open face that is on no side which prescribes the flux."""
+    found = np.zeros((), bool)
+    for axis in place.grid.axes:
+        low, high = boundaries.pair(axis)
+        solved = np.ones(place.grid.shape[axis] + 1, bool)
+        solved[0], solved[-1] = not low.prescribes, not high.prescribes
+        layer = list(place.layer)
+        if axis == place.axis:
+            layer[axis] = slice(-2, None) if place.upper else slice(2)
+        along = [-1 if a == axis else 1 for a in range(3)]
+        free = (opened[axis][tuple(layer)] > 0.0) & solved[layer[axis]].reshape(along)
+        found = found | free[edge(axis, slice(-1))] | free[edge(axis, slice(1, None))]
+    return found

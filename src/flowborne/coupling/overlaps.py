@@ -24,29 +24,34 @@ from __future__ import annotations
 
 import numpy as np
 
+from flowborne.fluid.ghosts import edge
 from flowborne.kernels.arrays import Integers, Rows
 from flowborne.kernels.coupling_rows import COVERED, NARROW, WIDE, Kinds
 
 
-def handed_on(rows: Rows, kind: Kinds, columns: int) -> Rows:
+def handed_on(rows: Rows, kind: Kinds, columns: int, periodic: tuple[bool, bool, bool]) -> Rows:
     """E^T J: the rows of COVERED cells as rows of WIDE ones, one for each cell.
 
     kind     (nx, ny, nz) of the cells, see `kinds_of_cells`
     columns  k of J
+    periodic (3,) whether each axis is: there the way goes on from one side to the other
     Cells from which no way leads through covered and narrow ones to a wide one have no rows.
     """
     padded = np.pad(kind, 1)
+    home: Integers = np.arange(padded.size).reshape(padded.shape)
+    for axis in (axis for axis in range(3) if periodic[axis]):
+        home[edge(axis, 0)], home[edge(axis, -1)] = home[edge(axis, -2)], home[edge(axis, 1)]
     strides = np.array(padded.strides) // padded.itemsize
     steps = np.concatenate([strides, -strides])
     sources, start, column, value = rows
     inside = np.stack(np.unravel_index(sources, kind.shape)) + 1
     cell = np.repeat(np.ravel_multi_index(tuple(inside), padded.shape), np.diff(start))
-    layer = layers(padded.ravel(), np.unique(cell), steps)
+    layer = layers(padded.ravel(), np.unique(cell), steps, home.ravel())
     kept = layer[cell] > 0
     cell, column, value = cell[kept], column[kept], value[kept]
     for depth in range(int(layer[cell].max(initial=0)), 0, -1):
         deep = layer[cell] == depth
-        beside = cell[deep, None] + steps
+        beside = home.ravel()[cell[deep, None] + steps]
         nearer = layer[beside] == depth - 1
         number = nearer.sum(axis=1)
         cell = np.concatenate([cell[~deep], beside[nearer]])
@@ -61,19 +66,20 @@ def handed_on(rows: Rows, kind: Kinds, columns: int) -> Rows:
     return cells, np.append(first, cell.size), column, value
 
 
-def layers(kind: Kinds, sources: Integers, steps: Integers) -> Integers:
+def layers(kind: Kinds, sources: Integers, steps: Integers, home: Integers) -> Integers:
     """(n,) how many steps from cell to cell, none of which is ENCLOSED, lead to a WIDE one, as far
     as the sources are deep; -1 for cells beyond them and those that no way leads out of.
 
     kind     (n,) of all cells, with a rim of others
     sources  (m,) COVERED cells
     steps    (6,) from the index of a cell to those of its neighbours
+    home     (n,) the cell that each is, one across the domain for the rim of a periodic side
     """
     layer = np.where(kind == WIDE, 0, -1)
     left = np.flatnonzero((kind == COVERED) | (kind == NARROW))
     depth = 0
     while (layer[sources] < 0).any():
-        reached = (layer[left[:, None] + steps] == depth).any(axis=1)
+        reached = (layer[home[left[:, None] + steps]] == depth).any(axis=1)
         if not reached.any():
             break
         depth += 1

@@ -116,7 +116,7 @@ def step_together(world: World, dt: float, command: JointCommand, timer: Timer) 
     state.pressure[:] = kick.pressure + solved.projected.pressure
     state.scalars = dyed.scalars
     advance_clock(world, dt)
-    balance = momentum_balance(world, mass, kick, carried, solved)
+    balance = momentum_balance(world, cut, mass, kick, carried, solved)
     timer.lap("advection")
     done = report(
         world, pose, with_kick(solved, kick), buoyancy, wind, reaction, balance, dt, timer
@@ -196,7 +196,7 @@ def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
         setup.shapes,
         pose.geom_position[setup.shapes.source],
         pose.geom_rotation[setup.shapes.source],
-        skins_on(setup.fluid.grid, seen, pose.vertices),
+        skins_on(setup.fluid.grid, setup.fluid.boundaries, seen, pose.vertices),
         setup.solid.nbody,
         setup.fluid.grid,
         setup.fluid.boundaries,
@@ -292,9 +292,9 @@ def linear(push: Array, first: int) -> Array:
 
 
 def momentum_balance(
-    world: World, mass: Faces, kick: Kick, carried: Carried, solved: Solved
+    world: World, cut: Geometry, mass: Faces, kick: Kick, carried: Carried, solved: Solved
 ) -> Momentum:
-    """Where the fluid's momentum came from and went to in a step."""
+    """Where the fluid's momentum came from and went to in a step that ends at the cut `cut`."""
     fluid, _ = world.flow()
     projected, before = solved.projected, solved.before_pressure
     assert projected is not None
@@ -305,10 +305,13 @@ def momentum_balance(
     after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     first = 6 * world.setup.solid.nbody
     forces = linear(projected.impulse, first)
-    sides, exchanged = dt * side_push(projected.pressure, grid, boundaries), forces.sum(axis=0)
+    sides, exchanged = (
+        dt * side_push(projected.pressure, cut.open, grid, boundaries),
+        forces.sum(axis=0),
+    )
     scale = float(np.abs(forces).sum()) + moved
     missing = float(np.abs(exchanged + taken - sides).max())
-    sides += dt * side_push(kick.pressure, grid, boundaries)
+    sides += kick.sides
     exchanged += linear(kick.impulse, first).sum(axis=0)
     forces = pressed - fluid_momentum(carried.velocity, mass, grid, boundaries)
     came = carried.crossed + carried.expelled + carried.lost

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -80,24 +81,18 @@ class Walls:
         return couples
 
 
-def walls_of(systems: list[ViscousFaces], distance: Array, nearest: Integers, grid: Grid) -> Walls:
-    """The walls of all components.
-
-    distance  (nx+1, ny+1, nz+1) to the nearest body at the nodes, m
-    nearest   (nx+1, ny+1, nz+1) that body
-    """
+def walls_of(systems: list[ViscousFaces], cut: Geometry, grid: Grid) -> Walls:
+    """The walls of all components on the bodies in the grid."""
     parts = []
     first = 0
     for axis, system in zip(grid.axes, systems, strict=True):
-        parts.append(walls_across(axis, first, system, distance, nearest, grid))
+        parts.append(walls_across(axis, first, system, cut, grid))
         first += system.kind.size
     names = [field.name for field in fields(Walls)]
     return Walls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def walls_across(
-    axis: int, first: int, system: ViscousFaces, distance: Array, nearest: Integers, grid: Grid
-) -> Walls:
+def walls_across(axis: int, first: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> Walls:
     """The pieces of wall of the faces across `axis`, and the tied ones; each belongs to the body
     nearest to one of its nodes.
 
@@ -116,9 +111,10 @@ def walls_across(
     one, other = np.delete(np.eye(3, dtype=np.int64), axis, 0)
     low = at[system.beside.size :]
     corners = np.stack([low, low + one, low + other, low + one + other])
-    which = np.argmin(distance[tuple(np.moveaxis(corners, -1, 0))], axis=0)
+    which = np.argmin(cut.distance[tuple(np.moveaxis(corners, -1, 0))], axis=0)
     corner = corners[which, np.arange(moved.size)]
-    body = np.concatenate([nearest.reshape(-1)[system.node], nearest[tuple(corner.T)]])
+    body = np.concatenate([cut.nearest.reshape(-1)[system.node], cut.nearest[tuple(corner.T)]])
+    point = cut.images.at_bodies(point, body)
     across = np.tile(np.eye(3)[axis], (index.size, 1))
     return Walls(
         index=first + index,

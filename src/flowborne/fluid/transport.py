@@ -203,6 +203,8 @@ def marks_of(listed: Integers, component: int, grid: Grid, sides: Boundaries) ->
     for place, side in sides.around(grid):
         layers = Layers(place, GHOSTS)
         if side.joined:
+            if place.axis == component and not place.upper:  # the last faces are the first ones
+                padded[edge(component, -1 - GHOSTS)] = padded[edge(component, GHOSTS)]
             side.fill(padded, layers, None)
             continue
         for n in range(GHOSTS):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.sides import CLOSED, PERIODIC
 
 CREASE = 0.02
 """Open part below which a face in a crease is closed. Bodies that overlap at a joint, or reach into
@@ -95,11 +96,22 @@ def count_beside(beside: Integers, phi: Array, box: Integers, count: int) -> Non
 
 
 @njit(nogil=True, cache=True)
-def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int) -> bool:
-    """Whether two bodies, or a body and a side, bound one of the cells at face (i, j, k)."""
-    n = i if axis == 0 else (j if axis == 1 else k)
-    x, y, z = i - int(axis == 0), j - int(axis == 1), k - int(axis == 2)
-    return bool((n < beside.shape[axis] and beside[i, j, k] > 1) or (n > 0 and beside[x, y, z] > 1))
+def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool) -> bool:
+    """Whether two bodies, or a body and a side, bound one of the cells at face (i, j, k).
+
+    ring  whether the axis is periodic
+    """
+    n, count = i if axis == 0 else (j if axis == 1 else k), beside.shape[axis]
+    back = count if ring and n == 0 else 0
+    x, y, z = (
+        i + (back - 1) * (axis == 0),
+        j + (back - 1) * (axis == 1),
+        k + (back - 1) * (axis == 2),
+    )
+    low = (n > 0 or ring) and beside[x, y, z] > 1
+    back = count if ring and n == count else 0
+    x, y, z = i - back * (axis == 0), j - back * (axis == 1), k - back * (axis == 2)
+    return bool(low or ((n < count or ring) and beside[x, y, z] > 1))
 
 
 @njit(nogil=True, cache=True)
@@ -112,18 +124,18 @@ def share_closed(
     phi: Array,
     box: Integers,
     axis: int,
-    walls: Integers,
+    codes: Integers,
 ) -> int:
     """This body's part of each closed face in its box, and the open fractions; counts parts.
 
     beside (nx, ny, nz) how many bodies and solid sides bound each cell
-    walls  (2,) 1 where the lower or upper side across `axis` is solid or an inflow: the side, not
-           the body, decides what crosses there
+    codes  (2,) of the lower and upper side across `axis`, see `sides`: at a CLOSED one the side,
+           not the body, decides what crosses
     """
     upper = box[:, 1] - 1
     upper[axis] += 1
     count = 0
-    last = opened.shape[axis] - 1
+    last, ring = opened.shape[axis] - 1, codes[0] == PERIODIC
     for i in range(box[0, 0], upper[0]):
         for j in range(box[1, 0], upper[1]):
             for k in range(box[2, 0], upper[2]):
@@ -134,11 +146,11 @@ def share_closed(
                     continue
                 union = face_closed(distance, axis, i, j, k)
                 if union > 1.0 - CREASE and (
-                    union > 1.0 - 1e-9 or in_a_crease(beside, axis, i, j, k)
+                    union > 1.0 - 1e-9 or in_a_crease(beside, axis, i, j, k, ring)
                 ):
                     union = 1.0
                 opened[i, j, k] = 1.0 - union
-                if (n == 0 and walls[0]) or (n == last and walls[1]):
+                if (n == 0 and codes[0] == CLOSED) or (n == last and codes[1] == CLOSED):
                     continue
                 own = face_closed(phi, axis, a, b, c)
                 share[a, b, c] = union * own / total[i, j, k]

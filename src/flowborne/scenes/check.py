@@ -162,17 +162,23 @@ def _check_ranges(draft: Draft, model: SolidModel) -> Iterator[str]:
 
 
 def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
-    """No moving body may start outside the domain."""
+    """No moving body may start outside the domain, or be longer than it between periodic sides."""
     scene, domain = draft.scene, draft.scene.domain
     if domain is None or not scene.has_fluid or not draft.sound("domain", "solids"):
         return
     start = initial_state(scene, model)
-    yield from check_flesh_places(draft, model, start, domain)
+    assert scene.boundaries is not None
+    yield from check_flesh_places(draft, model, start, domain, scene.boundaries)
     low, high = geom_boxes(model, start.q)
     axes = min(len(domain.lower), scene.dimensions)
     moving = model.moving[model.geom_body] & np.isfinite(low).all(axis=1)
     outside = (low[:, :axes] < domain.lower[:axes]) | (high[:, :axes] > domain.upper[:axes])
     outside &= moving[:, None]
+    for axis in (axis for axis in range(axes) if scene.boundaries.periodic(axis)):
+        for body in np.unique(model.geom_body[outside[:, axis]]):
+            own = model.geom_body == body
+            length = high[own, axis].max() - low[own, axis].min()
+            outside[own, axis] &= length >= domain.extent()[axis]
     if not outside.any():
         return
     geom, axis = np.argwhere(outside)[0]

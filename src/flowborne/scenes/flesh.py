@@ -12,6 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from flowborne.scenes.domain import Domain
+from flowborne.scenes.sides import BoundariesTable
 from flowborne.solids.compiler import MjSpec
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
@@ -184,9 +185,13 @@ def check_flesh(
 
 
 def check_flesh_places(
-    places: Places, model: SolidModel, start: SolidState, domain: Domain
+    places: Places,
+    model: SolidModel,
+    start: SolidState,
+    domain: Domain,
+    boundaries: BoundariesTable,
 ) -> Iterator[str]:
-    """No flesh may start outside the domain."""
+    """No flesh may start outside the domain, or be longer than it between periodic sides."""
     if model.flesh is None:
         return
     vertices = kinematics(model, start.q).vertices
@@ -195,7 +200,8 @@ def check_flesh_places(
         for axis in range(len(domain.lower)):
             low, high = own[:, axis].min(), own[:, axis].max()
             first, last = domain.lower[axis], domain.upper[axis]
-            if low < first or high > last:
+            shorter = boundaries.periodic(axis) and high - low < last - first
+            if (low < first or high > last) and not shorter:
                 yield (
                     f"{places.at('flesh', flesh)}: '{name}' reaches from {low:g} to {high:g} m in "
                     f"{'xyz'[axis]} at the start, outside the domain from {first:g} to {last:g} m. "

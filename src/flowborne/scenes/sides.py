@@ -147,6 +147,10 @@ class BoundariesTable(Table):
     z_min: BoundarySide = _CLOSED
     z_max: BoundarySide = _CLOSED
 
+    def periodic(self, axis: int) -> bool:
+        """Whether bodies may cross the sides across an axis."""
+        return getattr(self, f"{'xyz'[axis]}_min").kind == "periodic"
+
 
 def check_sides(places: Places, boundaries: BoundariesTable, *, slab: bool) -> Iterator[str]:
     sides = dict(boundaries)

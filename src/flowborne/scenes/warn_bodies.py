@@ -221,6 +221,7 @@ def fixed_outside(scene: Scene, setup: Setup) -> Iterator[str]:
     low, high = geom_boxes(model, initial_state(scene, model).q)
     axes = slice(0, scene.dimensions)
     gone = (high[:, axes] <= domain.lower) | (low[:, axes] >= domain.upper)
+    gone &= ~np.array(setup.fluid.boundaries.periodic())[axes]
     fixed = ~model.moving[model.geom_body]
     names = [model.geom_names[g] for g in np.flatnonzero(gone.any(axis=1) & fixed)]
     if names:

@@ -8,6 +8,7 @@ from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.closed_fractions import (
     CREASE,
 )
+from flowborne.kernels.sides import CLOSED, PERIODIC
 
 
 def face_closed_reference(phi: Array, axis: int) -> Array:
@@ -62,18 +63,20 @@ def share_closed_reference(
     phi: Array,
     box: Integers,
     axis: int,
-    walls: Integers,
+    codes: Integers,
 ) -> tuple[Array, Array]:
     """`share_closed` in NumPy: the shares in the box, and the open fractions after it."""
     at, n = faces_in(box, axis), np.arange(box[axis, 0], box[axis, 1])
     union = face_closed_reference(distance, axis)[at]
     ends = [(int(d == axis),) * 2 for d in range(3)]
-    most = np.pad(beside, ends)
+    most = np.pad(beside, ends, mode="wrap" if codes[0] == PERIODIC else "constant")
     crease = np.maximum(np.delete(most, 0, axis), np.delete(most, -1, axis))[at] > 1
     union = np.where((union > 1.0 - 1e-9) | ((union > 1.0 - CREASE) & crease), 1.0, union)
     touched, out = total[at] > 0.0, opened.copy()
     out[at] = np.where(touched, 1.0 - union, opened[at])
-    solid = ((n == 0) & bool(walls[0])) | ((n == opened.shape[axis] - 1) & bool(walls[1]))
+    solid = ((n == 0) & (codes[0] == CLOSED)) | (
+        (n == opened.shape[axis] - 1) & (codes[1] == CLOSED)
+    )
     counts = touched & ~np.expand_dims(solid, tuple(d for d in range(3) if d != axis))
     own = union * face_closed_reference(phi, axis)
     return np.divide(own, total[at], np.zeros_like(own), where=counts), out
