@@ -350,7 +350,7 @@ def departed(world: World, report: StepReport) -> str | None:
         gone = low[:, axis] < grid.origin[axis], high[:, axis] > grid.upper[axis]
         for end, side in enumerate(fluid.boundaries.pair(axis)):
             found = np.flatnonzero(met & gone[end])
-            if found.size and side.kind not in ("open", "periodic"):
+            if found.size and side.prescribes:
                 return (
                     f"body '{model.body_names[body[found[0]]]}' has left the domain through its "
                     f"{side.kind} side {SIDES[2 * axis + end]}; enlarge [domain], or put a plane "

@@ -112,13 +112,14 @@ def around_bodies(
     shapes: Shapes,
     position: Array,
     rotation: Array,
+    boxes: Array,
     skins: Skins,
-    first_skin: int,
     grid: Grid,
     boundaries: Boundaries,
 ) -> Iterator[tuple[int, Grid, Integers, Array]]:
     """The distance to each body and flesh at the nodes around it and around its images.
 
+    boxes   see `body_boxes`
     yields  its number; the grid displaced such that the body itself is there; (3, 2) ranges of
             nodes, up to RIM beyond periodic sides of a room; the distances there, m
     """
@@ -127,8 +128,7 @@ def around_bodies(
     for body in np.unique(shapes.body):
         geoms = np.flatnonzero(shapes.body == body)
         plain = np.array([g for g in geoms if g not in shapes.skins], np.int64)
-        low, high = body_box(shapes, geoms, position, rotation)
-        for image in displaced(grid, boundaries, low, high):
+        for image in displaced(grid, boundaries, *boxes[body]):
             origin = np.array(image.origin) - h * rim
             box = node_box(geoms, position, rotation, shapes.reach, origin, h, shape + 2 * rim)
             box -= rim[:, None]
@@ -145,15 +145,17 @@ def around_bodies(
         box = np.ascontiguousarray(skins.box[n])
         counts = box[:, 1] - box[:, 0]
         phi = skins.distance[start : start + counts.prod()].reshape(counts)
-        yield first_skin + int(skins.flesh[n]), grid, box, phi
+        yield len(boxes) + int(skins.flesh[n]), grid, box, phi
 
 
-def body_box(
-    shapes: Shapes, geoms: Integers, position: Array, rotation: Array
-) -> tuple[Array, Array]:
-    """(3,) corners of the box around some geometries, m."""
-    reach = np.einsum("gij,gj->gi", np.abs(rotation[geoms]), shapes.reach[geoms])
-    return (position[geoms] - reach).min(axis=0), (position[geoms] + reach).max(axis=0)
+def body_boxes(shapes: Shapes, position: Array, rotation: Array, bodies: int) -> Array:
+    """(bodies, 2, 3) lowest and highest corner of the box around each body's geometries, m; 0 of a
+    body without any."""
+    reach, boxes = np.einsum("gij,gj->gi", np.abs(rotation), shapes.reach), np.zeros((bodies, 2, 3))
+    for body in np.unique(shapes.body):
+        own = shapes.body == body
+        boxes[body] = (position - reach)[own].min(axis=0), (position + reach)[own].max(axis=0)
+    return boxes
 
 
 def within(box: Integers, phi: Array, grid: Grid) -> tuple[Integers, Array]:
@@ -241,7 +243,8 @@ def geometry(
     ox, oy, oz = opened = [np.ones(grid.face_shape(d)) for d in range(3)]
     total = grid.zeros_faces()
     pieces = []
-    around = around_bodies(shapes, position, rotation, skins, first_skin, grid, boundaries)
+    boxes = body_boxes(shapes, position, rotation, first_skin)
+    around = around_bodies(shapes, position, rotation, boxes, skins, grid, boundaries)
     for body, image, wide, found in around:
         box, phi = within(wide, found, grid)
         merge(distance, nearest, phi, box, body)
@@ -277,11 +280,8 @@ def geometry(
     kind = kinds_of_cells(ox, oy, oz, walls)
     open_cells = kind >= NARROW
     bones = [share for share in shares if share[0] < first_skin]
-    middle = np.zeros((first_skin, 3))
-    for body in np.unique(shapes.body):
-        geoms = np.flatnonzero(shapes.body == body)
-        middle[body] = np.mean(body_box(shapes, geoms, position, rotation), axis=0)
-    images = Images(periods(grid, boundaries), np.concatenate([middle, skins.middle]))
+    middle = np.concatenate([boxes.mean(axis=1), skins.middle])
+    images = Images(periods(grid, boundaries), middle)
     centres, index = face_centres(axis, face, grid)
     place = images.at_bodies(centres, part_body)
     rows = bone_rows(bones, open_cells, grid)

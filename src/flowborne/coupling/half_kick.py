@@ -23,9 +23,8 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
-from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, faces_of
-from flowborne.fluid.momentum import face_masses, fluid_momentum
+from flowborne.fluid.momentum import each_once, face_masses, fluid_momentum
 from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
 
 
@@ -69,8 +68,7 @@ def half_kick(world: World, cut: Geometry, volumes: ControlVolumes, dt: float) -
     kick, before = grid.zeros_faces(), grid.zeros_faces()
     subtract_pressure_gradient(kick, rate, pressure, grid, sides, dt)
     subtract_pressure_gradient(before, rate, earlier, grid, sides, dt)
-    # the last faces along a periodic axis are the first ones
-    own = [edge(a, slice(None, -1 if ring else None)) for a, ring in enumerate(sides.periodic())]
+    own = [each_once(axis, sides) for axis in range(3)]
     fields = list(zip(own, mass, kick, before, strict=True))
     both = sum(float((m * k * b)[once].sum()) for once, m, k, b in fields)
     square = sum(float((m * k * k)[once].sum()) for once, m, k, _ in fields)

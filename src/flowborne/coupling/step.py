@@ -305,10 +305,8 @@ def momentum_balance(
     after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     first = 6 * world.setup.solid.nbody
     forces = linear(projected.impulse, first)
-    sides, exchanged = (
-        dt * side_push(projected.pressure, cut.open, grid, boundaries),
-        forces.sum(axis=0),
-    )
+    sides = dt * side_push(projected.pressure, cut.open, grid, boundaries)
+    exchanged = forces.sum(axis=0)
     scale = float(np.abs(forces).sum()) + moved
     missing = float(np.abs(exchanged + taken - sides).max())
     sides += kick.sides

@@ -16,11 +16,16 @@ def face_masses(volumes: ControlVolumes, density: float) -> Faces:
     return faces_of([density * v for v in volumes.merged])
 
 
+def each_once(axis: int, sides: Boundaries) -> tuple[int | slice, ...]:
+    """Index of the faces across an axis, without the last ones if they are the first ones."""
+    return edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
+
+
 def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> Array:
     """(3,) linear momentum of the fluid, N s."""
     total = np.zeros(3)
     for axis in grid.axes:
-        own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
+        own = each_once(axis, sides)
         total[axis] = inner_product(mass[axis][own], velocity[axis][own])
     return total
 
@@ -32,7 +37,7 @@ def momentum_change(
     N s."""
     total, size = np.zeros(3), 0.0
     for axis in grid.axes:
-        own = edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
+        own = each_once(axis, sides)
         fields = (np.ascontiguousarray(f[axis][own]) for f in (mass, before, after))
         total[axis], change = weighted_change(*fields)
         size += change

@@ -149,7 +149,7 @@ class BoundariesTable(Table):
 
     def periodic(self, axis: int) -> bool:
         """Whether bodies may cross the sides across an axis."""
-        return getattr(self, f"{'xyz'[axis]}_min").kind == "periodic"
+        return bool(getattr(self, f"{'xyz'[axis]}_min").boundary.joined)
 
 
 def check_sides(places: Places, boundaries: BoundariesTable, *, slab: bool) -> Iterator[str]:
