@@ -15,11 +15,11 @@ from typing import TypedDict, Unpack
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from flowborne.coupling import flow
+from flowborne.coupling.cut import cut_by_bodies, volumes_of
 from flowborne.coupling.motion import JointCommand, Trajectory
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.start import set_going, start
-from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.coupling.step import step
 from flowborne.coupling.stream import Sampled
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.advection import CENTRE, carry, cells_per_step
@@ -144,13 +144,13 @@ def advance(
 
 
 def set_velocity(world: World, field: Field) -> None:
-    """Set the velocity of the fluid, and its advecting velocity."""
+    """Set the velocity of the fluid, as if it had not changed in the last step."""
     fluid, state = world.flow()
     for axis in fluid.grid.axes:
         x, y, z = np.meshgrid(*fluid.grid.face_coordinates(axis), indexing="ij")
         values = np.broadcast_to(field(x, y, z)[axis], x.shape)
         state.velocity[axis][:] = values
-        state.advecting_velocity[axis][:] = values
+        state.velocity_change[axis][:] = 0.0
 
 
 def velocity_at(world: World, x: Array) -> Array:
@@ -165,7 +165,7 @@ def kinetic_energy(world: World) -> float:
     if world.fluid is None:
         return energy
     fluid, state = world.flow()
-    mass = face_masses(flow.volumes_of(world, cut_by_bodies(world)), fluid.density)
+    mass = face_masses(volumes_of(world, cut_by_bodies(world)), fluid.density)
     return energy + kinetic_energy_of_fluid(state.velocity, mass, fluid.grid, fluid.boundaries)
 
 
@@ -175,8 +175,8 @@ def start_from(coarse: World, fine: World) -> None:
     for axis in fluid.grid.axes:
         known, wanted = (g.face_coordinates(axis) for g in (rough.grid, fluid.grid))
         to.velocity[axis][:] = _interpolated(of.velocity[axis], known, wanted)
-        found = _interpolated(of.advecting_velocity[axis], known, wanted)
-        to.advecting_velocity[axis][:] = found
+        found = _interpolated(of.velocity_change[axis], known, wanted)
+        to.velocity_change[axis][:] = found
     known, wanted = rough.grid.cell_coordinates(), fluid.grid.cell_coordinates()
     to.pressure[:] = _interpolated(of.pressure, known, wanted)
 

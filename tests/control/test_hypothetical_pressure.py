@@ -55,7 +55,7 @@ def test_the_gradient_is_that_of_the_full_solve(
         assert controller is not None
         quick = gradient(controller, world)
         assert world.setup.hypothetical.fluid.tolerance > world.setup.fluid.tolerance
-        monkeypatch.setattr("flowborne.coupling.world.HYPOTHETICAL", 0.0)
+        monkeypatch.setattr("flowborne.coupling.world.TRIAL_TOLERANCE", 0.0)
         world.setup = replace(world.setup)
         full = gradient(controller, world)
     assert world.setup.hypothetical.fluid == world.setup.fluid

@@ -69,7 +69,7 @@ def trial_of(
 @pytest.fixture
 def every_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps whose forces nobody reads are taken like all others, so that they can be recorded."""
-    monkeypatch.setattr(trial, "move_as_told", lambda world, dt, command: False)
+    monkeypatch.setattr(trial, "advance_prescribed", lambda world, dt, command: False)
 
 
 @pytest.mark.usefixtures("every_step")
@@ -146,7 +146,7 @@ def test_steps_before_the_last_ask_for_no_forces_where_all_is_told(
     recorder = Recorder(stepping.step)
     quick = controller.trials(world, recorder).values(moves)
     assert len(recorder.worlds) == 2 * (1 if skipped else controller.hypothesis.steps)
-    monkeypatch.setattr(trial, "move_as_told", lambda world, dt, command: False)
+    monkeypatch.setattr(trial, "advance_prescribed", lambda world, dt, command: False)
     assert controller.trials(world, stepping.step).values(moves).tobytes() == quick.tobytes()
 
 

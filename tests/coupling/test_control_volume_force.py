@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flowborne.coupling.flow import volumes_of
-from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.coupling.cut import cut_by_bodies, volumes_of
+from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid import transport
 from flowborne.fluid.grid import Array, Grid

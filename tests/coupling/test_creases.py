@@ -7,7 +7,7 @@ import pytest
 
 from flowborne import Grid, World
 from flowborne.bodies import TrajectorySinusoid, kinematics
-from flowborne.coupling.flow import volumes_of
+from flowborne.coupling.cut import volumes_of
 from flowborne.coupling.operators import twists
 from flowborne.fluid.momentum import face_masses
 from flowborne.fluid.projection import accelerated, face_weights

@@ -94,7 +94,7 @@ def test_dye_never_crosses_a_thin_plate_from_wall_to_wall(
     for _ in range(steps):
         report = step(world, dt)
         assert report.outcome.name == "DONE", world.steps
-        amount = state.cells * state.scalars["dye"]
+        amount = state.cell_volume * state.scalars["dye"]
         assert amount[ahead_of(world) < 0.0].sum() < 1e-6 * amount.sum(), world.steps
         opened = cut_by_bodies(world).open
         for u, o in zip(state.velocity[:2], opened[:2], strict=True):
@@ -160,5 +160,5 @@ def test_the_dye_of_a_jet_in_space_is_as_much_as_was_blown_and_never_more_than_t
         dye = state.scalars["dye"]
         assert 0.0 <= dye.min() < dye.max() <= 1.0
         if not dye[-1].any():
-            assert np.vdot(state.cells, dye) == pytest.approx(0.1 * world.time, rel=1e-12)
-    assert np.vdot(state.cells, dye) == pytest.approx(0.1 * world.time, rel=2e-4)
+            assert np.vdot(state.cell_volume, dye) == pytest.approx(0.1 * world.time, rel=1e-12)
+    assert np.vdot(state.cell_volume, dye) == pytest.approx(0.1 * world.time, rel=2e-4)

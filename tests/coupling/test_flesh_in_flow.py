@@ -8,10 +8,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flowborne.coupling.cut import cut_by_bodies
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import add_flux, boundary_velocity, leak_proof, pressure_push
 from flowborne.coupling.report import Outcome
-from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid

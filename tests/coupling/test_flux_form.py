@@ -25,9 +25,10 @@ from flowborne.bodies import JointCommand, TrajectorySinusoid, kinetic_energy
 from flowborne.coupling.advection.flux_form import FluxForm
 from flowborne.coupling.advection.scheme import Advection
 from flowborne.coupling.advection.semi_lagrangian import SemiLagrangian
-from flowborne.coupling.flow import carry_fluid, volumes_of
+from flowborne.coupling.bodies_step import move_bodies
+from flowborne.coupling.cut import departure, volumes_of
+from flowborne.coupling.flow import advect, leak_proof_transport
 from flowborne.coupling.mouths import Mouth
-from flowborne.coupling.step import move_bodies
 from flowborne.fluid import momentum as of_fluid
 from flowborne.fluid.momentum import face_masses
 from flowborne.motion.inflow import FactorSteady
@@ -170,16 +171,15 @@ def test_a_stream_past_a_body_that_goes_with_it_stays_uniform(
     _, state = world.flow()
     for _ in range(15):
         set_velocity(world, lambda x, y, z: tuple(0 * x + component for component in speed))
-        before_cut = cut_by_bodies(world)
-        start = volumes_of(world, before_cut)
-        before, pose = move_bodies(world, JointCommand.none(6), DT)
-        cut = cut_by_bodies(world, pose)
-        carried, _ = carry_fluid(world, state.velocity, before, before_cut, start, cut, (), DT)
+        start = departure(world)
+        move_bodies(world, JointCommand.none(6), DT)
+        transport = leak_proof_transport(world, start, cut_by_bodies(world), DT)
+        advected, _ = advect(world, start, state.velocity, transport)
         for axis in grid.axes:
-            holds = carried.volumes.volume[axis] > 1e-9 * grid.cell_volume
-            drift = np.abs(carried.velocity[axis][holds] - speed[axis]).max()
+            holds = advected.volumes.volume[axis] > 1e-9 * grid.cell_volume
+            drift = np.abs(advected.velocity[axis][holds] - speed[axis]).max()
             assert drift < 1e-12, f"{drift} across {axis}"
-        state.cells, state.pose = carried.volumes.cells, world.solid.q.copy()
+        state.cell_volume, state.pose = advected.volumes.cells, world.solid.q.copy()
 
 
 @EACH
@@ -267,7 +267,7 @@ def test_dye_that_is_everywhere_stays_so(name: str, monkeypatch: pytest.MonkeyPa
     fluid, state = world.flow()
     for _ in range(12):
         taken(world)
-        filled = state.cells > 1e-6 * fluid.grid.cell_volume
+        filled = state.cell_volume > 1e-6 * fluid.grid.cell_volume
         assert np.abs(state.scalars["even"][filled] - 0.7).max() < 1e-12
 
 

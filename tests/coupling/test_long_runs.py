@@ -7,7 +7,7 @@ import pytest
 
 from flowborne import Array, Grid, Simulation, World, load_scene, step
 from flowborne.bodies import TrajectoryConstant, TrajectorySinusoid, kinetic_energy
-from flowborne.coupling.flow import volumes_of
+from flowborne.coupling.cut import volumes_of
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid import momentum as of_fluid
 from flowborne.fluid.momentum import face_masses

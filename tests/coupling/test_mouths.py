@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, Tissue, World, step
-from flowborne.coupling.flow import volumes_of
+from flowborne.coupling.cut import jets_at, volumes_of
 from flowborne.coupling.mouths import Mouth
-from flowborne.coupling.step import jets_at
 from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorSteady
@@ -182,7 +181,7 @@ def test_dye_leaves_from_the_mouth(grid: Grid) -> None:
     _, state = world.flow()
     dye = state.scalars["dye"]
     x, y, _ = np.meshgrid(*grid.cell_coordinates(), indexing="ij")
-    assert np.vdot(state.cells, dye) == pytest.approx(RATE * world.time, rel=1e-12)
+    assert np.vdot(state.cell_volume, dye) == pytest.approx(RATE * world.time, rel=1e-12)
     assert np.abs(dye[x < 0.013]).max() < 1e-4
     assert (dye * y).sum() / dye.sum() == pytest.approx(0.007, abs=0.5 * grid.spacing)
 
@@ -197,7 +196,7 @@ def test_a_mouth_that_drinks_takes_the_dye_that_is_there(grid: Grid) -> None:
     for _ in range(12):
         report = advance(world, 0.5 * grid.spacing * area / RATE)
         assert report.dye_error < 1e-13
-        outside = state.cells > 0.0
+        outside = state.cell_volume > 0.0
         np.testing.assert_allclose(state.scalars["dye"][outside], 1.0, rtol=1e-12)
 
 
@@ -215,7 +214,7 @@ def test_a_mouth_drinks_again_the_dye_that_it_blew(grid: Grid) -> None:
         assert report.dye_error < 1e-13
         dye = state.scalars["dye"]
         assert 0.0 <= dye.min() <= dye.max() <= 1.0
-        amount.append(float(np.vdot(state.cells, dye)))
+        amount.append(float(np.vdot(state.cell_volume, dye)))
     gained = np.diff(amount)
     blown = RATE * dt * np.array([swing.at(n * dt) for n in range(36)])
     assert np.abs(gained[:12]).max() == 0.0

@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 import flowborne
 from flowborne import World
 from flowborne.coupling import step as steps
+from flowborne.coupling.cut import cut_by_bodies
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised, pressure_push
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.report import Outcome
-from flowborne.coupling.step import cut_by_bodies, step
+from flowborne.coupling.step import step
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.open import BoundaryOpen

@@ -66,8 +66,7 @@ def arm(grid: Grid, *, viscosity: float = 0.0, pull: float = 300.0) -> World:
     for motion in motions:
         world.solid.q[model.dof_position[motion.dofs]] = motion.position(0.0)
         world.solid.v[motion.dofs] = motion.velocity(0.0)
-    for faces in (world.flow()[1].velocity, world.flow()[1].advecting_velocity):
-        faces[0][:] = 1.5
+    world.flow()[1].velocity[0][:] = 1.5
     return world
 
 

@@ -32,9 +32,8 @@ def flag(grid: Grid, *, one_way: bool) -> World:
     sides = Boundaries(sides.x_min, sides.x_max, sides.y_min, BoundaryOpen())
     fluid = Fluid(grid, 1.2, boundaries=sides, one_way=one_way)
     world = World.at_rest(Setup(model, fluid, winds=(WindStream(1.2),)))
-    for faces in (world.flow()[1].velocity, world.flow()[1].advecting_velocity):
-        for axis, speed in enumerate((1.5, 0.5)):
-            faces[axis][:] = speed
+    for axis, speed in enumerate((1.5, 0.5)):
+        world.flow()[1].velocity[axis][:] = speed
     return world
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flowborne
-from flowborne.coupling import step as steps
+from flowborne.coupling import cut
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Setup, World
@@ -98,7 +98,7 @@ def test_a_saved_state_goes_on_bit_for_bit(simulation: Simulation) -> None:
 
 def test_a_state_that_lacks_a_part_is_refused(simulation: Simulation) -> None:
     arrays = simulation.world.arrays()
-    for name in ("clock", "solid/v", "fluid/pressure", "fluid/advecting_velocity_y"):
+    for name in ("clock", "solid/v", "fluid/pressure", "fluid/velocity_change_y"):
         rest = {other: values for other, values in arrays.items() if other != name}
         with pytest.raises(KeyError):
             World.from_arrays(simulation.world.setup, rest)
@@ -107,21 +107,21 @@ def test_a_state_that_lacks_a_part_is_refused(simulation: Simulation) -> None:
 def test_the_grid_is_cut_once_for_each_pose(monkeypatch: pytest.MonkeyPatch) -> None:
     """By a step, by the next one, and by what looks at the state between them."""
     poses = []
-    cut_at = steps.cut_at
+    cut_at = cut.cut_at
 
     def counted(setup: Setup, pose: Kinematics) -> Geometry:
         poses.append(pose)
         return cut_at(setup, pose)
 
-    monkeypatch.setattr(steps, "cut_at", counted)
+    monkeypatch.setattr(cut, "cut_at", counted)
     with swimming(workers=1) as simulation:
         world = simulation.world.copy()
     world.solid.v[:] = 0.1
     for _ in range(3):
-        steps.step(world, 0.01)
-        steps.cut_by_bodies(world)
-        steps.cut_by_bodies(world.copy())
+        step(world, 0.01)
+        cut.cut_by_bodies(world)
+        cut.cut_by_bodies(world.copy())
     assert len(poses) == 4
     world.solid.q[0] += 0.1
-    steps.cut_by_bodies(world)
+    cut.cut_by_bodies(world)
     assert len(poses) == 5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.coupling.flow import source_rate
+from flowborne.coupling.cut import source_rate
 from flowborne.coupling.fractions import uncut
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World

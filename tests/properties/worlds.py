@@ -166,7 +166,6 @@ class Case:
                 ends[-1] = ends[0]
         for axis, values in turned_faces(noise, turn).items():
             world.flow()[1].velocity[axis][:] = values
-            world.flow()[1].advecting_velocity[axis][:] = values
         return world
 
     def model(self, turn: Turn) -> str:

@@ -52,7 +52,11 @@ def test_a_world_is_read_back_bit_for_bit(tmp_path, world):
         ("solid/q", lambda q: np.zeros(3), r"'solid/q' is \[3\] of float64 in place of \[1\]"),
         ("solid/v", lambda v: v.astype(complex), r"'solid/v' is \[1\] of complex128 in place"),
         ("fluid/pressure", lambda p: p.astype(str), "'fluid/pressure' is"),
-        ("fluid/earlier", lambda p: p * np.nan, "'fluid/earlier' has a number that is not finite"),
+        (
+            "fluid/previous_pressure",
+            lambda p: p * np.nan,
+            "'fluid/previous_pressure' has a number that is not finite",
+        ),
         ("fluid/scalar_smoke", lambda p: p[None], "'fluid/scalar_smoke' is"),
         ("memory/target", lambda q: q[:1], r"'memory/target' is \[1\] of float64 in place of"),
         ("clock", lambda clock: clock[:2], "'clock' is"),

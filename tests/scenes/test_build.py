@@ -118,10 +118,9 @@ def test_the_fluid_starts_with_the_scenes_velocity_everywhere(write: Write) -> N
     made = build(load_scene(write(), {"fluid.velocity": "[1.5, -0.5]"}))
     fluid = made.world.fluid
     assert fluid is not None
-    for faces in (fluid.velocity, fluid.advecting_velocity):
-        for values, expected in zip(faces, (1.5, -0.5, 0.0), strict=True):
-            assert_allclose(values, expected)
-    for values in fluid.acceleration:
+    for values, expected in zip(fluid.velocity, (1.5, -0.5, 0.0), strict=True):
+        assert_allclose(values, expected)
+    for values in (*fluid.velocity_change, *fluid.acceleration):
         assert_allclose(values, 0.0)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flowborne.coupling.seen import Seen
-from flowborne.coupling.world import HYPOTHETICAL
+from flowborne.coupling.world import TRIAL_TOLERANCE
 from flowborne.scenes import warn, warn_bodies
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
@@ -249,7 +249,7 @@ def test_strength_and_probe_in_radians(
 
 
 def test_a_probe_as_small_as_may_be_has_a_gradient_right_to_a_thousandth() -> None:
-    assert HYPOTHETICAL / np.radians(warn.LEAST_PROBE) == pytest.approx(1e-3)
+    assert TRIAL_TOLERANCE / np.radians(warn.LEAST_PROBE) == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize("strength", ["120.0", "360.0"])

@@ -17,8 +17,8 @@ from flowborne.control import creature
 from flowborne.control.course import Step, TrialError, advance
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
+from flowborne.coupling.bodies_step import advance_prescribed
 from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.step import move_as_told
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
@@ -105,7 +105,7 @@ class Trial:
             if number == hypothesis.steps + 1:
                 command.rate[dofs] = self._last_rate(command)
             # only the last step is measured; before it, prescribed motion needs no solve
-            if number == whole or not move_as_told(world, hypothesis.dt, command):
+            if number == whole or not advance_prescribed(world, hypothesis.dt, command):
                 report = advance(self, world, hypothesis.dt, command)
         value = self.objective.value(Measurement(world, report, self.course.world.time))
         if not np.isfinite(value):

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flowborne.coupling.advection.scheme import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.swept import swept_cells
 from flowborne.coupling.world import Fluid
@@ -44,40 +45,33 @@ left to them. One that they open holds nothing until it is reached."""
 
 
 def leak_proof_flux(
-    velocity: Faces,
-    before: Geometry,
-    after: Geometry,
-    cells: Array,
-    rate: Array,
-    fluid: Fluid,
-    time: float,
-    dt: float,
+    departure: Departure, after: Geometry, fluid: Fluid, time: float, dt: float
 ) -> tuple[Faces, Array]:
     """Volume fluxes through all faces over a step, m^3/s, and the volumes that they lead to, m^3.
 
-    velocity       Faces at the middle of the step, m/s
-    before, after  the cut grid at both ends of the step
-    cells          (nx, ny, nz) volumes at the start, m^3
-    rate           (nx, ny, nz) what mouths and sources bring, m^3/s
-    time           s at the middle of the step
+    departure  the start of the step
+    after      the cut grid at its end
+    time       s in its middle
     """
+    state, before, cells = departure.state, departure.cut, departure.volumes.cells
     grid, sides = fluid.grid, fluid.boundaries
     flux, weights = grid.zeros_faces(), grid.zeros_faces()
     for axis in grid.axes:
         ends = before.open[axis], after.open[axis]
-        mean_flux(flux[axis], weights[axis], velocity[axis], *ends, grid.face_area, stiffness(grid))
+        moving = state.velocity[axis], state.velocity_change[axis]
+        mean_flux(flux[axis], weights[axis], *moving, *ends, grid.face_area, stiffness(grid))
     drive_sides(flux, weights, grid, sides, time)
     swept = swept_cells(before, after, cells, grid, sides)
     start, end = swept.set_aside(flux, weights, cells, after.volume)
     system = PressureSystem(weights, sides.periodic())
-    rhs, net = volume_rates(system, start, end, rate, dt), np.empty(grid.shape)
+    rhs, net = volume_rates(system, start, end, departure.rate, dt), np.empty(grid.shape)
     net_out(net, *flux)
     rhs += net
     left = LEFT * grid.cell_volume / dt
     solution = system.solve(-rhs, None, tolerance=TOLERANCE, absolute=left)
     subtract_pressure_gradient(flux, weights, solution.pressure, grid, sides, 1.0)
     net_out(net, *flux)
-    later = start + dt * (rate - net)
+    later = start + dt * (departure.rate - net)
     swept.put_back(flux, later, dt)
     return flux, later
 

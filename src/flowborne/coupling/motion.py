@@ -1,4 +1,4 @@
-"""What the joints are told to do during a step."""
+"""Prescribed motions, and what drives the joints in a step."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ class Trajectory(Protocol):
         ...
 
 
-def velocity_after(model: SolidModel, q: Array, told: Trajectory, time: float, dt: float) -> Array:
+def velocity_after(
+    model: SolidModel, q: Array, motion: Trajectory, time: float, dt: float
+) -> Array:
     """(k,) velocity with which a motion goes on for a step after `time` (s).
 
     In leapfrog the velocities at an instant are those of half a step on, which the bodies then move
@@ -40,9 +42,9 @@ def velocity_after(model: SolidModel, q: Array, told: Trajectory, time: float, d
     q  (nq,) a pose whose other joints do not matter
     """
     here, there = q.copy(), q.copy()
-    places = model.indices_of(told.dofs)
-    here[places], there[places] = told.position(time), told.position(time + dt)
-    return model.difference(here, there)[told.dofs] / dt
+    indices = model.indices_of(motion.dofs)
+    here[indices], there[indices] = motion.position(time), motion.position(time + dt)
+    return model.difference(here, there)[motion.dofs] / dt
 
 
 @dataclass
@@ -66,12 +68,7 @@ class JointCommand:
         return cls(np.zeros(nv, bool), np.zeros(nv), np.zeros(nv), np.full(nv, np.inf))
 
     def copy(self) -> JointCommand:
-        return JointCommand(
-            self.prescribed.copy(),
-            self.rate.copy(),
-            self.final_velocity.copy(),
-            self.torque_limit.copy(),
-        )
+        return JointCommand(*(values.copy() for values in vars(self).values()))
 
     def set(
         self,

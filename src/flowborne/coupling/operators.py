@@ -44,19 +44,6 @@ def generalised(kinematics: Kinematics, push: Array) -> Array:
     return np.asarray(on_bones + kinematics.vertex_jacobian.T @ push[6 * bodies :])
 
 
-def on_bodies(kinematics: Kinematics, carried: Array, push: Array) -> Array:
-    """(nbody, 6) wrench of a push (k,) on every body with the flesh that it carries.
-
-    carried  (n, nbody) share of each body in a vertex, see `Flesh`
-    """
-    bodies = kinematics.twist_jacobian.shape[0]
-    if kinematics.vertices.size == 0:
-        return push.reshape(bodies, 6)
-    force, place = push[6 * bodies :].reshape(-1, 3), kinematics.vertices
-    wrench = np.concatenate([force, np.cross(place, force)], axis=1)
-    return push[: 6 * bodies].reshape(-1, 6) + carried.T @ wrench
-
-
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:
     """Field that crosses no body: open part fluid, closed part body.
 

@@ -7,12 +7,15 @@ control of joints and muscles", which the paper uses.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.motion import JointCommand, Trajectory, velocity_after
+
+if TYPE_CHECKING:
+    from flowborne.coupling.world import World
 
 Array = NDArray[np.float64]
 
@@ -95,9 +98,9 @@ class ServoPD:
 
 @dataclass(frozen=True)
 class TrajectoryServo:
-    """A prescribed motion whose dofs are taken to it by a servo: late, or with limited force.
+    """A prescribed motion that a servo follows: late, or with limited force.
 
-    trajectory  what the dofs are told, and where they start
+    trajectory  the prescribed motion, and where it starts
     servo       how their drives follow
     """
 
@@ -109,9 +112,43 @@ class TrajectoryServo:
         return self.trajectory.dofs
 
     def position(self, time: float) -> Array:
-        """(m,) rad, m, unit quaternions that the dofs are told."""
+        """(m,) rad, m, unit quaternions of the prescribed motion."""
         return self.trajectory.position(time)
 
     def velocity(self, time: float) -> Array:
-        """(k,) rad/s or m/s that the dofs are told."""
+        """(k,) rad/s or m/s of the prescribed motion."""
         return self.trajectory.velocity(time)
+
+
+def joint_command(world: World, dt: float, command: JointCommand | None) -> JointCommand:
+    """The command with prescribed motions and a slab's locked dofs added.
+
+    A drive that follows a motion exactly ends the step with the velocity of half a step later, as
+    the dofs that answer forces do (leapfrog). A trial keeps to the half step of the world itself,
+    so that its velocities change over just its step. A servo moves its dofs with the velocity that
+    they have: its torque limit may prevent another one, and it steers the step after.
+    """
+    model, end = world.setup.solid, world.time + dt
+    command = JointCommand.none(model.nv) if command is None else command.copy()
+    for motion in world.setup.motions:
+        if isinstance(motion, TrajectoryServo):
+            v = world.solid.v[motion.dofs]
+            gap = gap_to(world, motion, end + dt) - dt * v
+            final_velocity, _ = motion.servo.velocity(gap, v, dt, dt)
+            limit = np.asarray(motion.servo.torque_limit, dtype=np.float64)
+            command.set(motion.dofs, v, final_velocity, limit)
+        else:
+            rate, span = gap_to(world, motion, end) / dt, 2.0 * world.ahead
+            final_velocity = motion.velocity(end)
+            if span > 0.0:
+                final_velocity = velocity_after(model, world.solid.q, motion, end, span)
+            command.set(motion.dofs, rate, final_velocity)
+    command.set(model.locked, 0.0, 0.0)
+    return command
+
+
+def gap_to(world: World, motion: Trajectory, time: float) -> Array:
+    """(k,) displacement of a motion's dofs from their positions to its own at `time` (s)."""
+    model, goal = world.setup.solid, world.solid.q.copy()
+    goal[model.indices_of(motion.dofs)] = motion.position(time)
+    return model.difference(world.solid.q, goal)[motion.dofs]

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flowborne.coupling.flow import source_rate
+from flowborne.coupling.cut import source_rate
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.friction import diffuse
 from flowborne.coupling.mouths import Jet, add_rates

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome
-from flowborne.coupling.step import joint_command, step
+from flowborne.coupling.servo import joint_command
+from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.errors import BreakdownError
 
@@ -67,13 +68,8 @@ def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
     fluid, state = world.flow()
     if fluid.one_way:
         return
-    there = World(
-        world.setup.but(motions=(), winds=()),
-        world.solid.copy(),
-        state.copy(),
-        world.time,
-        cut=world.cut,
-    )
+    there = world.copy()
+    there.setup = world.setup.but(motions=(), winds=())
     command = JointCommand.none(there.solid.v.size)
     kept = np.ones(there.solid.v.size, bool) if given is None else given
     command.set(kept, 0.0, there.solid.v[kept])
@@ -83,7 +79,7 @@ def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
         raise BreakdownError(f"the flow at the start was not found: {report.outcome.value}")
     _, found = there.flow()
     world.solid.v[:] = there.solid.v
-    for axis in range(3):
-        state.velocity[axis][:] = found.velocity[axis]
-        state.advecting_velocity[axis][:] = found.velocity[axis]
+    state.velocity = found.velocity
+    for values in state.velocity_change:
+        values[:] = 0.0
     world.cut = there.cut

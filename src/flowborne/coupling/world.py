@@ -1,4 +1,4 @@
-"""The world: all the state there is, and the fixed things that it is stepped with."""
+"""The world: the whole state, and what stays constant during a run."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.state import FluidState
+from flowborne.fluid.state import FluidState, under
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 from flowborne.solids.wind import Wind
 
-HYPOTHETICAL = 1e-5
+TRIAL_TOLERANCE = 1e-5
 """Relative residual of the pressure in a hypothetical step: gradients are right to 1e-3."""
 
 
@@ -38,7 +38,7 @@ class Fluid:
     body_force    (3,) uniform force per mass on the fluid, m/s^2, besides gravity
     advection     scheme that carries the velocity
     tolerance     relative residual of the pressure solve
-    one_way       whether the fluid does not feel the bodies, and pushes them as a wind alone
+    one_way       whether the bodies do not act on the fluid, which acts on them as a wind alone
     """
 
     grid: Grid
@@ -55,13 +55,13 @@ class Fluid:
 
 @dataclass(frozen=True)
 class Setup:
-    """What never changes during a run, shared by all copies of a world.
+    """The constant part of a world, shared by all its copies.
 
     solid    the articulated bodies; a world without any has `SolidModel.empty()`
     fluid    the fluid, or None (simple wind and gravity only)
     motions  prescribed motions of some dofs
     winds    simple winds (paper eq. 2, or a uniform force)
-    mouths   patches of skin through which fluid is expelled; a fluid that feels the bodies is there
+    mouths   patches of skin through which fluid is expelled; needs a fluid that is not one-way
     trial    whether steps are hypothetical, and may be longer than those of the world itself
     splits   whether steps report the added-mass part of the fluid's force, which costs a solve
     """
@@ -77,10 +77,9 @@ class Setup:
     @cached_property
     def hypothetical(self) -> Setup:
         """The same for hypothetical steps: their pressure is solved as far as a gradient needs."""
-        if self.fluid is None:
-            return replace(self, trial=True, splits=False)
-        tolerance = max(self.fluid.tolerance, HYPOTHETICAL)
-        fluid = replace(self.fluid, tolerance=tolerance)
+        fluid = self.fluid
+        if fluid is not None:
+            fluid = replace(fluid, tolerance=max(fluid.tolerance, TRIAL_TOLERANCE))
         return self.but(fluid=fluid, trial=True, splits=False)
 
     @cached_property
@@ -97,15 +96,15 @@ class Setup:
 
     @cached_property
     def shapes(self) -> Shapes:
-        """The bodies' geometries as the fluid's grid sees them: none if it does not feel them."""
+        """The bodies' geometries sampled on the fluid's grid: none if the fluid is one-way."""
         assert self.fluid is not None
-        seen = SolidModel.empty() if self.fluid.one_way else self.solid
-        return shapes(seen, self.fluid.grid)
+        solid = SolidModel.empty() if self.fluid.one_way else self.solid
+        return shapes(solid, self.fluid.grid)
 
 
 @dataclass
 class World:
-    """All the state there is. Copies are cheap and share nothing but `setup`.
+    """The whole state. Copies are cheap and share only `setup`.
 
     solid   positions and velocities of the bodies
     fluid   None when the setup has no fluid
@@ -145,17 +144,15 @@ class World:
             raise ValueError("this world has no fluid; give its setup one")
         return self.setup.fluid, self.fluid
 
+    def advance_clock(self, dt: float) -> None:
+        """Count a step of dt (s)."""
+        self.time += dt
+        self.steps += 1
+
     def copy(self) -> World:
-        return World(
-            self.setup,
-            self.solid.copy(),
-            None if self.fluid is None else self.fluid.copy(),
-            self.time,
-            self.steps,
-            self.ahead,
-            {name: values.copy() for name, values in self.memory.items()},
-            self.cut,
-        )
+        fluid = None if self.fluid is None else self.fluid.copy()
+        memory = {name: values.copy() for name, values in self.memory.items()}
+        return replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory)
 
     def arrays(self) -> dict[str, Array]:
         """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""
@@ -168,21 +165,13 @@ class World:
     @classmethod
     def from_arrays(cls, setup: Setup, arrays: dict[str, Array]) -> World:
         """World of `setup` in the state that `arrays` gave. Raises KeyError when one is missing."""
-
-        def part(prefix: str) -> dict[str, Array]:
-            return {
-                name.removeprefix(prefix): values
-                for name, values in arrays.items()
-                if name.startswith(prefix)
-            }
-
         time, steps, ahead = arrays["clock"]
         return cls(
             setup,
             SolidState(arrays["solid/q"], arrays["solid/v"]),
-            None if setup.fluid is None else FluidState.from_arrays(part("fluid/")),
+            None if setup.fluid is None else FluidState.from_arrays(under("fluid/", arrays)),
             float(time),
             int(steps),
             float(ahead),
-            part("memory/"),
+            under("memory/", arrays),
         )

@@ -11,27 +11,27 @@ from flowborne.fluid.grid import Array, Faces, Grid
 
 @dataclass
 class FluidState:
-    """Everything that the fluid carries from one step to the next.
+    """The fluid at t^n, and what the next step needs of the last one, from t^{n-1} to t^n.
 
-    velocity            u on the faces, m/s; zero where a face is wholly closed
-    acceleration        given by the last step beside what the flow carried, away from bodies,
-                        m/s^2
-    advecting_velocity  u half a step on, as the last two velocities tell, m/s
-    pressure            (nx, ny, nz) dynamic pressure, Pa (hydrostatic part left out)
-    earlier             (nx, ny, nz) that of the step before, Pa
-    scalars             name -> (nx, ny, nz), carried for pictures
-    cells               (nx, ny, nz) open volume of each cell, m^3; empty before the first step
-    pose                (nq,) positions of the bodies that left these volumes
+    velocity           u^n on the faces, m/s; 0 where a face is wholly closed
+    velocity_change    u^n - u^{n-1} on the faces, m/s; 0 next to bodies, and before the first step
+    acceleration       a^{n-1/2} on the faces, m/s^2: the part of that change that is not advection,
+                       per time; 0 next to bodies
+    pressure           p^{n-1/2}, (nx, ny, nz), Pa: dynamic, without the hydrostatic part
+    previous_pressure  p^{n-3/2}, (nx, ny, nz), Pa
+    cell_volume        V^n, (nx, ny, nz) open volume of each cell, m^3; empty before the first step
+    pose               q^n, (nq,) positions of the bodies for which the volumes hold
+    scalars            c^n, name -> (nx, ny, nz): dye and smoke
     """
 
     velocity: Faces
+    velocity_change: Faces
     acceleration: Faces
-    advecting_velocity: Faces
     pressure: Array
-    earlier: Array
-    scalars: dict[str, Array] = field(default_factory=dict)
-    cells: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    previous_pressure: Array
+    cell_volume: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     pose: Array = field(default_factory=lambda: np.zeros(0))
+    scalars: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
     def at_rest(cls, grid: Grid, scalars: tuple[str, ...] = ()) -> FluidState:
@@ -42,7 +42,7 @@ class FluidState:
             grid.zeros_faces(),
             np.zeros(grid.shape),
             np.zeros(grid.shape),
-            {name: np.zeros(grid.shape) for name in scalars},
+            scalars={name: np.zeros(grid.shape) for name in scalars},
         )
 
     def copy(self) -> FluidState:
@@ -50,17 +50,12 @@ class FluidState:
 
     def arrays(self) -> dict[str, Array]:
         """Every array by a name; `from_arrays` is the way back."""
-        named = {
-            "pressure": self.pressure,
-            "earlier": self.earlier,
-            "cells": self.cells,
-            "pose": self.pose,
-        }
-        for name in ("velocity", "acceleration", "advecting_velocity"):
+        whole = "pressure", "previous_pressure", "cell_volume", "pose"
+        named = {name: getattr(self, name) for name in whole}
+        for name in ("velocity", "velocity_change", "acceleration"):
             for axis, values in zip("xyz", getattr(self, name), strict=True):
                 named[f"{name}_{axis}"] = values
-        named.update({f"scalar_{name}": values for name, values in self.scalars.items()})
-        return named
+        return named | {f"scalar_{name}": values for name, values in self.scalars.items()}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Array]) -> FluidState:
@@ -69,15 +64,16 @@ class FluidState:
 
         return cls(
             faces("velocity"),
+            faces("velocity_change"),
             faces("acceleration"),
-            faces("advecting_velocity"),
             arrays["pressure"],
-            arrays["earlier"],
-            {
-                name.removeprefix("scalar_"): values
-                for name, values in arrays.items()
-                if name.startswith("scalar_")
-            },
-            arrays["cells"],
+            arrays["previous_pressure"],
+            arrays["cell_volume"],
             arrays["pose"],
+            under("scalar_", arrays),
         )
+
+
+def under(prefix: str, arrays: dict[str, Array]) -> dict[str, Array]:
+    """The arrays whose names begin with `prefix`, by the rest of their names."""
+    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}

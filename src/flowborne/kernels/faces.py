@@ -73,22 +73,27 @@ def mean_flux(
     flux: Array,
     weight: Array,
     velocity: Array,
+    change: Array,
     before: Array,
     after: Array,
     area: float,
     whole: float,
 ) -> None:
-    """Volume per time through the mean open part of each face, and its weight.
+    """Volume per time through the mean open part of each face in the middle of a step, and its
+    weight.
 
-    before, after  open parts at both ends of a step
-    whole          weight of a face that is wholly open
+    velocity, change  at the start of the step, and of the last step: in the middle it will be
+                      velocity + change / 2
+    before, after     open parts at both ends of a step
+    whole             weight of a face that is wholly open
     """
-    q, w, u, one, other = flat(flux), flat(weight), flat(velocity), flat(before), flat(after)
+    q, w, u, du = flat(flux), flat(weight), flat(velocity), flat(change)
+    one, other = flat(before), flat(after)
     for i in prange(q.shape[0]):
         for k in range(q.shape[1]):
             mean = 0.5 * (one[i, k] + other[i, k])
             w[i, k] = whole * mean
-            q[i, k] = area * mean * u[i, k]
+            q[i, k] = area * mean * (u[i, k] + 0.5 * du[i, k])
 
 
 @kernel
@@ -102,12 +107,20 @@ def fill_empty_faces(field: Array, volume: Array, inside: Array) -> None:
 
 
 @kernel
-def gained(out: Array, a: Array, b: Array, c: Array, d: Array, dt: float) -> None:
-    """(a - b + c - d) / dt."""
-    rate, one, two, three, four = flat(out), flat(a), flat(b), flat(c), flat(d)
-    for i in prange(rate.shape[0]):
-        for k in range(rate.shape[1]):
-            rate[i, k] = (one[i, k] - two[i, k] + three[i, k] - four[i, k]) / dt
+def changes_of_step(
+    acceleration: Array, change: Array, velocity: Array, start: Array, advected: Array, dt: float
+) -> None:
+    """What a step to `velocity` changed, in all and per time by what is not advection.
+
+    change  on entry the velocity before the step, on return velocity - it
+    start   the velocity from which `advected` came: that before the step and what was added to it
+    """
+    rate, last, u = flat(acceleration), flat(change), flat(velocity)
+    one, other = flat(start), flat(advected)
+    for i in prange(u.shape[0]):
+        for k in range(u.shape[1]):
+            rate[i, k] = (u[i, k] - other[i, k] + one[i, k] - last[i, k]) / dt
+            last[i, k] = u[i, k] - last[i, k]
 
 
 @kernel
@@ -118,18 +131,6 @@ def still_to_come(out: Array, rate: Array, now: Array, was: Array, dt: float) ->
     for i in prange(left.shape[0]):
         for k in range(left.shape[1]):
             left[i, k] = whole[i, k] - 2.0 * (one[i, k] - other[i, k]) / dt
-
-
-@kernel
-def move_on(was: Array, now: Array, later: Array) -> None:
-    """Where a velocity will be half a step on, from the last two: now + (now - was) / 2; then the
-    last one becomes the present one, in place."""
-    last, u, ahead = flat(was), flat(now), flat(later)
-    for i in prange(u.shape[0]):
-        for k in range(u.shape[1]):
-            value = u[i, k]
-            ahead[i, k] = value + 0.5 * (value - last[i, k])
-            last[i, k] = value
 
 
 @kernel

@@ -109,7 +109,7 @@ class Recorder:
 
 def open_cells(world: World, pose: Kinematics) -> Array:
     """(nx, ny, nz) open fraction of each cell, from the bodies' distance to its centre."""
-    from flowborne.coupling.step import cut_by_bodies
+    from flowborne.coupling.cut import cut_by_bodies
 
     assert world.setup.fluid is not None
     distance = cut_by_bodies(world, pose).distance

@@ -108,11 +108,10 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
 
 
 def _set_velocity(state: FluidState, scene: Scene) -> None:
-    """Set velocity and advecting velocity to the initial velocity on every face."""
+    """Set the velocity to the initial one on every face."""
     assert scene.fluid is not None
-    for faces in (state.velocity, state.advecting_velocity):
-        for values, component in zip(faces, scene.fluid.velocity, strict=True):
-            values.fill(component)
+    for values, component in zip(state.velocity, scene.fluid.velocity, strict=True):
+        values.fill(component)
 
 
 def mouths_of(scene: Scene, model: SolidModel) -> tuple[Mouth, ...]:

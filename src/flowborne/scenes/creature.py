@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.step import cut_at
+from flowborne.coupling.cut import cut_at
 from flowborne.coupling.world import Setup
 from flowborne.phrases import listed
 from flowborne.scenes.bodies import displace_of, initial_state

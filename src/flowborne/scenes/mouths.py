@@ -9,8 +9,8 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from flowborne.control.surroundings import Surroundings
+from flowborne.coupling.cut import cut_by_bodies, jets_at
 from flowborne.coupling.mouths import Mouth, Strength
-from flowborne.coupling.step import cut_by_bodies, jets_at
 from flowborne.coupling.world import Setup, World
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorPulse, FactorSteady

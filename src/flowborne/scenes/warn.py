@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
-from flowborne.coupling.world import HYPOTHETICAL, Setup
+from flowborne.coupling.world import TRIAL_TOLERANCE, Setup
 from flowborne.motion.clip_reading import MIN_STANDING_COSINE, standing_axis
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.phrases import listed, rounded_up
@@ -39,11 +39,12 @@ LEAST_STRENGTH = 2.0 * math.pi
 degrees it is a right angle in 14 s."""
 
 GRADIENT_ERROR = 1e-3
-"""Relative error of a gradient that trials are solved for (`coupling.world.HYPOTHETICAL`)."""
+"""Relative error of a gradient that trials are solved for (`coupling.world.TRIAL_TOLERANCE`)."""
 
-LEAST_PROBE = math.degrees(HYPOTHETICAL / GRADIENT_ERROR)
-"""Degrees, 0.57. The pressure of a trial is right to HYPOTHETICAL of itself, and two trials differ
-by about the probe in radians of it: a smaller probe has a gradient worse than GRADIENT_ERROR."""
+LEAST_PROBE = math.degrees(TRIAL_TOLERANCE / GRADIENT_ERROR)
+"""Degrees, 0.57. The pressure of a trial is right to TRIAL_TOLERANCE of itself, and two trials
+differ by about the probe in radians of it: a smaller probe has a gradient worse than
+GRADIENT_ERROR."""
 
 
 def angles_in_radians(scene: Scene, setup: Setup) -> Iterator[str]:

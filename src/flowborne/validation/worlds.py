@@ -118,7 +118,7 @@ def start_at_once(world: World, dt: float) -> StepReport:
     """
     report = advance(world, dt)
     _, state = world.flow()
-    for values in (*state.acceleration, state.pressure, state.earlier):
+    for values in (*state.acceleration, state.pressure, state.previous_pressure):
         values[:] = 0.0
     return report
 

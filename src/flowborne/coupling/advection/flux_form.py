@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import Advection, Carried, Departure
+from flowborne.coupling.advection.scheme import Advection, AdvectionResult, Departure
 from flowborne.coupling.inlets import after_drinking, inlets_across, taken_by
 from flowborne.fluid.ghosts import impose_sides
+from flowborne.fluid.grid import Faces
 from flowborne.fluid.momentum import face_masses, fluid_momentum
-from flowborne.fluid.transport import beside_faces, carry_component
+from flowborne.fluid.transport import Transport, beside_faces, carry_component
 from flowborne.kernels.faces import still_to_come
 
 
@@ -18,12 +19,12 @@ from flowborne.kernels.faces import still_to_come
 class FluxForm(Advection):
     """Every component on its moving control volumes; nothing is lost."""
 
-    half_kick = True
+    explicit_half_pressure = True
 
-    def carry(self, start: Departure) -> Carried:
+    def carry(self, start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:
         grid, sides, state, jets = start.grid, start.sides, start.state, start.jets
-        transport, velocity, dt = start.transport, start.velocity, start.transport.dt
-        arrived, crossed, held, gained = grid.zeros_faces(), np.zeros(3), np.zeros(3), np.zeros(3)
+        dt, arrived = transport.dt, grid.zeros_faces()
+        crossed, held, gained = np.zeros((3, 3))
         drunk = [np.zeros(3) for _ in jets]
         lasting = transport.lasting(grid)
         for axis in grid.axes:
@@ -43,7 +44,7 @@ class FluxForm(Advection):
         masses = face_masses(transport.after, start.density)
         reached = fluid_momentum(arrived, masses, grid, sides)
         impose_sides(arrived, grid, sides, transport.time + dt)
-        return Carried(
+        return AdvectionResult(
             arrived,
             transport.after,
             np.zeros(3),

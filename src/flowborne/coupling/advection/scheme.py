@@ -1,4 +1,4 @@
-"""What every scheme that carries the fluid's velocity is given, does and returns."""
+"""What every scheme that advects the fluid's velocity is given, does and returns."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from flowborne.solids.state import SolidState
 
 @dataclass(frozen=True)
 class Departure:
-    """Fluid and bodies at the start of a step, and what carries the fluid through it.
+    """Fluid and bodies at the start of a step, t^n.
 
-    grid, sides  where the fluid is
+    grid, sides  of the fluid
     density      kg/m^3
     state        of the fluid
-    velocity     Faces, with half of the last pressure, m/s
-    transport    the leak-proof fluxes, and the control volumes at both ends
     cut          the cut grid
+    volumes      control volumes
     jets         of the mouths
-    sources      (nx, ny, nz) what sources bring into each cell, m^3/s
-    solid        the bodies,
+    sources      (nx, ny, nz) volume per time that sources bring into each cell, m^3/s
+    rate         (nx, ny, nz) the same of sources and mouths
+    solid        the bodies
     bodies       and their state
     """
 
@@ -36,26 +36,26 @@ class Departure:
     sides: Boundaries
     density: float
     state: FluidState
-    velocity: Faces
-    transport: Transport
     cut: Geometry
+    volumes: ControlVolumes
     jets: tuple[Jet, ...]
     sources: Array
+    rate: Array
     solid: SolidModel
     bodies: SolidState
 
 
 @dataclass(frozen=True)
-class Carried:
-    """The fluid a step later.
+class AdvectionResult:
+    """The fluid after advection.
 
     velocity  Faces u*, m/s
     volumes   control volumes at the end of the step
     lost      (3,) momentum that the scheme made (or lost, when negative), N s
     crossed   (3,) momentum that the flow carried in through the sides, N s
-    stopped   (3,) momentum that the sides which prescribe a velocity gave to what reached them, N s
+    stopped   (3,) momentum that sides with a prescribed velocity gave to the flow, N s
     expelled  (3,) momentum that came in through mouths and sources, N s
-    jets      of the mouths, those that drink with the velocity of what they drank
+    jets      of the mouths; those that take fluid in have the velocity of that fluid
     """
 
     velocity: Faces
@@ -68,13 +68,17 @@ class Carried:
 
 
 class Advection:
-    """A scheme that carries the fluid's velocity.
+    """A scheme that advects the fluid's velocity.
 
-    half_kick  whether half of the last pressure may act before it (see `half_kick`)
+    explicit_half_pressure  whether half of the last pressure may act before (see `half_pressure`)
     """
 
-    half_kick: ClassVar[bool]
+    explicit_half_pressure: ClassVar[bool]
 
-    def carry(self, start: Departure) -> Carried:
-        """The fluid after `start.transport.dt`."""
+    def carry(self, start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:
+        """The fluid after `transport.dt`.
+
+        velocity   Faces at the start, with half of the last pressure, m/s
+        transport  leak-proof fluxes, and the control volumes at both ends of the step
+        """
         raise NotImplementedError

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import Advection, Carried, Departure
+from flowborne.coupling.advection.scheme import Advection, AdvectionResult, Departure
 from flowborne.coupling.mouths import add_closed_slip, fill_mouths, jet_force
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.fluid.advection import OFFSETS, carry, cells_per_step
@@ -18,6 +18,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import pad_faces
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.momentum import face_masses, fluid_momentum
+from flowborne.fluid.transport import Transport
 from flowborne.solids.dynamics import kinematics
 
 
@@ -25,34 +26,35 @@ from flowborne.solids.dynamics import kinematics
 class SemiLagrangian(Advection):
     """What arrives at a face has the velocity of the place that it comes from."""
 
-    half_kick = False
+    explicit_half_pressure = False
 
-    def carry(self, start: Departure) -> Carried:
-        grid, sides, state, jets = start.grid, start.sides, start.state, start.jets
-        transport, density = start.transport, start.density
-        before, end = transport.before, transport.after
-        carried = faces_of([u.copy() for u in state.velocity])
+    def carry(self, start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:
+        grid, sides, jets = start.grid, start.sides, start.jets
+        density, before, end = start.density, transport.before, transport.after
+        carried = faces_of([u.copy() for u in velocity])
         fill_mouths(carried, jets, grid)
         field, arrived = pad_faces(carried, grid, sides, transport.time), grid.zeros_faces()
         counts, periodic = np.array(grid.shape), np.array(sides.periodic(), np.uint8)
-        paths = particle_paths(start)
+        paths = particle_paths(start, transport)
         for axis in grid.axes:
             carry(arrived[axis], field[axis], *paths, OFFSETS[axis], counts, periodic)
         end.follow(arrived, grid)
-        was = fluid_momentum(state.velocity, face_masses(before, density), grid, sides)
+        was = fluid_momentum(velocity, face_masses(before, density), grid, sides)
         now = fluid_momentum(arrived, face_masses(end, density), grid, sides)
-        crossed = transport.dt * carried_in(state.velocity, start.cut.open, grid, sides, density)
+        crossed = transport.dt * carried_in(velocity, start.cut.open, grid, sides, density)
         expelled = transport.dt * jet_force(jets, density)
         lost = now - was - crossed - expelled
-        return Carried(arrived, end, lost, crossed, np.zeros(3), expelled, jets)
+        return AdvectionResult(arrived, end, lost, crossed, np.zeros(3), expelled, jets)
 
 
-def particle_paths(start: Departure) -> Faces:
+def particle_paths(start: Departure, transport: Transport) -> Faces:
     """Padded Faces, cells per step, along which velocity goes: that of the fluid through the open
     and of the bodies through the closed part of each face."""
-    grid, transport, bodies = start.grid, start.transport, start.bodies
+    grid, bodies = start.grid, start.bodies
     moving = boundary_velocity(kinematics(start.solid, bodies.q), bodies.v)
-    field = leak_proof(start.state.advecting_velocity, start.cut, moving, grid)
+    pairs = zip(start.state.velocity, start.state.velocity_change, strict=True)
+    ahead = faces_of([u + 0.5 * change for u, change in pairs])
+    field = leak_proof(ahead, start.cut, moving, grid)
     add_closed_slip(field, start.jets, grid)
     padded = pad_faces(field, grid, start.sides, transport.time)
     return cells_per_step(padded, transport.dt, grid.spacing)

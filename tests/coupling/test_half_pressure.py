@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid, World, step
-from flowborne.coupling.flow import volumes_of
-from flowborne.coupling.half_kick import half_kick, likely
+from flowborne.coupling.cut import departure
+from flowborne.coupling.half_pressure import explicit_half_pressure, pressure_increment_ratio
 from flowborne.validation.worlds import mjcf
-from flowborne.worlds import Boundaries, BoundaryOpen, cut_by_bodies, make_world, set_velocity
+from flowborne.worlds import Boundaries, BoundaryOpen, make_world, set_velocity
 
 DT = 1.0 / 64
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
@@ -27,7 +27,7 @@ def swirl(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
     ids=["steady", "rises", "falls", "an impulse", "after an impulse", "turned round"],
 )
 def test_a_pressure_goes_on_unless_it_is_an_impulse(earlier: float, part: float) -> None:
-    assert likely(earlier) == pytest.approx(part)
+    assert pressure_increment_ratio(earlier) == pytest.approx(part)
 
 
 @pytest.mark.parametrize("sides", [Boundaries(), Boundaries(x_max=BoundaryOpen())])
@@ -35,16 +35,15 @@ def test_half_of_the_last_pressure_acts_where_no_side_is_open(sides: Boundaries)
     world = make_world(BODY, SQUARE, solid_density=0.5, boundaries=sides)
     set_velocity(world, swirl)
     turned(world, 4)
-    cut = cut_by_bodies(world)
     last = world.flow()[1].pressure.copy()
-    kick = half_kick(world, cut, volumes_of(world, cut), DT)
-    np.testing.assert_allclose(kick.pressure + world.flow()[1].pressure, last, rtol=1e-14)
+    half = explicit_half_pressure(world, departure(world), DT)
+    np.testing.assert_allclose(half.pressure + world.flow()[1].pressure, last, rtol=1e-14)
     if sides.x_max.kind == "open":
-        assert not kick.pressure.any()
-        assert not kick.impulse.any()
+        assert not half.pressure.any()
+        assert not half.impulse.any()
     else:
-        assert 0.3 < kick.pressure.max() / last.max() <= 0.5
-        assert np.abs(kick.impulse).max() > 0.0
+        assert 0.3 < half.pressure.max() / last.max() <= 0.5
+        assert np.abs(half.impulse).max() > 0.0
 
 
 def turned(world: World, steps: int) -> World:
@@ -60,10 +59,10 @@ def test_the_pressure_of_a_step_is_that_of_the_whole_step() -> None:
     set_velocity(world, swirl)
     other = turned(world, 4).copy()
     flow = other.flow()[1]
-    flow.pressure[:], flow.earlier[:] = 0.0, 0.0
+    flow.pressure[:], flow.previous_pressure[:] = 0.0, 0.0
     with_it, without = step(world, DT), step(other, DT)
     force, alone = with_it.pressure_wrench[1], without.pressure_wrench[1]
     assert np.abs(force - alone).max() < 0.05 * np.abs(alone).max()
     level = world.flow()[1].pressure - other.flow()[1].pressure
-    spread = np.ptp(level[world.flow()[1].cells > 0.5 / 32**2])
+    spread = np.ptp(level[world.flow()[1].cell_volume > 0.5 / 32**2])
     assert spread < 0.1 * np.ptp(other.flow()[1].pressure)

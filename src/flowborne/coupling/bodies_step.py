@@ -1,0 +1,79 @@
+"""The bodies in a step: they move, then forces and drives change their velocities.
+
+Without a fluid this is the whole step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.operators import generalised
+from flowborne.coupling.report import StepReport
+from flowborne.coupling.servo import joint_command
+from flowborne.coupling.solve import solve_bodies
+from flowborne.coupling.step_report import report_bodies
+from flowborne.coupling.stream import winds_on
+from flowborne.coupling.timer import Timer
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Array
+from flowborne.solids.driven import Driven, drive
+from flowborne.solids.dynamics import kinematics
+from flowborne.solids.following import follow
+from flowborne.solids.state import SolidState
+
+
+def move_bodies(world: World, command: JointCommand, dt: float) -> SolidState:
+    """Move the positions to the end of the step, in place; returns the state before.
+
+    A drive with a torque limit may not reach its velocity, so its dof moves with the one it has.
+    Where a drive moves bones otherwise than they went, the flesh that they carry moves with them.
+    """
+    model, before = world.setup.solid, world.solid.copy()
+    exact = command.prescribed & ~np.isfinite(command.torque_limit)
+    velocity = before.v + follow(model, before.q, np.where(exact, command.rate - before.v, 0.0))
+    velocity[exact] = command.rate[exact]
+    world.solid.q[:] = model.integrate(before.q, velocity, dt)
+    return before
+
+
+def equations(
+    world: World, before: SolidState, force: Array, command: JointCommand, dt: float
+) -> Driven:
+    """The bodies' own equations of motion under a generalised force (nv,), with the drives."""
+    goal, limit = command.final_velocity, command.torque_limit
+    return drive(world.setup.solid, world.solid, force, dt, before, command.prescribed, goal, limit)
+
+
+def step_bodies(
+    world: World, dt: float, command: JointCommand, done: StepReport, timer: Timer
+) -> None:
+    """A step without a fluid, in place: simple winds, gravity, joints and contact."""
+    model, before = world.setup.solid, move_bodies(world, command, dt)
+    force = np.zeros(model.nv)
+    if world.setup.winds:
+        pose = kinematics(model, world.solid.q)
+        done.centre, done.wind_wrench = pose.mass_centre, winds_on(world, pose)
+        force = generalised(pose, np.append(done.wind_wrench, np.zeros(pose.vertices.size)))
+    driven = equations(world, before, force, command, dt)
+    solved = solve_bodies(driven, command.torque_limit, 6 * model.nbody)
+    world.solid.v[:] = solved.v
+    world.advance_clock(dt)
+    report_bodies(done, world, solved)
+    timer.lap("solids")
+
+
+def advance_prescribed(world: World, dt: float, command: JointCommand) -> bool:
+    """Advance the bodies by dt, in place, if every dof is prescribed: then no force is needed.
+
+    returns  False, and does nothing, if there is a fluid or a dof that answers forces
+    """
+    if world.setup.fluid is not None:
+        return False
+    command = joint_command(world, dt, command)
+    if not np.all(command.prescribed & np.isinf(command.torque_limit)):
+        return False
+    move_bodies(world, command, dt)
+    world.solid.v[:] = command.final_velocity
+    world.advance_clock(dt)
+    return True

@@ -1,0 +1,96 @@
+"""What a step reports about the bodies, filled in as it becomes known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.coupling.flesh import hydrostatic_push
+from flowborne.coupling.mouths import Jet, jet_wrench
+from flowborne.coupling.operators import buoyancy_wrench
+from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.solve import Solved
+from flowborne.coupling.stream import winds_on
+from flowborne.coupling.timer import Timer
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Array
+from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.flesh import Flesh
+from flowborne.solids.momentum import halfway_momentum
+
+
+def blank(world: World, dt: float, timer: Timer) -> StepReport:
+    """The report of a step of which nothing is known: forces are nan, or 0 without a fluid."""
+    model, force = world.setup.solid, 0.0 if world.fluid is None else np.nan
+    wrench, drives = np.full((model.nbody, 6), force), np.full(model.nv, force)
+    return StepReport(
+        dt=dt,
+        outcome=Outcome.DONE,
+        velocity=drives,
+        actuator=drives,
+        pressure_wrench=wrench,
+        viscous_wrench=wrench,
+        buoyancy_wrench=wrench,
+        wind_wrench=wrench,
+        jet_wrench=wrench,
+        added_mass_wrench=wrench,
+        centre=wrench[:, :3],
+        seconds=timer.seconds,
+    )
+
+
+def known_push(
+    done: StepReport, world: World, pose: Kinematics, half: Array, jets: tuple[Jet, ...]
+) -> Array:
+    """(k,) force on the bodies that is known before the solve, N and N m: of winds, of jets, of the
+    hydrostatic pressure, and of half of the last pressure with the impulse `half` (k,)."""
+    model, density = world.setup.solid, world.flow()[0].density
+    buoyancy = buoyancy_wrench(pose.centroid, model.volume, model.gravity, density).ravel()
+    if model.flesh is not None:
+        surface = model.flesh.surface
+        pressed = hydrostatic_push(pose.vertices, surface, model.gravity, density)
+        buoyancy = np.append(buoyancy, pressed)
+    done.expelled = done.dt * sum(jet.rate for jet in jets)
+    done.wind_wrench = winds_on(world, pose)
+    done.jet_wrench = jet_wrench(jets, density, model.nbody)
+    done.buoyancy_wrench = on_bodies(pose, model.flesh, buoyancy)
+    push = buoyancy + half / done.dt
+    push[: 6 * model.nbody] += (done.wind_wrench + done.jet_wrench).ravel()
+    return push
+
+
+def report_bodies(done: StepReport, world: World, solved: Solved) -> None:
+    """What the solve gave to the bodies and their drives."""
+    done.velocity, done.actuator = 0.5 * (solved.driven.system.v + solved.v), solved.actuator
+    done.work = done.dt * float(solved.actuator @ done.velocity)
+    done.momentum.solid = halfway_momentum(world.setup.solid, world.solid, done.dt)[0]
+    done.contacts, done.limited = solved.driven.system.contacts, solved.driven.limited.nonzero()[0]
+    done.outcome, done.unsettled = solved.outcome, solved.unsettled
+    if not np.isfinite(solved.v).all():
+        done.outcome = Outcome.NOT_FINITE
+
+
+def report_coupled(
+    done: StepReport, world: World, pose: Kinematics, half: Array, solved: Solved
+) -> None:
+    """`report_bodies`, the forces of the fluid on the bodies, and how well the solve did."""
+    report_bodies(done, world, solved)
+    projected, flesh, dt = solved.projected, world.setup.solid.flesh, done.dt
+    assert projected is not None
+    done.centre = pose.mass_centre
+    done.pressure_wrench = on_bodies(pose, flesh, (projected.impulse + half) / dt)
+    done.viscous_wrench = on_bodies(pose, flesh, solved.viscous_impulse / dt)
+    done.added_mass_wrench = on_bodies(pose, flesh, solved.added_mass / dt)
+    done.iterations, done.residual = projected.iterations, projected.residual
+    done.divergence, done.fastest = projected.divergence, projected.fastest
+    if not np.isfinite(projected.pressure).all():
+        done.outcome = Outcome.NOT_FINITE
+
+
+def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
+    """(nbody, 6) wrench of a push (k,) on every body with the flesh that it carries."""
+    if flesh is None:
+        return push.reshape(-1, 6)
+    first = push.size - pose.vertices.size
+    force = push[first:].reshape(-1, 3)
+    wrench = np.concatenate([force, np.cross(pose.vertices, force)], axis=1)
+    return push[:first].reshape(-1, 6) + flesh.carried.T @ wrench
