@@ -122,10 +122,10 @@ def eel(y_max: str) -> World:
 def test_torques_in_a_closed_tank_bend_as_in_one_with_an_open_side(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    equations, torque = steps.equations_under, np.zeros(8)
+    equations, torque = steps.equations, np.zeros(8)
     torque[FREE] = TORQUE
     monkeypatch.setattr(
-        steps, "equations_under", lambda w, b, force, *rest: equations(w, b, force + torque, *rest)
+        steps, "equations", lambda w, b, force, *rest: equations(w, b, force + torque, *rest)
     )
     closed, one_open = eel("no-slip"), eel("open")
     for world in (closed, one_open):
