@@ -58,4 +58,4 @@ def test_a_jet_that_comes_in_through_an_open_side_dies_away() -> None:
     u[:] = x * np.where(np.abs(y - 0.5) < 0.15, -3.0, 9.0 / 7.0)
     for _ in range(400):
         assert step(world, 1.0 / 128).outcome.name == "DONE"
-    assert u[-1].min() > -0.3
+    assert world.flow()[1].velocity[0][-1].min() > -0.3
