@@ -23,18 +23,17 @@ from flowborne.solids.following import follow
 from flowborne.solids.state import SolidState
 
 
-def move_bodies(world: World, command: JointCommand, dt: float) -> SolidState:
-    """Move the positions to the end of the step, in place; returns the state before.
+def move_bodies(world: World, command: JointCommand, dt: float) -> None:
+    """Move the positions to the end of the step, in place.
 
     A drive with a torque limit may not reach its velocity, so its dof moves with the one it has.
     Where a drive moves bones otherwise than they went, the flesh that they carry moves with them.
     """
-    model, before = world.setup.solid, world.solid.copy()
+    model, q, v = world.setup.solid, world.solid.q, world.solid.v
     exact = command.prescribed & ~np.isfinite(command.torque_limit)
-    velocity = before.v + follow(model, before.q, np.where(exact, command.rate - before.v, 0.0))
+    velocity = v + follow(model, q, np.where(exact, command.rate - v, 0.0))
     velocity[exact] = command.rate[exact]
-    world.solid.q[:] = model.integrate(before.q, velocity, dt)
-    return before
+    q[:] = model.integrate(q, velocity, dt)
 
 
 def equations(
@@ -49,8 +48,8 @@ def step_bodies(
     world: World, dt: float, command: JointCommand, done: StepReport, timer: Timer
 ) -> None:
     """A step without a fluid, in place: simple winds, gravity, joints and contact."""
-    model, before = world.setup.solid, move_bodies(world, command, dt)
-    force = np.zeros(model.nv)
+    model, before, force = world.setup.solid, world.solid.copy(), np.zeros(world.setup.solid.nv)
+    move_bodies(world, command, dt)
     if world.setup.winds:
         pose = kinematics(model, world.solid.q)
         done.centre, done.wind_wrench = pose.mass_centre, winds_on(world, pose)

@@ -24,8 +24,8 @@ from flowborne.solids.dynamics import Kinematics
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
     """Fluxes past the moving bodies, and the control volumes that they lead to at the cut `end`."""
     fluid, _ = world.flow()
-    flux, cells = leak_proof_flux(start, end, fluid, world.time + 0.5 * dt, dt)
-    volumes = control_volumes(cells, end.open, fluid.grid, fluid.boundaries)
+    flux, cells = leak_proof_flux(start, end, world.time + 0.5 * dt, dt)
+    volumes = control_volumes(cells, end.open, start.grid, start.sides)
     kinematic_viscosity = fluid.viscosity / fluid.density
     return Transport(flux, start.volumes, volumes, dt, world.time, kinematic_viscosity)
 

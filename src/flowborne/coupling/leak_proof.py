@@ -22,7 +22,6 @@ import numpy as np
 from flowborne.coupling.advection.scheme import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.swept import swept_cells
-from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -45,7 +44,7 @@ left to them. One that they open holds nothing until it is reached."""
 
 
 def leak_proof_flux(
-    departure: Departure, after: Geometry, fluid: Fluid, time: float, dt: float
+    departure: Departure, after: Geometry, time: float, dt: float
 ) -> tuple[Faces, Array]:
     """Volume fluxes through all faces over a step, m^3/s, and the volumes that they lead to, m^3.
 
@@ -54,7 +53,7 @@ def leak_proof_flux(
     time       s in its middle
     """
     state, before, cells = departure.state, departure.cut, departure.volumes.cells
-    grid, sides = fluid.grid, fluid.boundaries
+    grid, sides = departure.grid, departure.sides
     flux, weights = grid.zeros_faces(), grid.zeros_faces()
     for axis in grid.axes:
         ends = before.open[axis], after.open[axis]

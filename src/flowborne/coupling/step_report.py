@@ -20,7 +20,7 @@ from flowborne.solids.momentum import halfway_momentum
 
 def blank(world: World, dt: float, timer: Timer) -> StepReport:
     """The report of a step of which nothing is known: forces are nan, or 0 without a fluid."""
-    model, force = world.setup.solid, 0.0 if world.fluid is None else np.nan
+    model, force = world.setup.solid, 0.0 if world.setup.fluid is None else np.nan
     wrench, drives = np.full((model.nbody, 6), force), np.full(model.nv, force)
     return StepReport(
         dt=dt,
