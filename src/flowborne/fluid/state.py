@@ -13,7 +13,7 @@ from flowborne.fluid.grid import Array, Faces, Grid
 class FluidState:
     """The fluid at t^n, and what the next step needs of the last one, from t^{n-1} to t^n.
 
-    A step replaces the arrays of velocity and pressure: one that is kept over it has the old values.
+    A step replaces the arrays of velocity and pressure: one kept over it has the old values.
 
     velocity           u^n on the faces, m/s; 0 where a face is wholly closed
     velocity_change    u^n - u^{n-1} on the faces, m/s; 0 next to bodies, and before the first step
