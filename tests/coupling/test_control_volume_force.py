@@ -25,8 +25,10 @@ Box = tuple[slice, slice, slice]
 
 
 def box_in(grid: Grid) -> Box:
-    """The control volumes of a component that lie well around the body."""
-    around = slice(grid.shape[0] // 8, 7 * grid.shape[0] // 8)
+    """The control volumes of a component that lie well around the body, and what even out with it:
+    no transfers cross its sides."""
+    first = grid.shape[0] // 8 - 1
+    around = slice(first, grid.shape[0] - first)
     return around, around, slice(None) if grid.is_slab else around
 
 
@@ -96,4 +98,4 @@ def test_the_force_is_that_of_a_control_volume(
             force = (DT * area * float(sides) - left - change[axis]) / DT
             exchanged = report.momentum.exchanged[axis] / DT
             assert force == pytest.approx(exchanged, rel=1e-10, abs=1e-10)
-    assert np.abs(report.momentum.exchanged).max() / DT > 1e-3
+    assert np.abs(report.momentum.exchanged).max() / DT > 1e-4

@@ -74,14 +74,9 @@ def piston(model: Model, solid: bool = False) -> World:
     return world
 
 
-TOO_FAST = pytest.mark.xfail(
-    strict=True, reason="cells that are whole before and behind it: 9 % crosses in 100 steps"
-)
-
-
 @pytest.mark.parametrize(
     ("steps", "dt"),
-    [(1000, 1 / 128), pytest.param(100, 1 / 32, marks=TOO_FAST)],
+    [(1000, 1 / 128), (100, 1 / 32)],
     ids=["0.6 cells a step", "2.4 cells a step"],
 )
 @MODELS

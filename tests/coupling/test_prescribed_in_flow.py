@@ -82,7 +82,8 @@ def test_a_prescribed_joint_reaches_its_target_whatever_pulls_at_it(
 ) -> None:
     """Gravity, fluid, contact with a floor and a random wrench; 1e-8 rad and rad/s.
 
-    Its velocity is that of half a step on, which is what takes it to where it is told next.
+    Its velocity is that of half a part on, which is what takes it to where it is told to be after
+    the next part.
     """
     world = arm(grid, viscosity=viscosity)
     model, touched = world.setup.solid, 0
@@ -93,8 +94,9 @@ def test_a_prescribed_joint_reaches_its_target_whatever_pulls_at_it(
         for motion in world.setup.motions:
             found = world.solid.q[model.dof_position[motion.dofs]]
             assert np.abs(found - motion.position(world.time)).max() < 1e-8
-            ahead = motion.position(world.time + 0.01) - motion.position(world.time)
-            assert np.abs(world.solid.v[motion.dofs] - ahead / 0.01).max() < 1e-8
+            part = 0.01 / world.parts
+            ahead = motion.position(world.time + part) - motion.position(world.time)
+            assert np.abs(world.solid.v[motion.dofs] - ahead / part).max() < 1e-8
         assert np.abs(report.actuator[:2]).min() > 0.0
         assert report.actuator[2] == 0.0
         assert report.momentum.exchange_error < 1e-10

@@ -147,8 +147,8 @@ def test_the_sum_of_momentum_is_kept(grid: Grid, name: str) -> None:
         for axis in grid.axes:
             u = np.random.default_rng(seed).standard_normal(grid.face_shape(axis))
             done = carry_component(u, None, axis, case.transport, NO_INLETS, grid, case.sides)
-            before, size = case.amount(u, case.transport.before.merged[axis], axis)
-            after, _ = case.amount(done.velocity, case.transport.after.merged[axis], axis)
+            before, size = case.amount(u, case.transport.before.moving[axis], axis)
+            after, _ = case.amount(done.velocity, case.transport.after.moving[axis], axis)
             assert abs(after - before) < 1e-12 * size
             assert done.crossed == 0.0
 
@@ -169,8 +169,8 @@ def test_what_crosses_sides_and_inlets_is_told(grid: Grid, name: str) -> None:
             done = carry_component(
                 u, along if seed % 2 else None, axis, case.transport, inlets, grid, sides
             )
-            before, size = case.amount(u, case.transport.before.merged[axis], axis)
-            after, _ = case.amount(done.velocity, case.transport.after.merged[axis], axis)
+            before, size = case.amount(u, case.transport.before.moving[axis], axis)
+            after, _ = case.amount(done.velocity, case.transport.after.moving[axis], axis)
             brought = DT * float(inlets.gain @ inlets.velocity) - float(done.drained.sum())
             assert abs(after - before - done.crossed - brought) < 1e-12 * size
             assert np.abs(done.drained).max() > 0.0

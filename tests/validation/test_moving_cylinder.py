@@ -28,8 +28,8 @@ def test_V3_repeats_its_own_second_cycle_on_four_cells():
     phases, forces = last_cycle(4, 2)
     moments, published = np.array(reference("V3", CURVE)).T
     away = np.interp(moments, phases, forces, period=1.0) - published
-    assert np.sqrt(np.mean(away**2)) == pytest.approx(0.2011, rel=0.01)
-    assert np.abs(forces).max() == pytest.approx(3.1262, rel=2e-3)
+    assert np.sqrt(np.mean(away**2)) == pytest.approx(0.2117, rel=0.01)
+    assert np.abs(forces).max() == pytest.approx(3.3181, rel=2e-3)
 
 
 def test_V3_the_coefficients_of_a_force_that_has_them():
@@ -41,13 +41,13 @@ def test_V3_the_coefficients_of_a_force_that_has_them():
 
 
 def test_V5_the_spring_moves_the_cylinder_and_its_added_mass():
-    """Of six cells across it, which give 1.2 % too much acceleration."""
+    """Of six cells across it, which give 1.5 % too much acceleration."""
     world = sprung(6, 5.0)
     world.solid.q[0] = 0.2
     advance(world, 1e-3)
     stiffness = MASS * (2.0 * np.pi / 5.0) ** 2
     free = -stiffness * 0.2 / (MASS + 0.25 * np.pi)
-    assert world.solid.v[0] / 1e-3 == pytest.approx(1.0122 * free, rel=2e-3)
+    assert world.solid.v[0] / 1e-3 == pytest.approx(1.0154 * free, rel=2e-3)
 
 
 def test_V8_torque_is_of_second_order_and_within_a_third_of_a_percent():

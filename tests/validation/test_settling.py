@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from flowborne.validation import case
@@ -26,7 +27,7 @@ def test_V2_largest_velocities_are_measured_ones_and_the_curves_those_of_six_cel
     findings = case("V2").run(quick=True)
     assert [result.verdict for result in findings] == ["pass", "coarse", "pass", "coarse"]
     curves = [result.value for result in findings[1::2]]
-    assert curves == pytest.approx([0.12843, 0.081829], rel=0.01)
+    assert curves == pytest.approx([0.13018, 0.08213], rel=0.01)
 
 
 @pytest.mark.parametrize("oil", OILS, ids=lambda oil: oil.name)
@@ -40,16 +41,20 @@ def test_V2_without_friction_a_sphere_starts_with_its_added_mass(oil):
 
 @pytest.mark.parametrize("fall", FALLS, ids=lambda fall: fall.name)
 def test_V1_without_friction_a_cylinder_starts_with_its_added_mass(fall):
-    """In a box 8 D wide Ca is 1.03."""
-    world = box(replace(fall, viscosity=0.0), 6)
-    advance(world, 1e-4)
-    free = (fall.density - 1.0) * CYLINDER_GRAVITY / (fall.density + 1.03)
-    assert -world.solid.v[1] / 1e-4 == pytest.approx(free, rel=0.01)
-    assert abs(world.solid.v[0]) < 1e-3 * abs(world.solid.v[1])
+    """In a box 8 D wide Ca is 1.03: the mean over four places in its cell, each within 2 %."""
+    free, found = (fall.density - 1.0) * CYLINDER_GRAVITY / (fall.density + 1.03), []
+    for place in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)):
+        world = box(replace(fall, viscosity=0.0), 6)
+        world.solid.q[:2] += np.array(place) * world.flow()[0].grid.spacing
+        advance(world, 1e-4)
+        found.append(-world.solid.v[1] / 1e-4)
+        assert abs(world.solid.v[0]) < 1e-3 * abs(world.solid.v[1])
+    assert np.mean(found) == pytest.approx(free, rel=0.01)
+    assert found == pytest.approx([free] * 4, rel=0.02)
 
 
 def test_V1_the_slow_cylinder_repeats_its_own_speed_on_four_cells():
     """1.3 % below the reference, for which the list has 17.2 to 17.5."""
     largest, course = fastest(FALLS[0], 4)
-    assert largest == pytest.approx(17.0724, rel=1e-3)
+    assert largest == pytest.approx(17.2240, rel=1e-3)
     assert course[-1, 1] > 0.9 * largest

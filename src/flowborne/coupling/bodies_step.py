@@ -24,7 +24,13 @@ from flowborne.solids.state import SolidState
 
 
 def move_bodies(world: World, command: JointCommand, dt: float) -> None:
-    """Move the positions to the end of the step, in place.
+    """Move the positions to the end of the step, in place."""
+    q = world.solid.q
+    q[:] = world.setup.solid.integrate(q, position_velocity(world, command), dt)
+
+
+def position_velocity(world: World, command: JointCommand) -> Array:
+    """(nv,) velocity with which the positions move in a step.
 
     A drive with a torque limit may not reach its velocity, so its dof moves with the one it has.
     Where a drive moves bones otherwise than they went, the flesh that they carry moves with them.
@@ -33,7 +39,7 @@ def move_bodies(world: World, command: JointCommand, dt: float) -> None:
     exact = command.prescribed & ~np.isfinite(command.torque_limit)
     velocity = v + follow(model, q, np.where(exact, command.rate - v, 0.0))
     velocity[exact] = command.rate[exact]
-    q[:] = model.integrate(q, velocity, dt)
+    return velocity
 
 
 def equations(

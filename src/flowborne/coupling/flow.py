@@ -23,11 +23,9 @@ from flowborne.solids.dynamics import Kinematics
 
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
     """Fluxes past the moving bodies, and the control volumes that they lead to at the cut `end`."""
-    fluid, _ = world.flow()
     flux, cells = leak_proof_flux(start, end, world.time + 0.5 * dt, dt)
     volumes = control_volumes(cells, end.open, start.grid, start.sides)
-    kinematic_viscosity = fluid.viscosity / fluid.density
-    return Transport(flux, start.volumes, volumes, dt, world.time, kinematic_viscosity)
+    return Transport(flux, start.volumes, volumes, dt, world.time)
 
 
 def advect(
@@ -91,7 +89,7 @@ def store_state(
     velocity = projected.velocity
     inside = leak_proof(velocity, cut, boundary_velocity(pose, solved.v), grid)
     for axis in grid.axes:
-        fill_empty_faces(velocity[axis], volumes.merged[axis], inside[axis])
+        fill_empty_faces(velocity[axis], volumes.moving[axis], inside[axis])
     volumes.follow(velocity, grid)
     for axis in grid.axes:
         change, acceleration = state.velocity[axis], state.acceleration[axis]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
+from flowborne.kernels.distance import SPHERE
 from flowborne.shapes.mesh import ShapeThickened
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.model import SolidModel
@@ -49,6 +50,13 @@ class Shapes:
     pitch: Array
     skins: dict[int, Mesh]
     sheets: NDArray[np.bool_]
+
+    def tips(self) -> Array:
+        """(ng, 8, 3) corners of the bounding box of each in its own frame, m; of a sphere, which
+        turns on the spot, its centre."""
+        corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
+        reach = np.where((self.kind == SPHERE)[:, None], 0.0, self.reach)
+        return np.asarray(reach[:, None] * corners)
 
 
 def shapes(model: SolidModel, grid: Grid) -> Shapes:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.coupling.bodies_step import position_velocity
 from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.parts import parts_of
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.servo import joint_command
-from flowborne.coupling.step import step
+from flowborne.coupling.step import step_part
 from flowborne.coupling.world import World
 from flowborne.errors import BreakdownError
 
@@ -35,7 +37,10 @@ def start(
     command  to joints without a trajectory
     raises   BreakdownError when the flow cannot be solved for, or the half step fails
     """
-    setup, time, half = world.setup, world.time, 0.5 * dt
+    setup, time = world.setup, world.time
+    told = joint_command(world, dt, command)
+    world.parts = parts_of(world, position_velocity(world, told), dt)
+    half = 0.5 * dt / world.parts
     if world.fluid is not None:
         set_going(world, given)
     if world.solid.v.any():
@@ -46,7 +51,7 @@ def start(
     command = joint_command(world, half, command)
     world.time, world.setup = time, setup.but(motions=())
     scalars = {} if world.fluid is None else world.fluid.scalars
-    report = step(world, half, command)
+    report = step_part(world, half, command)
     if report.outcome is not Outcome.DONE:
         raise BreakdownError(f"the first half of a step failed: {report.outcome.value}")
     if world.fluid is not None:
@@ -74,7 +79,7 @@ def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
     kept = np.ones(there.solid.v.size, bool) if given is None else given
     command.set(kept, 0.0, there.solid.v[kept])
     there.solid.v[:] = 0.0
-    report = step(there, INSTANT, command)
+    report = step_part(there, INSTANT, command)
     if report.outcome is not Outcome.DONE:
         raise BreakdownError(f"the flow at the start was not found: {report.outcome.value}")
     _, found = there.flow()

@@ -28,7 +28,12 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.coupling.balance import momentum_balance
-from flowborne.coupling.bodies_step import equations, move_bodies, step_bodies
+from flowborne.coupling.bodies_step import (
+    equations,
+    move_bodies,
+    position_velocity,
+    step_bodies,
+)
 from flowborne.coupling.cut import cut_by_bodies, departure, jets_at
 from flowborne.coupling.flow import (
     advect,
@@ -39,6 +44,7 @@ from flowborne.coupling.flow import (
 from flowborne.coupling.half_pressure import explicit_half_pressure
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised
+from flowborne.coupling.parts import joined, part_of, parts_of
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_together
@@ -50,12 +56,30 @@ from flowborne.solids.dynamics import kinematics
 
 
 def step(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
-    """Advance `world` by dt, in place (section 6).
+    """Advance `world` by dt, in place (section 6), in as many equal parts as `parts_of` asks for.
+
+    The world's own steps keep the number once it has been raised: steps of changing length lose an
+    order of accuracy.
 
     command  what the controlled dofs do; the setup's prescribed motions are added to it
     returns  the report; its outcome is not DONE when the numbers cannot be trusted, and the world
              cannot be stepped on
     """
+    told = joint_command(world, dt, command)
+    parts = parts_of(world, position_velocity(world, told), dt)
+    if not world.setup.trial:
+        world.parts = parts = max(parts, world.parts)
+    command = JointCommand.none(world.setup.solid.nv) if command is None else command
+    reports: list[StepReport] = []
+    for left in range(parts, 0, -1):
+        reports.append(step_part(world, dt / parts, part_of(command, world, left)))
+        if reports[-1].outcome is not Outcome.DONE:
+            break
+    return joined(reports)
+
+
+def step_part(world: World, dt: float, command: JointCommand) -> StepReport:
+    """Advance `world` by a part of a step, in place, that no body crosses more than a cell in."""
     timer = Timer()
     done = blank(world, dt, timer)
     if not world.setup.trial:

@@ -110,7 +110,8 @@ class World:
     fluid   None when the setup has no fluid
     time    s
     steps   number of steps taken
-    ahead   s by which v is ahead of the positions: half of the last step of the world itself
+    ahead   s by which v is ahead of the positions: half of the last part of a step of its own
+    parts   most parts that a step of the world itself has been divided into, see `parts`
     memory  the controller's own arrays, by name
     cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
             and not part of it
@@ -122,6 +123,7 @@ class World:
     time: float = 0.0
     steps: int = 0
     ahead: float = 0.0
+    parts: int = 1
     memory: dict[str, Array] = field(default_factory=dict)
     cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
 
@@ -156,7 +158,8 @@ class World:
 
     def arrays(self) -> dict[str, Array]:
         """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""
-        named: dict[str, Array] = {"clock": np.array([self.time, self.steps, self.ahead])}
+        clock = [self.time, self.steps, self.ahead, self.parts]
+        named: dict[str, Array] = {"clock": np.array(clock)}
         named |= {"solid/q": self.solid.q, "solid/v": self.solid.v}
         if self.fluid is not None:
             named |= {f"fluid/{k}": v for k, v in self.fluid.arrays().items()}
@@ -165,7 +168,7 @@ class World:
     @classmethod
     def from_arrays(cls, setup: Setup, arrays: dict[str, Array]) -> World:
         """World of `setup` in the state that `arrays` gave. Raises KeyError when one is missing."""
-        time, steps, ahead = arrays["clock"]
+        time, steps, ahead, parts = arrays["clock"]
         return cls(
             setup,
             SolidState(arrays["solid/q"], arrays["solid/v"]),
@@ -173,5 +176,6 @@ class World:
             float(time),
             int(steps),
             float(ahead),
+            int(parts),
             under("memory/", arrays),
         )

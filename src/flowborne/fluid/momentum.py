@@ -12,8 +12,8 @@ from flowborne.kernels.faces import weighted_change
 
 
 def face_masses(volumes: ControlVolumes, density: float) -> Faces:
-    """Mass of the fluid that pressure on each face accelerates, kg; 0 at small ones."""
-    return faces_of([density * v for v in volumes.merged])
+    """Mass of the fluid that pressure on each face accelerates, kg; 0 at closed ones."""
+    return faces_of([density * v for v in volumes.moving])
 
 
 def each_once(axis: int, sides: Boundaries) -> tuple[int | slice, ...]:

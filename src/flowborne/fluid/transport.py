@@ -25,6 +25,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import (
     NOTHING,
     ControlVolumes,
+    Transfers,
     means,
     parts,
     wrapping,
@@ -46,8 +47,8 @@ from flowborne.kernels.control_volumes import (
     join_small,
     level,
     mark_cut,
-    share_velocity,
 )
+from flowborne.kernels.face_masses import add_transfers
 from flowborne.kernels.flux import (
     CLEAR,
     CUT,
@@ -71,11 +72,10 @@ LASTING = (2.0, 4.0)
 goes along, and from which on nothing does. Pressure and forces gave it at a place that a faster
 flow leaves behind, and it would grow from step to step: noise as fine as the grid."""
 
-SMALL, TINY = 0.2, 0.05
-"""Parts of a cell below which control volumes begin to be mixed with their neighbours, and are
-wholly mixed, at the Courant number COURANT; in proportion to it at smaller ones, where less of a
-control volume is exchanged in a step. Otherwise short steps mix as often as they are many, and
-friction grows with their number."""
+MIXED = (2.0, 3.0)
+"""Times what a control volume holds that leaves it in a substep, from which on it is mixed with
+the largest one beside it, and from which on wholly. Where c times it leaves, Heun's method keeps
+1 - c + c^2/2 of what it had, more than all from c = 2 on; (3 - c) times that is less than all."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +101,11 @@ NO_INLETS = Inlets(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0))
 class Transport:
     """What carries the momentum through a step.
 
-    flux       Faces, volume per time through each face of the leak-proof field, m^3/s
-    before     control volumes at the start,
-    after      and at the end of the step
-    dt         s
-    time       s, at the start
-    viscosity  kinematic; where it holds small control volumes they are mixed less, m^2/s
+    flux    Faces, volume per time through each face of the leak-proof field, m^3/s
+    before  control volumes at the start,
+    after   and at the end of the step
+    dt      s
+    time    s, at the start
     """
 
     flux: Faces
@@ -114,7 +113,6 @@ class Transport:
     after: ControlVolumes
     dt: float
     time: float
-    viscosity: float = 0.0
 
     @cached_property
     def crossing(self) -> float:
@@ -235,18 +233,16 @@ def carry_component(
     if along is not None:
         along.reshape(-1)[flow.listed] = 0.0
         flow.join(along)
-    u = transport.before.mean_velocity(velocity, component)
+    u = velocity.copy()
     flow.fill(u)
     crossed, held, drained = 0.0, 0.0, np.zeros(inlets.index.size)
     for s in range(count):
         time = s * dt
         flow.begin(u, s / count, (s + 1) / count)
         middle, came, left = flow.stage(u, along, time, dt, 1.0)
-        flow.mean(middle)
         arrived, went, gone = flow.stage(middle, along, time + dt, dt, 0.5)
         if s < count - 1:
             u = arrived.copy()
-            flow.mean(u)
             held += flow.hold(u, time + dt)
         crossed += 0.5 * dt * (came + went)
         drained += 0.5 * dt * (left + gone)
@@ -266,34 +262,53 @@ class Flow:
     ) -> None:
         self.component, self.grid, self.sides = component, grid, sides
         self.transport, self.inlets = transport, inlets
-        self.ends = transport.before.volume[component], transport.after.volume[component]
-        self.listed = parts(*self.ends, component, grid, sides)
+        before, after = transport.before, transport.after
+        volumes = before.volume[component], after.volume[component]
+        self.ends = before.moving[component], after.moving[component]
+        self.listed = parts(*volumes, component, grid, sides)
         self.marks = marks_of(self.listed, component, grid, sides)
-        self.small = transport.after.small[component]
-        self.targets = transport.after.targets[component]
-        self.shares = transport.after.shares[component]
-        self.closed = transport.after.closed(component)
+        self.closed = before.closed[component], after.closed[component]
+        self.passed = passed_on(before.transfers[component], after.transfers[component])
         self.wraps = wrapping(component, grid, sides)
         shape = grid.face_shape(component)
         self.shape = np.array(shape)
         self.nothing = NOTHING * grid.cell_volume
         self.padded = np.empty([n + 2 * GHOSTS * (a in grid.axes) for a, n in enumerate(shape)])
-        self.net, self.merged = np.zeros(shape), np.empty(shape)
+        self.net = np.zeros(shape)
         periodic = sides.periodic()[component]
         self.place, self.share = neighbours(shape[component], periodic)
-        self.crossings = crossings(transport.flux, self.ends[0], self.marks, component, grid, sides)
-        # friction 2 mu A / d over the depth d = V / A of a small control volume, dt / m times
-        self.held = 2.0 * transport.viscosity * transport.dt * grid.face_area**2
-        exchanged = transport.courant(grid) / transport.substeps(grid) / COURANT
-        self.limit = min(exchanged, 1.0) * grid.cell_volume
+        self.crossings = crossings(transport.flux, volumes[0], self.marks, component, grid, sides)
+        self.leaving = self.outflow()
         self.fleeting = self.find_fleeting()
+
+    def outflow(self) -> Array:
+        """(n,) volume per time that leaves each listed control volume through its sides, inlets
+        and transfers, m^3/s."""
+        rate = side_rates(
+            self.transport.flux, self.listed, self.component, self.grid, self.place, self.share
+        )
+        total = np.maximum(rate, 0.0).sum(axis=1)
+        if self.inlets.index.size:
+            at = np.searchsorted(self.listed, self.inlets.index)
+            known = at < self.listed.size
+            known[known] = self.listed[at[known]] == self.inlets.index[known]
+            np.add.at(total, at[known], np.maximum(self.inlets.loss[known], 0.0))
+        givers, takers, change = self.passed
+        rate = change / self.transport.dt
+        for index, out in ((givers, rate), (takers, -rate)):
+            at = np.searchsorted(self.listed, index)
+            known = at < self.listed.size
+            known[known] = self.listed[at[known]] == index[known]
+            np.add.at(total, at[known], np.maximum(out[known], 0.0))
+        return total
 
     def find_fleeting(self) -> Fleeting | None:
         """Those that may let through more in a substep than they hold; None without any."""
         transport, grid, component = self.transport, self.grid, self.component
         if transport.courant(grid) <= CROSSED:
             return None
-        index = left_or_taken_up(self.listed, *self.ends)
+        volumes = transport.before.volume[component], transport.after.volume[component]
+        index = left_or_taken_up(self.listed, *volumes)
         rate = side_rates(transport.flux, index, component, grid, self.place, self.share)
         crossed = transport.dt * np.maximum(rate, 0.0).sum(axis=1) / grid.cell_volume
         index, rate = index[crossed > CROSSED], rate[crossed > CROSSED]
@@ -306,11 +321,7 @@ class Flow:
         """Give control volumes that hold nothing yet the velocity around them, in place."""
         if self.listed.size:
             fill_empty(u, self.ends[0], self.listed, self.nothing, self.shape, self.wraps)
-        self.join(u)
-
-    def mean(self, u: Array) -> None:
-        """Give small ones what goes with their targets, in place."""
-        share_velocity(u, self.small, self.targets, self.shares)
+            self.closed[0].follow(u)
         self.join(u)
 
     def join(self, u: Array) -> None:
@@ -341,6 +352,7 @@ class Flow:
         self.high = end if late == 1.0 else start + late * (end - start)
         if self.fleeting is not None:
             self.fleeting.choose(self.low, self.high, (late - early) * self.transport.dt)
+        self.span = (late - early) * self.transport.dt
 
     def stage(
         self, u: Array, along: Array | None, time: float, dt: float, weight: float
@@ -366,6 +378,7 @@ class Flow:
             planes(self.transport.flux, grid), axis + grid.is_slab, self.place, self.share,
         )  # fmt: skip
         left = self.exchange(later, dt, weight)
+        self.pass_on(later, u, dt, weight)
         if self.fleeting is not None:
             inner = [slice(GHOSTS, -GHOSTS) if a in grid.axes else slice(None) for a in range(3)]
             self.fleeting.pass_on(later, self.net, self.padded[tuple(inner)], weight)
@@ -388,19 +401,41 @@ class Flow:
         later.reshape(-1)[at] -= weight * dt * more / np.where(volume > self.nothing, volume, 1.0)
         return np.asarray(left)
 
+    def pass_on(self, later: Array, u: Array, dt: float, weight: float) -> None:
+        """Let control volumes give to others what their transfers change by, in place."""
+        givers, takers, change = self.passed
+        if givers.size == 0:
+            return
+        more, at = np.zeros(later.size), np.union1d(givers, takers)
+        add_transfers(more, u, givers, takers, change / self.transport.dt)
+        more = more[at]
+        self.net.reshape(-1)[at] += more
+        volume = self.high.reshape(-1)[at]
+        later.reshape(-1)[at] -= weight * dt * more / np.where(volume > self.nothing, volume, 1.0)
+
     def settle(self, later: Array) -> None:
-        """Share amounts between small control volumes and those beside them, in place."""
-        merged = self.high
-        if self.small.size:
-            merged = self.merged
-            np.copyto(merged, self.high)
-            join_small(later, merged, self.small, self.targets, self.shares, self.nothing)
+        """Give what closed faces got to their targets, and mix what is too small, in place."""
         if self.listed.size:
-            limits = TINY * self.limit, SMALL * self.limit, self.held, self.nothing
-            level(later, self.low, merged, self.listed, *limits, self.shape, self.wraps)
-            share_velocity(later, *self.closed)
+            closed = self.closed[1]
+            lists = closed.index, closed.targets, closed.shares
+            merged = self.high.copy()
+            join_small(later, merged, *lists, self.nothing)
+            level(
+                later, merged, self.listed, self.span * self.leaving, *MIXED, self.nothing,
+                self.shape, self.wraps,
+            )  # fmt: skip
             fill_empty(later, self.high, self.listed, self.nothing, self.shape, self.wraps)
+            closed.follow(later)
         self.join(later)
+
+
+def passed_on(before: Transfers, after: Transfers) -> tuple[Integers, Integers, Array]:
+    """Givers, takers and how much more they give at the end of a step than at its start, m^3."""
+    return (
+        np.concatenate([before.givers, after.givers]),
+        np.concatenate([before.takers, after.takers]),
+        np.concatenate([-before.volume, after.volume]),
+    )
 
 
 def planes(flux: Faces, grid: Grid) -> Faces:

@@ -11,6 +11,14 @@ from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Marks
 
+TURNS = 2
+"""Times that small control volumes are mixed: one beside another goes with what is behind that.
+With one turn fluid leaves the creases of a swimmer at 4.1 times the speed of its links, with two at
+less than 2.5 times."""
+
+NONE = 1e-9
+"""Open part of a face up to which it counts as closed."""
+
 
 @njit(nogil=True, cache=True)
 def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
@@ -40,6 +48,7 @@ def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
 @njit(nogil=True, cache=True)
 def find_targets(
     small: Integers,
+    driven: Marks,
     opened: Array,
     volumes: Array,
     cells: Array,
@@ -50,11 +59,12 @@ def find_targets(
     itself where there is none.
 
     A face that is wholly closed has a control volume where a cell beside it is open in part. What
-    lies in each of its two cells goes along with the opposite face of that cell, where that is
-    open; else all of it goes with the neighbour that has the largest volume, else with the targets
-    of a neighbour, which may have them from another.
+    lies there goes along with the opposite faces of both cells, in proportion to their open parts
+    and to those of the cells; where both are closed with the neighbour that has the largest volume,
+    else with the targets of a neighbour, which may have them from another.
 
-    small   (n,) closed faces with a volume
+    small    (n,) closed faces with a volume
+    driven   1 where pressure acts on a face
     opened   open part of each face
     volumes  of each control volume
     cells    volume of each cell
@@ -62,7 +72,7 @@ def find_targets(
     targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
     shape, cell_shape = np.array(opened.shape), np.array(cells.shape)
     volume_flat = volumes.reshape(-1)
-    open_flat, cell_flat = opened.reshape(-1), cells.reshape(-1)
+    open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), driven.reshape(-1)
     for n in range(small.size):
         f = small[n]
         targets[n, :] = f
@@ -84,8 +94,8 @@ def find_targets(
                 continue
             to = neighbour(shape, wraps, f, 2 * component + side)
             volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
-            if to >= 0 and open_flat[to] > 0.0 and volume > 0.0:
-                targets[n, side], parts[n, side] = to, volume
+            if to >= 0 and pushed[to] and volume > 0.0:
+                targets[n, side], parts[n, side] = to, open_flat[to] * volume
         total = parts[n, 0] + parts[n, 1]
         if total > 0.0:
             parts[n] /= total
@@ -93,7 +103,7 @@ def find_targets(
         most = 0.0
         for way in range(6):
             to = neighbour(shape, wraps, f, way)
-            if to >= 0 and open_flat[to] > 0.0 and volume_flat[to] > most:
+            if to >= 0 and pushed[to] and volume_flat[to] > most:
                 targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
     led = True
     while led:
@@ -183,45 +193,51 @@ def fill_empty(
 @njit(nogil=True, cache=True)
 def level(
     field: Array,
-    before: Array,
     volumes: Array,
     listed: Integers,
-    tiny: float,
-    small: float,
-    held: float,
+    leaving: Array,
+    least: float,
+    most: float,
     nothing: float,
     shape: Integers,
     wraps: Integers,
 ) -> None:
-    """Mix small control volumes with the largest one beside them, in place.
+    """Mix listed control volumes with the largest one beside them, in place, where more leaves them
+    than they hold.
 
-    The exchange V_i V_t/(V_i + V_t) (u_t - u_i) levels both out and keeps their sum (Hu et al.
-    2006): all of it below the volume `tiny`, none above `small`, linear between; and less where
-    friction holds them, by what that slows them down in a step, 1 + held / V_i^2. One that vanishes
-    in the step keeps no greater part of what it had than is left of its volume, or that, over what
-    is left, could be any velocity.
+    The exchange V_i V_t/(V_t + sum V_i) (u_t - u_i) levels out all that mix with one and keeps
+    their sum (Hu et al. 2006): none of it up to `least` times what they hold, all of it from `most`
+    times on, linear between. All exchange what they have at first.
 
-    before   volumes at the start of the step
-    volumes  at its end
+    leaving  (n,) volume that leaves each in the substep
     """
-    flat, volume, earlier = field.reshape(-1), volumes.reshape(-1), before.reshape(-1)
+    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    found, others, count = np.empty((2, listed.size), np.int64), {0: 0.0}, 0
     for n in range(listed.size):
         f = listed[n]
         own = volume[f]
-        if own <= nothing or own >= small:
+        if own <= nothing or leaving[n] <= least * own:
             continue
-        best, most = -1, own
+        best, largest = -1, own
         for way in range(6):
             to = neighbour(shape, wraps, f, way)
-            if to >= 0 and volume[to] > most:
-                best, most = to, volume[to]
-        if best < 0:
-            continue
-        kept = min(held / (held + own**2), own / max(own, earlier[f]))
-        share = min((small - own) / (small - tiny), 1.0) * (1.0 - kept)
-        exchange = share * (flat[best] - flat[f]) / (own + most)
-        flat[f] += most * exchange
-        flat[best] -= own * exchange
+            if to >= 0 and volume[to] > largest:
+                best, largest = to, volume[to]
+        if best >= 0:
+            found[0, count], found[1, count] = n, best
+            others[best] = others.get(best, 0.0) + own
+            count += 1
+    exchange = np.empty(count)
+    for _ in range(TURNS):
+        for m in range(count):
+            f, best = listed[found[0, m]], found[1, m]
+            own, all_of_it = volume[f], volume[best] + others[best]
+            share = min((leaving[found[0, m]] / own - least) / (most - least), 1.0)
+            exchange[m] = share * own * volume[best] / all_of_it * (flat[best] - flat[f])
+        for m in range(count):
+            f, best = listed[found[0, m]], found[1, m]
+            flat[f] += exchange[m] / volume[f]
+            flat[best] -= exchange[m] / volume[best]
 
 
 @njit(nogil=True, cache=True)
@@ -290,49 +306,36 @@ def find_parts(
 
 
 @njit(nogil=True, cache=True)
-def find_small(
+def find_closed(
     driven: Marks,
     opened: Array,
     volume: Array,
     component: int,
     prescribed: Marks,
     periodic: bool,
-    narrow: float,
     nothing: float,
-) -> tuple[Integers, Array]:
-    """Flat indices of the small ones among the faces of a component, and which part of each is one.
+) -> Integers:
+    """Flat indices of the faces of a component with a volume that pressure does not push: where
+    the face or its volume is not above `nothing`.
 
-    A face is one with all of its volume where no pressure pushes it: where it is closed, or its
-    volume is not above `nothing`; and in part where the volume exceeds `narrow` times its opening.
-
-    driven      1 where the face may be a target: pushed and no small one; given
+    driven      1 where pressure acts on the face; given
     opened      open part of each face
     prescribed  (2,) 1 where the velocity of the first or last layer is prescribed: none of either
     periodic    whether the last layer is the first one, and counts once
     """
     n0, n1, n2 = opened.shape
-    own, part, count = np.empty(opened.size, np.int64), np.empty(opened.size), 0
+    own, count = np.empty(opened.size, np.int64), 0
     last = opened.shape[component] - 1
     for i in range(n0):
         for j in range(n1):
-            at = i if component == 0 else j
-            one, room, mark, low = opened[i, j], volume[i, j], driven[i, j], 0
+            one, room, mark = opened[i, j], volume[i, j], driven[i, j]
             for k in range(n2):
-                low += int(narrow * one[k] < room[k]) | int(one[k] == 0.0) | int(room[k] <= nothing)
-                mark[k] = 1
-            for k in range(n2 if low else 0):
-                at = k if component == 2 else at
-                pushed = narrow * one[k] if room[k] > nothing else 0.0
-                small = room[k] != 0.0 and (pushed < room[k] or pushed == 0.0)
-                mark[k] = pushed > 0.0 and not small
-                first = at == 0 and prescribed[0]
-                if small and not first and not (at == last and (prescribed[1] or periodic)):
+                at = i if component == 0 else (j if component == 1 else k)
+                told = (at == 0 and prescribed[0]) or (at == last and prescribed[1])
+                double = at == last and periodic
+                pushed = one[k] > NONE and room[k] > nothing
+                mark[k] = pushed and not told and not double
+                if not pushed and room[k] != 0.0 and not told and not double:
                     own[count] = (i * n1 + j) * n2 + k
-                    part[count] = 1.0 - pushed / room[k]
                     count += 1
-            if component == 2:
-                mark[0] = 0 if prescribed[0] else mark[0]
-                mark[last] = 0 if prescribed[1] else mark[last]
-            elif (at == 0 and prescribed[0]) or (at == last and prescribed[1]):
-                mark[:] = 0
-    return own[:count].copy(), part[:count].copy()
+    return own[:count].copy()

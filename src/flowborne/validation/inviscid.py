@@ -130,14 +130,18 @@ class PotentialFlow:
         return velocity.real, -velocity.imag, 0.0 * velocity.real
 
 
-def held_ellipse(cells: int, incidence: float) -> tuple[float, float]:
+def held_ellipse(
+    cells: int, incidence: float, place: tuple[float, float] = (0.0, 0.0)
+) -> tuple[float, float]:
     """Moment (nose-up) over pi (a^2 - b^2)/2 and force over its chord, both over rho U^2.
 
     The first projection makes the potential flow; the pressure is Bernoulli's a few steps later.
 
     cells  across the long axis, in a box of 3 m whose sides have the unbounded flow's velocity
+    place  of the ellipse in its cell, cells
     """
-    grid = square(3 * cells, 3.0)
+    h = 1.0 / cells
+    grid = Grid.slab(3 * cells, 3 * cells, h, tuple(-1.5 - h * np.array(place)))
     model = mjcf(f'<geom type="ellipsoid" size="{LONG} {SHORT} 1"/>')
     world = make_world(model, grid, boundaries=all_inflow(PotentialFlow(incidence)))
     dt = 0.25 * grid.spacing

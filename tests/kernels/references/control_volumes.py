@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.control_volumes import NONE, TURNS
 
 
 def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
@@ -33,6 +34,7 @@ def largest_reference(
 
 def find_targets_reference(
     small: Integers,
+    pushed: Marks,
     opened: Array,
     volumes: Array,
     cells: Array,
@@ -41,7 +43,7 @@ def find_targets_reference(
 ) -> tuple[Integers, Array]:
     """`find_targets` in NumPy."""
     beside = neighbours_reference(np.array(opened.shape), wraps)[:, small]
-    driven = (beside >= 0) & (opened.ravel()[beside] > 0.0)
+    driven = (beside >= 0) & (pushed.ravel()[beside] > 0)
     ends = [(int(axis == component),) * 2 for axis in range(3)]
     wide = np.pad(cells, ends, mode="wrap" if wraps[component] > 0 else "constant")
     own = np.unravel_index(small, opened.shape)
@@ -52,7 +54,7 @@ def find_targets_reference(
         ]
     )
     opposite = slice(2 * component, 2 * component + 2)
-    held = np.where(driven[opposite], cell, 0.0)
+    held = np.where(driven[opposite], cell * opened.ravel()[beside[opposite]], 0.0)
     targets = np.where(held > 0.0, beside[opposite], small)
     parts = held / np.where(held.sum(axis=0) > 0.0, held.sum(axis=0), 1.0)
     near, touched = largest_reference(beside, np.where(driven, volumes.ravel()[beside], 0.0), 0.0)
@@ -113,27 +115,28 @@ def fill_empty_reference(
 
 def level_reference(
     field: Array,
-    before: Array,
     volumes: Array,
     listed: Integers,
-    tiny: float,
-    small: float,
-    held: float,
+    leaving: Array,
+    least: float,
+    most: float,
     nothing: float,
     wraps: Integers,
 ) -> Array:
-    """`level` in NumPy: the field after it. One exchange comes after the other."""
+    """`level` in NumPy: the field after it."""
     levelled, volume = field.ravel().copy(), volumes.ravel()
-    beside = neighbours_reference(np.array(field.shape), wraps)
-    for f in listed[(volume[listed] > nothing) & (volume[listed] < small)]:
-        around = beside[:, f][beside[:, f] >= 0]
-        to = around[np.argmax(volume[around])]
-        if volume[to] > volume[f]:
-            left = volume[f] / max(volume[f], before.ravel()[f])
-            share = np.clip((small - volume[f]) / (small - tiny), 0.0, 1.0)
-            share *= 1.0 - min(held / (held + volume[f] ** 2), left)
-            mean = np.average(levelled[[f, to]], weights=volume[[f, to]])
-            levelled[[f, to]] += share * (mean - levelled[[f, to]])
+    beside = neighbours_reference(np.array(field.shape), wraps)[:, listed]
+    to, _ = largest_reference(beside, np.where(beside >= 0, volume[beside], -1.0), 0.0)
+    part = leaving / np.where(volume[listed] > nothing, volume[listed], 1.0)
+    mixed = (volume[listed] > nothing) & (part > least) & (volume[to] > volume[listed])
+    f, to = listed[mixed], to[mixed]
+    share = np.minimum((part[mixed] - least) / (most - least), 1.0)
+    others = np.bincount(to, volume[f], volume.size)
+    for _ in range(TURNS):
+        weight = share * volume[f] * volume[to] / (volume[to] + others[to])
+        exchange = weight * (levelled[to] - levelled[f])
+        np.add.at(levelled, f, exchange / volume[f])
+        np.subtract.at(levelled, to, exchange / volume[to])
     return levelled.reshape(field.shape)
 
 
@@ -177,21 +180,18 @@ def find_parts_reference(
     return np.flatnonzero(np.minimum(before, after) < least)
 
 
-def find_small_reference(
+def find_closed_reference(
     opened: Array,
     volume: Array,
     component: int,
     prescribed: Marks,
     periodic: bool,
-    narrow: float,
     nothing: float,
-) -> tuple[Integers, Array, Array]:
-    """`find_small` in NumPy: small ones, parts, and which faces may be targets."""
-    pushed = np.where(volume > nothing, narrow * opened, 0.0)
-    small = (volume != 0.0) & ((pushed < volume) | (pushed == 0.0))
-    driven, counted = (pushed > 0.0) & ~small, small.copy()
+) -> tuple[Integers, Array]:
+    """`find_closed` in NumPy: closed faces, and on which ones pressure acts."""
+    driven = (volume > nothing) & (opened > NONE)
+    counted = (volume != 0.0) & ~driven
     for end, told in zip((0, -1), prescribed, strict=True):
-        np.moveaxis(driven, component, 0)[end] &= not told
-        np.moveaxis(counted, component, 0)[end] &= not told and not (periodic and end)
-    own = np.flatnonzero(counted)
-    return own, 1.0 - pushed.ravel()[own] / volume.ravel()[own], driven
+        for marks in (driven, counted):
+            np.moveaxis(marks, component, 0)[end] &= not told and not (periodic and end)
+    return np.flatnonzero(counted), driven

@@ -1,0 +1,201 @@
+"""Volumes that move with the faces: control volumes whose excess over a h^3 goes to neighbours.
+
+Flat indices into the arrays of one component; lists are in ascending order. `way` is 2 axis for the
+neighbour below along an axis and 2 axis + 1 for the one above.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.control_volumes import neighbour
+
+KEPT = 0.5
+"""Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""
+
+
+@njit(nogil=True, cache=True)
+def cell_beside(f: int, way: int, shape: Integers, wraps: Integers, component: int) -> int:
+    """Flat index of the cell on one side of face f of a component; -1 beyond the domain."""
+    n1, n2 = shape[1], shape[2]
+    i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
+    at = (i, j, k)[component] - 1 + way % 2
+    count = shape[component] - 1
+    if wraps[component] > 0:
+        at %= count
+    elif at < 0 or at >= count:
+        return -1
+    if component == 0:
+        return int((at * n1 + j) * n2 + k)
+    if component == 1:
+        return int((i * (n1 - 1) + at) * n2 + k)
+    return int((i * n1 + j) * (n2 - 1) + at)
+
+
+@njit(nogil=True, cache=True)
+def face_between(
+    f: int, way: int, low: int, shape: Integers, wraps: Integers, component: int, across: Integers
+) -> int:
+    """Flat index of one of the two faces between control volume f and the one beside it along
+    another axis: that at the lower (0) or upper (1) of its cells; -1 beyond the domain.
+
+    across  (3,) shape of the faces across that axis
+    """
+    n1, n2 = shape[1], shape[2]
+    axis = way // 2
+    place = np.array([f // (n1 * n2), (f // n2) % n1, f % n2])
+    place[component] += low - 1
+    count = shape[component] - 1
+    if wraps[component] > 0:
+        place[component] %= count
+    elif place[component] < 0 or place[component] >= count:
+        return -1
+    place[axis] += way % 2
+    return int((place[0] * across[1] + place[1]) * across[2] + place[2])
+
+
+@njit(nogil=True, cache=True)
+def openings(
+    listed: Integers,
+    driven: Marks,
+    component: int,
+    axis: int,
+    own: Array,
+    cells: Array,
+    across: Array,
+    shape: Integers,
+    wraps: Integers,
+) -> tuple[Integers, Array, Array]:
+    """Place in the list (n,) of the control volume above each along an axis, -1 if it is not there,
+    the opening w (n,) of the way to it, and what w a of others than listed ones is beside each.
+
+    w is the open part of the cell between both along the component's own axis, elsewhere the mean
+    of the two faces between them times the smaller one of their own.
+
+    driven  1 where pressure acts on the face
+    own     open part of each face of the component
+    cells   open part of each cell
+    across  open part of the faces across the axis
+    """
+    above, way, rest = np.full(listed.size, -1), np.zeros(listed.size), np.zeros(listed.size)
+    faces, room, sides = own.reshape(-1), cells.reshape(-1), across.reshape(-1)
+    wide = np.array(across.shape)
+    for n in range(listed.size):
+        f = listed[n]
+        for side in range(2):
+            to = neighbour(shape, wraps, f, 2 * axis + side)
+            if to < 0:
+                continue
+            at = np.searchsorted(listed, to)
+            there = at < listed.size and listed[at] == to
+            if there and side == 0:
+                continue
+            if axis == component:
+                opening = room[cell_beside(f, side, shape, wraps, component)]
+            else:
+                total, count = 0.0, 0
+                for low in range(2):
+                    between = face_between(f, 2 * axis + side, low, shape, wraps, component, wide)
+                    if between >= 0:
+                        total += sides[between]
+                        count += 1
+                opening = total / count * min(faces[f], faces[to])
+            if there:
+                above[n], way[n] = at, opening
+            elif driven.reshape(-1)[to]:
+                rest[n] += opening * faces[to]
+    return above, way, rest
+
+
+@njit(nogil=True, cache=True)
+def even_out(
+    held: Array, goal: Array, opened: Array, above: Integers, way: Array, rest: Array
+) -> Array:
+    """(n,) what each gives to the one above it along an axis, in one sweep; taken from `held` and
+    added to it, in place.
+
+        T = w (e_f a_g - e_g a_f) (a_f + a_g) / (a_g S_f + a_f S_g),   e = held - goal
+
+    with S the sum of w a over both neighbours: in a row of equal openings each ends with the mean
+    of both neighbours' excess. What is added up here has the same bits from either side, so that
+    what is symmetric stays so.
+
+    opened  (n,) a;  goal  (n,) a h^3;  above, way, rest  see `openings`
+    """
+    count, reach = held.size, rest.copy()
+    given, out, gained = np.zeros(count), np.zeros(count), np.zeros(count)
+    for n in range(count):
+        m = above[n]
+        if m >= 0:
+            reach[n] += way[n] * opened[m]
+            reach[m] += way[n] * opened[n]
+    for n in range(count):
+        m = above[n]
+        if m < 0 or way[n] == 0.0:
+            continue
+        a, b = opened[n], opened[m]
+        skew = (held[n] - goal[n]) * b - (held[m] - goal[m]) * a
+        given[n] = way[n] * skew * (a + b) / (b * reach[n] + a * reach[m])
+        if given[n] > 0.0:
+            out[n] += given[n]
+        else:
+            out[m] -= given[n]
+    for n in range(count):
+        spare = max(held[n] - KEPT * max(min(held[n], goal[n]), 0.0), 0.0)
+        out[n] = min(spare / out[n], 1.0) if out[n] > 0.0 else 1.0
+    for n in range(count):
+        m = above[n]
+        if m >= 0:
+            given[n] *= out[n] if given[n] > 0.0 else out[m]
+            gained[n] -= given[n]
+            gained[m] += given[n]
+    held += gained
+    return given
+
+
+@njit(nogil=True, cache=True)
+def add_transfers(
+    net: Array, field: Array, givers: Integers, takers: Integers, rate: Array
+) -> None:
+    """Add what transfers take from the amounts of control volumes per time, in place: volume x mean
+    velocity of both, which changes no energy."""
+    leaving, values = net.reshape(-1), field.reshape(-1)
+    for n in range(givers.size):
+        f, g = givers[n], takers[n]
+        passed = rate[n] * 0.5 * (values[f] + values[g])
+        leaving[f] += passed
+        leaving[g] -= passed
+
+
+@njit(nogil=True, cache=True)
+def find_cut(volume: Array, goal: Array, slack: float, driven: Marks) -> Integers:
+    """Flat indices of the faces whose volume is not what their opening says.
+
+    goal    a h^3
+    driven  1 where pressure acts on the face
+    """
+    v, g, d = volume.reshape(-1), goal.reshape(-1), driven.reshape(-1)
+    found, count = np.empty(v.size, np.int64), 0
+    for f in range(v.size):
+        if d[f] and abs(v[f] - g[f]) > slack:
+            found[count] = f
+            count += 1
+    return found[:count].copy()
+
+
+@njit(nogil=True, cache=True)
+def with_neighbours(cut: Integers, driven: Marks, shape: Integers, wraps: Integers) -> Integers:
+    """The listed ones and those beside them on which pressure acts, in ascending order."""
+    marked = driven.reshape(-1)
+    found, count = np.empty(7 * cut.size, np.int64), 0
+    for f in cut:
+        found[count] = f
+        count += 1
+        for way in range(6):
+            to = neighbour(shape, wraps, f, way)
+            if to >= 0 and marked[to]:
+                found[count] = to
+                count += 1
+    return np.unique(found[:count])
