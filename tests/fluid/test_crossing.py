@@ -9,11 +9,11 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import means
-from flowborne.fluid.crossing import crossings
-from flowborne.fluid.ghosts import fill_ghosts
+from flowborne.fluid.ghosts import packed_sides
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.transport import marks_of
+from flowborne.fluid.transport import neighbours, planes
+from flowborne.kernels.carry import Fluxes, cross_sides, draw_in, fill_ghosts, mark_volumes
 from flowborne.kernels.flux import GHOSTS
 from flowborne.solids.model import SolidModel
 
@@ -30,16 +30,17 @@ def test_what_comes_in_has_the_mean_velocity_and_what_leaves_its_own(
     sides = Boundaries(x_max=OPEN) if end else Boundaries(x_min=OPEN)
     flux = grid.zeros_faces()
     flux[0][-end] = random.normal(size=flux[0][-end].shape)
-    u, volume = random.normal(size=(2, *grid.face_shape(component)))
-    volume = volume**2
-    padded = np.pad(u, [(GHOSTS * (a in grid.axes),) * 2 for a in range(3)])
-    fill_ghosts(padded, component, grid, sides, 0.0)
-    marks = marks_of(np.zeros(0, np.int64), component, grid, sides)
-    came = 0.0
-    for crossing in crossings(faces_of(flux), volume, marks, component, grid, sides):
-        crossing.draw_in(padded)
-        came += crossing.came_in(padded)
-    mean = float(np.average(u[-end], weights=volume[-end]))
+    u, cells = random.normal(size=grid.face_shape(component)), random.random(grid.shape)
+    axis, shape = component + 1, np.array([1, *grid.face_shape(component)[:2]])
+    padded = np.pad(u.reshape(shape), [(GHOSTS * (n > 0),) * 2 for n in range(3)])
+    table = packed_sides(component, grid, sides, [0.0])
+    through = Fluxes(planes(faces_of(flux), grid), *neighbours(int(shape[axis]), False))
+    marks = np.empty(padded.shape, np.uint8)
+    mark_volumes(marks, np.zeros(0, np.int64), table, shape, 0 * shape, axis)
+    cross_sides(table, through, cells.reshape(1, 7, 6), axis, shape)
+    fill_ghosts(padded, table, 0, shape, axis)
+    came = draw_in(padded, marks, table, shape)
+    mean = float(np.average(u[-end], weights=means(cells, component, False)[-end]))
     rate = (-flux[0] if end else flux[0])[[-end]]
     if component == 1:
         rate = means(rate, 1, False)

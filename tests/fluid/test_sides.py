@@ -83,9 +83,6 @@ def test_what_enters_is_of_the_shape_of_the_side(side: Boundary) -> None:
         assert scalar is None or np.broadcast_to(scalar, cells.shape).shape == cells.shape
         if scalar is not None and place.axis == 0:
             np.testing.assert_allclose(scalar[0, :, 0], CUBE.cell_coordinates()[1] + 0.5)
-        beside, share = np.random.default_rng(3).random((2, *cells.shape))
-        velocity = side.entering(beside, share / share.sum())
-        assert velocity is None or beside.min() <= velocity <= beside.max()
 
 
 def test_every_side_of_scenes_is_of_a_kind_of_its_name() -> None:

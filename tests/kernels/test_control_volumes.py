@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from flowborne.kernels.control_volumes import (
+    DRIVEN,
     fill_empty,
-    find_closed,
-    find_parts,
     find_targets,
     join_small,
     level,
+    listed_kinds,
     mark_cut,
     merge_small,
     neighbour,
     share_velocity,
+    sort_faces,
 )
 
 from .cut_cells import face_shape
@@ -197,7 +198,11 @@ def test_small_ones_mix_with_their_neighbours_and_keep_the_sum(
         field[case.last] = np.take(field, [0], component)
     mixed, limits = field.copy(), (0.5, 2.0, 0.01)
     leaving = np.random.default_rng(4).uniform(0.0, 0.5, listed.size)
-    level(mixed, case.volumes, listed, leaving, *limits, case.shape, case.wraps)
+    least, most, nothing = limits
+    nought = np.zeros(case.shape)
+    rest = nought, nothing, case.shape, case.wraps
+    level(mixed, case.volumes, listed, leaving, least, most, *rest)
+    assert not nought.any()
     expected = level_reference(field, case.volumes, listed, leaving, *limits, case.wraps)
     assert (mixed != field).any()
     np.testing.assert_allclose(mixed, expected, atol=1e-14)
@@ -209,16 +214,6 @@ def test_small_ones_mix_with_their_neighbours_and_keep_the_sum(
     assert mixed.min() >= field.min()
     assert mixed.max() <= field.max()
     assert (weights * mixed**2).sum() < (weights * field**2).sum()
-
-
-@ROOM_OR_SLAB
-def test_parts(shape: tuple, periodic: tuple, component: int) -> None:
-    """Those that are less than whole before or after."""
-    before, after = (case_of(shape, periodic, component, seed) for seed in (0, 1))
-    found = find_parts(before.volumes, after.volumes, 0.1, component, before.wraps)
-    expected = find_parts_reference(before.volumes, after.volumes, 0.1, component, before.wraps)
-    np.testing.assert_array_equal(found, expected)
-    assert 0 < found.size < before.volumes.size
 
 
 @ROOM_OR_SLAB
@@ -248,12 +243,23 @@ def test_mark_cut(shape: tuple, periodic: tuple, component: int) -> None:
 
 @ROOM_OR_SLAB
 @pytest.mark.parametrize("told", [(0, 0), (1, 0), (1, 1)])
-def test_find_closed(shape: tuple, periodic: tuple, component: int, told: tuple) -> None:
-    case, ring = case_of(shape, periodic, component), periodic[component]
+def test_sort_faces(shape: tuple, periodic: tuple, component: int, told: tuple) -> None:
+    """Their volumes, and which are less than whole, closed, or have not what their opening says."""
+    case, ring, cell, slack = case_of(shape, periodic, component), periodic[component], 0.5, 0.04
     prescribed = np.array((0, 0) if ring else told, np.uint8)
-    rest = case.opened, case.volumes, component, prescribed, ring, 0.01
-    own, driven = find_closed_reference(*rest)
-    assert 0 < own.size < case.volumes.size
-    mark = np.full(case.shape, 7, np.uint8)
-    np.testing.assert_array_equal(find_closed(mark, *rest), own)
-    np.testing.assert_array_equal(mark, driven)
+    shut, driven = find_closed_reference(
+        case.opened, case.volumes, component, prescribed, ring, 0.01
+    )
+    goal = cell * case.opened
+    if not ring:
+        np.moveaxis(goal, component, 0)[[0, -1]] *= 0.5
+    uneven = np.flatnonzero(driven & (np.abs(case.volumes - goal) > slack))
+    part = find_parts_reference(case.volumes, 0.2 * cell, component, case.wraps)
+    volumes, kinds = np.empty(case.shape), np.empty(case.shape, np.uint8)
+    counts, limits = np.empty((np.prod(case.shape[:2]), 3), np.int64), (cell, 0.2, slack, 0.01)
+    sort_faces(volumes, kinds, counts, case.cells, case.opened, component, prescribed, ring, limits)
+    np.testing.assert_array_equal(volumes, case.volumes)
+    np.testing.assert_array_equal(kinds & DRIVEN, driven)
+    for found, expected in zip(listed_kinds(kinds, counts), (part, shut, uneven), strict=True):
+        np.testing.assert_array_equal(found, expected)
+        assert 0 < found.size < case.volumes.size

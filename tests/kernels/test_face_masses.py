@@ -7,6 +7,7 @@ import pytest
 
 from flowborne import Grid
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
+from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.face_masses import add_transfers, even_out
 from flowborne.validation.worlds import RING, mjcf
 from flowborne.worlds import Boundaries, cut_by_bodies, make_world
@@ -84,8 +85,9 @@ def test_transfers_change_no_energy() -> None:
     random = np.random.default_rng(0)
     velocity, rate = random.standard_normal(9), random.standard_normal(20)
     givers, takers = random.integers(0, 9, (2, 20))
-    leaving = np.zeros(9)
-    add_transfers(leaving, velocity, givers, takers, rate)
+    leaving, later, given = np.zeros(9), np.zeros(9), Transfers(givers, takers, rate)
+    add_transfers(later, leaving, np.full(9, 2.0), velocity, given, 0.3, 0.0)
+    np.testing.assert_allclose(later, -0.15 * leaving, atol=1e-15)
     volume = np.zeros(9)
     np.add.at(volume, givers, rate)
     np.subtract.at(volume, takers, rate)

@@ -104,9 +104,12 @@ def departure(world: World) -> Departure:
 
 def volumes_of(world: World, cut: Geometry) -> ControlVolumes:
     """The control volumes of the fluid: of the cells as the last step left them, or of the cut
-    where the bodies have been moved since."""
+    where the bodies have been moved since. Those that the last step ended with are kept."""
     fluid, state = world.flow()
     cells = cut.volume if moved_since(world) else state.cell_volume
+    kept = world.volumes
+    if kept is not None and kept[0] is cut and np.array_equal(kept[1].cells, cells):
+        return kept[1]
     return control_volumes(cells, cut.open, fluid.grid, fluid.boundaries)
 
 

@@ -11,7 +11,7 @@ from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.solve import Solved
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
-from flowborne.fluid.control_volumes import control_volumes, parts
+from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Faces, faces_of
@@ -85,7 +85,7 @@ def store_state(
     grid, sides, volumes = fluid.grid, fluid.boundaries, advected.volumes
     dt, projected = solved.driven.system.dt, solved.projected
     assert projected is not None
-    world.solid.v[:] = solved.v
+    world.solid.v[:], world.volumes = solved.v, (cut, volumes)
     velocity = projected.velocity
     inside = leak_proof(velocity, cut, boundary_velocity(pose, solved.v), grid)
     for axis in grid.axes:
@@ -95,10 +95,8 @@ def store_state(
         change, acceleration = state.velocity[axis], state.acceleration[axis]
         passed = half.velocity[axis], advected.velocity[axis]
         changes_of_step(acceleration, change, velocity[axis], *passed, dt)
-        volume = volumes.volume[axis]
-        cut_faces = parts(volume, volume, axis, grid, sides)
         for values in (change, acceleration):
-            values.reshape(-1)[cut_faces] = 0.0
+            values.reshape(-1)[volumes.cut[axis]] = 0.0
             if sides.periodic()[axis]:
                 values[edge(axis, -1)] = values[edge(axis, 0)]
     state.velocity, state.velocity_change = velocity, state.velocity

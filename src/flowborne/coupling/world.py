@@ -15,6 +15,7 @@ from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
+from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.state import FluidState, under
 from flowborne.solids.model import SolidModel
@@ -115,6 +116,7 @@ class World:
     memory  the controller's own arrays, by name
     cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
             and not part of it
+    volumes the cut that the last step ended with, and its control volumes; likewise
     """
 
     setup: Setup
@@ -126,9 +128,10 @@ class World:
     parts: int = 1
     memory: dict[str, Array] = field(default_factory=dict)
     cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
+    volumes: tuple[Geometry, ControlVolumes] | None = field(default=None, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"cut": None}
+        return vars(self) | {"cut": None, "volumes": None}
 
     @classmethod
     def at_rest(cls, setup: Setup) -> World:

@@ -12,12 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.control_volumes import wrapping
-from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers, Marks
-from flowborne.kernels.fleeting import let_through, what_leaves
-from flowborne.kernels.flux import CUT, GHOSTS
+from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.carry import Fleeting, Fluxes, Volumes, side_rates
+from flowborne.kernels.flux import CUT
 
 CROSSED = 4.0
 """Whole cells that flow through a control volume in a step, beyond which it may be fleeting: with
@@ -27,75 +24,38 @@ CHANGED = 0.5
 """Part of the volume at one end of a step, below which it falls at the other end of one that is
 left or taken up."""
 
+NONE_FLEETING = Fleeting(np.zeros(0, np.int64), np.zeros((0, 6), np.int64), np.zeros((0, 6)))
 
-class Fleeting:
-    """Those of one component: all of a step, of which those of a substep are chosen.
 
-    index   (n,) flat, in ascending order
-    beside  (n, 6) control volume beyond each side; -1 at a side of the domain, and before an open
-            one, where what is upstream is carried
-    rate    (n, 6) volume per time that leaves through each side, m^3/s
+def find_fleeting(
+    listed: Integers,
+    held: tuple[Array, Array],
+    flux: Fluxes,
+    marks: Marks,
+    volumes: Volumes,
+    steps: float,
+) -> Fleeting:
+    """Those of listed control volumes that may let through more in a substep than they hold.
+
+    held   control volumes at both ends of the step, m^3
+    marks  of all of them, padded, see `kernels.carry.mark_volumes`
+    steps  duration of the step over the volume of a cell, s/m^3
     """
-
-    def __init__(self, index: Integers, beside: Integers, rate: Array, nothing: float) -> None:
-        self.index, self.beside, self.rate, self.nothing = index, beside, rate, nothing
-        self.gone = np.maximum(rate, 0.0).sum(axis=1)
-
-    def choose(self, low: Array, high: Array, dt: float) -> None:
-        """Choose those that more leaves in a substep than they hold at either end of it.
-
-        low, high  their volumes there, m^3
-        """
-        held = np.maximum(low.reshape(-1)[self.index], high.reshape(-1)[self.index])
-        chosen = dt * self.gone > held
-        self.high, self.dt, self.own = high, dt, self.index[chosen]
-        self.to, self.through = self.beside[chosen], self.rate[chosen]
-        row = np.minimum(np.searchsorted(self.own, self.to), self.own.size - 1)
-        self.row = np.where(self.own[row] == self.to, row, -1)
-
-    def pass_on(self, later: Array, net: Array, field: Array, weight: float) -> None:
-        """Let through their sides in a stage what leaves them and comes to them, in place.
-
-        later   velocity after the stage with the mean of both beside a side, m/s
-        net     amount that leaves each control volume per time
-        field   velocity that the stage carried, m/s
-        weight  of the stage; the first has 1, and the second lets through the same values
-        """
-        if self.own.size == 0:
-            return
-        field, lists = np.ascontiguousarray(field), (self.own, self.to, self.row)
-        if weight == 1.0:
-            self.arriving = field.reshape(-1)[self.to]
-            self.leaving = what_leaves(
-                field, later, self.high, *lists, self.dt * self.through, self.nothing
-            )
-        let_through(
-            later, net, field, self.high, *lists, self.through, self.arriving, self.leaving,
-            weight * self.dt, self.nothing,
-        )  # fmt: skip
+    one, other = (volume.reshape(-1)[listed] for volume in held)
+    index = listed[np.minimum(one, other) < CHANGED * np.maximum(one, other)]
+    rate = side_rates(flux, index, volumes.component, volumes.shape)
+    crossed = steps * np.maximum(rate, 0.0).sum(axis=1) > CROSSED
+    return Fleeting(index[crossed], beyond_sides(index[crossed], marks, volumes), rate[crossed])
 
 
-def left_or_taken_up(listed: Integers, start: Array, end: Array) -> Integers:
-    """Those of listed control volumes that a body leaves or takes up.
-
-    start, end  volumes at both ends of the step, m^3
-    """
-    one, other = start.reshape(-1)[listed], end.reshape(-1)[listed]
-    return listed[np.minimum(one, other) < CHANGED * np.maximum(one, other)]
-
-
-def beyond_sides(
-    index: Integers, marks: Marks, component: int, grid: Grid, sides: Boundaries
-) -> Integers:
-    """(n, 6) `Fleeting.beside` of control volumes of a component.
-
-    marks  of all of them, padded, see `transport.marks_of`
-    """
-    shape, wraps = grid.face_shape(component), wrapping(component, grid, sides)
+def beyond_sides(index: Integers, marks: Marks, volumes: Volumes) -> Integers:
+    """(n, 6) control volume beyond each side of some; -1 at a side of the domain, and before an
+    open one, where what is upstream is carried."""
+    shape, wraps = tuple(volumes.shape), volumes.wraps
     at, found = np.stack(np.unravel_index(index, shape)), np.full((index.size, 6), -1)
-    depth = np.array([[GHOSTS * (axis in grid.axes)] for axis in range(3)])
-    for axis in grid.axes:
-        for upper in (0, 1):
+    depth = np.array([[(wide - n) // 2] for wide, n in zip(marks.shape, shape, strict=True)])
+    for axis in range(3):
+        for upper in (0, 1) if shape[axis] > 1 else ():
             to = at.copy()
             to[axis] += 2 * upper - 1
             if wraps[axis]:
@@ -104,23 +64,3 @@ def beyond_sides(
             flat = np.ravel_multi_index(tuple(to), shape, mode="clip")
             found[:, 2 * axis + upper] = np.where(cut, flat, -1)
     return found
-
-
-def side_rates(
-    flux: Faces, index: Integers, component: int, grid: Grid, place: Integers, share: Array
-) -> Array:
-    """(n, 6) volume per time that leaves control volumes of a component through their sides, m^3/s.
-
-    flux          Faces, through the faces of the cells, m^3/s
-    place, share  of which two of them those through the sides are means, see `transport.neighbours`
-    """
-    at, rate = np.unravel_index(index, grid.face_shape(component)), np.zeros((index.size, 6))
-    for axis in grid.axes:
-        for upper in (0, 1):
-            side = [n + upper * (a == axis) for a, n in enumerate(at)]
-            own, line = int(axis == component), side[component]
-            for one in (0, 1):
-                side[component] = place[own, line, one]
-                through = share[own, line, one] * flux[axis][tuple(side)]
-                rate[:, 2 * axis + upper] += (2 * upper - 1) * through
-    return rate

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.sides.side import Boundary, Layers, hold
-from flowborne.kernels.flux import GHOSTS
+from flowborne.kernels.arrays import Integers
+from flowborne.kernels.carry import HELD, JOINED, MIRRORED, PRESCRIBED, Sides
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -24,6 +25,30 @@ def edge(axis: int, at: int | slice) -> tuple[int | slice, ...]:
     index: list[int | slice] = [slice(None)] * 3
     index[axis] = at
     return tuple(index)
+
+
+def plane(values: NDArray[Scalar], grid: Grid) -> NDArray[Scalar]:
+    """A field of a slab as one of a room that is one layer thick along its first axis."""
+    if not grid.is_slab:
+        return values
+    return values.reshape(1, *values.shape[:2])
+
+
+def planes(faces: Faces, grid: Grid) -> Faces:
+    """Fields on the faces in the order of the kernels' axes; of a slab none across its first, which
+    takes no part."""
+    x, y, z = faces
+    return (plane(x, grid), plane(x, grid), plane(y, grid)) if grid.is_slab else (x, y, z)
+
+
+def kernel_axes(component: int, grid: Grid, sides: Boundaries) -> tuple[int, Integers, Integers]:
+    """Of the faces across an axis, in the order of the kernels' axes: that axis, the shape of their
+    fields, and (3,) how many distinct ones there are along each periodic axis, else 0."""
+    wraps = np.array(grid.shape, np.int64) * np.array(sides.periodic(), np.int64)
+    shape = np.array(grid.face_shape(component))
+    if not grid.is_slab:
+        return component, shape, wraps
+    return component + 1, np.array([1, *shape[:2]]), np.array([0, *wraps[:2]])
 
 
 def pad(values: NDArray[Scalar], axes: tuple[int, ...]) -> NDArray[Scalar]:
@@ -83,20 +108,33 @@ def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: floa
         side.impose(velocity[place.axis], place, time)
 
 
-def fill_ghosts(
-    padded: Array, component: int, grid: Grid, boundaries: Boundaries, time: float
-) -> None:
-    """Set the two layers of ghosts around a face field such that they carry the boundary
-    conditions, in place.
+def packed_sides(component: int, grid: Grid, boundaries: Boundaries, times: list[float]) -> Sides:
+    """The sides as a component's kernels take them, and what they prescribe to it at these times;
+    see `kernels.carry`.
 
-    Along the component's own axis they hold what the side's faces do. Along the others the mean of
-    the first ghost and its neighbour is what the side prescribes, and the second mirrors the
-    next neighbour likewise; beyond closed sides the field is mirrored, beyond open ones it goes on.
-    Corners are left alone.
+    Along the component's own axis ghosts hold what the side's faces do. Along the others the mean
+    of the first ghost and its neighbour is what the side prescribes, and the second mirrors the
+    next neighbour likewise.
     """
-    inner = tuple(slice(GHOSTS, -GHOSTS) if a in grid.axes else slice(None) for a in range(3))
+    table, walls, shape, first = [], [], grid.face_shape(component), 0
     for place, side in boundaries.around(grid):
-        wall = None
-        if component != place.axis:
-            wall = side.prescribed_velocity(place, component, time)
-        fill(padded, side, component, Layers(place, GHOSTS, inner), wall)
+        own, layer = place.axis == component, list(shape)
+        layer[place.axis] = 1
+        size = int(np.prod(layer))
+        wall = None if side.joined else side.prescribed_velocity(place, component, times[0])
+        beyond = HELD if own or side.free else MIRRORED
+        if side.joined:
+            beyond = JOINED
+        elif wall is not None and not own:
+            beyond = PRESCRIBED
+        prescribed = np.zeros((len(times), size))
+        if beyond == PRESCRIBED or (own and side.supplies):
+            for n, time in enumerate(times):
+                given = side.prescribed_velocity(place, component, time)
+                prescribed[n] = np.broadcast_to(np.asarray(given), layer).reshape(-1)
+        axis = place.axis + grid.is_slab
+        table.append((axis, place.upper, beyond, side.free, side.supplies, first))
+        walls.append(prescribed)
+        first += size
+    wide = np.concatenate(walls, axis=1)
+    return Sides(np.array(table, np.int64), wide, np.zeros(first), np.zeros(first))

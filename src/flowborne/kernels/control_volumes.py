@@ -6,10 +6,13 @@ in it.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.jit import inlined, kernel
 
 TURNS = 2
 """Times that small control volumes are mixed: one beside another goes with what is behind that.
@@ -18,6 +21,35 @@ less than 2.5 times."""
 
 NONE = 1e-9
 """Open part of a face up to which it counts as closed."""
+
+DRIVEN, PART, SHUT, UNEVEN = 1, 2, 4, 8
+"""Kinds of faces: pressure acts on it; its control volume is not whole; pressure does not act on
+it, and it has one; its control volume is not what its opening says."""
+
+
+class Closed(NamedTuple):
+    """Faces of one component that pressure does not push; what they hold goes to their targets.
+
+    faces    (n,) flat
+    targets  (n, 2) flat; one without a target is its own
+    shares   (n, 2) of each target
+    """
+
+    faces: Integers
+    targets: Integers
+    shares: Array
+
+
+class Transfers(NamedTuple):
+    """Volumes that control volumes of one component give to others.
+
+    givers, takers  (n,) flat
+    volume          (n,) m^3; what is below 0 goes the other way
+    """
+
+    givers: Integers
+    takers: Integers
+    volume: Array
 
 
 @njit(nogil=True, cache=True)
@@ -48,7 +80,7 @@ def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
 @njit(nogil=True, cache=True)
 def find_targets(
     small: Integers,
-    driven: Marks,
+    kinds: Marks,
     opened: Array,
     volumes: Array,
     cells: Array,
@@ -64,7 +96,7 @@ def find_targets(
     else with the targets of a neighbour, which may have them from another.
 
     small    (n,) closed faces with a volume
-    driven   1 where pressure acts on a face
+    kinds    of the faces, see `sort_faces`
     opened   open part of each face
     volumes  of each control volume
     cells    volume of each cell
@@ -72,7 +104,7 @@ def find_targets(
     targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
     shape, cell_shape = np.array(opened.shape), np.array(cells.shape)
     volume_flat = volumes.reshape(-1)
-    open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), driven.reshape(-1)
+    open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
         f = small[n]
         targets[n, :] = f
@@ -94,7 +126,7 @@ def find_targets(
                 continue
             to = neighbour(shape, wraps, f, 2 * component + side)
             volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
-            if to >= 0 and pushed[to] and volume > 0.0:
+            if to >= 0 and pushed[to] & DRIVEN and volume > 0.0:
                 targets[n, side], parts[n, side] = to, open_flat[to] * volume
         total = parts[n, 0] + parts[n, 1]
         if total > 0.0:
@@ -103,7 +135,7 @@ def find_targets(
         most = 0.0
         for way in range(6):
             to = neighbour(shape, wraps, f, way)
-            if to >= 0 and pushed[to] and volume_flat[to] > most:
+            if to >= 0 and pushed[to] & DRIVEN and volume_flat[to] > most:
                 targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
     led = True
     while led:
@@ -198,6 +230,7 @@ def level(
     leaving: Array,
     least: float,
     most: float,
+    nought: Array,
     nothing: float,
     shape: Integers,
     wraps: Integers,
@@ -210,9 +243,10 @@ def level(
     times on, linear between. All exchange what they have at first.
 
     leaving  (n,) volume that leaves each in the substep
+    nought   as large as the field, 0 before and after
     """
-    flat, volume = field.reshape(-1), volumes.reshape(-1)
-    found, others, count = np.empty((2, listed.size), np.int64), {0: 0.0}, 0
+    flat, volume, others = field.reshape(-1), volumes.reshape(-1), nought.reshape(-1)
+    found, count = np.empty((2, listed.size), np.int64), 0
     for n in range(listed.size):
         f = listed[n]
         own = volume[f]
@@ -225,7 +259,7 @@ def level(
                 best, largest = to, volume[to]
         if best >= 0:
             found[0, count], found[1, count] = n, best
-            others[best] = others.get(best, 0.0) + own
+            others[best] += own
             count += 1
     exchange = np.empty(count)
     for _ in range(TURNS):
@@ -238,6 +272,8 @@ def level(
             f, best = listed[found[0, m]], found[1, m]
             flat[f] += exchange[m] / volume[f]
             flat[best] -= exchange[m] / volume[best]
+    for m in range(count):
+        others[found[1, m]] = 0.0
 
 
 @njit(nogil=True, cache=True)
@@ -271,71 +307,111 @@ def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -
                         marks[to[0], to[1], to[2]] = 0
 
 
-@njit(nogil=True, cache=True)
-def find_parts(
-    before: Array, after: Array, whole: float, component: int, wraps: Integers
-) -> Integers:
-    """Flat indices of the control volumes that are less than whole at one of two times.
+@inlined
+def kind_of(
+    volume: float, opened: float, least: float, goal: float, slack: float, nothing: float, own: bool
+) -> int:
+    """What a face is: DRIVEN, PART, SHUT and UNEVEN, added up.
 
-    The first and last ones along a component's own axis are half as large, and the last is the
-    first one where that is periodic.
+    least  volume below which it is cut
+    goal   what it would move if it were open
+    own    whether its velocity is not prescribed, and it is not another one
     """
-    n0, n1, n2 = before.shape
-    found, count = np.empty(before.size, np.int64), 0
-    last = before.shape[component] - 1
-    ends = 0.0 if wraps[component] > 0 else 0.5 * whole
-    for i in range(n0):
-        for j in range(n1):
-            one, two, low = before[i, j], after[i, j], 0
-            at = i if component == 0 else j
-            least = ends if component < 2 and (at == 0 or at == last) else whole
-            if wraps[component] > 0 and component < 2 and at == 0:
-                least = whole
-            for k in range(n2):
-                low += int(one[k] < least) | int(two[k] < least)
-            if low == 0:
-                continue
-            for k in range(n2):
-                bound = least
-                if component == 2 and (k == last or (k == 0 and wraps[2] == 0)):
-                    bound = ends
-                if one[k] < bound or two[k] < bound:
-                    found[count] = (i * n1 + j) * n2 + k
-                    count += 1
-    return found[:count].copy()
+    pushed = own and opened > NONE and volume > nothing
+    shut = own and not pushed and volume != 0.0
+    uneven = pushed and abs(volume - goal * opened) > slack
+    return DRIVEN * pushed + PART * (volume < least) + SHUT * shut + UNEVEN * uneven
 
 
-@njit(nogil=True, cache=True)
-def find_closed(
-    driven: Marks,
+@kernel
+def sort_faces(
+    volumes: Array,
+    kinds: Marks,
+    counts: Integers,
+    cells: Array,
     opened: Array,
-    volume: Array,
     component: int,
     prescribed: Marks,
     periodic: bool,
-    nothing: float,
-) -> Integers:
-    """Flat indices of the faces of a component with a volume that pressure does not push: where
-    the face or its volume is not above `nothing`.
+    limits: tuple[float, float, float, float],
+) -> None:
+    """Control volumes of the faces of a component, V_f = (V_L + V_R) / 2, and their kinds.
 
-    driven      1 where pressure acts on the face; given
-    opened      open part of each face
-    prescribed  (2,) 1 where the velocity of the first or last layer is prescribed: none of either
-    periodic    whether the last layer is the first one, and counts once
+    The first and last ones along its own axis are half as large, and the last is the first one
+    where that is periodic: it counts as none.
+
+    kinds       see `kind_of`
+    counts      (n0 n1, 3) in each row how many are PART, SHUT and UNEVEN
+    prescribed  (2,) 1 where the velocity of the first or last layer is prescribed
+    limits      volume of a cell; part of it below which control volumes are cut; `slack` and
+                `nothing`, see `kind_of`
     """
     n0, n1, n2 = opened.shape
-    own, count = np.empty(opened.size, np.int64), 0
-    last = opened.shape[component] - 1
-    for i in range(n0):
-        for j in range(n1):
-            one, room, mark = opened[i, j], volume[i, j], driven[i, j]
+    last, (cell, bound, slack, nothing) = opened.shape[component] - 1, limits
+    for row in prange(n0 * n1):
+        i, j = np.int64(row) // n1, np.int64(row) % n1
+        at = i if component == 0 else j
+        volume, kind, part = volumes[i, j], kinds[i, j], opened[i, j]
+        if component == 2:
+            line = cells[i, j]
+            low, high = (line[last - 1], line[0]) if periodic else (0.0, 0.0)
+            volume[0] = 0.5 * (low + line[0])
+            for k in range(1, last):
+                volume[k] = 0.5 * (line[k - 1] + line[k])
+            volume[last] = 0.5 * (line[last - 1] + high)
+        else:
+            below, above = (at - 1) % last, at % last
+            one, other = (
+                (cells[below, j], cells[above, j])
+                if component == 0
+                else (cells[i, below], cells[i, above])
+            )
+            first = 0.5 if periodic or at > 0 else 0.0
+            second = 0.5 if periodic or at < last else 0.0
             for k in range(n2):
-                at = i if component == 0 else (j if component == 1 else k)
-                told = (at == 0 and prescribed[0]) or (at == last and prescribed[1])
-                double = at == last and periodic
-                pushed = one[k] > NONE and room[k] > nothing
-                mark[k] = pushed and not told and not double
-                if not pushed and room[k] != 0.0 and not told and not double:
-                    own[count] = (i * n1 + j) * n2 + k
-                    count += 1
-    return own[:count].copy()
+                volume[k] = first * one[k] + second * other[k]
+        for end in range(3):  # the middle of the row first, then both of its ends
+            start, stop = 0, n2
+            if end > 0:
+                if component != 2:
+                    break
+                start = at = 0 if end == 1 else last
+                stop = start + 1
+            elif component == 2:
+                at = 1
+            outer = at == 0 or at == last
+            double = periodic and at == last
+            own = not double and not (at == 0 and prescribed[0])
+            own = own and not (at == last and prescribed[1])
+            least = bound * (0.0 if double else (0.5 if outer and not periodic else 1.0))
+            goal = cell * (0.5 if outer and not periodic else 1.0)
+            for k in range(start, stop):
+                kind[k] = kind_of(volume[k], part[k], least * cell, goal, slack, nothing, own)
+        parts, shut, uneven = 0, 0, 0
+        for k in range(n2):
+            parts += (kind[k] & PART) // PART
+            shut += (kind[k] & SHUT) // SHUT
+            uneven += (kind[k] & UNEVEN) // UNEVEN
+        counts[row, 0], counts[row, 1], counts[row, 2] = parts, shut, uneven
+
+
+@njit(nogil=True, cache=True)
+def listed_kinds(kinds: Marks, counts: Integers) -> tuple[Integers, Integers, Integers]:
+    """Flat indices of the faces that are PART, SHUT and UNEVEN, see `sort_faces`."""
+    flat, width, total = kinds.reshape(-1), kinds.shape[2], counts.sum(axis=0)
+    parts, shut = np.empty(total[0], np.int64), np.empty(total[1], np.int64)
+    uneven, a, b, c = np.empty(total[2], np.int64), 0, 0, 0
+    for row in range(counts.shape[0]):
+        if counts[row, 0] + counts[row, 1] + counts[row, 2] == 0:
+            continue
+        for f in range(row * width, (row + 1) * width):
+            if flat[f] & PART:
+                parts[a] = f
+                a += 1
+            if flat[f] & SHUT:
+                shut[b] = f
+                b += 1
+            if flat[f] & UNEVEN:
+                uneven[c] = f
+                c += 1
+    return parts, shut, uneven

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Marks
-from flowborne.kernels.control_volumes import neighbour
+from flowborne.kernels.control_volumes import DRIVEN, Transfers, neighbour
 
 KEPT = 0.5
 """Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""
@@ -59,11 +59,12 @@ def face_between(
 @njit(nogil=True, cache=True)
 def openings(
     listed: Integers,
-    driven: Marks,
+    kinds: Marks,
     component: int,
     axis: int,
     own: Array,
     cells: Array,
+    cell: float,
     across: Array,
     shape: Integers,
     wraps: Integers,
@@ -74,9 +75,10 @@ def openings(
     w is the open part of the cell between both along the component's own axis, elsewhere the mean
     of the two faces between them times the smaller one of their own.
 
-    driven  1 where pressure acts on the face
+    kinds   of the faces
     own     open part of each face of the component
-    cells   open part of each cell
+    cells   open volume of each cell
+    cell    volume of a whole one
     across  open part of the faces across the axis
     """
     above, way, rest = np.full(listed.size, -1), np.zeros(listed.size), np.zeros(listed.size)
@@ -93,7 +95,8 @@ def openings(
             if there and side == 0:
                 continue
             if axis == component:
-                opening = room[cell_beside(f, side, shape, wraps, component)]
+                part = room[cell_beside(f, side, shape, wraps, component)] / cell
+                opening = min(max(part, 0.0), 1.0)
             else:
                 total, count = 0.0, 0
                 for low in range(2):
@@ -104,7 +107,7 @@ def openings(
                 opening = total / count * min(faces[f], faces[to])
             if there:
                 above[n], way[n] = at, opening
-            elif driven.reshape(-1)[to]:
+            elif kinds.reshape(-1)[to] & DRIVEN:
                 rest[n] += opening * faces[to]
     return above, way, rest
 
@@ -156,46 +159,52 @@ def even_out(
 
 
 @njit(nogil=True, cache=True)
-def add_transfers(
-    net: Array, field: Array, givers: Integers, takers: Integers, rate: Array
+def give(
+    later: Array, net: Array, volume: Array, f: int, more: float, dt: float, nothing: float
 ) -> None:
-    """Add what transfers take from the amounts of control volumes per time, in place: volume x mean
-    velocity of both, which changes no energy."""
-    leaving, values = net.reshape(-1), field.reshape(-1)
-    for n in range(givers.size):
-        f, g = givers[n], takers[n]
-        passed = rate[n] * 0.5 * (values[f] + values[g])
-        leaving[f] += passed
-        leaving[g] -= passed
+    """Let more of its amount per time leave one control volume, in place; all flat.
 
-
-@njit(nogil=True, cache=True)
-def find_cut(volume: Array, goal: Array, slack: float, driven: Marks) -> Integers:
-    """Flat indices of the faces whose volume is not what their opening says.
-
-    goal    a h^3
-    driven  1 where pressure acts on the face
+    later   value after a stage of dt, what is left of the amount where `volume` is not above
+            `nothing`
+    net     amount that leaves per time
+    volume  after the stage
     """
-    v, g, d = volume.reshape(-1), goal.reshape(-1), driven.reshape(-1)
-    found, count = np.empty(v.size, np.int64), 0
-    for f in range(v.size):
-        if d[f] and abs(v[f] - g[f]) > slack:
-            found[count] = f
-            count += 1
-    return found[:count].copy()
+    net[f] += more
+    later[f] -= dt * more / (volume[f] if volume[f] > nothing else 1.0)
 
 
 @njit(nogil=True, cache=True)
-def with_neighbours(cut: Integers, driven: Marks, shape: Integers, wraps: Integers) -> Integers:
+def add_transfers(
+    later: Array,
+    net: Array,
+    volume: Array,
+    field: Array,
+    given: Transfers,
+    dt: float,
+    nothing: float,
+) -> None:
+    """Let what transfers take leave control volumes and come to others, in place: volume per time
+    x mean velocity of both, which changes no energy. See `give`."""
+    after, leaving, held = later.reshape(-1), net.reshape(-1), volume.reshape(-1)
+    values = field.reshape(-1)
+    for n in range(given.givers.size):
+        f, g = given.givers[n], given.takers[n]
+        passed = given.volume[n] * 0.5 * (values[f] + values[g])
+        give(after, leaving, held, f, passed, dt, nothing)
+        give(after, leaving, held, g, -passed, dt, nothing)
+
+
+@njit(nogil=True, cache=True)
+def with_neighbours(cut: Integers, kinds: Marks, shape: Integers, wraps: Integers) -> Integers:
     """The listed ones and those beside them on which pressure acts, in ascending order."""
-    marked = driven.reshape(-1)
+    marked = kinds.reshape(-1)
     found, count = np.empty(7 * cut.size, np.int64), 0
     for f in cut:
         found[count] = f
         count += 1
         for way in range(6):
             to = neighbour(shape, wraps, f, way)
-            if to >= 0 and marked[to]:
+            if to >= 0 and marked[to] & DRIVEN:
                 found[count] = to
                 count += 1
     return np.unique(found[:count])

@@ -20,6 +20,38 @@ SETTLED = 1e-15
 
 
 @njit(nogil=True, cache=True)
+def choose(
+    index: Integers, beside: Integers, rate: Array, low: Array, high: Array, dt: float
+) -> tuple[Integers, Integers, Array, Integers]:
+    """Those of listed control volumes that more leaves in a substep than they hold at either end of
+    it, with their rows of `beside` and `rate`, and the places of those beside them among them.
+
+    low, high  volumes at both ends of the substep of dt
+    """
+    one, other = low.reshape(-1), high.reshape(-1)
+    found = np.empty(index.size, np.int64)
+    count = 0
+    for n in range(index.size):
+        gone = 0.0
+        for way in range(6):
+            gone += max(rate[n, way], 0.0)
+        if dt * gone > max(one[index[n]], other[index[n]]):
+            found[count] = n
+            count += 1
+    own, to = np.empty(count, np.int64), np.empty((count, 6), np.int64)
+    through, row = np.empty((count, 6)), np.full((count, 6), -1)
+    for n in range(count):
+        own[n] = index[found[n]]
+        to[n], through[n] = beside[found[n]], rate[found[n]]
+    for n in range(count):
+        for way in range(6):
+            at = np.searchsorted(own, to[n, way])
+            if at < count and own[at] == to[n, way]:
+                row[n, way] = at
+    return own, to, through, row
+
+
+@njit(nogil=True, cache=True)
 def what_leaves(
     field: Array,
     later: Array,

@@ -167,17 +167,15 @@ def mark_cut_reference(marks: Marks, listed: Integers, shape: Integers, wraps: I
     return out
 
 
-def find_parts_reference(
-    before: Array, after: Array, whole: float, component: int, wraps: Integers
-) -> Integers:
+def find_parts_reference(volume: Array, whole: float, component: int, wraps: Integers) -> Integers:
     """`find_parts` in NumPy."""
-    least = np.full(before.shape, whole)
+    least = np.full(volume.shape, whole)
     ends = np.moveaxis(least, component, 0)
     if wraps[component] > 0:
         ends[-1] = 0.0
     else:
         ends[0], ends[-1] = 0.5 * whole, 0.5 * whole
-    return np.flatnonzero(np.minimum(before, after) < least)
+    return np.flatnonzero(volume < least)
 
 
 def find_closed_reference(

@@ -10,10 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from flowborne.fluid.grid import Array
-from flowborne.fluid.sides.side import Boundary, Field, Layers, Place, hold
+from flowborne.fluid.sides.side import Boundary, Place
 
 
 @dataclass(frozen=True)
@@ -25,9 +22,3 @@ class BoundaryOpen(Boundary):
 
     def prescribed_velocity(self, place: Place, component: int, time: float) -> None:
         return None
-
-    def fill(self, field: Field, layers: Layers, wall: Array | float | None) -> None:
-        hold(field, layers)
-
-    def entering(self, beside: Array, share: Array) -> float:
-        return float(np.vdot(share, beside))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flowborne.fluid.grid import Array
-from flowborne.fluid.sides.side import Boundary, Field, Layers, Place
+from flowborne.fluid.sides.side import Boundary, Place
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,3 @@ class BoundaryPeriodic(Boundary):
     def impose(self, field: Array, place: Place, time: float) -> None:
         if place.upper:
             field[place.layer] = field[Place(place.grid, place.axis, upper=False).layer]
-
-    def fill(self, field: Field, layers: Layers, wall: Array | float | None) -> None:
-        for n in range(layers.depth):
-            field[layers.outside(n)] = field[layers.across(n)]

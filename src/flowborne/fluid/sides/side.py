@@ -103,7 +103,8 @@ class Boundary:
     `Layers`.
 
     kind      its name in scenes and messages
-    free      whether the pressure determines the flux through it; otherwise the side prescribes it
+    free      whether the pressure determines the flux through it; otherwise the side prescribes it.
+              What enters through a free side has the mean velocity of the fluid along all of it
     supplies  whether it prescribes a velocity at which fluid enters
     joined    whether the fluid continues at the opposite side
     """
@@ -136,10 +137,14 @@ class Boundary:
     def fill(self, field: Field, layers: Layers, wall: Array | float | None) -> None:
         """Set the ghosts of a field beyond the side, in place.
 
-        wall  value at the side, half-way between field and ghosts; None mirrors the field
+        wall  value at the side, half-way between field and ghosts; None mirrors the field, and
+              holds its values beyond a free side
         """
         for n in range(layers.depth):
-            inner = field[layers.inside(n)]
+            if self.joined:
+                field[layers.outside(n)] = field[layers.across(n)]
+                continue
+            inner = field[layers.inside(0 if self.free and wall is None else n)]
             field[layers.outside(n)] = inner if wall is None else 2.0 * wall - inner
 
     def pressure_weight(self, place: Place) -> Array | float:
@@ -149,14 +154,6 @@ class Boundary:
         the cell. Broadcasts over the layer at the side.
         """
         return 1.0 if self.free or self.joined else 0.0
-
-    def entering(self, beside: Array, share: Array) -> Array | float | None:
-        """Velocity of fluid that enters, m/s; None where it is the mean of field and ghosts.
-
-        beside  velocity of the control volumes at the side, m/s
-        share   of each in the volume of all of them
-        """
-        return None
 
     def entering_scalar(self, name: str, place: Place, time: float) -> Array | None:
         """Values of a scalar in fluid that enters; None for those in the cells at the side."""

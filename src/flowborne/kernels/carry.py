@@ -1,0 +1,520 @@
+"""One component of the velocity through a step on moving control volumes: all its substeps.
+
+A slab is a room one layer thick along its first axis, as in `flux`. Indices of control volumes are
+flat; lists of them are in ascending order.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, prange
+
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.control_volumes import (
+    Closed,
+    Transfers,
+    fill_empty,
+    join_small,
+    level,
+    mark_cut,
+    share_velocity,
+)
+from flowborne.kernels.face_masses import add_transfers, give
+from flowborne.kernels.fleeting import choose, let_through, what_leaves
+from flowborne.kernels.flux import CLEAR, CUT, GHOSTS, UPSTREAM, pad_field, stage
+from flowborne.kernels.jit import kernel
+
+MIRRORED, HELD, PRESCRIBED, JOINED = range(4)
+"""Ghosts beyond a side: those inside mirrored, the layer at the side held, such that the mean of
+both is what the side prescribes, or what is inside the opposite side."""
+
+AXIS, UPPER, BEYOND, FREE, SUPPLIES, FIRST = range(6)
+"""Columns of the table of sides: where the side lies, what is beyond it, whether it is free and
+whether it supplies fluid (see `fluid.sides.side`), and where its layer begins in packed layers."""
+
+
+class Sides(NamedTuple):
+    """The sides of the domain to one component.
+
+    table  (n, 6) integers, one row for each side
+    wall   (times, k) packed layers of what they prescribe when each stage begins and ends
+    rate   (k,) volume per time that comes in
+    share  (k,) of each control volume in the volume of its layer
+    """
+
+    table: Integers
+    wall: Array
+    rate: Array
+    share: Array
+
+
+class Volumes(NamedTuple):
+    """Control volumes of one component in a step.
+
+    before, after    volumes that move with them at both ends
+    cut              (n,) those that are cut at one of them
+    leaving          (n,) volume per time that leaves each
+    was_shut, shut   closed ones at both ends
+    given            what transfers give, volume per time
+    component        axis of the kernel
+    shape, wraps     (3,) see `control_volumes.neighbour`
+    nothing          volume up to which one holds nothing
+    """
+
+    before: Array
+    after: Array
+    cut: Integers
+    leaving: Array
+    was_shut: Closed
+    shut: Closed
+    given: Transfers
+    component: int
+    shape: Integers
+    wraps: Integers
+    nothing: float
+
+
+class Fluxes(NamedTuple):
+    """Volume per time through the faces of the cells across each axis, and which of them those
+    through the sides of control volumes are means of, see `flux.stage`."""
+
+    through: Faces
+    place: Integers
+    share: Array
+
+
+class Inflows(NamedTuple):
+    """What inlets bring: volume x velocity per time, and volume per time that leaves with the
+    fluid's own; in flat control volumes, each once."""
+
+    faces: Integers
+    brought: Array
+    loss: Array
+
+
+class Fleeting(NamedTuple):
+    """Control volumes that may let through more in a substep than they hold.
+
+    faces   (n,) flat, in ascending order
+    beside  (n, 6) control volume beyond each side; -1 at a side of the domain, and before an open
+            one, where what is upstream is carried
+    rate    (n, 6) volume per time that leaves through each side
+    """
+
+    faces: Integers
+    beside: Integers
+    rate: Array
+
+
+class Scratch(NamedTuple):
+    """Arrays that a step is done in, without meaning before and after it: like the padded velocity
+    and like the velocity; `nought` is 0 before and after."""
+
+    padded: Array
+    marks: Marks
+    net: Array
+    start: Array
+    middle: Array
+    early: Array
+    late: Array
+    nought: Array
+
+
+@njit(nogil=True, cache=True)
+def layer(row: Integers, field: Array, shape: Integers) -> tuple[int, int, int, int, int, int, int]:
+    """Where the layer of a padded field inside a side lies: its first element, the steps outwards
+    and along the other two axes, the numbers along them, and along its own."""
+    strides, axis, first = np.empty(3, np.int64), row[AXIS], 0
+    strides[0], strides[1], strides[2] = field.shape[1] * field.shape[2], field.shape[2], 1
+    for a in range(3):
+        first += strides[a] * ((field.shape[a] - shape[a]) // 2)
+    one, other = int(axis == 0), 2 - int(axis == 2)
+    outward = -strides[axis]
+    if row[UPPER]:
+        first += strides[axis] * (shape[axis] - 1)
+        outward = strides[axis]
+    return first, outward, strides[one], strides[other], shape[one], shape[other], shape[axis]
+
+
+@njit(nogil=True, cache=True)
+def fill_ghosts(field: Array, sides: Sides, time: int, shape: Integers, component: int) -> None:
+    """Set the two layers of ghosts around a padded field such that they carry the conditions at the
+    sides, in place; corners are left alone.
+
+    time  row of what the sides prescribe
+    """
+    flat = field.reshape(-1)
+    for s in range(sides.table.shape[0]):
+        row = sides.table[s]
+        beyond, first = row[BEYOND], row[FIRST]
+        start, out, one, other, n, m, length = layer(row, field, shape)
+        period = (length - int(row[AXIS] == component)) * out
+        for a in range(n):
+            for b in range(m):
+                at = start + a * one + b * other
+                if beyond == HELD:
+                    flat[at + out] = flat[at + 2 * out] = flat[at]
+                elif beyond == MIRRORED:
+                    flat[at + out], flat[at + 2 * out] = flat[at], flat[at - out]
+                elif beyond == PRESCRIBED:
+                    twice = 2.0 * sides.wall[time, first + a * m + b]
+                    flat[at + out] = twice - flat[at]
+                    flat[at + 2 * out] = twice - flat[at - out]
+                else:
+                    flat[at + out] = flat[at + out - period]
+                    flat[at + 2 * out] = flat[at + 2 * out - period]
+
+
+@njit(nogil=True, cache=True)
+def mark_volumes(
+    marks: Marks, cut: Integers, sides: Sides, shape: Integers, wraps: Integers, component: int
+) -> None:
+    """Padded marks of the control volumes: CLEAR where no cut one is among the next GHOSTS along an
+    axis, UPSTREAM on a free side of the domain, where means would draw in ever more, else CUT."""
+    flat = marks.reshape(-1)
+    flat[:] = CLEAR
+    mark_cut(marks, cut, shape, wraps)
+    for s in range(sides.table.shape[0]):
+        row = sides.table[s]
+        start, out, one, other, n, m, length = layer(row, marks, shape)
+        own = row[AXIS] == component
+        period = (length - int(own)) * out
+        for a in range(n):
+            for b in range(m):
+                at_side = start + a * one + b * other
+                if row[BEYOND] == JOINED:
+                    if own and not row[UPPER]:  # the last faces are the first ones
+                        flat[at_side - period] = flat[at_side]
+                    flat[at_side + out] = flat[at_side + out - period]
+                    flat[at_side + 2 * out] = flat[at_side + 2 * out - period]
+                    continue
+                flat[at_side + out] = flat[at_side + 2 * out] = CUT
+                if own:
+                    flat[at_side] = UPSTREAM if row[FREE] else CUT
+
+
+@njit(nogil=True, cache=True)
+def across(faces: Faces, axis: int) -> Array:
+    """The field of the faces across an axis."""
+    if axis == 0:
+        return faces[0]
+    return faces[1] if axis == 1 else faces[2]
+
+
+@njit(nogil=True, cache=True)
+def side_rates(flux: Fluxes, index: Integers, component: int, shape: Integers) -> Array:
+    """(n, 6) volume per time that leaves control volumes through their sides: 2 axis for the lower
+    one, 2 axis + 1 for the upper one."""
+    rate, at, side = np.zeros((index.size, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
+    for n in range(index.size):
+        f = index[n]
+        at[0], at[1], at[2] = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
+        for axis in range(3):
+            if shape[axis] == 1:
+                continue
+            q = (
+                flux.through[0]
+                if axis == 0
+                else (flux.through[1] if axis == 1 else flux.through[2])
+            )
+            own = int(axis == component)
+            for upper in range(2):
+                side[:] = at
+                side[axis] += upper
+                line = side[component]
+                for one in range(2):
+                    side[component] = flux.place[own, line, one]
+                    through = flux.share[own, line, one] * q[side[0], side[1], side[2]]
+                    rate[n, 2 * axis + upper] += (2 * upper - 1) * through
+    return rate
+
+
+@njit(nogil=True, cache=True)
+def what_flows_out(
+    flux: Fluxes, listed: Integers, component: int, shape: Integers, inflows: Inflows,
+    given: Transfers,
+) -> Array:  # fmt: skip
+    """(n,) volume per time that leaves listed control volumes through their sides, inlets and
+    transfers."""
+    rate, total = side_rates(flux, listed, component, shape), np.zeros(listed.size)
+    for n in range(listed.size):
+        for way in range(6):
+            total[n] += max(rate[n, way], 0.0)
+    for index, out, sign in (
+        (inflows.faces, inflows.loss, 1.0),
+        (given.givers, given.volume, 1.0),
+        (given.takers, given.volume, -1.0),
+    ):
+        for m in range(index.size):
+            at = np.searchsorted(listed, index[m])
+            if at < listed.size and listed[at] == index[m]:
+                total[at] += max(sign * out[m], 0.0)
+    return total
+
+
+@njit(nogil=True, cache=True)
+def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape: Integers) -> None:
+    """Set what comes in through each side with each control volume beside it, and their shares in
+    the volume of their layer, in place. The last faces along a periodic axis count as none.
+
+    cells  volumes
+    """
+    at = np.empty(3, np.int64)
+    for s in range(sides.table.shape[0]):
+        row = sides.table[s]
+        axis, upper, first = row[AXIS], row[UPPER], row[FIRST]
+        if row[BEYOND] == JOINED:
+            continue
+        q, total = across(flux.through, axis), 0.0
+        one, other = int(axis == 0), 2 - int(axis == 2)
+        count = shape[one] * shape[other]
+        for n in range(count):
+            at[one], at[other] = n // shape[other], n % shape[other]
+            at[axis] = upper * (shape[axis] - 1)
+            line, through, held = at[component], 0.0, 0.0
+            if line == shape[component] - 1 and joined(sides.table, component):
+                continue
+            for m in range(2):
+                at[component], part = flux.place[0, line, m], flux.share[0, line, m]
+                at[axis] = min(at[axis], cells.shape[axis] - 1)
+                held += part * cells[at[0], at[1], at[2]]
+                at[axis] = upper * (q.shape[axis] - 1)
+                if axis != component:
+                    through += part * q[at[0], at[1], at[2]]
+            if axis == component:
+                through = q[at[0], at[1], at[2]]
+            sides.rate[first + n] = (1.0 - 2.0 * upper) * through
+            sides.share[first + n] = held
+            total += held
+        sides.share[first : first + count] /= max(total, 1e-300)
+
+
+@njit(nogil=True, cache=True)
+def joined(table: Integers, axis: int) -> bool:
+    """Whether an axis is periodic."""
+    found = False
+    for s in range(table.shape[0]):
+        found |= table[s, AXIS] == axis and table[s, BEYOND] == JOINED
+    return found
+
+
+@njit(nogil=True, cache=True)
+def draw_in(field: Array, marks: Marks, sides: Sides, shape: Integers) -> float:
+    """Give what comes in through free sides the mean velocity of the layer beside it, in the
+    ghosts of a padded field; gives volume x velocity that comes in through all sides per time."""
+    flat, mark, came = field.reshape(-1), marks.reshape(-1), 0.0
+    for s in range(sides.table.shape[0]):
+        row = sides.table[s]
+        first = row[FIRST]
+        if row[BEYOND] == JOINED:
+            continue
+        start, out, one, other, n, m, _ = layer(row, field, shape)
+        mean = 0.0
+        for a in range(n if row[FREE] else 0):
+            for b in range(m):
+                mean += sides.share[first + a * m + b] * flat[start + a * one + b * other]
+        for a in range(n):
+            for b in range(m):
+                at, rate = start + a * one + b * other, sides.rate[first + a * m + b]
+                upstream = mark[at] == UPSTREAM
+                if row[FREE] and rate > 0.0:
+                    flat[at + out] = mean if upstream else 2.0 * mean - flat[at]
+                near, far = flat[at], flat[at + out]
+                if upstream:
+                    came += rate * (far if rate > 0.0 else near)
+                else:
+                    came += rate * (0.5 * (near + far))
+    return came
+
+
+@njit(nogil=True, cache=True)
+def hold(
+    u: Array, volume: Array, sides: Sides, time: int, shape: Integers, component: int
+) -> float:
+    """Give the faces of inflows across the component their own velocity, in place; gives volume
+    times what that changes it by.
+
+    Their ghosts hold what they do: left alone, they would grow away from those beside them, by
+    exp(1) while the flow crosses a cell.
+    """
+    flat, volumes, given = u.reshape(-1), volume.reshape(-1), 0.0
+    for s in range(sides.table.shape[0]):
+        row = sides.table[s]
+        if not row[SUPPLIES] or row[AXIS] != component:
+            continue
+        start, _, one, other, n, m, _ = layer(row, u, shape)
+        for a in range(n):
+            for b in range(m):
+                at, wanted = start + a * one + b * other, sides.wall[time, row[FIRST] + a * m + b]
+                given += volumes[at] * (wanted - flat[at])
+                flat[at] = wanted
+    return given
+
+
+@njit(nogil=True, cache=True)
+def join(u: Array, axis: int) -> None:
+    """Make the last layer across an axis the first one, in place."""
+    if axis == 0:
+        u[-1] = u[0]
+    elif axis == 1:
+        u[:, -1] = u[:, 0]
+    else:
+        u[:, :, -1] = u[:, :, 0]
+
+
+@kernel
+def part_of_step(out: Array, start: Array, end: Array, part: float) -> None:
+    """start + part (end - start)."""
+    one, other, both = start.reshape(-1), end.reshape(-1), out.reshape(-1)
+    size = one.size // start.shape[0]
+    for i in prange(start.shape[0]):
+        for n in range(i * size, (i + 1) * size):
+            both[n] = one[n] + part * (other[n] - one[n])
+
+
+@njit(nogil=True, cache=True)
+def settle(
+    later: Array, high: Array, volumes: Volumes, span: float, least: float, most: float,
+    nought: Array,
+) -> None:  # fmt: skip
+    """Give what closed control volumes got to their targets, and mix what is too small, in place.
+
+    high         volumes after the stage
+    span         s, of the substep
+    least, most  see `level`
+    """
+    shut, targets, held = volumes.shut.faces, volumes.shut.targets, high.reshape(-1)
+    was = np.empty((shut.size, 3))
+    for n in range(shut.size):
+        was[n, 0], was[n, 1] = held[targets[n, 0]], held[targets[n, 1]]
+        was[n, 2] = held[shut[n]]
+    join_small(later, high, shut, targets, volumes.shut.shares, volumes.nothing)
+    leaving, shape, wraps = span * volumes.leaving, volumes.shape, volumes.wraps
+    level(later, high, volumes.cut, leaving, least, most, nought, volumes.nothing, shape, wraps)
+    for n in range(shut.size):
+        held[targets[n, 0]], held[targets[n, 1]] = was[n, 0], was[n, 1]
+        held[shut[n]] = was[n, 2]
+    fill_and_follow(later, high, volumes, volumes.shut)
+
+
+@njit(nogil=True, cache=True)
+def fill_and_follow(u: Array, held: Array, volumes: Volumes, shut: Closed) -> None:
+    """Give control volumes that hold nothing the velocity around them, closed ones that of their
+    targets, and the last ones of a periodic axis that of the first ones, in place."""
+    fill_empty(u, held, volumes.cut, volumes.nothing, volumes.shape, volumes.wraps)
+    share_velocity(u, shut.faces, shut.targets, shut.shares)
+    if volumes.wraps[volumes.component] > 0:
+        join(u, volumes.component)
+
+
+@njit(nogil=True, cache=True)
+def exchange(
+    later: Array, net: Array, volume: Array, padded: Array, inflows: Inflows, own: Array,
+    shape: Integers, dt: float, nothing: float,
+) -> None:  # fmt: skip
+    """Let through inlets what they bring to a padded field, in place; see `give`.
+
+    own  (n,) on return what leaves at each with the fluid's own velocity, per time
+    """
+    after, gone, held = later.reshape(-1), net.reshape(-1), volume.reshape(-1)
+    for n in range(own.size):
+        f = inflows.faces[n]
+        i, j, k = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
+        i += (padded.shape[0] - shape[0]) // 2
+        own[n] = inflows.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
+        give(after, gone, held, f, own[n] - inflows.brought[n], dt, nothing)
+
+
+@njit(nogil=True, cache=True)
+def inside(padded: Array, shape: Integers) -> Array:
+    """Copy of a field without its ghosts."""
+    d, (n0, n1, n2) = (padded.shape[0] - shape[0]) // 2, (shape[0], shape[1], shape[2])
+    return padded[d : d + n0, GHOSTS : GHOSTS + n1, GHOSTS : GHOSTS + n2].copy()
+
+
+@njit(nogil=True, cache=True)
+def values_at(field: Array, places: Integers) -> Array:
+    """(n, 6) values of a field at flat places; those at -1 have no meaning."""
+    flat, found = field.reshape(-1), np.zeros(places.shape)
+    for n in range(places.shape[0]):
+        for way in range(6):
+            found[n, way] = flat[max(places[n, way], 0)]
+    return found
+
+
+@kernel
+def carry(
+    out: Array,
+    u: Array,
+    along: Array,
+    rising: bool,
+    volumes: Volumes,
+    flux: Fluxes,
+    sides: Sides,
+    inflows: Inflows,
+    fleeting: Fleeting,
+    scratch: Scratch,
+    dt: float,
+    count: int,
+    least: float,
+    most: float,
+) -> tuple[float, float, Array]:
+    """A component a step later, in `out`; gives the volume times velocity that came in through the
+    sides, what inflows gave to what was carried to them, and (n,) what left at each inlet.
+
+    u            at the start
+    along        what else it is given, if `rising`, velocity per time
+    dt           s, of each of `count` substeps
+    least, most  times what a control volume holds that leaves it, see `level`
+    """
+    c, shape, nothing = volumes.component, volumes.shape, volumes.nothing
+    padded, marks, net, middle = scratch.padded, scratch.marks, scratch.net, scratch.middle
+    start, later = (out, scratch.start) if count % 2 == 0 else (scratch.start, out)
+    low = volumes.before
+    inlets, drained = np.zeros(inflows.faces.size), np.zeros(inflows.faces.size)
+    arriving, leaving, crossed, held = np.zeros((0, 6)), np.zeros(0), 0.0, 0.0
+    part_of_step(start, u, u, 0.0)
+    fill_and_follow(start, low, volumes, volumes.was_shut)
+    for s in range(count):
+        if s < count - 1:
+            high = scratch.late if s % 2 == 0 else scratch.early
+            part_of_step(high, volumes.before, volumes.after, (s + 1) / count)
+        else:
+            high = volumes.after
+        own, to, through, row = choose(
+            fleeting.faces, fleeting.beside, fleeting.rate, low, high, dt
+        )
+        for turn in range(2):
+            weight = 1.0 - 0.5 * turn
+            source, target = (start, middle) if turn == 0 else (middle, later)
+            if rising and s + turn > 0:
+                pad_field(padded, source, along, (s + turn) * dt)
+            else:
+                pad_field(padded, source, source, 0.0)
+            fill_ghosts(padded, sides, s + turn, shape, c)
+            came = draw_in(padded, marks, sides, shape)
+            stage(
+                target, net, weight, start, low, high, dt, nothing, padded, marks, flux.through, c,
+                flux.place, flux.share,
+            )  # fmt: skip
+            part, given = weight * dt, volumes.given
+            exchange(target, net, high, padded, inflows, inlets, shape, part, nothing)
+            add_transfers(target, net, high, source, given, part, nothing)
+            if own.size:
+                field = inside(padded, shape)
+                if turn == 0:
+                    arriving = values_at(field, to)
+                    leaving = what_leaves(field, target, high, own, to, row, dt * through, nothing)
+                let_through(
+                    target, net, field, high, own, to, row, through, arriving, leaving, part,
+                    nothing,
+                )  # fmt: skip
+            settle(target, high, volumes, dt, least, most, scratch.nought)
+            crossed += 0.5 * dt * came
+            drained += 0.5 * dt * inlets
+        if s < count - 1:
+            held += hold(later, high, sides, s + 1, shape, c)
+            start, later, low = later, start, high
+    return crossed, held, drained
