@@ -13,6 +13,7 @@ from flowborne.coupling.world import World
 from flowborne.fluid import transport
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.momentum import face_masses
+from flowborne.kernels import carry as kernels
 from flowborne.kernels.flux import GHOSTS
 
 from ..kernels.references.flux import line_flux_reference, side_fluxes_reference
@@ -72,14 +73,15 @@ def test_the_force_is_that_of_a_control_volume(
 ) -> None:
     world = channel(grid) if held else free(grid)
     stages: list[tuple[Any, ...]] = []
-    carried = transport.stage
+    carried = kernels.stage
 
     def recorded(*arguments: Any) -> None:
         padded, marks = arguments[8].copy(), arguments[9].copy()
         stages.append((padded, marks, *arguments[10:]))
         carried(*arguments)
 
-    monkeypatch.setattr(transport, "stage", recorded)
+    monkeypatch.setattr(kernels, "stage", recorded)
+    monkeypatch.setattr(transport, "carry", kernels.carry.__wrapped__)
     box, area = box_in(grid), grid.face_area
     fluid, state = world.flow()
     for _ in range(6):

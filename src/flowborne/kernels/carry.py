@@ -15,13 +15,14 @@ from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
+    across_axis,
     fill_empty,
     join_small,
     level,
     mark_cut,
     share_velocity,
 )
-from flowborne.kernels.face_masses import add_transfers, give
+from flowborne.kernels.face_masses import add_transfers, give, place_of
 from flowborne.kernels.fleeting import choose, let_through, what_leaves
 from flowborne.kernels.flux import CLEAR, CUT, GHOSTS, UPSTREAM, pad_field, stage
 from flowborne.kernels.jit import kernel
@@ -196,14 +197,6 @@ def mark_volumes(
 
 
 @njit(nogil=True, cache=True)
-def across(faces: Faces, axis: int) -> Array:
-    """The field of the faces across an axis."""
-    if axis == 0:
-        return faces[0]
-    return faces[1] if axis == 1 else faces[2]
-
-
-@njit(nogil=True, cache=True)
 def side_rates(flux: Fluxes, index: Integers, component: int, shape: Integers) -> Array:
     """(n, 6) volume per time that leaves control volumes through their sides: 2 axis for the lower
     one, 2 axis + 1 for the upper one."""
@@ -242,14 +235,15 @@ def what_flows_out(
     for n in range(listed.size):
         for way in range(6):
             total[n] += max(rate[n, way], 0.0)
-    for index, out, sign in (
+    for faces, out, sign in (
         (inflows.faces, inflows.loss, 1.0),
         (given.givers, given.volume, 1.0),
         (given.takers, given.volume, -1.0),
     ):
-        for m in range(index.size):
-            at = np.searchsorted(listed, index[m])
-            if at < listed.size and listed[at] == index[m]:
+        at = 0
+        for m in range(faces.size):
+            at = place_of(listed, faces[m], at)
+            if at < listed.size and listed[at] == faces[m]:
                 total[at] += max(sign * out[m], 0.0)
     return total
 
@@ -267,7 +261,7 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape:
         axis, upper, first = row[AXIS], row[UPPER], row[FIRST]
         if row[BEYOND] == JOINED:
             continue
-        q, total = across(flux.through, axis), 0.0
+        q, total = across_axis(flux.through, axis), 0.0
         one, other = int(axis == 0), 2 - int(axis == 2)
         count = shape[one] * shape[other]
         for n in range(count):

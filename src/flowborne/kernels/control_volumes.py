@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.jit import inlined, kernel
 
 TURNS = 2
@@ -50,6 +50,14 @@ class Transfers(NamedTuple):
     givers: Integers
     takers: Integers
     volume: Array
+
+
+@njit(nogil=True, cache=True)
+def across_axis(faces: Faces, axis: int) -> Array:
+    """The field of the faces across an axis."""
+    if axis == 0:
+        return faces[0]
+    return faces[1] if axis == 1 else faces[2]
 
 
 @njit(nogil=True, cache=True)

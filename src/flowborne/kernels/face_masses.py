@@ -9,11 +9,31 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Integers, Marks
-from flowborne.kernels.control_volumes import DRIVEN, Transfers, neighbour
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.control_volumes import (
+    DRIVEN,
+    Closed,
+    Transfers,
+    across_axis,
+    merge_small,
+    neighbour,
+)
 
 KEPT = 0.5
 """Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""
+
+
+ROUNDS = 2
+"""Times that volumes are evened out along all axes, and so as many neighbours as take part. The
+velocity on cut faces of the potential flow past a circle is off by 0.050, 0.025, 0.019 of the
+stream (rms) with 8, 16, 32 cells to its diameter; with one round by 0.046, 0.043, 0.040, with three
+by 0.061, 0.030, 0.018, and by 0.115, 0.135, 0.121 where control volumes keep what they have."""
+
+AHEAD = 16
+"""Places that a list is gone through before it is searched."""
+
+LISTED = 16
+"""Kind of a face that is in a list, beside those of `control_volumes`."""
 
 
 @njit(nogil=True, cache=True)
@@ -45,15 +65,27 @@ def face_between(
     """
     n1, n2 = shape[1], shape[2]
     axis = way // 2
-    place = np.array([f // (n1 * n2), (f // n2) % n1, f % n2])
-    place[component] += low - 1
-    count = shape[component] - 1
+    at = (f // (n1 * n2), (f // n2) % n1, f % n2)
+    place, count, up = at[component] + low - 1, shape[component] - 1, way % 2
     if wraps[component] > 0:
-        place[component] %= count
-    elif place[component] < 0 or place[component] >= count:
+        place %= count
+    elif place < 0 or place >= count:
         return -1
-    place[axis] += way % 2
-    return int((place[0] * across[1] + place[1]) * across[2] + place[2])
+    i = place if component == 0 else at[0] + up * int(axis == 0)
+    j = place if component == 1 else at[1] + up * int(axis == 1)
+    k = place if component == 2 else at[2] + up * int(axis == 2)
+    return int((i * across[1] + j) * across[2] + k)
+
+
+@njit(nogil=True, cache=True)
+def place_of(listed: Integers, f: int, near: int) -> int:
+    """Place of the first of a list in ascending order that is not below f; quick where that is a
+    little after the place `near`."""
+    if near == 0 or listed[near - 1] < f:
+        for at in range(near, min(near + AHEAD, listed.size)):
+            if listed[at] >= f:
+                return at
+    return int(np.searchsorted(listed, f))
 
 
 @njit(nogil=True, cache=True)
@@ -83,14 +115,14 @@ def openings(
     """
     above, way, rest = np.full(listed.size, -1), np.zeros(listed.size), np.zeros(listed.size)
     faces, room, sides = own.reshape(-1), cells.reshape(-1), across.reshape(-1)
-    wide = np.array(across.shape)
+    wide, near = np.array(across.shape), [0, 0]
     for n in range(listed.size):
         f = listed[n]
         for side in range(2):
             to = neighbour(shape, wraps, f, 2 * axis + side)
             if to < 0:
                 continue
-            at = np.searchsorted(listed, to)
+            at = near[side] = place_of(listed, to, near[side])
             there = at < listed.size and listed[at] == to
             if there and side == 0:
                 continue
@@ -196,15 +228,102 @@ def add_transfers(
 
 @njit(nogil=True, cache=True)
 def with_neighbours(cut: Integers, kinds: Marks, shape: Integers, wraps: Integers) -> Integers:
-    """The listed ones and those beside them on which pressure acts, in ascending order."""
-    marked = kinds.reshape(-1)
+    """The listed ones and those beside them on which pressure acts, in ascending order.
+
+    kinds  of the faces; on return LISTED too where a face is in the list
+    """
+    kind = kinds.reshape(-1)
     found, count = np.empty(7 * cut.size, np.int64), 0
     for f in cut:
-        found[count] = f
-        count += 1
+        if not kind[f] & LISTED:
+            kind[f] |= LISTED
+            found[count] = f
+            count += 1
+    for f in cut:
         for way in range(6):
             to = neighbour(shape, wraps, f, way)
-            if to >= 0 and marked[to] & DRIVEN:
+            if to >= 0 and kind[to] & DRIVEN and not kind[to] & LISTED:
+                kind[to] |= LISTED
                 found[count] = to
                 count += 1
-    return np.unique(found[:count])
+    return np.sort(found[:count])
+
+
+@njit(nogil=True, cache=True)
+def share_out(
+    volume: Array,
+    closed: Closed,
+    kinds: Marks,
+    uneven: Integers,
+    cells: Array,
+    opened: Faces,
+    component: int,
+    wraps: Integers,
+    cell: float,
+) -> Transfers:
+    """What control volumes of a component give to others, taken from `volume` and added to it, in
+    place.
+
+    kinds   of the faces, see `sort_faces`; changed
+    uneven  (n,) those that have more or less than their opening says
+    cells   volumes
+    cell    that of a whole one
+    """
+    own, shape, listed = across_axis(opened, component), np.array(volume.shape), uneven
+    for _ in range(ROUNDS):
+        for f in listed:
+            kinds.reshape(-1)[f] &= ~LISTED
+        listed = with_neighbours(listed, kinds, shape, wraps)
+    flat, size, last = volume.reshape(-1), listed.size, shape[component] - 1
+    stride = shape[1] * shape[2] if component == 0 else (shape[2] if component == 1 else 1)
+    part, held = own.reshape(-1)[listed], flat[listed]
+    aim = cell * part
+    for n in range(size):
+        at = (listed[n] // stride) % (last + 1)
+        if wraps[component] == 0 and (at == 0 or at == last):
+            aim[n] *= 0.5
+    above, way = np.empty((3, size), np.int64), np.empty((3, size))
+    rest, given, count = np.empty((3, size)), np.zeros((3, size)), 0
+    for m in range(3):
+        axis = component if m == 0 else m - int(m <= component)
+        if shape[axis] > 1:
+            above[count], way[count], rest[count] = openings(
+                listed, kinds, component, axis, own, cells, cell, across_axis(opened, axis), shape,
+                wraps,
+            )  # fmt: skip
+            count += 1
+    shut, lent = closed.faces, np.zeros(closed.shares.shape)
+    for turn in range(ROUNDS):
+        for group in range(2):  # along its own axis, then all others together
+            ways = range(0, 1) if group == 0 else range(1, count)
+            gained = np.zeros(size)
+            for m in ways:
+                after = held.copy()
+                given[m] += even_out(after, aim, part, above[m], way[m], rest[m]) / len(ways)
+                gained += (after - held) / len(ways)
+            held = held + gained
+            if turn == group == 0:  # what closes in a step comes in as it closes
+                flat[listed] = held
+                for n in range(shut.size):
+                    lent[n] = closed.shares[n] * flat[shut[n]]
+                merge_small(volume, shut, closed.targets, closed.shares)
+                held = flat[listed]
+    for n in range(shut.size):
+        if closed.shares[n].any():
+            flat[shut[n]] = 0.0
+    flat[listed] = held
+    total = count * size + 2 * shut.size
+    givers, takers, amounts = np.empty(total, np.int64), np.empty(total, np.int64), np.empty(total)
+    at = 0
+    for m in range(count):
+        for n in range(size):
+            if given[m, n] != 0.0:
+                givers[at], takers[at] = listed[n], listed[above[m, n]]
+                amounts[at] = given[m, n]
+                at += 1
+    for m in range(2):
+        for n in range(shut.size):
+            if lent[n, m] != 0.0:
+                givers[at], takers[at], amounts[at] = shut[n], closed.targets[n, m], lent[n, m]
+                at += 1
+    return Transfers(givers[:at].copy(), takers[:at].copy(), amounts[:at].copy())
