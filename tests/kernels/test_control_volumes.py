@@ -237,7 +237,7 @@ def test_mark_cut(shape: tuple, periodic: tuple, component: int) -> None:
     listed = case.listed(0.002)
     assert listed.size > 0
     expected = mark_cut_reference(marks, listed, case.shape, case.wraps)
-    mark_cut(marks, listed, case.shape, case.wraps)
+    mark_cut(marks, listed, case.shape, case.wraps, 2)
     np.testing.assert_array_equal(marks, expected)
 
 

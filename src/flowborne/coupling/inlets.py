@@ -14,8 +14,17 @@ from flowborne.fluid.transport import NO_INLETS, Inlets
 from flowborne.kernels.arrays import Integers
 
 
+def cells_with_inlets(jets: tuple[Jet, ...], sources: Array) -> Integers:
+    """Flat cells into which mouths and sources bring something, ascending."""
+    cells = np.flatnonzero(sources)
+    for jet in jets:
+        cells = np.union1d(cells, jet.cells)
+    return cells
+
+
 def inlets_across(
     axis: int,
+    cells: Integers,
     jets: tuple[Jet, ...],
     sources: Array,
     grid: Grid,
@@ -24,10 +33,9 @@ def inlets_across(
     """What mouths and sources bring to the control volumes of the faces across `axis`.
 
     A mouth that drinks, and a source, take or bring fluid as fast as that around.
+
+    cells  see `cells_with_inlets`
     """
-    cells = np.flatnonzero(sources)
-    for jet in jets:
-        cells = np.union1d(cells, jet.cells)
     if cells.size == 0:
         return NO_INLETS
     gain, weighted, local = np.zeros(cells.size), np.zeros(cells.size), -sources.reshape(-1)[cells]

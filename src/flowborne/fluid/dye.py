@@ -23,6 +23,7 @@ from flowborne.fluid.grid import Array, Grid, faces_of, inner_product
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport
 from flowborne.kernels.arrays import Integers, Marks
+from flowborne.kernels.control_volumes import mark_cut
 from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, pass_on, sort_cells
 from flowborne.kernels.dye import sweep
 
@@ -111,15 +112,17 @@ class Passage:
         flowing = transport.dt * float(fullest.max())
         self.count = int(min(max(1.0, np.ceil(flowing - SLACK)), SUBSTEPS))
         self.dt = transport.dt / self.count
-        self.clear = far_from_cut(kind == WHOLE, grid, sides)
-        self.flux, self.listed = transport.flux, np.flatnonzero(kind == CUT)
+        others = np.flatnonzero(kind != WHOLE)
+        shape, wraps = np.array(grid.shape), np.array(grid.shape) * np.array(sides.periodic())
+        self.clear: Marks = np.ones(grid.shape, np.uint8)
+        mark_cut(self.clear, others, shape, wraps, REACH)
+        self.flux, self.listed = transport.flux, others[kind.reshape(-1)[others] == CUT]
+        self.given: dict[tuple[str, int, int], Array | None] = {}
         n = self.listed.size
         self.beside, self.row = np.full((n, 6), -1), np.full((n, 6), -1)
         self.out = np.zeros((n, 6))
         if n:
             self.flux = faces_of([q.copy() for q in transport.flux])
-            shape = np.array(grid.shape)
-            wraps = shape * np.array(sides.periodic())
             tables = self.beside, self.row, self.out
             for axis in grid.axes:
                 list_flows(self.listed, axis, self.flux[axis], wraps, shape, *tables)
@@ -133,7 +136,7 @@ class Passage:
         start, end = self.transport.before.cells, self.transport.after.cells
         field, gained = values.copy(), 0.0
         for s in range(self.count):
-            volume = start + (s / self.count) * (end - start)
+            volume = start + (s / self.count) * (end - start) if s > 0 else start.copy()
             if self.listed.size:
                 gained += self.pass_on(name, field, volume, bounds)
             order = self.grid.axes if (s % 2 == 0) != self.backwards else self.grid.axes[::-1]
@@ -164,8 +167,10 @@ class Passage:
         """Values that come in through a side across `axis`, in the order of `along`: what the side
         prescribes, or those beside it."""
         place, time = Place(self.grid, axis, bool(upper)), self.transport.time + self.transport.dt
-        given = self.sides.pair(axis)[upper].entering_scalar(name, place, time)
-        layer = field[place.layer]
+        if (name, axis, upper) not in self.given:
+            prescribed = self.sides.pair(axis)[upper].entering_scalar(name, place, time)
+            self.given[name, axis, upper] = prescribed
+        layer, given = field[place.layer], self.given[name, axis, upper]
         values = (layer if given is None else np.broadcast_to(given, layer.shape))[edge(axis, 0)]
         return values.T if self.grid.is_slab else values
 
@@ -188,23 +193,6 @@ class Passage:
         local = dt * self.brought.rate.reshape(-1)[self.listed] - gain
         tables = self.listed, self.beside, self.row, dt * self.out
         return pass_on(field, volume, *tables, entering, gain, dye, local, *bounds)
-
-
-def far_from_cut(whole: NDArray[np.bool_], grid: Grid, sides: Boundaries) -> Marks:
-    """(nx, ny, nz) 1 in whole cells with none but whole ones among the next REACH along an axis."""
-    clear = whole.copy()
-    if whole.all():
-        return clear.view(np.uint8)
-    for axis in grid.axes:
-        for shift in range(1, REACH + 1):
-            low, high = edge(axis, slice(None, -shift)), edge(axis, slice(shift, None))
-            clear[low] &= whole[high]
-            clear[high] &= whole[low]
-            if sides.periodic()[axis]:
-                first, last = edge(axis, slice(None, shift)), edge(axis, slice(-shift, None))
-                clear[first] &= whole[last]
-                clear[last] &= whole[first]
-    return clear.view(np.uint8)
 
 
 def along(values: NDArray[Scalar], axis: int, grid: Grid) -> NDArray[Scalar]:

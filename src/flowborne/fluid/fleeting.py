@@ -28,21 +28,16 @@ NONE_FLEETING = Fleeting(np.zeros(0, np.int64), np.zeros((0, 6), np.int64), np.z
 
 
 def find_fleeting(
-    listed: Integers,
-    held: tuple[Array, Array],
-    flux: Fluxes,
-    marks: Marks,
-    volumes: Volumes,
-    steps: float,
+    held: tuple[Array, Array], flux: Fluxes, marks: Marks, volumes: Volumes, steps: float
 ) -> Fleeting:
-    """Those of listed control volumes that may let through more in a substep than they hold.
+    """Those of cut control volumes that may let through more in a substep than they hold.
 
     held   control volumes at both ends of the step, m^3
     marks  of all of them, padded, see `kernels.carry.mark_volumes`
     steps  duration of the step over the volume of a cell, s/m^3
     """
-    one, other = (volume.reshape(-1)[listed] for volume in held)
-    index = listed[np.minimum(one, other) < CHANGED * np.maximum(one, other)]
+    one, other = (volume.reshape(-1)[volumes.cut] for volume in held)
+    index = volumes.cut[np.minimum(one, other) < CHANGED * np.maximum(one, other)]
     rate = side_rates(flux, index, volumes.component, volumes.shape)
     crossed = steps * np.maximum(rate, 0.0).sum(axis=1) > CROSSED
     return Fleeting(index[crossed], beyond_sides(index[crossed], marks, volumes), rate[crossed])

@@ -6,6 +6,7 @@ A ghost value is such that the linear interpolation to the side gives what the s
 
 from __future__ import annotations
 
+from math import prod
 from typing import TypeVar
 
 import numpy as np
@@ -120,18 +121,18 @@ def packed_sides(component: int, grid: Grid, boundaries: Boundaries, times: list
     for place, side in boundaries.around(grid):
         own, layer = place.axis == component, list(shape)
         layer[place.axis] = 1
-        size = int(np.prod(layer))
-        wall = None if side.joined else side.prescribed_velocity(place, component, times[0])
-        beyond = HELD if own or side.free else MIRRORED
-        if side.joined:
-            beyond = JOINED
-        elif wall is not None and not own:
-            beyond = PRESCRIBED
-        prescribed = np.zeros((len(times), size))
-        if beyond == PRESCRIBED or (own and side.supplies):
-            for n, time in enumerate(times):
-                given = side.prescribed_velocity(place, component, time)
-                prescribed[n] = np.broadcast_to(np.asarray(given), layer).reshape(-1)
+        size, beyond = prod(layer), JOINED if side.joined else HELD
+        prescribed, used = np.zeros((len(times), size)), range(len(times))
+        if own:  # what enters has its own velocity again after each substep but the last one
+            used = range(1, len(times) - 1) if side.supplies else range(0)
+        for n in used if not side.joined else ():
+            wall = side.prescribed_velocity(place, component, times[n])
+            if wall is None:
+                beyond = HELD if side.free else MIRRORED
+                break
+            if not own:
+                beyond = PRESCRIBED
+            prescribed[n] = np.broadcast_to(np.asarray(wall), layer).reshape(-1)
         axis = place.axis + grid.is_slab
         table.append((axis, place.upper, beyond, side.free, side.supplies, first))
         walls.append(prescribed)

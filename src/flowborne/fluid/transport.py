@@ -34,9 +34,7 @@ from flowborne.kernels.carry import (
     Scratch,
     Volumes,
     carry,
-    cross_sides,
-    mark_volumes,
-    what_flows_out,
+    prepare,
 )
 from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.flux import GHOSTS, fade, largest_crossing
@@ -181,58 +179,47 @@ def carry_component(
               nothing
     """
     count, (axis, shape, wraps) = transport.substeps(grid), kernel_axes(component, grid, sides)
-    dt = transport.dt / count
-    before, after = transport.before, transport.after
-    table = packed_sides(
-        component, grid, sides, [transport.time + n * dt for n in range(count + 1)]
-    )
-    cut = np.union1d(before.cut[component], after.cut[component])
-    if along is not None:
-        along.reshape(-1)[cut] = 0.0
-        if sides.periodic()[component]:
-            along[edge(component, -1)] = along[edge(component, 0)]
-    flux = Fluxes(
-        planes(transport.flux, grid), *neighbours(int(shape[axis]), sides.periodic()[component])
-    )
+    before, after, dt = transport.before, transport.after, transport.dt / count
+    times = [transport.time + n * dt for n in range(count + 1)]
+    table = packed_sides(component, grid, sides, times)
+    ring = sides.periodic()[component]
+    flux = Fluxes(planes(transport.flux, grid), *neighbours(int(shape[axis]), ring))
     given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
     inflows = Inflows(inlets.index, inlets.gain * inlets.velocity, inlets.loss)
-    volumes = Volumes(
-        plane(before.moving[component], grid),
-        plane(after.moving[component], grid),
-        cut,
-        what_flows_out(flux, cut, axis, shape, inflows, given),
-        before.closed[component],
-        after.closed[component],
-        given,
-        axis,
-        shape,
-        wraps,
-        NOTHING * grid.cell_volume,
-    )
-    cross_sides(table, flux, plane(before.cells, grid), axis, shape)
-    out = np.empty(velocity.shape)
+    ends, out = (before.cut[component], after.cut[component]), np.empty(velocity.shape)
+    fields = plane(out, grid), plane(velocity, grid), plane(velocity, grid)
     with borrowed((int(shape[0]), int(shape[1]), int(shape[2]))) as scratch:
-        mark_volumes(scratch.marks, cut, table, shape, wraps, axis)
+        cut, leaving = prepare(
+            scratch.marks, plane(before.cells, grid), ends, given, flux, table, inflows, axis,
+            shape, wraps,
+        )  # fmt: skip
+        volumes = Volumes(
+            plane(before.moving[component], grid),
+            plane(after.moving[component], grid),
+            cut,
+            leaving,
+            before.closed[component],
+            after.closed[component],
+            given,
+            axis,
+            shape,
+            wraps,
+            NOTHING * grid.cell_volume,
+        )
+        if along is not None:
+            along.reshape(-1)[cut] = 0.0
+            if ring:
+                along[edge(component, -1)] = along[edge(component, 0)]
+            fields = *fields[:2], plane(along, grid)
         fleeting = NONE_FLEETING
         if transport.courant(grid) > CROSSED:
-            held = before.volume[component], after.volume[component]
-            ends = transport.dt / grid.cell_volume
-            fleeting = find_fleeting(cut, held, flux, scratch.marks, volumes, ends)
+            held, steps = (before.volume, after.volume), transport.dt / grid.cell_volume
+            both = held[0][component], held[1][component]
+            fleeting = find_fleeting(both, flux, scratch.marks, volumes, steps)
         crossed, held_back, drained = carry(
-            plane(out, grid),
-            plane(velocity, grid),
-            plane(velocity if along is None else along, grid),
-            along is not None,
-            volumes,
-            flux,
-            table,
-            inflows,
-            fleeting,
-            scratch,
-            dt,
-            count,
+            *fields, along is not None, volumes, flux, table, inflows, fleeting, scratch, dt, count,
             *MIXED,
-        )
+        )  # fmt: skip
     return Carried(out, crossed, held_back, drained)
 
 

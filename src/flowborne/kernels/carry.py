@@ -176,7 +176,7 @@ def mark_volumes(
     axis, UPSTREAM on a free side of the domain, where means would draw in ever more, else CUT."""
     flat = marks.reshape(-1)
     flat[:] = CLEAR
-    mark_cut(marks, cut, shape, wraps)
+    mark_cut(marks, cut, shape, wraps, GHOSTS)
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
         start, out, one, other, n, m, length = layer(row, marks, shape)
@@ -283,6 +283,30 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape:
             sides.share[first + n] = held
             total += held
         sides.share[first : first + count] /= max(total, 1e-300)
+
+
+@njit(nogil=True, cache=True)
+def prepare(
+    marks: Marks,
+    cells: Array,
+    cut: tuple[Integers, Integers],
+    given: Transfers,
+    flux: Fluxes,
+    sides: Sides,
+    inflows: Inflows,
+    component: int,
+    shape: Integers,
+    wraps: Integers,
+) -> tuple[Integers, Array]:
+    """`Volumes.cut` and `Volumes.leaving`; the marks and what crosses the sides are set in place.
+
+    cells  volumes at the start
+    cut    control volumes that are cut at the start, and those at the end
+    """
+    both = np.unique(np.concatenate(cut))
+    mark_volumes(marks, both, sides, shape, wraps, component)
+    cross_sides(sides, flux, cells, component, shape)
+    return both, what_flows_out(flux, both, component, shape, inflows, given)
 
 
 @njit(nogil=True, cache=True)

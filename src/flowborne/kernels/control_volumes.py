@@ -297,22 +297,23 @@ def share_velocity(field: Array, small: Integers, targets: Integers, shares: Arr
 
 
 @njit(nogil=True, cache=True)
-def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers) -> None:
-    """Set to 0 the marks of listed control volumes, and of those along each axis that are no
-    further from them than the marks' padding is deep, in place."""
-    at, to = np.empty(3, np.int64), np.empty(3, np.int64)
+def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers, reach: int) -> None:
+    """Set to 0 the marks, padded or not, of listed places of a field of this shape, and of those up
+    to `reach` beyond them along each axis, in place."""
+    n1, n2, flat = shape[1], shape[2], marks.reshape(-1)
+    d0, d1 = (marks.shape[0] - shape[0]) // 2, (marks.shape[1] - n1) // 2
+    d2 = (marks.shape[2] - n2) // 2
     for f in listed:
-        at[0], at[1], at[2] = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
+        at = (f // (n1 * n2), (f // n2) % n1, f % n2)
+        own = ((at[0] + d0) * marks.shape[1] + at[1] + d1) * marks.shape[2] + at[2] + d2
         for axis in range(3):
-            depth = (marks.shape[axis] - shape[axis]) // 2
-            for other in range(3):
-                to[other] = at[other] + (marks.shape[other] - shape[other]) // 2
-            for shift in range(-depth, depth + 1):
-                for image in range(-1, 2):
-                    place = at[axis] + shift + image * wraps[axis]
-                    if 0 <= place < shape[axis]:
-                        to[axis] = place + depth
-                        marks[to[0], to[1], to[2]] = 0
+            step = marks.shape[1] * marks.shape[2] if axis == 0 else 1
+            step = marks.shape[2] if axis == 1 else step
+            for shift in range(-reach, reach + 1):
+                for image in range(-1, 2) if wraps[axis] > 0 else range(0, 1):
+                    away = shift + image * wraps[axis]
+                    if 0 <= at[axis] + away < shape[axis]:
+                        flat[own + away * step] = 0
 
 
 @inlined

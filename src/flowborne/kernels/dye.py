@@ -119,11 +119,15 @@ def sweep(
                 c[0, k], c[1, k] = c[n, k], c[n + 1, k]
                 c[n + 2, k], c[n + 3, k] = c[2, k], c[3, k]
             v[0, k], v[n + 1, k] = v[n, k], v[1, k]
-        low, high = np.zeros((n + 2, w)), np.zeros((n + 2, w))
-        for j in range(1, n + 1):
-            bend_row(
-                low[j], high[j], c[j - 1], c[j], c[j + 1], c[j + 2], c[j + 3], free[j], least, most
-            )
+        low, high, even = np.zeros((n + 2, w)), np.zeros((n + 2, w)), 0
+        for j in range(n + 4):
+            row, before, same = c[j], c[max(j - 1, 0), 0], True
+            for k in range(w):
+                same &= row[k] == before
+            even = even + 1 if same else 0
+            if j >= 4 and even < 5:  # in the middle of five equal rows parabolas are flat
+                n0, n1, n2, n3, at = c[j - 4], c[j - 3], c[j - 2], c[j - 1], j - 3
+                bend_row(low[at], high[at], n0, n1, n2, n3, row, free[at], least, most)
         if wraps:
             low[0], high[0], low[n + 1], high[n + 1] = low[n], high[n], low[1], high[1]
         flow, amount = np.empty((2, w)), np.empty((2, w))
