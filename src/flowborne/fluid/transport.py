@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from flowborne.fluid.control_volumes import NOTHING, ControlVolumes, means
 from flowborne.fluid.fleeting import CROSSED, NONE_FLEETING, find_fleeting
 from flowborne.fluid.ghosts import edge, kernel_axes, packed_sides, plane, planes
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.carry import (
     Fluxes,
     Inflows,
@@ -188,7 +189,7 @@ def carry_component(
     inflows = Inflows(inlets.index, inlets.gain * inlets.velocity, inlets.loss)
     ends, out = (before.cut[component], after.cut[component]), np.empty(velocity.shape)
     fields = plane(out, grid), plane(velocity, grid), plane(velocity, grid)
-    with borrowed((int(shape[0]), int(shape[1]), int(shape[2]))) as scratch:
+    with borrowed(grid, shape.tolist()) as scratch:
         cut, leaving = prepare(
             scratch.marks, plane(before.cells, grid), ends, given, flux, table, inflows, axis,
             shape, wraps,
@@ -213,9 +214,9 @@ def carry_component(
             fields = *fields[:2], plane(along, grid)
         fleeting = NONE_FLEETING
         if transport.courant(grid) > CROSSED:
-            held, steps = (before.volume, after.volume), transport.dt / grid.cell_volume
-            both = held[0][component], held[1][component]
-            fleeting = find_fleeting(both, flux, scratch.marks, volumes, steps)
+            held = before.volume[component], after.volume[component]
+            steps = transport.dt / grid.cell_volume
+            fleeting = find_fleeting(held, flux, scratch.marks, volumes, steps)
         crossed, held_back, drained = carry(
             *fields, along is not None, volumes, flux, table, inflows, fleeting, scratch, dt, count,
             *MIXED,
@@ -223,22 +224,23 @@ def carry_component(
     return Carried(out, crossed, held_back, drained)
 
 
-_spare: dict[tuple[int, int, int], list[Scratch]] = {}
+_spare: dict[tuple[int, int, int], list[tuple[Array, Marks]]] = {}
 
 
 @contextmanager
-def borrowed(shape: tuple[int, int, int]) -> Iterator[Scratch]:
-    """Scratch for a component of this shape, kept for the next one."""
-    store = _spare.setdefault(shape, [])
+def borrowed(grid: Grid, shape: list[int]) -> Iterator[Scratch]:
+    """Scratch for a component of this shape in the order of the kernels' axes, in memory that is
+    kept for the next one."""
+    store, deep = _spare.setdefault(grid.shape, []), 2 * GHOSTS
     try:
-        scratch = store.pop()
+        memory, bits = store.pop()
     except IndexError:
-        padded = [n + 2 * GHOSTS * (n > 1 or axis > 0) for axis, n in enumerate(shape)]
-        net, start, middle, early, late, nought = np.zeros((6, *shape))
-        field, marks = np.zeros(padded), np.zeros(padded, np.uint8)
-        scratch = Scratch(field, marks, net, start, middle, early, late, nought)
-    yield scratch
-    store.append(scratch)
+        most = prod(n + 1 + deep if axis in grid.axes else n for axis, n in enumerate(grid.shape))
+        memory, bits = np.zeros((7, most)), np.zeros(most, np.uint8)
+    wide = [n + deep * (axis > 0 or not grid.is_slab) for axis, n in enumerate(shape)]
+    padded, marks = memory[0, : prod(wide)].reshape(wide), bits[: prod(wide)].reshape(wide)
+    yield Scratch(padded, marks, *(flat[: prod(shape)].reshape(shape) for flat in memory[1:]))
+    store.append((memory, bits))
 
 
 def passed_on(before: Transfers, after: Transfers, dt: float) -> Transfers:
