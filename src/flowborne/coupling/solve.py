@@ -237,7 +237,8 @@ def solve_together(
     change = boundary_velocity(pose, v - driven.system.v)
     added = np.full(change.size, np.nan)
     if world.setup.splits:
-        added = added_mass_impulse(matrix, cut, change)
+        plain = PressureSystem(weights, fluid.boundaries.periodic()) if yielding.size else matrix
+        added = added_mass_impulse(plain, cut, change)
     timer.lap("projection")
     return Solved(driven, v, actuator, viscous, added, smooth, projected, outcome, left)
 
@@ -249,6 +250,8 @@ def added_mass_impulse(matrix: PressureSystem, cut: Geometry, change: Array) -> 
 
     The pressure's impulse less this one is what it would give bodies that kept their velocities:
     with them fixed, K p^ = -(D u* + J v+), which is linear in v+.
+
+    matrix  K, with a preconditioner of its own: what flesh makes room for is no part of it
     """
     rhs = np.zeros(matrix.shape)
     add_flux(rhs, cut, -change)
