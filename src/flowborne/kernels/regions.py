@@ -121,11 +121,16 @@ def region_sums(x: Array, label: Labels, regions: int) -> Array:
     planes = x.shape[0] - 2 * d
     parts = np.zeros((planes, regions))
     for i in prange(planes):
+        row = np.zeros(x.shape[2])  # of the first region: nearly always the only one
         for j in range(1, x.shape[1] - 1):
             for k in range(1, x.shape[2] - 1):
+                row[k] += x[i + d, j, k] if label[i + d, j, k] == 0 else 0.0
+            for k in range(1, x.shape[2] - 1 if regions > 1 else 1):
                 a = label[i + d, j, k]
-                if a >= 0:
+                if a > 0:
                     parts[i, a] += x[i + d, j, k]
+        for k in range(x.shape[2]):
+            parts[i, 0] += row[k]
     total = np.zeros(regions)
     for i in range(planes):
         for a in range(regions):
@@ -151,11 +156,14 @@ def remove_null(x: Array, label: Labels, basis: Array) -> None:
         for a in range(regions):
             constants[a] -= basis[a, n] * part
     d = 1 if x.shape[0] > 1 else 0
+    first = constants[0]
     for i in prange(x.shape[0] - 2 * d):
         for j in range(1, x.shape[1] - 1):
             for k in range(1, x.shape[2] - 1):
+                x[i + d, j, k] += first if label[i + d, j, k] == 0 else 0.0
+            for k in range(1, x.shape[2] - 1 if regions > 1 else 1):
                 a = label[i + d, j, k]
-                if a >= 0:
+                if a > 0:
                     x[i + d, j, k] += constants[a]
 
 

@@ -146,10 +146,10 @@ def load_cells(target: Array, source: Array, diagonal: Array) -> None:
     """Cells into a padded array; 0 in ghosts and in cells without an open face."""
     d = 1 if target.shape[0] > 1 else 0
     n1, n2 = source.shape[1], source.shape[2]
-    for i in range(target.shape[0]):
+    for i in prange(target.shape[0]):
         target[i] = 0.0
         if d == 0 or 0 < i < target.shape[0] - 1:
             for j in range(n1):
                 for k in range(n2):
-                    if diagonal[i, j + 1, k + 1] > 0.0:
-                        target[i, j + 1, k + 1] = source[i - d, j, k]
+                    value, active = source[i - d, j, k], diagonal[i, j + 1, k + 1] > 0.0
+                    target[i, j + 1, k + 1] = value if active else 0.0

@@ -152,8 +152,10 @@ class PressureSystem:
         cells = (inner[0] - 2 if inner[0] > 1 else 1, inner[1] - 2, inner[2] - 2)
         diagonal = b.finest[3]
         x, right = b.vectors[:2]
-        first = np.zeros(self.shape) if guess is None else np.ascontiguousarray(guess, np.float64)
-        load_cells(x, first.reshape(cells), diagonal)
+        if guess is None:
+            x[:] = 0.0
+        else:
+            load_cells(x, np.ascontiguousarray(guess, np.float64).reshape(cells), diagonal)
         load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
         added = self.deflation(term)
         iterations, residual, converged = solve(
