@@ -31,7 +31,7 @@ face weights of one of them."""
 def mark_own(marks: Marks, w: Triple, inverse: Real, factor: Integers) -> None:
     """Mark the largest connected part of the fine cells under each coarse cell as OWN.
 
-    factor  fine cells in a coarse one along each axis
+    factor  fine cells in a coarse one along each axis, 1 or 2
     """
     w0, w1, w2 = w
     f0, f1, f2 = factor
@@ -51,7 +51,7 @@ def mark_own(marks: Marks, w: Triple, inverse: Real, factor: Integers) -> None:
                         share = inverse[i, j, k]
                         whole = (i == first0) | (w0[i, j, k] * share > WEAK)
                         whole &= (j == first1) | (w1[i, j, k] * share > WEAK)
-                        whole &= ((k - 1) % f2 == 0) | (w2[i, j, k] * share > WEAK)
+                        whole &= ((k - 1) & (f2 - 1) == 0) | (w2[i, j, k] * share > WEAK)
                         active = share > 0.0
                         state[k] |= (0 if whole & active else CUT) | (ACTIVE if active else 0)
                         marks[i, j, k] = OWN if active else 0

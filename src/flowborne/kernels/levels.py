@@ -187,8 +187,8 @@ def inverse_diagonal(w: Triple, added: Real, inverse: Real) -> None:
                 total = w1[m, j, k] + w1[m, j + 1, k] + w2[m, j, k] + w2[m, j, k + 1]
                 if d:
                     total += w0[m, j, k] + w0[m + 1, j, k]
-                if total > 0.0:
-                    inverse[m, j, k] = 1.0 / (total + added[m, j, k])
+                share = np.divide(1.0, total + added[m, j, k])  # no check for 0: vector code
+                inverse[m, j, k] = share if total > 0.0 else 0.0
 
 
 @kernel

@@ -6,7 +6,7 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Array, Labels, Periodic, Rows
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 NULL = 1e-10
 """Share of the largest below which a sum over a region counts as 0."""
@@ -31,6 +31,25 @@ def join(parent: Labels, a: int, b: int) -> None:
         parent[a] = b
 
 
+@inlined
+def is_whole(w2: Array, diagonal: Array, i: int, j: int) -> bool:
+    """Whether all cells of a row are active and connected along it."""
+    last = diagonal.shape[2] - 2
+    found = int(diagonal[i, j, 1] > 0.0)
+    for k in range(2, last + 1):
+        found += int(diagonal[i, j, k] > 0.0) & int(w2[i, j, k] > 0.0)
+    return found == last
+
+
+@inlined
+def is_crossed(w: Array, i: int, j: int) -> bool:
+    """Whether some weight of a row of faces is above 0."""
+    found = 0
+    for k in range(1, w.shape[2] - 1):
+        found += int(w[i, j, k] > 0.0)
+    return found > 0
+
+
 @kernel
 def label_regions(
     finest: tuple[Array, Array, Array, Array],
@@ -53,8 +72,20 @@ def label_regions(
     label[:] = -1
     parent[0] = 0
     used = 1
+    whole = np.zeros((p0, p1), np.bool_)  # rows of one run, which need no look at every cell
     for i in range(d, p0 - d):
         for j in range(1, p1 - 1):
+            whole[i, j] = is_whole(w2, diagonal, i, j)
+            above = whole[i, j - 1] and is_crossed(w1, i, j)
+            before = d == 0 or (whole[i - 1, j] and is_crossed(w0, i, j))
+            if whole[i, j] and above and before:
+                parent[used] = used
+                label[i, j, 1 : p2 - 1] = used
+                join(parent, used, label[i, j - 1, 1])
+                if d:
+                    join(parent, used, label[i - 1, j, 1])
+                used += 1
+                continue
             run = -1
             last1, last0 = -1, -1
             for k in range(1, p2 - 1):
@@ -105,6 +136,12 @@ def label_regions(
             parent[a] = parent[top]
     for i in range(d, p0 - d):
         for j in range(1, p1 - 1):
+            if whole[i, j]:
+                number = -1 - parent[label[i, j, 1]]
+                label[i, j, 1 : p2 - 1] = number
+                if number >= 0:
+                    count[number] += p2 - 2
+                continue
             for k in range(1, p2 - 1):
                 if label[i, j, k] >= 0:
                     number = -1 - parent[label[i, j, k]]

@@ -84,7 +84,8 @@ def defect_plane(r: Real, x: Real, b: Real, w: Triple, inverse: Real, m: int) ->
             if d:
                 total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
             a = inverse[m, j, k]
-            r[m, j, k] = total - x[m, j, k] / a if a > 0.0 else 0.0
+            left = total - np.divide(x[m, j, k], a)  # no check for 0: vector code
+            r[m, j, k] = left if a > 0.0 else x.dtype.type(0)
 
 
 @kernel
