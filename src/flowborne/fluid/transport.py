@@ -52,10 +52,10 @@ LASTING = (2.0, 4.0)
 goes along, and from which on nothing does. Pressure and forces gave it at a place that a faster
 flow leaves behind, and it would grow from step to step: noise as fine as the grid."""
 
-MIXED = (2.0, 3.0)
+MIXED = (2.0, 2.5)
 """Times what a control volume holds that leaves it in a substep, from which on it is mixed with
 the largest one beside it, and from which on wholly. Where c times it leaves, Heun's method keeps
-1 - c + c^2/2 of what it had, more than all from c = 2 on; (3 - c) times that is less than all."""
+1 - c + c^2/2 of what it had, more than all from c = 2 on; mixing leaves (1 - 2 (c - 2)) of that."""
 
 
 @dataclass(frozen=True)

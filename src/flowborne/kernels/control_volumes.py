@@ -246,15 +246,16 @@ def level(
     """Mix listed control volumes with the largest one beside them, in place, where more leaves them
     than they hold.
 
-    The exchange V_i V_t/(V_t + sum V_i) (u_t - u_i) levels out all that mix with one and keeps
-    their sum (Hu et al. 2006): none of it up to `least` times what they hold, all of it from `most`
-    times on, linear between. All exchange what they have at first.
+    All parts s V_i that mix with one and its V_t get their mean velocity (Hu et al. 2006 for one):
+    none of a volume up to `least` times what it holds, all of it from `most` times on, linear
+    between. All exchange what they have at first.
 
     leaving  (n,) volume that leaves each in the substep
     nought   as large as the field, 0 before and after
     """
-    flat, volume, others = field.reshape(-1), volumes.reshape(-1), nought.reshape(-1)
+    flat, volume, total = field.reshape(-1), volumes.reshape(-1), nought.reshape(-1)
     found, count = np.empty((2, listed.size), np.int64), 0
+    part, whole, exchange = np.empty(listed.size), np.empty(listed.size), np.empty(listed.size)
     for n in range(listed.size):
         f = listed[n]
         own = volume[f]
@@ -266,22 +267,25 @@ def level(
             if to >= 0 and volume[to] > largest:
                 best, largest = to, volume[to]
         if best >= 0:
-            found[0, count], found[1, count] = n, best
-            others[best] += own
+            found[0, count], found[1, count] = f, best
+            part[count] = min((leaving[n] / own - least) / (most - least), 1.0) * own
+            total[best] += part[count]
             count += 1
-    exchange = np.empty(count)
+    for m in range(count):
+        whole[m] = volume[found[1, m]] + total[found[1, m]]
     for _ in range(TURNS):
+        total[found[1, :count]] = 0.0
         for m in range(count):
-            f, best = listed[found[0, m]], found[1, m]
-            own, all_of_it = volume[f], volume[best] + others[best]
-            share = min((leaving[found[0, m]] / own - least) / (most - least), 1.0)
-            exchange[m] = share * own * volume[best] / all_of_it * (flat[best] - flat[f])
+            f, best = found[0, m], found[1, m]
+            total[best] += part[m] * (flat[f] - flat[best])
         for m in range(count):
-            f, best = listed[found[0, m]], found[1, m]
+            f, best = found[0, m], found[1, m]
+            exchange[m] = part[m] * (total[best] / whole[m] - (flat[f] - flat[best]))
+        for m in range(count):
+            f, best = found[0, m], found[1, m]
             flat[f] += exchange[m] / volume[f]
             flat[best] -= exchange[m] / volume[best]
-    for m in range(count):
-        others[found[1, m]] = 0.0
+    total[found[1, :count]] = 0.0
 
 
 @njit(nogil=True, cache=True)

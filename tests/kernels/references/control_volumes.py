@@ -130,11 +130,12 @@ def level_reference(
     part = leaving / np.where(volume[listed] > nothing, volume[listed], 1.0)
     mixed = (volume[listed] > nothing) & (part > least) & (volume[to] > volume[listed])
     f, to = listed[mixed], to[mixed]
-    share = np.minimum((part[mixed] - least) / (most - least), 1.0)
-    others = np.bincount(to, volume[f], volume.size)
+    mixing = np.minimum((part[mixed] - least) / (most - least), 1.0) * volume[f]
+    whole = volume + np.bincount(to, mixing, volume.size)
     for _ in range(TURNS):
-        weight = share * volume[f] * volume[to] / (volume[to] + others[to])
-        exchange = weight * (levelled[to] - levelled[f])
+        apart = levelled[f] - levelled[to]
+        mean = np.bincount(to, mixing * apart, volume.size)[to] / whole[to]
+        exchange = mixing * (mean - apart)
         np.add.at(levelled, f, exchange / volume[f])
         np.subtract.at(levelled, to, exchange / volume[to])
     return levelled.reshape(field.shape)
