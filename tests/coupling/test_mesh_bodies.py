@@ -32,7 +32,7 @@ def of_volume(mesh: trimesh.Trimesh, volume: float) -> trimesh.Trimesh:
 
 
 COPIES = {
-    "sphere": ('type="sphere" size="1"', of_volume(trimesh.creation.icosphere(3), BALL)),
+    "sphere": ('type="sphere" size="1"', of_volume(trimesh.creation.icosphere(4), BALL)),
     "box": ('type="box" size="0.8 0.5 1"', trimesh.creation.box((1.6, 1.0, 2.0))),
     "capsule": (
         'type="capsule" size="0.5 0.7"',
