@@ -207,12 +207,7 @@ def side_rates(flux: Fluxes, index: Integers, component: int, shape: Integers) -
         for axis in range(3):
             if shape[axis] == 1:
                 continue
-            q = (
-                flux.through[0]
-                if axis == 0
-                else (flux.through[1] if axis == 1 else flux.through[2])
-            )
-            own = int(axis == component)
+            q, own = across_axis(flux.through, axis), int(axis == component)
             for upper in range(2):
                 side[:] = at
                 side[axis] += upper

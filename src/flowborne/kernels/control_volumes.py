@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit, prange
 
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
 
 TURNS = 2
@@ -365,24 +366,7 @@ def sort_faces(
         i, j = np.int64(row) // n1, np.int64(row) % n1
         at = i if component == 0 else j
         volume, kind, part = volumes[i, j], kinds[i, j], opened[i, j]
-        if component == 2:
-            line = cells[i, j]
-            low, high = (line[last - 1], line[0]) if periodic else (0.0, 0.0)
-            volume[0] = 0.5 * (low + line[0])
-            for k in range(1, last):
-                volume[k] = 0.5 * (line[k - 1] + line[k])
-            volume[last] = 0.5 * (line[last - 1] + high)
-        else:
-            below, above = (at - 1) % last, at % last
-            one, other = (
-                (cells[below, j], cells[above, j])
-                if component == 0
-                else (cells[i, below], cells[i, above])
-            )
-            first = 0.5 if periodic or at > 0 else 0.0
-            second = 0.5 if periodic or at < last else 0.0
-            for k in range(n2):
-                volume[k] = first * one[k] + second * other[k]
+        mean_row(volume, cells, i, j, component, periodic)
         for end in range(3):  # the middle of the row first, then both of its ends
             start, stop = 0, n2
             if end > 0:

@@ -15,32 +15,36 @@ LANES = 64
 """Partial sums that a plane is added up in, so that the compiler makes vector code of it."""
 
 
+@njit(nogil=True, cache=True)
+def mean_row(row: Array, cells: Array, i: int, j: int, axis: int, periodic: bool) -> None:
+    """Row (i, j) of `face_means`."""
+    n = cells.shape[axis]
+    if axis == 2:
+        line = cells[i, j]
+        low, high = (line[n - 1], line[0]) if periodic else (0.0, 0.0)
+        row[0] = 0.5 * (low + line[0])
+        for k in range(1, n):
+            row[k] = 0.5 * (line[k - 1] + line[k])
+        row[n] = 0.5 * (line[n - 1] + high)
+    else:
+        at = i if axis == 0 else j
+        below, above = (at - 1) % n, at % n
+        one, other = (
+            (cells[below, j], cells[above, j]) if axis == 0 else (cells[i, below], cells[i, above])
+        )
+        first = 0.5 if periodic or at > 0 else 0.0
+        second = 0.5 if periodic or at < n else 0.0
+        for k in range(row.size):
+            row[k] = first * one[k] + second * other[k]
+
+
 @kernel
 def face_means(out: Array, cells: Array, axis: int, periodic: bool) -> None:
     """Mean of both cells of each face across `axis`; 0 beyond the ends of an axis that is not
     periodic."""
-    n = cells.shape[axis]
     for i in prange(out.shape[0]):
         for j in range(out.shape[1]):
-            if axis == 2:
-                line, row = cells[i, j], out[i, j]
-                low, high = (line[n - 1], line[0]) if periodic else (0.0, 0.0)
-                row[0] = 0.5 * (low + line[0])
-                for k in range(1, n):
-                    row[k] = 0.5 * (line[k - 1] + line[k])
-                row[n] = 0.5 * (line[n - 1] + high)
-                continue
-            at = np.int64(i) if axis == 0 else np.int64(j)
-            below, above = (at - 1) % n, at % n
-            one, other = (
-                (cells[below, j], cells[above, j])
-                if axis == 0
-                else (cells[i, below], cells[i, above])
-            )
-            first = 0.5 if periodic or at > 0 else 0.0
-            second = 0.5 if periodic or at < n else 0.0
-            for k in range(out.shape[2]):
-                out[i, j, k] = first * one[k] + second * other[k]
+            mean_row(out[i, j], cells, np.int64(i), j, axis, periodic)
 
 
 @njit(forceinline=True, nogil=True, cache=True)
