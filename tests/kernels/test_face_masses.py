@@ -62,22 +62,25 @@ def test_what_moves_with_faces_is_near_their_opening_and_all_there_is(
 
 def test_in_a_ring_of_equal_openings_each_gets_the_mean_excess_of_both_beside_it() -> None:
     held, whole = np.array([1.3, 1.0, 1.1]), np.ones(3)
-    given = even_out(held, whole, whole, np.array([1, 2, 0]), whole, np.zeros(3))
-    np.testing.assert_allclose(held, [1.05, 1.2, 1.15])
+    given, gained = np.zeros(3), np.zeros(3)
+    even_out(held, whole, whole, np.array([1, 2, 0]), whole, np.zeros(3), 1.0, given, gained)
+    np.testing.assert_allclose(held + gained, [1.05, 1.2, 1.15])
     np.testing.assert_allclose(given, [0.15, -0.05, -0.1], atol=1e-15)
 
 
 def test_what_is_even_for_each_part_of_its_opening_stays() -> None:
     held, goal = np.array([0.22, 0.77, 0.11]), np.array([0.2, 0.7, 0.1])
-    even_out(held, goal, goal, np.array([1, 2, -1]), np.array([0.3, 0.5, 0.0]), np.zeros(3))
-    np.testing.assert_allclose(held, [0.22, 0.77, 0.11], rtol=1e-14)
+    above, way, gained = np.array([1, 2, -1]), np.array([0.3, 0.5, 0.0]), np.zeros(3)
+    even_out(held, goal, goal, above, way, np.zeros(3), 1.0, np.zeros(3), gained)
+    np.testing.assert_allclose(gained, 0.0, atol=1e-15)
 
 
 def test_one_keeps_half_of_what_its_opening_says() -> None:
     """Beside a wide one that lacks as much as there is."""
     held, goal, opened = np.array([0.3, 0.1]), np.array([0.2, 1.0]), np.array([0.2, 1.0])
-    even_out(held, goal, opened, np.array([1, -1]), np.array([1.0, 0.0]), np.zeros(2))
-    assert held[0] == pytest.approx(0.1)
+    above, way, gained = np.array([1, -1]), np.array([1.0, 0.0]), np.zeros(2)
+    even_out(held, goal, opened, above, way, np.zeros(2), 1.0, np.zeros(2), gained)
+    assert held[0] + gained[0] == pytest.approx(0.1)
 
 
 def test_transfers_change_no_energy() -> None:

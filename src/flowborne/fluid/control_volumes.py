@@ -31,7 +31,7 @@ from flowborne.kernels.control_volumes import (
     share_velocity,
     sort_faces,
 )
-from flowborne.kernels.face_masses import share_out
+from flowborne.kernels.face_masses import ROUNDS, share_out, with_neighbours
 from flowborne.kernels.faces import face_means
 
 WHOLE = 0.99
@@ -117,6 +117,8 @@ def moving_volumes(
     cut, shut, uneven = listed_kinds(kinds, counts)
     targets = find_targets(shut, kinds, wide[axis], volume, room, axis, wraps)
     closed = Closed(shut, *targets)
+    for _ in range(ROUNDS):
+        uneven = np.sort(with_neighbours(uneven, kinds, shape, wraps))
     given = share_out(volume, closed, kinds, uneven, room, wide, axis, wraps, cell)
     if ring:
         found[edge(component, -1)] = found[edge(component, 0)]

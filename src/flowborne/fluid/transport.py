@@ -187,11 +187,12 @@ def carry_component(
     flux = Fluxes(planes(transport.flux, grid), *neighbours(int(shape[axis]), ring))
     given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
     inflows = Inflows(inlets.index, inlets.gain * inlets.velocity, inlets.loss)
-    ends, out = (before.cut[component], after.cut[component]), np.empty(velocity.shape)
+    cut = np.union1d(before.cut[component], after.cut[component])
+    out = np.empty(velocity.shape)
     fields = plane(out, grid), plane(velocity, grid), plane(velocity, grid)
     with borrowed(grid, shape.tolist()) as scratch:
-        cut, leaving = prepare(
-            scratch.marks, plane(before.cells, grid), ends, given, flux, table, inflows, axis,
+        leaving = prepare(
+            scratch.marks, plane(before.cells, grid), cut, given, flux, table, inflows, axis,
             shape, wraps,
         )  # fmt: skip
         volumes = Volumes(

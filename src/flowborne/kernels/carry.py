@@ -284,7 +284,7 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape:
 def prepare(
     marks: Marks,
     cells: Array,
-    cut: tuple[Integers, Integers],
+    cut: Integers,
     given: Transfers,
     flux: Fluxes,
     sides: Sides,
@@ -292,16 +292,15 @@ def prepare(
     component: int,
     shape: Integers,
     wraps: Integers,
-) -> tuple[Integers, Array]:
-    """`Volumes.cut` and `Volumes.leaving`; the marks and what crosses the sides are set in place.
+) -> Array:
+    """`Volumes.leaving`; the marks and what crosses the sides are set in place.
 
     cells  volumes at the start
-    cut    control volumes that are cut at the start, and those at the end
+    cut    see `Volumes`
     """
-    both = np.unique(np.concatenate(cut))
-    mark_volumes(marks, both, sides, shape, wraps, component)
+    mark_volumes(marks, cut, sides, shape, wraps, component)
     cross_sides(sides, flux, cells, component, shape)
-    return both, what_flows_out(flux, both, component, shape, inflows, given)
+    return what_flows_out(flux, cut, component, shape, inflows, given)
 
 
 @njit(nogil=True, cache=True)
@@ -369,12 +368,13 @@ def hold(
 @njit(nogil=True, cache=True)
 def join(u: Array, axis: int) -> None:
     """Make the last layer across an axis the first one, in place."""
-    if axis == 0:
-        u[-1] = u[0]
-    elif axis == 1:
-        u[:, -1] = u[:, 0]
-    else:
-        u[:, :, -1] = u[:, :, 0]
+    layer, flat = 1, u.reshape(-1)
+    for a in range(axis + 1, 3):
+        layer *= u.shape[a]
+    block = layer * u.shape[axis]
+    for first in range(0, flat.size, block):
+        for n in range(first, first + layer):
+            flat[n + block - layer] = flat[n]
 
 
 @kernel
@@ -443,8 +443,12 @@ def exchange(
 @njit(nogil=True, cache=True)
 def inside(padded: Array, shape: Integers) -> Array:
     """Copy of a field without its ghosts."""
-    d, (n0, n1, n2) = (padded.shape[0] - shape[0]) // 2, (shape[0], shape[1], shape[2])
-    return padded[d : d + n0, GHOSTS : GHOSTS + n1, GHOSTS : GHOSTS + n2].copy()
+    d, out = (padded.shape[0] - shape[0]) // 2, np.empty((shape[0], shape[1], shape[2]))
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            for k in range(shape[2]):
+                out[i, j, k] = padded[i + d, j + GHOSTS, k + GHOSTS]
+    return out
 
 
 @njit(nogil=True, cache=True)

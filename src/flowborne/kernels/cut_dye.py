@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.control_volumes import neighbour
+from flowborne.kernels.control_volumes import neighbour, place_of
 from flowborne.kernels.jit import kernel
 
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ def list_flows(
         for upper in range(2):
             way, to = 2 * axis + upper, neighbour(shape, wraps, listed[n], 2 * axis + upper)
             beside[n, way] = to
-            at = np.searchsorted(listed, to)
+            at = place_of(listed, to, 0)
             row[n, way] = at if to >= 0 and at < listed.size and listed[at] == to else -1
             out[n, way] = (2.0 * upper - 1.0) * through[face_of(shape, axis, listed[n], upper)]
     for n in range(listed.size):

@@ -17,6 +17,7 @@ from flowborne.kernels.control_volumes import (
     across_axis,
     merge_small,
     neighbour,
+    place_of,
 )
 
 KEPT = 0.5
@@ -28,9 +29,6 @@ ROUNDS = 2
 velocity on cut faces of the potential flow past a circle is off by 0.050, 0.025, 0.019 of the
 stream (rms) with 8, 16, 32 cells to its diameter; with one round by 0.046, 0.043, 0.040, with three
 by 0.061, 0.030, 0.018, and by 0.115, 0.135, 0.121 where control volumes keep what they have."""
-
-AHEAD = 16
-"""Places that a list is gone through before it is searched."""
 
 LISTED = 16
 """Kind of a face that is in a list, beside those of `control_volumes`."""
@@ -78,17 +76,6 @@ def face_between(
 
 
 @njit(nogil=True, cache=True)
-def place_of(listed: Integers, f: int, near: int) -> int:
-    """Place of the first of a list in ascending order that is not below f; quick where that is a
-    little after the place `near`."""
-    if near == 0 or listed[near - 1] < f:
-        for at in range(near, min(near + AHEAD, listed.size)):
-            if listed[at] >= f:
-                return at
-    return int(np.searchsorted(listed, f))
-
-
-@njit(nogil=True, cache=True)
 def openings(
     listed: Integers,
     kinds: Marks,
@@ -113,11 +100,11 @@ def openings(
     cell    volume of a whole one
     across  open part of the faces across the axis
     """
-    above, way, rest = np.full(listed.size, -1), np.zeros(listed.size), np.zeros(listed.size)
+    above, way, rest = np.empty(listed.size, np.int64), np.zeros(listed.size), np.zeros(listed.size)
     faces, room, sides = own.reshape(-1), cells.reshape(-1), across.reshape(-1)
     wide, near = np.array(across.shape), [0, 0]
     for n in range(listed.size):
-        f = listed[n]
+        f, above[n] = listed[n], -1
         for side in range(2):
             to = neighbour(shape, wraps, f, 2 * axis + side)
             if to < 0:
@@ -146,10 +133,18 @@ def openings(
 
 @njit(nogil=True, cache=True)
 def even_out(
-    held: Array, goal: Array, opened: Array, above: Integers, way: Array, rest: Array
-) -> Array:
-    """(n,) what each gives to the one above it along an axis, in one sweep; taken from `held` and
-    added to it, in place.
+    held: Array,
+    goal: Array,
+    opened: Array,
+    above: Integers,
+    way: Array,
+    rest: Array,
+    share: float,
+    passed: Array,
+    gained: Array,
+) -> None:
+    """Add to `passed` this share of what each gives to the one above it along an axis in one sweep,
+    and to `gained` what each has of it; all (n,).
 
         T = w (e_f a_g - e_g a_f) (a_f + a_g) / (a_g S_f + a_f S_g),   e = held - goal
 
@@ -160,7 +155,7 @@ def even_out(
     opened  (n,) a;  goal  (n,) a h^3;  above, way, rest  see `openings`
     """
     count, reach = held.size, rest.copy()
-    given, out, gained = np.zeros(count), np.zeros(count), np.zeros(count)
+    given, out, more = np.zeros(count), np.zeros(count), np.zeros(count)
     for n in range(count):
         m = above[n]
         if m >= 0:
@@ -183,11 +178,12 @@ def even_out(
     for n in range(count):
         m = above[n]
         if m >= 0:
-            given[n] *= out[n] if given[n] > 0.0 else out[m]
-            gained[n] -= given[n]
-            gained[m] += given[n]
-    held += gained
-    return given
+            given[n] *= share * (out[n] if given[n] > 0.0 else out[m])
+            more[n] -= given[n]
+            more[m] += given[n]
+    for n in range(count):
+        passed[n] += given[n]
+        gained[n] += more[n]
 
 
 @njit(nogil=True, cache=True)
@@ -228,17 +224,15 @@ def add_transfers(
 
 @njit(nogil=True, cache=True)
 def with_neighbours(cut: Integers, kinds: Marks, shape: Integers, wraps: Integers) -> Integers:
-    """The listed ones and those beside them on which pressure acts, in ascending order.
+    """The listed ones, and then those beside them on which pressure acts.
 
     kinds  of the faces; on return LISTED too where a face is in the list
     """
     kind = kinds.reshape(-1)
-    found, count = np.empty(7 * cut.size, np.int64), 0
-    for f in cut:
-        if not kind[f] & LISTED:
-            kind[f] |= LISTED
-            found[count] = f
-            count += 1
+    found, count = np.empty(7 * cut.size, np.int64), cut.size
+    for n in range(count):
+        found[n] = cut[n]
+        kind[cut[n]] |= LISTED
     for f in cut:
         for way in range(6):
             to = neighbour(shape, wraps, f, way)
@@ -246,7 +240,7 @@ def with_neighbours(cut: Integers, kinds: Marks, shape: Integers, wraps: Integer
                 kind[to] |= LISTED
                 found[count] = to
                 count += 1
-    return np.sort(found[:count])
+    return found[:count].copy()
 
 
 @njit(nogil=True, cache=True)
@@ -254,7 +248,7 @@ def share_out(
     volume: Array,
     closed: Closed,
     kinds: Marks,
-    uneven: Integers,
+    listed: Integers,
     cells: Array,
     opened: Faces,
     component: int,
@@ -264,24 +258,20 @@ def share_out(
     """What control volumes of a component give to others, taken from `volume` and added to it, in
     place.
 
-    kinds   of the faces, see `sort_faces`; changed
-    uneven  (n,) those that have more or less than their opening says
+    kinds   of the faces, see `sort_faces`
+    listed  (n,) those that have more or less than their opening says, and those around them
     cells   volumes
     cell    that of a whole one
     """
-    own, shape, listed = across_axis(opened, component), np.array(volume.shape), uneven
-    for _ in range(ROUNDS):
-        for f in listed:
-            kinds.reshape(-1)[f] &= ~LISTED
-        listed = with_neighbours(listed, kinds, shape, wraps)
-    flat, size, last = volume.reshape(-1), listed.size, shape[component] - 1
+    own, shape = across_axis(opened, component), np.array(volume.shape)
+    flat, part_flat, size = volume.reshape(-1), own.reshape(-1), listed.size
     stride = shape[1] * shape[2] if component == 0 else (shape[2] if component == 1 else 1)
-    part, held = own.reshape(-1)[listed], flat[listed]
-    aim = cell * part
+    part, held, aim = np.empty(size), np.empty(size), np.empty(size)
     for n in range(size):
-        at = (listed[n] // stride) % (last + 1)
-        if wraps[component] == 0 and (at == 0 or at == last):
-            aim[n] *= 0.5
+        f = listed[n]
+        part[n], held[n], at = part_flat[f], flat[f], (f // stride) % shape[component]
+        outer = wraps[component] == 0 and (at == 0 or at == shape[component] - 1)
+        aim[n] = cell * part[n] * (0.5 if outer else 1.0)
     above, way = np.empty((3, size), np.int64), np.empty((3, size))
     rest, given, count = np.empty((3, size)), np.zeros((3, size)), 0
     for m in range(3):
@@ -295,23 +285,24 @@ def share_out(
     shut, lent = closed.faces, np.zeros(closed.shares.shape)
     for turn in range(ROUNDS):
         for group in range(2):  # along its own axis, then all others together
-            ways = range(0, 1) if group == 0 else range(1, count)
-            gained = np.zeros(size)
+            ways, gained = range(0, 1) if group == 0 else range(1, count), np.zeros(size)
             for m in ways:
-                after = held.copy()
-                given[m] += even_out(after, aim, part, above[m], way[m], rest[m]) / len(ways)
-                gained += (after - held) / len(ways)
-            held = held + gained
+                even_out(
+                    held, aim, part, above[m], way[m], rest[m], 1.0 / len(ways), given[m], gained
+                )
+            for n in range(size):
+                held[n] += gained[n]
+                flat[listed[n]] = held[n]
             if turn == group == 0:  # what closes in a step comes in as it closes
-                flat[listed] = held
                 for n in range(shut.size):
-                    lent[n] = closed.shares[n] * flat[shut[n]]
+                    for m in range(2):
+                        lent[n, m] = closed.shares[n, m] * flat[shut[n]]
                 merge_small(volume, shut, closed.targets, closed.shares)
-                held = flat[listed]
+                for n in range(size):
+                    held[n] = flat[listed[n]]
     for n in range(shut.size):
-        if closed.shares[n].any():
+        if closed.shares[n, 0] + closed.shares[n, 1] > 0.0:
             flat[shut[n]] = 0.0
-    flat[listed] = held
     total = count * size + 2 * shut.size
     givers, takers, amounts = np.empty(total, np.int64), np.empty(total, np.int64), np.empty(total)
     at = 0

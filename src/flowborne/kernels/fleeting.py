@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.control_volumes import place_of
 
 SWEEPS = 1000
 """Most times that what leaves all of them is worked out, one after the other."""
@@ -45,7 +46,7 @@ def choose(
         to[n], through[n] = beside[found[n]], rate[found[n]]
     for n in range(count):
         for way in range(6):
-            at = np.searchsorted(own, to[n, way])
+            at = place_of(own, to[n, way], 0)
             if at < count and own[at] == to[n, way]:
                 row[n, way] = at
     return own, to, through, row

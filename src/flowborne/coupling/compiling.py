@@ -1,9 +1,8 @@
-"""Compiling the kernels of the pressure solver in a second process.
+"""Compiling kernels in a second process.
 
-A first run compiles for about 70 s on one core. The pressure solver is more than half of that and
-needs nothing of the rest, so another process compiles it for the cache on disc. It begins where a
-step comes last, with the iteration: meanwhile this process compiles what the step begins with, and
-finds in the cache what the other has done by then.
+Half of what a first run compiles is the pressure solver and the transport of momentum. Neither
+needs anything of the rest, so another process compiles both for the cache on disc, in the order in
+which a step comes to them: meanwhile this process compiles what the step begins with.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ SMALL = 8
 
 
 @cache
-def compile_solver_beside() -> None:
-    """Have the pressure solver compiled by another process, unless it is in the cache or this
-    machine has one core. At most once in a process; it need not be waited for."""
+def compile_beside() -> None:
+    """Have solver and transport compiled by another process, unless the solver is in the cache or
+    this machine has one core. At most once in a process; it need not be waited for."""
     from flowborne.kernels.conjugate_gradients import solve
     from flowborne.kernels.jit import cores
 
@@ -30,14 +29,8 @@ def compile_solver_beside() -> None:
     if cores() == 1 or any(index.glob("conjugate_gradients.solve-*.nbi")):
         return
     quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", "flowborne.solvers.compiling"]
+    command = [sys.executable, "-m", "flowborne.coupling.compiling"]
     subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
-
-
-def compile_solver() -> None:
-    """Have all kernels of the pressure solver in the cache: the iteration first."""
-    compile_iteration()
-    solve_small_slab()
 
 
 def compile_iteration() -> None:
@@ -78,5 +71,22 @@ def solve_small_slab() -> None:
     PressureSystem(weights).solve(rhs, term=term)
 
 
+def carry_small_slab() -> None:
+    """Carry a velocity through a small slab at rest, which takes every kernel."""
+    from flowborne.fluid.boundary import Boundaries
+    from flowborne.fluid.control_volumes import control_volumes
+    from flowborne.fluid.grid import Grid, faces_of
+    from flowborne.fluid.transport import NO_INLETS, Transport, carry_component
+
+    grid, sides = Grid.slab(SMALL, SMALL, 1.0, (0.0, 0.0)), Boundaries()
+    cells, still = np.ones(grid.shape), grid.zeros_faces()
+    opened = faces_of([np.ones(grid.face_shape(axis)) for axis in range(3)])
+    volumes = control_volumes(cells, opened, grid, sides)
+    transport = Transport(still, volumes, volumes, 1.0, 0.0)
+    carry_component(still[0], np.zeros(still[0].shape), 0, transport, NO_INLETS, grid, sides)
+
+
 if __name__ == "__main__":
-    compile_solver()
+    compile_iteration()
+    solve_small_slab()
+    carry_small_slab()
