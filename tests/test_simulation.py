@@ -59,7 +59,7 @@ def test_going_on_from_a_copy_of_the_state_gives_the_same_numbers(small_scene):
     with Simulation(small_scene) as whole, Simulation(small_scene) as later:
         for _ in range(3):
             whole.advance_frame()
-        later.restore(whole.world.copy(), whole.frame)
+        later.restore(whole.snapshot())
         for _ in range(3):
             whole.advance_frame()
             later.advance_frame()

@@ -19,11 +19,13 @@ from flowborne.version import __version__
 
 if TYPE_CHECKING:
     from flowborne.characters.folder import Imported, import_character
+    from flowborne.control.commands import Position, Torque, Velocity
     from flowborne.control.controller import Controller, Decision, StrengthInPhase
     from flowborne.control.measurement import Measurement
     from flowborne.control.trial import Hypothesis, Velocities
     from flowborne.coupling.named import BodyState, JointState
     from flowborne.coupling.report import Momentum, Outcome, StepReport
+    from flowborne.coupling.sensed import FlowState
     from flowborne.coupling.step import step
     from flowborne.coupling.world import Fluid, Setup, World
     from flowborne.error_bars import ErrorBar, Refinement, error_bar
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
     from flowborne.runs.run_folder import RunFolderError
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.schema import Scene
-    from flowborne.simulation import BlowUpError, Simulation
+    from flowborne.simulation import BlowUpError, Simulation, Snapshot
     from flowborne.solids.model import SolidModel
     from flowborne.solids.state import SolidState
     from flowborne.solids.tissue.growth import Tissue
@@ -51,6 +53,7 @@ __all__ = [
     "Decision",
     "ErrorBar",
     "Faces",
+    "FlowState",
     "Fluid",
     "FluidState",
     "FrameReport",
@@ -63,6 +66,7 @@ __all__ = [
     "OpenRun",
     "Outcome",
     "PartError",
+    "Position",
     "Refinement",
     "RunFolderError",
     "RunInterrupted",
@@ -71,12 +75,15 @@ __all__ = [
     "SceneError",
     "Setup",
     "Simulation",
+    "Snapshot",
     "SolidModel",
     "SolidState",
     "StepReport",
     "StrengthInPhase",
     "Tissue",
+    "Torque",
     "Velocities",
+    "Velocity",
     "World",
     "__version__",
     "advance",
@@ -112,6 +119,7 @@ _PLACES = {
     "Decision": "flowborne.control.controller",
     "ErrorBar": "flowborne.error_bars",
     "Faces": "flowborne.fluid.grid",
+    "FlowState": "flowborne.coupling.sensed",
     "Fluid": "flowborne.coupling.world",
     "FluidState": "flowborne.fluid.state",
     "FrameReport": "flowborne.runs.frame_report",
@@ -124,6 +132,7 @@ _PLACES = {
     "OpenRun": "flowborne.runs.open_run",
     "Outcome": "flowborne.coupling.report",
     "PartError": "flowborne.errors",
+    "Position": "flowborne.control.commands",
     "Refinement": "flowborne.error_bars",
     "RunFolderError": "flowborne.runs.run_folder",
     "RunInterrupted": "flowborne.running",
@@ -132,12 +141,15 @@ _PLACES = {
     "SceneError": "flowborne.errors",
     "Setup": "flowborne.coupling.world",
     "Simulation": "flowborne.simulation",
+    "Snapshot": "flowborne.simulation",
     "SolidModel": "flowborne.solids.model",
     "SolidState": "flowborne.solids.state",
     "StepReport": "flowborne.coupling.report",
     "StrengthInPhase": "flowborne.control.controller",
     "Tissue": "flowborne.solids.tissue.growth",
+    "Torque": "flowborne.control.commands",
     "Velocities": "flowborne.control.trial",
+    "Velocity": "flowborne.control.commands",
     "World": "flowborne.coupling.world",
     "advance": "flowborne.worlds",
     "error_bar": "flowborne.error_bars",

@@ -22,6 +22,7 @@ class JointMeasures:
     setup       of the world
     controlled  (n,) dofs of the controller
     chosen      joints with columns for their drive: True for all that are driven, or names
+    told        joints that are told from outside
 
     angle_<joint>_rad, position_<joint>_m    of every hinge and slide
     target_<joint>_rad, target_<joint>_m     of those that are controlled, or chosen and prescribed
@@ -36,10 +37,17 @@ class JointMeasures:
     places     column of the position of each controlled joint -> its place among `controlled`
     """
 
-    def __init__(self, setup: Setup, controlled: Integers, chosen: bool | tuple[str, ...]) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        controlled: Integers,
+        chosen: bool | tuple[str, ...],
+        told: tuple[str, ...] = (),
+    ) -> None:
         self._model, self._motions = setup.solid, setup.motions
         prescribed = _mask(self._model, [motion.dofs for motion in setup.motions])
-        driven = prescribed | _mask(self._model, [controlled])
+        others = [self._model.dofs_of(joint) for joint in told]
+        driven = prescribed | _mask(self._model, [controlled, *others])
         self.positions: dict[str, int] = {}
         self.places: dict[str, int] = {}
         self._decided: dict[str, int] = {}

@@ -80,6 +80,7 @@ class Measures:
         stream: tuple[float, ...] | None,
         bodies: tuple[str, ...] = (),
         joints: bool | tuple[str, ...] = True,
+        told: tuple[str, ...] = (),
     ) -> None:
         self._model = setup.solid
         self._controller = controller
@@ -88,7 +89,7 @@ class Measures:
         self._along, self._across = _axes(stream)
         self._named = BodyMeasures(setup.solid, bodies)
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
-        self._joints = JointMeasures(setup, dofs, joints)
+        self._joints = JointMeasures(setup, dofs, joints, told)
         self.controlled = list(self._joints.places)
         self._terms = [] if controller is None else _terms(controller)
         self.columns = self._columns()

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flowborne.coupling.named import Sensed
 from flowborne.coupling.seen import seen_bodies
 from flowborne.errors import PartError, SceneError, WorkerError
 from flowborne.extras import missing_to_draw
@@ -33,7 +34,7 @@ from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.warn import warnings_of
-from flowborne.simulation import BlowUpError, Simulation
+from flowborne.simulation import BlowUpError, Simulation, Snapshot
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
@@ -190,7 +191,7 @@ class _Run:
             if folder.checkpoint.exists():
                 controller, setup = simulation.controller, simulation.setup
                 memory = None if controller is None else controller.memory_shapes(setup.solid.nq)
-                simulation.restore(*load_checkpoint(folder.checkpoint, setup, memory))
+                simulation.restore(Snapshot(*load_checkpoint(folder.checkpoint, setup, memory)))
             if simulation.frame > self.frames:
                 raise RunFolderError(
                     f"{folder.path} has {simulation.frame} frames already; ask for more of them, "
@@ -344,7 +345,9 @@ class _Run:
         assert self.history is not None
         self.history.sync()
         self.recorder.sync()
-        save_checkpoint(self.folder.checkpoint, self.simulation.world, self.simulation.frame)
+        now = self.simulation.snapshot()
+        felt = None if now.report is None else Sensed.of(now.report)
+        save_checkpoint(self.folder.checkpoint, now.world, now.frame, felt)
 
     def _check_space(self, freed: int) -> None:
         """Raise RunFolderError if the remaining frames do not fit on the disc."""

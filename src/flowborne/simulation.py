@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from flowborne.coupling.named import BodyState, JointState, Named
+from flowborne.control.commands import Commands, Drives, drives_of, told_by
+from flowborne.coupling.named import BodyState, JointState, Named, Sensed
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
+from flowborne.coupling.sensed import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import PartError, SceneError, described
 from flowborne.fluid.boundary import SIDES
@@ -60,13 +62,13 @@ class BlowUpError(Exception):
         return BlowUpError, (self.frame, self.step, self.cause, self.fault)
 
 
-@dataclass(frozen=True)
-class _Moment:
-    """The state after some frames and the report of the last, which change together."""
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The state after some frames, and what the last one said of bodies and joints."""
 
     world: World
     frame: int
-    report: FrameReport | None
+    report: FrameReport | Sensed | None
 
 
 class Simulation:
@@ -115,10 +117,12 @@ class Simulation:
         self.steps_per_frame = built.steps_per_frame
         self.frames = built.frames
         output, stream = self.scene.output, self.scene.stream()
+        told = () if self.scene.policy is None else self.scene.policy.joints
         self.measures = Measures(
-            built.world.setup, self.controller, stream, output.bodies, output.joints
+            built.world.setup, self.controller, stream, output.bodies, output.joints, told
         )
-        self._moment = _Moment(built.world, 0, None)
+        self._policy = None if self.scene.policy is None else self.scene.policy.build()
+        self._moment = Snapshot(built.world, 0, None)
         self._started = False
         self._step: Step = step
 
@@ -149,27 +153,54 @@ class Simulation:
 
     @property
     def report(self) -> FrameReport | None:
-        """Report of the last frame; None before the first, and after `restore`."""
-        return self._moment.report
+        """Report of the last frame; None before the first, and when going on from a checkpoint."""
+        report = self._moment.report
+        return report if isinstance(report, FrameReport) else None
 
-    def restore(self, world: World, frame: int) -> None:
-        """Continue from `world`, the state after `frame` frames of the same scene."""
-        self._moment, self._started = _Moment(world, frame, None), True
+    def snapshot(self) -> Snapshot:
+        """The state now. A frame makes a new one, so it costs nothing to keep."""
+        return replace(self._moment, world=self.world)
 
-    def advance_frame(self) -> FrameReport:
+    def restore(self, snapshot: Snapshot) -> None:
+        """Continue from a state of the same scene, to the same bits."""
+        self._moment, self._started = snapshot, True
+
+    def advance_frame(self, commands: Commands | None = None) -> FrameReport:
         """Decide, then take the steps of one frame, on all cores unless a context allows fewer.
 
-        raises  BlowUpError if a step fails or a measure is not a finite number. After any error the
-                state is that before the frame
+        commands  what joints are told by their names: Position, Velocity or Torque. The scene's
+                  motions and its controller move the others. By default the scene's policy tells
+        raises    BlowUpError if a step or the policy fails or a measure is not a finite number;
+                  SceneError for a wrong command. After any error the state is that before the frame
         """
         world = self.world.copy()
+        if commands is None and self._policy is not None:
+            try:
+                commands = self._policy(self)
+            except PartError as error:
+                raise BlowUpError(self.frame + 1, 1, str(error)) from error
+        beyond: tuple[str, ...] = ()
+        if commands:
+            told, beyond = told_by(commands, world, self.frame_time, self._drives())
+            world.setup = world.setup.but(told=told)
         with _one_blas_thread(), kernel_threads():
-            report = self._advance(world, self.frame + 1)
+            report = replace(self._advance(world, self.frame + 1), beyond=beyond)
+        if commands:
+            world.setup = self.setup
         lost = self.measures.lost(self.measures.values(world, report.frame, report))
         if lost:
             raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")
-        self._moment = _Moment(world, report.frame, report)
+        self._moment = Snapshot(world, report.frame, report)
         return report
+
+    def flow_at(self, body: str, points: Array) -> FlowState:
+        """The fluid now at points (n, 3) that ride on a body, in m from the origin of its frame and
+        along its axes.
+
+        raises  ValueError for an unknown name, and without a fluid
+        """
+        state = self.body(body)
+        return flow_at(self.world, state.position + np.atleast_2d(points) @ state.rotation.T)
 
     def body(self, name: str) -> BodyState:
         """Pose and velocity of a body now and the frame's mean force, in SI units; see `BodyState`.
@@ -186,7 +217,13 @@ class Simulation:
         return self._named().joint(name)
 
     def _named(self) -> Named:
-        return Named.after(self.world, self.report)
+        return Named.after(self.world, self._moment.report)
+
+    def _drives(self) -> Drives:
+        """Those of the scene itself."""
+        controller = self.controller
+        own = [] if controller is None else [(controller.dofs, controller.servo)]
+        return drives_of(self.setup, own)
 
     def measure(self) -> dict[str, float]:
         """A row of the history for the present state: column -> value.

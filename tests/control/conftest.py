@@ -56,7 +56,7 @@ def move_only(world: World, dt: float, command: JointCommand | None = None) -> S
     world.steps += 1
     none = [np.zeros((model.nbody, 6))] * 6
     centre = np.zeros((model.nbody, 3))
-    return StepReport(dt, Outcome.DONE, world.solid.v, np.zeros(model.nv), *none, centre)
+    return StepReport(dt, Outcome.DONE, world.solid.v, *[np.zeros(model.nv)] * 2, *none, centre)
 
 
 @pytest.fixture

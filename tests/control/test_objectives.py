@@ -35,7 +35,7 @@ def measured(make_world: MakeWorld) -> Measurement:
     world.time = 3.0
     rng = np.random.default_rng(1)
     wrench = rng.normal(size=(5, 4, 6))
-    told = np.zeros(3), np.array([3.0, -4.0, 12.0]), *wrench
+    told = np.zeros(3), np.zeros(3), np.array([3.0, -4.0, 12.0]), *wrench
     report = StepReport(0.05, Outcome.DONE, *told, np.zeros((4, 6)), np.zeros((4, 3)))
     return Measurement(world, report)
 

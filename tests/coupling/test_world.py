@@ -12,7 +12,7 @@ from flowborne.coupling import cut
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Setup, World
-from flowborne.simulation import Simulation
+from flowborne.simulation import Simulation, Snapshot
 from flowborne.solids.dynamics import Kinematics
 
 SMALL = {"domain.resolution": "32", "time.frames": "4"}
@@ -89,7 +89,7 @@ def test_a_saved_state_goes_on_bit_for_bit(simulation: Simulation) -> None:
     with swimming(workers=1) as later:
         restored = World.from_arrays(later.world.setup, arrays)
         assert bits(restored) == bits(simulation.world)
-        later.restore(restored, simulation.frame)
+        later.restore(Snapshot(restored, simulation.frame, None))
         for _ in range(2):
             later.advance_frame()
             simulation.advance_frame()

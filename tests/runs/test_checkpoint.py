@@ -37,7 +37,7 @@ def world():
 def test_a_world_is_read_back_bit_for_bit(tmp_path, world):
     path = tmp_path / "checkpoint.npz"
     save_checkpoint(path, world, 5)
-    again, frame = load_checkpoint(path, world.setup)
+    again, frame, _ = load_checkpoint(path, world.setup)
     assert (frame, again.steps, again.time, again.ahead) == (5, 7, world.time, 0.05)
     saved, read = world.arrays(), again.arrays()
     assert list(saved) == list(read)

@@ -319,14 +319,15 @@ class Controller:
 
     def _groups(self, world: World, size: int) -> list[tuple[Integers, ObjectiveSum]]:
         """Indices into the variables (N,) of a decision, in groups with the same objectives, and
-        their sum. Groups without an active term are left out, except on a plan, where terms can
-        become active later."""
+        their sum. Dofs that are told are left out, and groups without an active term, except on a
+        plan, where terms can become active later."""
         knots = self.dofs.size * np.arange(size // self.dofs.size)[:, None]
-        return [
-            ((knots + indices).ravel(), objective)
-            for indices, objective in self.objective.group_by_joints(self.dofs)
-            if isinstance(self.hypothesis, Horizon) or objective.active(world.time)
-        ]
+        told, groups = np.isin(self.dofs, world.setup.told.dofs()), []
+        for indices, objective in self.objective.group_by_joints(self.dofs):
+            left = indices[~told[indices]]
+            if left.size and (isinstance(self.hypothesis, Horizon) or objective.active(world.time)):
+                groups.append(((knots + left).ravel(), objective))
+        return groups
 
     def _estimate(self, trials: Trials) -> tuple[float, Array]:
         """Objective and its gradient (m,). Raises PartError if the estimate is no such pair."""

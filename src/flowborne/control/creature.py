@@ -26,8 +26,9 @@ Mask = NDArray[np.bool_]
 
 
 def given(setup: Setup) -> Mask:
-    """(nv,) dofs whose velocity the controller cannot choose: prescribed and locked ones."""
+    """(nv,) dofs whose velocity the controller cannot choose: prescribed, told and locked ones."""
     mask = np.asarray(setup.solid.locked, dtype=bool).copy()
+    mask[setup.told.dofs()] = True
     for motion in setup.motions:
         mask[motion.dofs] = True
     return mask

@@ -118,9 +118,10 @@ class Trial:
         Every trial makes all dofs outboard of any controlled one rigid, so that trials differ only
         in the displacement.
         """
-        hypothesis, dofs, rigid = self.course.hypothesis, self.course.dofs, self.course.rigid
-        v = world.solid.v
-        rate = self.displacement / hypothesis.duration
+        hypothesis, rigid, v = self.course.hypothesis, self.course.rigid, world.solid.v
+        own = ~np.isin(self.course.dofs, world.setup.told.dofs())
+        dofs = self.course.dofs[own]
+        rate = self.displacement[own] / hypothesis.duration
         if hypothesis.velocities == "present":
             final = v[dofs].copy()
             creature.give_velocity(world, rigid, np.zeros(rigid.size), dofs)
@@ -133,7 +134,7 @@ class Trial:
         command.set(rigid, 0.0, 0.0)
         command.set(dofs, rate, final)
         ahead = hypothesis.last_steps * hypothesis.dt * self._last_rate(command)
-        command.rate[dofs] -= ahead / hypothesis.duration
+        command.rate[self.course.dofs] -= ahead / hypothesis.duration
         return command
 
     def _last_rate(self, command: JointCommand) -> Array:

@@ -46,8 +46,9 @@ def equations(
     world: World, before: SolidState, force: Array, command: JointCommand, dt: float
 ) -> Driven:
     """The bodies' own equations of motion under a generalised force (nv,), with the drives."""
-    goal, limit = command.final_velocity, command.torque_limit
-    return drive(world.setup.solid, world.solid, force, dt, before, command.prescribed, goal, limit)
+    goal, limit, model = command.final_velocity, command.torque_limit, world.setup.solid
+    force = force + world.setup.told.force_on(model.nv)
+    return drive(model, world.solid, force, dt, before, command.prescribed, goal, limit)
 
 
 def step_bodies(

@@ -8,6 +8,7 @@ is the mean of both. Read half a step off, a force in phase with an acceleration
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -29,6 +30,16 @@ class Report(Protocol):
         ...
 
     @property
+    def acceleration(self) -> Array:
+        """(nv,) change of v in its last step by dt."""
+        ...
+
+    @property
+    def dt(self) -> float:
+        """Length of that step, s."""
+        ...
+
+    @property
     def actuator(self) -> Array:
         """(nv,)"""
         ...
@@ -43,6 +54,35 @@ class Report(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Sensed:
+    """What a step or frame says of bodies and joints, kept for a checkpoint; see `Report`."""
+
+    velocity: Array
+    acceleration: Array
+    dt: float
+    actuator: Array
+    wrench: Array
+    added_mass: Array
+
+    @classmethod
+    def of(cls, report: Report) -> Sensed:
+        wrench, added = report.central_wrench(), report.central_added_mass()
+        state = report.velocity, report.acceleration, report.dt
+        return cls(*state, report.actuator, wrench, added)
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, Array]) -> Sensed:
+        """Those that its attributes were saved as."""
+        return cls(**arrays | {"dt": float(arrays["dt"])})  # type: ignore[arg-type]
+
+    def central_wrench(self) -> Array:
+        return self.wrench
+
+    def central_added_mass(self) -> Array:
+        return self.added_mass
+
+
+@dataclass(frozen=True, eq=False)
 class BodyState:
     """A body after a step, in world axes; what only a step can tell is nan before the first.
 
@@ -51,6 +91,10 @@ class BodyState:
     centre            (3,) its centre of mass, m
     velocity          (3,) of its centre of mass, m/s
     angular_velocity  (3,) rad/s
+    acceleration      (3,) of its centre of mass, m/s^2: change of its velocity from half a step
+                      before to half a step after, by the step
+    angular_acceleration
+                      (3,) rad/s^2
     force             (3,) of fluid and winds, N (N/m in a slab)
     torque            (3,) of the same about its centre of mass, N m
     added_mass_force  (3,) the part of `force` with which the fluid resists acceleration.
@@ -63,24 +107,12 @@ class BodyState:
     centre: Array
     velocity: Array
     angular_velocity: Array
+    acceleration: Array
+    angular_acceleration: Array
     force: Array
     torque: Array
     added_mass_force: Array
     added_mass_torque: Array
-
-    @classmethod
-    def of(cls, pose: Kinematics, body: int, report: Report | None) -> BodyState:
-        """The body of this number in a pose to which the step of `report` led."""
-        position, rotation = pose.body_position[body], pose.body_rotation[body]
-        centre = pose.mass_centre[body]
-        if report is None:
-            nothing = np.full(3, np.nan)
-            return cls(position, rotation, centre, *[nothing] * 6)
-        twist = pose.twist_jacobian[body] @ report.velocity
-        velocity = twist[:3] + np.cross(twist[3:], centre)
-        force, torque = np.split(report.central_wrench()[body], 2)
-        added = np.split(report.central_added_mass()[body], 2)
-        return cls(position, rotation, centre, velocity, twist[3:], force, torque, *added)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +139,6 @@ class Named:
 
     def __init__(self, model: SolidModel, q: Array, report: Report | None) -> None:
         self._model, self._q, self._report = model, q, report
-        self._pose: Kinematics | None = None
 
     @classmethod
     def after(cls, world: World, report: Report | None) -> Named:
@@ -116,9 +147,15 @@ class Named:
 
     def body(self, name: str) -> BodyState:
         """A body's state. Raises ValueError for an unknown name."""
-        if self._pose is None:
-            self._pose = kinematics(self._model, self._q)
-        return BodyState.of(self._pose, self._model.body(name), self._report)
+        pose, body, report = self._pose, self._model.body(name), self._report
+        place = pose.body_position[body], pose.body_rotation[body], pose.mass_centre[body]
+        if report is None:
+            return BodyState(*place, *[np.full(3, np.nan)] * 8)
+        velocity = central_twist(pose, report.velocity, body)
+        before, after = (central_twist(*half, body) for half in self._halves)
+        wrench, added = report.central_wrench()[body], report.central_added_mass()[body]
+        sixes = velocity, (after - before) / report.dt, wrench, added
+        return BodyState(*place, *(half for six in sixes for half in np.split(six, 2)))
 
     def joint(self, name: str) -> JointState:
         """A joint's state. Raises ValueError for an unknown name."""
@@ -128,3 +165,23 @@ class Named:
             nothing = np.full(dofs.size, np.nan)
             return JointState(position, nothing, nothing)
         return JointState(position, self._report.velocity[dofs], self._report.actuator[dofs])
+
+    @cached_property
+    def _pose(self) -> Kinematics:
+        return kinematics(self._model, self._q)
+
+    @cached_property
+    def _halves(self) -> tuple[tuple[Kinematics, Array], tuple[Kinematics, Array]]:
+        """Poses half a step before and after, and the velocities (nv,) there."""
+        assert self._report is not None
+        half, report = 0.5 * self._report.dt, self._report
+        before, after = (report.velocity + sign * half * report.acceleration for sign in (-1, 1))
+        ends = (-half, before), (half, after)
+        first, last = (self._model.integrate(self._q, v, dt) for dt, v in ends)
+        return (kinematics(self._model, first), before), (kinematics(self._model, last), after)
+
+
+def central_twist(pose: Kinematics, velocity: Array, body: int) -> Array:
+    """(6,) velocity of a body's centre of mass, and its angular velocity."""
+    twist = pose.twist_jacobian[body] @ velocity
+    return np.append(twist[:3] + np.cross(twist[3:], pose.mass_centre[body]), twist[3:])

@@ -67,6 +67,7 @@ class StepReport:
     dt               s
     velocity         (nv,) at the end of the step: v is that half a step before, then half a step
                      after it, and this is the mean of both
+    acceleration     (nv,) change of v in the step by dt
     actuator         (nv,) generalised force of the drives (and of locked dofs), N or N m
     pressure_wrench  (nbody, 6) force and torque about the world origin of the dynamic pressure
     viscous_wrench   (nbody, 6) the same of the shear stress
@@ -98,6 +99,7 @@ class StepReport:
     dt: float
     outcome: Outcome
     velocity: Array
+    acceleration: Array
     actuator: Array
     pressure_wrench: Array
     viscous_wrench: Array

@@ -121,7 +121,7 @@ class TrajectoryServo:
 
 
 def joint_command(world: World, dt: float, command: JointCommand | None) -> JointCommand:
-    """The command with prescribed motions and a slab's locked dofs added.
+    """The command with prescribed motions, what joints are told, and a slab's locked dofs added.
 
     A drive that follows a motion exactly ends the step with the velocity of half a step later, as
     the dofs that answer forces do (leapfrog). A trial keeps to the half step of the world itself,
@@ -130,7 +130,8 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
     """
     model, end = world.setup.solid, world.time + dt
     command = JointCommand.none(model.nv) if command is None else command.copy()
-    for motion in world.setup.motions:
+    told = world.setup.told
+    for motion in (*world.setup.motions, *told.motions):
         if isinstance(motion, TrajectoryServo):
             v = world.solid.v[motion.dofs]
             gap = gap_to(world, motion, end + dt) - dt * v
@@ -143,6 +144,7 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
             if span > 0.0:
                 final_velocity = velocity_after(model, world.solid.q, motion, end, span)
             command.set(motion.dofs, rate, final_velocity)
+    command.prescribed[told.pushed] = False
     command.set(model.locked, 0.0, 0.0)
     return command
 

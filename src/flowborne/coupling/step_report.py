@@ -26,6 +26,7 @@ def blank(world: World, dt: float, timer: Timer) -> StepReport:
         dt=dt,
         outcome=Outcome.DONE,
         velocity=drives,
+        acceleration=drives,
         actuator=drives,
         pressure_wrench=wrench,
         viscous_wrench=wrench,
@@ -60,9 +61,11 @@ def known_push(
 
 def report_bodies(done: StepReport, world: World, solved: Solved) -> None:
     """What the solve gave to the bodies and their drives."""
-    done.velocity, done.actuator = 0.5 * (solved.driven.system.v + solved.v), solved.actuator
-    done.work = done.dt * float(solved.actuator @ done.velocity)
-    done.momentum.solid = halfway_momentum(world.setup.solid, world.solid, done.dt)[0]
+    before, model, told = solved.driven.system.v, world.setup.solid, world.setup.told
+    done.velocity, done.acceleration = 0.5 * (before + solved.v), (solved.v - before) / done.dt
+    done.actuator = solved.actuator + told.force_on(model.nv)
+    done.work = done.dt * float(done.actuator @ done.velocity)
+    done.momentum.solid = halfway_momentum(model, world.solid, done.dt)[0]
     done.contacts, done.limited = solved.driven.system.contacts, solved.driven.limited.nonzero()[0]
     done.outcome, done.unsettled = solved.outcome, solved.unsettled
     if not np.isfinite(solved.v).all():

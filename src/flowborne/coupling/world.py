@@ -14,6 +14,7 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
+from flowborne.coupling.told import NOTHING_TOLD, Told
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Grid
@@ -65,6 +66,7 @@ class Setup:
     mouths   patches of skin through which fluid is expelled; needs a fluid that is not one-way
     trial    whether steps are hypothetical, and may be longer than those of the world itself
     splits   whether steps report the added-mass part of the fluid's force, which costs a solve
+    told     what joints are told from outside
     """
 
     solid: SolidModel
@@ -74,6 +76,7 @@ class Setup:
     mouths: tuple[Mouth, ...] = ()
     trial: bool = False
     splits: bool = False
+    told: Told = NOTHING_TOLD
 
     @cached_property
     def hypothetical(self) -> Setup:

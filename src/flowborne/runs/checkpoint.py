@@ -9,25 +9,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.coupling.named import Sensed
 from flowborne.coupling.world import Setup, World
 from flowborne.files.arrays import read_arrays
 from flowborne.files.atomic import write_atomically
+from flowborne.fluid.state import under
+
+SENSED = "sensed/"
+"""Beginning of the names of arrays that say what bodies and joints felt."""
 
 
-def save_checkpoint(path: Path, world: World, frame: int) -> None:
+def save_checkpoint(path: Path, world: World, frame: int, sensed: Sensed | None = None) -> None:
     """Write the state after `frame` frames; an earlier checkpoint is replaced atomically.
 
     The file depends only on the state and the frame: equal runs write equal bytes. The history has
     a row per frame, so `frame` is also its length.
     """
     arrays = world.arrays()
+    if sensed is not None:
+        arrays |= {f"{SENSED}{name}": np.asarray(value) for name, value in vars(sensed).items()}
     write_atomically(path, lambda file: np.savez(file, frame=np.int64(frame), **arrays))  # type: ignore[arg-type]
 
 
 def load_checkpoint(
     path: Path, setup: Setup, memory: Mapping[str, tuple[int, ...]] | None = None
-) -> tuple[World, int]:
-    """The saved world of `setup`, and its number of frames.
+) -> tuple[World, int, Sensed | None]:
+    """The saved world of `setup`, its number of frames, and what its bodies and joints felt.
 
     memory  shapes of the controller's arrays; none without a controller
     raises  ValueError when the file is not a checkpoint, or belongs to another setup
@@ -43,7 +50,8 @@ def load_checkpoint(
         raise ValueError(f"{path} is not a checkpoint of this scene (it lacks {error})") from error
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is not a checkpoint of this scene ({error})") from error
-    return world, int(frame)
+    felt = under(SENSED, arrays)
+    return world, int(frame), Sensed.from_arrays(felt) if felt else None
 
 
 def _check_arrays(

@@ -29,6 +29,7 @@ class FrameReport:
     targets    (n,) where the controlled dofs are going, rad or m; nan for ball joints
     decided    whether the controller decided anew in this frame
     seconds    by part (`PARTS`) and "total"
+    beyond     sentences: which limits what joints were told would have passed
     """
 
     frame: int
@@ -40,6 +41,7 @@ class FrameReport:
     targets: Array
     decided: bool
     seconds: dict[str, float]
+    beyond: tuple[str, ...] = ()
 
     @property
     def step(self) -> StepReport:
@@ -50,6 +52,16 @@ class FrameReport:
     def velocity(self) -> Array:
         """(nv,) at the end of the frame."""
         return self.step.velocity
+
+    @property
+    def acceleration(self) -> Array:
+        """(nv,) change of v in the last step by dt."""
+        return self.step.acceleration
+
+    @property
+    def dt(self) -> float:
+        """Length of the last step, s."""
+        return self.step.dt
 
     @property
     def actuator(self) -> Array:

@@ -72,6 +72,7 @@ NEEDS_BODIES = (
     "control",
     "objectives",
     "controller",
+    "policy",
 )
 
 
@@ -115,6 +116,8 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         named += draft.unknown_body(model, scene.film.camera.follow, "film", "camera", "follow")
     for index, wind in enumerate(scene.wind):
         named += [f"{draft.at('wind', index)}: {problem}" for problem in wind.check(around)]
+    if scene.policy is not None:
+        named += [f"{draft.at('policy')}: {problem}" for problem in scene.policy.check(around)]
     yield from named
     state = [
         *check_initial(draft, model),

@@ -41,11 +41,12 @@ class TrajectoryHeld:
 def driven_dofs(
     scene: Scene, model: SolidModel, motions: Iterable[Trajectory]
 ) -> NDArray[np.bool_]:
-    """(nv,) which dofs are moved by motions or the controller, or locked in a slab."""
+    """(nv,) which dofs are moved by motions, the controller or the policy, or locked in a slab."""
     moved = model.locked.copy()
     for motion in motions:
         moved[motion.dofs] = True
-    for joint in scene.controlled_joints():
+    told = () if scene.policy is None else scene.policy.joints
+    for joint in (*scene.controlled_joints(), *told):
         moved[model.dofs_of(joint)] = True
     return moved
 

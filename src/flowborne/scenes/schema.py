@@ -20,6 +20,7 @@ from flowborne.scenes.dye import DyeTable, SourceTable
 from flowborne.scenes.flesh import FleshTable
 from flowborne.scenes.motions import EarlierTable, MotionTable
 from flowborne.scenes.mouths import MouthTable
+from flowborne.scenes.policy import PolicyTable
 from flowborne.scenes.schema_bodies import (
     ClipTable,
     HumanTable,
@@ -178,6 +179,7 @@ class Scene(Table):
     control: tuple[ControlTable, ...] = ()
     objectives: tuple[AnyObjective, ...] = ()
     controller: ControllerTable = ControllerTable()
+    policy: PolicyTable | None = None
     output: OutputTable = OutputTable()
     film: FilmTable = FilmTable()
 

@@ -1,0 +1,199 @@
+"""Commands to joints from outside: a position, a velocity or a torque for the next frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from flowborne.control.creature import within_range
+from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.servo import Servo, ServoExact, TrajectoryServo
+from flowborne.coupling.told import Told, TrajectoryKnots
+from flowborne.coupling.world import Setup, World
+from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.model import FREE, SolidModel
+
+Numbers = float | Sequence[float] | Array
+
+
+@dataclass(frozen=True)
+class Position:
+    """Where a joint is at the end of the frame. It goes there at even velocity.
+
+    value  rad or m; a unit quaternion (w, x, y, z) of a ball
+    then   where it is at the end of the frame after, which tells the velocity that it ends this
+           one with; when None it keeps its velocity
+    """
+
+    value: Numbers
+    then: Numbers | None = None
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """How fast a joint moves in the frame.
+
+    value  rad/s or m/s, (k,) in the joint's own axes for a ball
+    """
+
+    value: Numbers
+
+
+@dataclass(frozen=True)
+class Torque:
+    """What drives a joint in the frame: a force in the bodies' equations.
+
+    It acts from half a step after the frame's start to half a step after its end: velocities are
+    those of the middle of steps, and that of the first one has been found.
+
+    value  N m or N (per m in a slab), (k,) in the joint's own axes for a ball
+    """
+
+    value: Numbers
+
+
+Command = Position | Velocity | Torque
+Commands = Mapping[str, Command]
+
+Drives = Sequence[tuple[Integers, Servo]]
+"""Dofs and servo of drives."""
+
+
+def told_by(
+    commands: Commands, world: World, span: float, drives: Drives
+) -> tuple[Told, tuple[str, ...]]:
+    """What joints are told by commands, and which of their limits these would have passed.
+
+    A joint keeps within its range, and moves as its drive can: exactly, by a PD law, or with a
+    limited torque, which limits a told torque too.
+
+    commands  by the names of joints
+    span      s, length of the frame
+    drives    of the scene itself
+    raises    SceneError for a joint that is unknown or cannot be driven, and for wrong numbers
+    """
+    model, motions, beyond = world.setup.solid, list[Trajectory](), list[str]()
+    pushed, force = [np.zeros(0, np.int64)], [np.zeros(0)]
+    for joint, command in commands.items():
+        dofs = _driven_dofs(model, joint)
+        servo = _servo_of(dofs, drives)
+        if isinstance(command, Torque):
+            wanted, limit = _numbers(joint, command.value, dofs.size), _limit(model, joint, servo)
+            given = np.clip(wanted, -limit, limit)
+            beyond += _said(joint, wanted, given, "N m or N")
+            pushed.append(dofs)
+            force.append(given)
+        elif isinstance(command, Position | Velocity):
+            poses, said = _knots(joint, command, world, span)
+            beyond += said
+            end = world.time + span
+            times = np.array([world.time, end, end + span])
+            motion: Trajectory = TrajectoryKnots(model, dofs, times, poses)
+            exact = isinstance(servo, ServoExact) and np.all(np.isinf(servo.torque_limit))
+            motions.append(motion if exact else TrajectoryServo(motion, servo))
+        else:
+            raise SceneError(
+                f"the command to '{joint}' is {command!r:.60}: "
+                "give a Position, a Velocity or a Torque"
+            )
+    return Told(tuple(motions), np.concatenate(pushed), np.concatenate(force)), tuple(beyond)
+
+
+def _knots(
+    joint: str, command: Position | Velocity, world: World, span: float
+) -> tuple[Array, list[str]]:
+    """(3, nq) poses now, at the end of the frame and of the frame after, and what was beyond the
+    joint's range."""
+    model, here, dofs = world.setup.solid, world.solid.q, world.setup.solid.dofs_of(joint)
+    move, then = np.zeros(model.nv), None
+    if isinstance(command, Velocity):
+        move[dofs] = span * _numbers(joint, command.value, dofs.size)
+        goal = model.integrate(here, move, 1.0)
+    else:
+        goal = _pose(model, joint, here, command.value)
+        move = model.difference(here, goal)
+        if command.then is not None:
+            then = _pose(model, joint, goal, command.then)
+    allowed, said = within_range(model, here, move), list[str]()
+    if not np.array_equal(allowed, move):
+        said = _said(joint, move[dofs], allowed[dofs], "rad or m from here")
+        goal = model.integrate(here, allowed, 1.0)
+    onwards = allowed if then is None else model.difference(goal, then)
+    if then is None or not np.array_equal(within_range(model, goal, onwards), onwards):
+        then = model.integrate(goal, within_range(model, goal, onwards), 1.0)
+    return np.array([here, goal, then]), said
+
+
+def _pose(model: SolidModel, joint: str, q: Array, value: Numbers) -> Array:
+    """(nq,) the pose q with a joint at `value`."""
+    pose, at = q.copy(), model.positions_of(joint)
+    pose[at] = _numbers(joint, value, at.size)
+    if at.size == 4:
+        length = float(np.linalg.norm(pose[at]))
+        if not 0.999 < length < 1.001:
+            raise SceneError(f"the position of '{joint}' is no unit quaternion (w, x, y, z)")
+        pose[at] /= length
+    return pose
+
+
+def _numbers(joint: str, value: Any, count: int) -> Array:
+    """(count,) finite numbers of a command."""
+    try:
+        found = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.shape != (count,) or not np.isfinite(found).all():
+        wanted = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise SceneError(f"the command to '{joint}' has {value!r:.60}: give {wanted}")
+    return found
+
+
+def _driven_dofs(model: SolidModel, joint: str) -> Integers:
+    """Dofs of a joint that can be driven."""
+    try:
+        dofs = model.dofs_of(joint)
+    except ValueError as error:
+        raise SceneError(f"{error}") from None
+    if model.mj.jnt_type[model.joint(joint)] == FREE:
+        raise SceneError(f"'{joint}' is a free joint, which nothing drives: tell other joints")
+    if model.locked[dofs].any():
+        raise SceneError(f"'{joint}' is locked in a slab: tell joints that turn about z")
+    return dofs
+
+
+def drives_of(setup: Setup, others: Drives) -> Drives:
+    """The drives of a scene's motions, and others."""
+    servos = [(m.dofs, m.servo) for m in setup.motions if isinstance(m, TrajectoryServo)]
+    return [*servos, *others]
+
+
+def _servo_of(dofs: Integers, drives: Drives) -> Servo:
+    """The servo of dofs: exact where none is known."""
+    for driven, servo in drives:
+        own = np.isin(driven, dofs)
+        if own.any():
+            limit = np.broadcast_to(servo.torque_limit, driven.shape)[own]
+            if is_dataclass(servo) and np.ndim(servo.torque_limit):
+                return replace(servo, torque_limit=tuple(limit.tolist()))
+            return servo
+    return ServoExact()
+
+
+def _limit(model: SolidModel, joint: str, servo: Servo) -> Array:
+    """(k,) largest torque on a joint, by its servo and by the model's actuatorfrcrange."""
+    number, limit = model.joint(joint), np.asarray(servo.torque_limit, dtype=np.float64)
+    if model.mj.jnt_actfrclimited[number]:
+        limit = np.minimum(limit, np.abs(model.mj.jnt_actfrcrange[number]).min())
+    return np.asarray(limit)
+
+
+def _said(joint: str, wanted: Array, given: Array, unit: str) -> list[str]:
+    """That a joint got less than it was told."""
+    if np.array_equal(wanted, given):
+        return []
+    told, got = (", ".join(f"{x:.4g}" for x in values) for values in (wanted, given))
+    return [f"{joint}: {told} {unit} was told, its limit is {got}"]
