@@ -310,14 +310,7 @@ class _Run:
     def _write_start(self) -> None:
         """Write all files of frame 0, the checkpoint last."""
         simulation, folder = self.simulation, self.folder
-        write_model(
-            folder,
-            simulation.setup,
-            controlled=list(simulation.scene.controlled_joints()),
-            frames_per_second=1.0 / simulation.frame_time,
-            wind=[list(stream)] if (stream := simulation.scene.stream()) else [],
-            taken=self.taken,
-        )
+        _write_model_of(folder, simulation, self.taken)
         folder.drop_states_after(-1)
         self.history = History.create(folder.history, self.columns)
         self.recorder.write(0, simulation.world, None)
@@ -475,3 +468,27 @@ class _Signals:
             raise KeyboardInterrupt from error
         finally:
             self._safe = False
+
+
+def write_state_alone(folder: RunFolder, simulation: Simulation) -> None:
+    """A run folder of the present state of a simulation, to be drawn."""
+    from flowborne.scenes.save import scene_files
+
+    RunFolder.create(folder.path)
+    write_scene(folder, scene_files(simulation.scene))
+    _write_model_of(folder, simulation)
+    History.create(folder.history, simulation.measures.columns).close()
+    report = simulation.report
+    force = None if report is None else report.drag()
+    Recorder(folder).write(simulation.frame, simulation.world, force)
+
+
+def _write_model_of(folder: RunFolder, simulation: Simulation, taken: tuple[str, ...] = ()) -> None:
+    write_model(
+        folder,
+        simulation.setup,
+        controlled=list(simulation.scene.controlled_joints()),
+        frames_per_second=1.0 / simulation.frame_time,
+        wind=[list(stream)] if (stream := simulation.scene.stream()) else [],
+        taken=taken,
+    )

@@ -80,9 +80,10 @@ def told_by(
     pushed, force = [np.zeros(0, np.int64)], [np.zeros(0)]
     for joint, command in commands.items():
         dofs = _driven_dofs(model, joint)
-        servo = _servo_of(dofs, drives)
+        servo = servo_of(dofs, drives)
         if isinstance(command, Torque):
-            wanted, limit = _numbers(joint, command.value, dofs.size), _limit(model, joint, servo)
+            wanted = _numbers(joint, command.value, dofs.size)
+            limit = torque_limit(model, joint, servo)
             given = np.clip(wanted, -limit, limit)
             beyond += _said(joint, wanted, given, "N m or N")
             pushed.append(dofs)
@@ -171,7 +172,7 @@ def drives_of(setup: Setup, others: Drives) -> Drives:
     return [*servos, *others]
 
 
-def _servo_of(dofs: Integers, drives: Drives) -> Servo:
+def servo_of(dofs: Integers, drives: Drives) -> Servo:
     """The servo of dofs: exact where none is known."""
     for driven, servo in drives:
         own = np.isin(driven, dofs)
@@ -183,8 +184,9 @@ def _servo_of(dofs: Integers, drives: Drives) -> Servo:
     return ServoExact()
 
 
-def _limit(model: SolidModel, joint: str, servo: Servo) -> Array:
-    """(k,) largest torque on a joint, by its servo and by the model's actuatorfrcrange."""
+def torque_limit(model: SolidModel, joint: str, servo: Servo) -> Array:
+    """(k,) or (): largest torque on a joint, N m or N, by its servo and the model's
+    actuatorfrcrange."""
     number, limit = model.joint(joint), np.asarray(servo.torque_limit, dtype=np.float64)
     if model.mj.jnt_actfrclimited[number]:
         limit = np.minimum(limit, np.abs(model.mj.jnt_actfrcrange[number]).min())
