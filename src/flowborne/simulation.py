@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
 from flowborne.runs.frame_report import PARTS, FrameReport
 from flowborne.runs.summary import BUDGET_OPEN
+from flowborne.scenes.changes import ChangeTable, values_at
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, SLIDE
 from flowborne.solids.surfaces import geom_boxes
@@ -111,7 +112,8 @@ class Simulation:
         )
         kind = ("serial" if count == 1 else "threads") if executor is None else executor
         with _enough_memory(self.scene):
-            built = build(self.scene, mapper(kind, count))
+            self._executor = mapper(kind, count)
+            built = build(self.scene, self._executor)
         self.controller: Controller | None = built.controller
         self.frame_time = built.frame_time
         self.steps_per_frame = built.steps_per_frame
@@ -121,6 +123,8 @@ class Simulation:
         self.measures = Measures(
             built.world.setup, self.controller, stream, output.bodies, output.joints, told
         )
+        self._changes: tuple[ChangeTable, ...] = self.scene.changes
+        self._values: dict[str, Any] = {}
         self._policy = None if self.scene.policy is None else self.scene.policy.build()
         self._moment = Snapshot(built.world, 0, None)
         self._started = False
@@ -157,13 +161,34 @@ class Simulation:
         report = self._moment.report
         return report if isinstance(report, FrameReport) else None
 
+    @property
+    def changes(self) -> tuple[ChangeTable, ...]:
+        """All changes of keys so far and to come: those of the scene, and those of `change`. In
+        [[changes]] of the scene they give the same run."""
+        return self._changes
+
+    def change(self, values: Mapping[str, Any], over: float = 0.0) -> None:
+        """Give keys of the scene other values from now on: winds, streams, objectives, weights,
+        strengths.
+
+        values  dotted key -> value, as {"wind.0.velocity": [0.0, 5.0, 0.0]}
+        over    s in which numbers go there evenly
+        raises  SceneError for a key that is unknown or cannot change, or a wrong value
+        """
+        from flowborne.scenes.load import with_values
+
+        with_values(self.scene, values)
+        earlier = (change for change in self._changes if change.time <= self.time)
+        self._changes = (*earlier, ChangeTable(time=self.time, over=over, values=dict(values)))
+
     def snapshot(self) -> Snapshot:
         """The state now. A frame makes a new one, so it costs nothing to keep."""
         return replace(self._moment, world=self.world)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a state of the same scene, to the same bits."""
-        self._moment, self._started = snapshot, True
+        world = replace(snapshot.world, setup=self.setup)
+        self._moment, self._started = replace(snapshot, world=world), True
 
     def advance_frame(self, commands: Commands | None = None) -> FrameReport:
         """Decide, then take the steps of one frame, on all cores unless a context allows fewer.
@@ -173,6 +198,7 @@ class Simulation:
         raises    BlowUpError if a step or the policy fails or a measure is not a finite number;
                   SceneError for a wrong command. After any error the state is that before the frame
         """
+        self._apply_changes()
         world = self.world.copy()
         if commands is None and self._policy is not None:
             try:
@@ -184,7 +210,9 @@ class Simulation:
             told, beyond = told_by(commands, world, self.frame_time, self._drives())
             world.setup = world.setup.but(told=told)
         with _one_blas_thread(), kernel_threads():
-            report = replace(self._advance(world, self.frame + 1), beyond=beyond)
+            report = replace(
+                self._advance(world, self.frame + 1), beyond=beyond, values=self._values
+            )
         if commands:
             world.setup = self.setup
         lost = self.measures.lost(self.measures.values(world, report.frame, report))
@@ -218,6 +246,23 @@ class Simulation:
 
     def _named(self) -> Named:
         return Named.after(self.world, self._moment.report)
+
+    def _apply_changes(self) -> None:
+        """Remake setup and controller where the coming frame has other values than the last one."""
+        from flowborne.scenes.build import changed
+        from flowborne.scenes.load import at, raw_of, with_values
+
+        if not self._changes:
+            return
+        raw = raw_of(self.scene)
+        start = {key: at(raw, key) for change in self._changes for key in change.values}
+        values = values_at(self._changes, start, self.time, self.frame_time)
+        if values == self._values:
+            return
+        scene = with_values(self.scene, values, check=False)
+        setup, controller = changed(scene, self.setup, self._executor)
+        self._moment = replace(self._moment, world=replace(self.world, setup=setup))
+        self.controller, self._values = controller, values
 
     def _drives(self) -> Drives:
         """Those of the scene itself."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ class FrameReport:
     decided    whether the controller decided anew in this frame
     seconds    by part (`PARTS`) and "total"
     beyond     sentences: which limits what joints were told would have passed
+    values     dotted key -> value that differs from the scene's, see [[changes]]
     """
 
     frame: int
@@ -42,6 +44,7 @@ class FrameReport:
     decided: bool
     seconds: dict[str, float]
     beyond: tuple[str, ...] = ()
+    values: dict[str, Any] = field(default_factory=dict)
 
     @property
     def step(self) -> StepReport:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -105,6 +105,17 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
         controller = controller_of(scene, around, executor or Serial())
     time = scene.time
     return Built(scene, world, controller, scene.frame_time, time.steps_per_frame, time.frames)
+
+
+def changed(scene: Scene, setup: Setup, executor: Mapper) -> tuple[Setup, Controller | None]:
+    """Setup and controller of a scene whose winds, sides, objectives or strengths have changed,
+    with the bodies, the motions and the grid of `setup`."""
+    around, fluid = surroundings_of(scene, setup.solid), setup.fluid
+    winds = tuple(wind for table in scene.wind if (wind := table.build(around)) is not None)
+    if fluid is not None and (other := fluid_of(scene)) is not None:
+        fluid = replace(fluid, boundaries=other.boundaries)
+    controller = controller_of(scene, around, executor) if scene.control else None
+    return setup.but(winds=winds, fluid=fluid), controller
 
 
 def _set_velocity(state: FluidState, scene: Scene) -> None:

@@ -19,6 +19,7 @@ from flowborne.motion.human.skeleton import SIDES
 from flowborne.phrases import suggestion
 from flowborne.runs.run_folder import reading
 from flowborne.scenes.bodies import with_steps
+from flowborne.scenes.changes import CHANGEABLE
 from flowborne.scenes.check import cross_check
 from flowborne.scenes.draft import Draft, explain, keys_of
 from flowborne.scenes.keyframe_file import inline_keyframes
@@ -151,6 +152,11 @@ def _examine(
     if draft is None:
         return None, problems
     problems = problems + cross_check(draft)
+    for number, change in enumerate(() if problems else draft.scene.changes, start=1):
+        try:
+            with_values(draft.scene, change.values)
+        except SceneError as error:
+            problems += [f"[[changes]] {number}: {problem}" for problem in error.problems]
     return draft.scene if problems else with_steps(draft.scene), problems
 
 
@@ -170,8 +176,9 @@ def python_of(raw: Mapping[str, Any]) -> list[str]:
     """Python code that a scene as read names: plugin files, then functions."""
     plugins = raw.get("plugins", [])
     named = [f"plugin {name}" for name in plugins] if isinstance(plugins, list) else []
-    for key in ("objectives", "wind"):
+    for key in ("objectives", "wind", "policy"):
         tables = raw.get(key, [])
+        tables = [tables] if isinstance(tables, dict) else tables
         for table in tables if isinstance(tables, list) else []:
             if isinstance(table, dict) and "function" in table:
                 named.append(f"function {table['function']}")
@@ -248,9 +255,18 @@ def override(raw: dict[str, Any], key: str, text: str) -> None:
     Missing tables are added; the schema finds unknown keys.
     raises  SceneError for a key that leads nowhere
     """
+    put(raw, key, value_of(text), f"--set {key}={text}")
+
+
+def put(raw: dict[str, Any], key: str, wanted: Any, said: str) -> None:
+    """Set a dotted key of a scene as read, in place.
+
+    said    how that was asked for, for messages
+    raises  SceneError for a key that leads nowhere
+    """
     steps = key.split(".")
     if not all(steps):
-        raise SceneError(f"--set {key}={text}: '{key}' is no key. Write it as table.key=value.")
+        raise SceneError(f"{said}: '{key}' is no key. Write it as table.key=value.")
     value: Any = raw
     for depth, step in enumerate(steps):
         so_far = ".".join(steps[:depth])
@@ -258,24 +274,68 @@ def override(raw: dict[str, Any], key: str, text: str) -> None:
         if isinstance(value, list):
             if not step.isdecimal() or int(step) >= len(value):
                 raise SceneError(
-                    f"--set {key}={text}: '{step}' is not an entry of {so_far}, which has "
+                    f"{said}: '{step}' is not an entry of {so_far}, which has "
                     f"{len(value)}. Count its entries from 0."
                 )
             index: Any = int(step)
         elif isinstance(value, dict):
             index = step
         else:
-            raise SceneError(
-                f"--set {key}={text}: {so_far} is {value!r} and has no keys. Shorten the key."
-            )
+            raise SceneError(f"{said}: {so_far} is {value!r} and has no keys. Shorten the key.")
         if last:
-            value[index] = value_of(text)
+            value[index] = wanted
             return
         if isinstance(value, dict):
             value.setdefault(index, {})
         if isinstance(value[index], str):
             value[index] = {"kind": value[index]}
         value = value[index]
+
+
+def at(raw: Any, key: str) -> Any:
+    """What a scene as read has at a dotted key; None where it has nothing."""
+    for step in key.split("."):
+        if isinstance(raw, list):
+            raw = raw[int(step)] if step.isdecimal() and int(step) < len(raw) else None
+        else:
+            raw = raw.get(step) if isinstance(raw, dict) else None
+    return raw
+
+
+def raw_of(scene: Scene) -> dict[str, Any]:
+    """A scene as it would be read from its file, without its changes."""
+    return scene.model_dump(mode="json", exclude_none=True, exclude={"changes"})
+
+
+def with_values(scene: Scene, values: Mapping[str, Any], *, check: bool = True) -> Scene:
+    """The same scene with other values of dotted keys, as they can change in a run.
+
+    check   hold it against its model, too
+    raises  SceneError with every problem there is
+    """
+    raw, where = raw_of(scene), f"scene {scene.name}"
+    for key, value in values.items():
+        if key.split(".")[0] not in CHANGEABLE:
+            raise SceneError(
+                f"{where}: '{key}' cannot change in a run. Change one of {', '.join(CHANGEABLE)}, "
+                "or start another run."
+            )
+        put(raw, key, value, f"{where}, change of {key}")
+    draft, problems = _validate(raw, scene.folder / f"{scene.name}.toml")
+    if draft is None or problems:
+        raise SceneError(problems)
+    changed = draft.scene
+    changed._kept = scene.kept
+    kept = [(one.controlled_joints(), [t.kind for t in one.objectives]) for one in (scene, changed)]
+    if kept[0] != kept[1]:
+        raise SceneError(
+            f"{where}: which joints are controlled and which objectives there are cannot change "
+            "in a run. Change strengths and weights; a weight of 0 switches an objective off."
+        )
+    problems = cross_check(draft) if check else []
+    if problems:
+        raise SceneError(problems)
+    return changed
 
 
 def value_of(text: str) -> Any:

@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_vali
 from flowborne.control.objective_kinds import AnyObjective
 from flowborne.runs.exporters import EXPORTERS, can_write, endings
 from flowborne.runs.run_folder import FIXED_NAMES
+from flowborne.scenes.changes import ChangeTable
 from flowborne.scenes.control import ControllerTable, ControlTable
 from flowborne.scenes.domain import Domain, FluidTable
 from flowborne.scenes.dye import DyeTable, SourceTable
@@ -180,6 +181,7 @@ class Scene(Table):
     objectives: tuple[AnyObjective, ...] = ()
     controller: ControllerTable = ControllerTable()
     policy: PolicyTable | None = None
+    changes: tuple[ChangeTable, ...] = ()
     output: OutputTable = OutputTable()
     film: FilmTable = FilmTable()
 
@@ -257,10 +259,11 @@ class Scene(Table):
         """Whether the optimum of the objectives does not depend on time.
 
         It does with a clip, an earlier run, a moving joint, a mouth, a plan of several knots,
-        phases, or an objective with a reference motion.
+        phases, changes, a policy, or an objective with a reference motion.
         """
         moved = self.clip is not None or self.earlier is not None or bool(self.mouths)
         moved |= not all(table.rests for table in self.motion)
+        moved |= bool(self.changes) or self.policy is not None
         planned = self.controller.knots is not None
         phased = any(table.in_phases for table in self.control)
         return not (moved or planned or phased) and all(
