@@ -19,7 +19,7 @@ from flowborne.version import __version__
 
 if TYPE_CHECKING:
     from flowborne.characters.folder import Imported, import_character
-    from flowborne.control.commands import Position, Torque, Velocity
+    from flowborne.control.commands import Control, Position, Torque, Velocity
     from flowborne.control.controller import Controller, Decision, StrengthInPhase
     from flowborne.control.measurement import Measurement
     from flowborne.control.trial import Hypothesis, Velocities
@@ -49,6 +49,7 @@ __all__ = [
     "Array",
     "BlowUpError",
     "BodyState",
+    "Control",
     "Controller",
     "Decision",
     "ErrorBar",
@@ -115,6 +116,7 @@ _PLACES = {
     "Array": "flowborne.fluid.grid",
     "BlowUpError": "flowborne.simulation",
     "BodyState": "flowborne.coupling.named",
+    "Control": "flowborne.control.commands",
     "Controller": "flowborne.control.controller",
     "Decision": "flowborne.control.controller",
     "ErrorBar": "flowborne.error_bars",

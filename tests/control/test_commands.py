@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.control.commands import Position, Torque, Velocity
+from flowborne.control.commands import Control, Position, Torque, Velocity
 from flowborne.coupling.motion import JointCommand
 from flowborne.simulation import Simulation
 
@@ -149,6 +149,34 @@ def test_drives_of_any_nominal_speed_that_are_saturated_move_alike(tmp_path: Pat
     assert (torques == 2.0).all()
 
 
+ACTUATORS = """<actuator>
+  <motor name="push" joint="hinge" gear="4" ctrlrange="-1 1"/>
+  <position name="place" joint="wrist" kp="3" forcerange="-5 5"/>
+  <velocity name="pace" joint="wrist" kv="2" gear="2"/>
+  <general name="flex" joint="wrist" dyntype="integrator"/>
+</actuator></mujoco>"""
+
+
+def test_actuators_of_the_model_mean_what_they_do_in_mujoco(tmp_path: Path) -> None:
+    """Motors by gear and range; servos go where MuJoCo's come to rest, and as fast."""
+    with arm(tmp_path):
+        (tmp_path / "arm.xml").write_text(PENDULUM.replace("</mujoco>", ACTUATORS))
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        simulation.advance_frame({"push": Control(0.5), "wrist": Position(0.0)})
+        assert simulation.joint("hinge").drive[0] == 2.0
+        simulation.advance_frame({"push": Control(3.0), "wrist": Position(0.0)})
+        assert simulation.joint("hinge").drive[0] == 4.0
+        for _ in range(10):
+            simulation.advance_frame({"hinge": Velocity(0.0), "pace": Control(0.8)})
+        assert simulation.joint("wrist").velocity[0] == pytest.approx(0.4)
+        for _ in range(240):
+            simulation.advance_frame({"hinge": Velocity(0.0), "place": Control(0.3)})
+            assert abs(simulation.joint("wrist").drive[0]) <= 5.0
+        assert simulation.joint("wrist").position[0] == pytest.approx(0.3, abs=1e-3)
+        with pytest.raises(fb.SceneError, match=r"'flex' is no actuator .* has: push, pl"):
+            simulation.advance_frame({"flex": Control(1.0)})
+
+
 def test_limits_hold_and_are_told(tmp_path: Path) -> None:
     with arm(tmp_path) as simulation:
         report = simulation.advance_frame({"hinge": Position(2.0), "wrist": Torque(5.0)})
@@ -163,7 +191,10 @@ def test_limits_hold_and_are_told(tmp_path: Path) -> None:
     ("commands", "said"),
     [
         ({"elbow": Torque(1.0)}, "no joint 'elbow' in the model. It has: hinge, wrist"),
-        ({"hinge": 1.0}, "the command to 'hinge' is 1.0: give a Position, a Velocity or a Torque"),
+        (
+            {"hinge": 1.0},
+            "the command to 'hinge' is 1.0: give a Position, a Vel",
+        ),
         ({"hinge": Torque(np.nan)}, "the command to 'hinge' has nan: give a finite number"),
         ({"hinge": Velocity([1.0, 2.0])}, r"the command to 'hinge' has \[1.0, 2.0\]: give a"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
@@ -10,11 +11,12 @@ import numpy as np
 
 from flowborne.control.creature import within_range
 from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, TrajectoryServo
+from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
 from flowborne.coupling.told import Told, TrajectoryKnots
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.actuators import actuators
 from flowborne.solids.model import FREE, SolidModel
 
 Numbers = float | Sequence[float] | Array
@@ -56,7 +58,19 @@ class Torque:
     value: Numbers
 
 
-Command = Position | Velocity | Torque
+@dataclass(frozen=True)
+class Control:
+    """What an actuator of the model is told, by its own name: u as MuJoCo's `ctrl`, held within its
+    range.
+
+    A motor is a torque. A position actuator is a critically damped servo of its stiffness, and a
+    velocity actuator an exact one, each with the actuator's largest force.
+    """
+
+    value: float
+
+
+Command = Position | Velocity | Torque | Control
 Commands = Mapping[str, Command]
 
 Drives = Sequence[tuple[Integers, Servo]]
@@ -71,23 +85,24 @@ def told_by(
     A joint keeps within its range, and moves as its drive can: exactly, by a PD law, or with a
     limited torque, which limits a told torque too.
 
-    commands  by the names of joints
+    commands  by the names of joints, or of actuators for Control
     span      s, length of the frame
     drives    of the scene itself
     raises    SceneError for a joint that is unknown or cannot be driven, and for wrong numbers
     """
     model, motions, beyond = world.setup.solid, list[Trajectory](), list[str]()
     pushed, force = [np.zeros(0, np.int64)], [np.zeros(0)]
-    for joint, command in commands.items():
+    for name, given in commands.items():
+        joint, command, own = _actuated(model, name, given)
         dofs = _driven_dofs(model, joint)
-        servo = servo_of(dofs, drives)
+        servo = servo_of(dofs, drives) if own is None else own
         if isinstance(command, Torque):
             wanted = _numbers(joint, command.value, dofs.size)
             limit = torque_limit(model, joint, servo)
-            given = np.clip(wanted, -limit, limit)
-            beyond += _said(joint, wanted, given, "N m or N")
+            torque = np.clip(wanted, -limit, limit)
+            beyond += _said(joint, wanted, torque, "N m or N")
             pushed.append(dofs)
-            force.append(given)
+            force.append(torque)
         elif isinstance(command, Position | Velocity):
             poses, said = _knots(joint, command, world, span)
             beyond += said
@@ -99,9 +114,27 @@ def told_by(
         else:
             raise SceneError(
                 f"the command to '{joint}' is {command!r:.60}: "
-                "give a Position, a Velocity or a Torque"
+                "give a Position, a Velocity, a Torque or a Control"
             )
     return Told(tuple(motions), np.concatenate(pushed), np.concatenate(force)), tuple(beyond)
+
+
+def _actuated(model: SolidModel, name: str, command: Command) -> tuple[str, Command, Servo | None]:
+    """Joint, command and servo that an actuator's control means; other commands as they are."""
+    if not isinstance(command, Control):
+        return name, command, None
+    known = {actuator.name: actuator for actuator in actuators(model)}
+    if name not in known:
+        names = ", ".join(known) or "none on hinges or slides"
+        raise SceneError(f"'{name}' is no actuator that can be told. The model has: {names}")
+    actuator = known[name]
+    wanted = actuator.wanted(float(_numbers(name, command.value, 1)[0]))
+    limit = actuator.limit or math.inf
+    if actuator.kind == "motor":
+        return actuator.joint, Torque(wanted), ServoExact(limit)
+    if actuator.kind == "velocity":
+        return actuator.joint, Velocity(wanted), ServoExact(limit)
+    return actuator.joint, Position(wanted), ServoPD(actuator.frequency, limit)
 
 
 def _knots(

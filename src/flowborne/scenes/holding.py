@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -9,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import ServoExact, ServoPD
+from flowborne.coupling.servo import Servo, ServoExact, ServoPD
 from flowborne.scenes.motions import driven
 from flowborne.scenes.schema import Scene
-from flowborne.solids.joint_kinds import position_actuator
+from flowborne.solids.actuators import actuators
 from flowborne.solids.model import BALL, HINGE, SLIDE, SolidModel
 
 Array = NDArray[np.float64]
@@ -84,8 +85,12 @@ def held(
     hold = () if scene.solids is None else scene.solids.hold
     if isinstance(hold, bool):
         hold = tuple(undriven(scene, model, motions)) if hold else ()
+    servos: dict[str, Servo] = {
+        a.joint: ServoPD(a.frequency, a.limit or math.inf)
+        for a in actuators(model)
+        if a.kind == "position"
+    }
     for joint in hold:
-        actuator = position_actuator(model, joint)
-        servo = ServoExact() if actuator is None else ServoPD(*actuator)
+        servo = servos.get(joint, ServoExact())
         place = start[model.positions_of(joint)]
         yield driven(TrajectoryHeld(model.dofs_of(joint), place), servo)

@@ -127,9 +127,9 @@ def _elements(scene: Scene, spec: MjSpec) -> Iterator[str]:
     hold = bool(scene.solids.hold)
     servos = sum(bool(actuator.biasprm[1] < 0.0) for actuator in spec.actuators)
     others = len(spec.actuators) - servos * hold
-    if others:
-        yield f"{others} actuator{'s' * (others > 1)}" + (
-            f", of which [solids] hold = true takes {servos}" if servos and not hold else ""
+    if others and scene.policy is None:
+        yield f"{others} actuator{'s' * (others > 1)}, which a script or a policy drives" + (
+            f", and of which [solids] hold = true takes {servos}" if servos and not hold else ""
         )
     if spec.sensors:
         yield f"{len(spec.sensors)} sensor{'s' * (len(spec.sensors) > 1)}"
