@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 from flowborne.version import __version__
 
 if TYPE_CHECKING:
+    from flowborne.batch_page import Batch, ClipRun
+    from flowborne.batches import run_clips
     from flowborne.characters.folder import Imported, import_character
     from flowborne.control.commands import Control, Position, Torque, Velocity
     from flowborne.control.controller import Controller, Decision, StrengthInPhase
@@ -47,8 +49,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Array",
+    "Batch",
     "BlowUpError",
     "BodyState",
+    "ClipRun",
     "Control",
     "Controller",
     "Decision",
@@ -99,6 +103,7 @@ __all__ = [
     "parts",
     "pictures",
     "run",
+    "run_clips",
     "step",
     "worlds",
 ]
@@ -114,9 +119,11 @@ PAGES = (
 
 _PLACES = {
     "Array": "flowborne.fluid.grid",
+    "Batch": "flowborne.batch_page",
     "BlowUpError": "flowborne.simulation",
     "BodyState": "flowborne.coupling.named",
     "Control": "flowborne.control.commands",
+    "ClipRun": "flowborne.batch_page",
     "Controller": "flowborne.control.controller",
     "Decision": "flowborne.control.controller",
     "ErrorBar": "flowborne.error_bars",
@@ -161,6 +168,7 @@ _PLACES = {
     "make_world": "flowborne.worlds",
     "open_run": "flowborne.runs.open_run",
     "run": "flowborne.running",
+    "run_clips": "flowborne.batches",
     "step": "flowborne.coupling.step",
 }
 

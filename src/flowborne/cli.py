@@ -12,9 +12,11 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from difflib import get_close_matches
+from functools import wraps
+from inspect import Parameter, signature
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -23,6 +25,7 @@ import typer
 from typer.core import TyperGroup
 
 from flowborne.console import (
+    batch_lines,
     check_lines,
     complain,
     fault_of,
@@ -121,13 +124,41 @@ def scenes() -> None:
         print(f"{name:<{widths[0]}}  {figure:<{widths[1]}}  {description}".rstrip())
 
 
+def _or_clips(run: Callable[..., None]) -> Callable[..., None]:
+    """The command `run` with the option --clips, which runs all clips of a folder."""
+    option = Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Run each BVH clip of this folder, and write a page with the effort of each. "
+            "The same command continues after a stop.",
+        ),
+    ]
+    own = signature(run, eval_str=True)
+    clips = Parameter("clips", Parameter.KEYWORD_ONLY, default=None, annotation=option)
+
+    @wraps(run)
+    def command(clips: Path | None = None, **given: Any) -> None:
+        if clips is None:
+            run(**given)
+        else:
+            _run_clips(clips, given)
+
+    command.__signature__ = own.replace(parameters=[*own.parameters.values(), clips])  # type: ignore[attr-defined]
+    return command
+
+
 @app.command()
+@_or_clips
 def run(
     scene: Annotated[
         str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write.", show_default="runs/<scene name>")
+        Path | None,
+        typer.Option(
+            help="Folder to write.", show_default="runs/<scene name>, of clips <scene name>-clips"
+        ),
     ] = None,
     frames: Annotated[
         int | None, typer.Option(help="Number of frames.", show_default="from the scene")
@@ -148,9 +179,7 @@ def run(
 
     loaded = load_scene(scene, _overrides(settings))
     folder = Path("runs") / loaded.name if out is None else out
-    missing = missing_to_draw() if film else None
-    if missing is not None:
-        print(f"no film will be drawn: {missing}", flush=True)
+    _say_if_not_drawn(film)
     with ProgressDisplay() as progress:
         from flowborne.running import RunOutcome
         from flowborne.running import run as run_scene
@@ -169,6 +198,42 @@ def run(
         complain(result.message)
         raise typer.Exit(WARNED if result.outcome is RunOutcome.DOUBTFUL else FAILED)
     print(run_lines(result))
+
+
+def _run_clips(clips: Path, given: dict[str, Any]) -> None:
+    """Run the clips of a folder with the arguments of `run`."""
+    from flowborne.batches import run_clips
+    from flowborne.progress import ProgressDisplay
+
+    overrides, frames = _overrides(given["settings"]), given["frames"]
+    if given["resume"] and given["replace"]:
+        raise InputError("--resume and --replace exclude each other; give one of them")
+    if frames is not None:
+        overrides["time.frames"] = str(frames)
+    _say_if_not_drawn(given["film"])
+    with ProgressDisplay() as progress:
+        batch = run_clips(
+            given["scene"],
+            clips,
+            given["out"],
+            overrides=overrides,
+            workers=given["workers"],
+            replace=given["replace"],
+            film=given["film"],
+            progress=progress,
+        )
+    print("\n".join(batch_lines(batch)))
+    failed = [done for done in batch.clips if done.failure]
+    for done in failed:
+        complain(f"{done.clip.name}: {done.failure}")
+    if failed or any(done.doubts for done in batch.clips):
+        raise typer.Exit(FAILED if failed else WARNED)
+
+
+def _say_if_not_drawn(film: bool) -> None:
+    missing = missing_to_draw() if film else None
+    if missing is not None:
+        print(f"no film will be drawn: {missing}", flush=True)
 
 
 @app.command()

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from flowborne.errors import described
+from flowborne.phrases import listed
 
 if TYPE_CHECKING:
+    from flowborne.batch_page import Batch
     from flowborne.coupling.world import Setup
     from flowborne.running import RunResult
     from flowborne.scenes.schema import Scene
@@ -51,6 +53,20 @@ def run_lines(result: RunResult) -> str:
     if summary["peak_memory_bytes"] is not None:
         pace += f", {summary['peak_memory_bytes'] / 1e6:.0f} MB at most"
     return "\n".join([*lines, pace])
+
+
+def batch_lines(batch: Batch) -> list[str]:
+    """The efforts of a batch of clips, its page, and what was skipped."""
+    from flowborne.batch_page import effort_text
+
+    lines = [
+        f"{done.clip.name}: {done.frames} frames, effort {effort_text(done)}"
+        + (f", not to be trusted: {'. '.join(done.doubts)}" if done.doubts else "")
+        for done in batch.clips
+        if not done.failure
+    ]
+    skipped = [f"skipped, not BVH: {listed(batch.skipped)}"] if batch.skipped else []
+    return [*lines, *skipped, f"page: {batch.page}"]
 
 
 def check_lines(scene: Scene, setup: Setup, warnings: list[str]) -> str:

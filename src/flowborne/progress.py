@@ -12,7 +12,7 @@ from typing import Literal, TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-Stage = Literal["start", "compiling", "frame", "film"]
+Stage = Literal["clip", "start", "compiling", "frame", "film"]
 
 COMPILING = "compiling kernels (first run only) …"
 
@@ -24,8 +24,8 @@ LINE_SECONDS = 10.0
 class RunProgress:
     """News of a run.
 
-    stage      "start" (once), "compiling" (at every kernel), "frame" (after every frame), "film"
-               (after every frame drawn)
+    stage      "clip" (before each run of a batch), "start" (once), "compiling" (at every kernel),
+               "frame" (after every frame), "film" (after every frame drawn)
     frame      frames done, or drawn
     frames     frames wanted
     seconds    since the run began
@@ -33,6 +33,7 @@ class RunProgress:
     warnings   number of warnings about the scene
     objective  after the frame; nan where there is none
     joints     (column of the history, rad or m) of each controlled joint
+    clip       which run of a batch begins; "" in other stages
     """
 
     stage: Stage
@@ -43,6 +44,7 @@ class RunProgress:
     warnings: int = 0
     objective: float = math.nan
     joints: tuple[tuple[str, float], ...] = ()
+    clip: str = ""
 
 
 class ProgressDisplay:
@@ -79,8 +81,10 @@ class ProgressDisplay:
             self._bar.stop()
 
     def __call__(self, news: RunProgress) -> None:
+        if news.stage == "clip":
+            self.say(news.clip)
         if news.stage == "start":
-            self._started_at = news.frame
+            self._started_at, self._first = news.frame, None
             if news.warnings:
                 self.say(f"warnings: {news.warnings}; flowborne check lists them")
         if news.stage == "frame" and self._first is None:
@@ -93,7 +97,7 @@ class ProgressDisplay:
             self._bar.update(
                 self._task,
                 description=self.line(news),
-                total=None if news.stage in ("start", "compiling") else news.frames,
+                total=None if news.stage in ("clip", "start", "compiling") else news.frames,
                 completed=news.frame,
             )
         elif news.stage in ("frame", "film"):
@@ -104,7 +108,7 @@ class ProgressDisplay:
 
     def line(self, news: RunProgress) -> str:
         """The news in one line."""
-        if news.stage == "start":
+        if news.stage in ("clip", "start"):
             return "starting …"
         if news.stage == "compiling":
             return f"{COMPILING} {news.kernels} kernels, {news.seconds:.0f} s"

@@ -84,7 +84,8 @@ def _walk(height: float) -> Capture:
 def human_of(scene: Scene) -> str:
     """MJCF of the scene's human: with the bones of the clip's file, or else the standard ones.
 
-    Controlled elbows are hinges, and arms that are controlled collide with the rest.
+    Elbows that are controlled are hinges, and all with human.elbows. Arms that are controlled
+    collide with the rest.
     raises  SceneError when the clip cannot be used, or an elbow of it is no hinge
     """
     assert scene.human is not None
@@ -95,7 +96,7 @@ def human_of(scene: Scene) -> str:
     controlled = set(scene.controlled_joints())
     held = () if capture is None else set(capture.held) - set(capture.mapping)
     touching = [side for side in SIDES if {f"{side}_shoulder", f"{side}_elbow"} & controlled]
-    hinged = controlled & set(ELBOWS)
+    hinged = set(ELBOWS) if scene.human.elbows else controlled & set(ELBOWS)
     try:
         return human_mjcf(skeleton, scene.human.mass, scene.human.sex, hinged, touching, held)
     except ValueError as error:

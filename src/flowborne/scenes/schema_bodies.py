@@ -160,8 +160,8 @@ class HumanTable(Table):
     mass    kg
     sex     selects the proportions of mass
     height  m, of the standard skeleton; where a clip's file gives the bones it is not used
-    elbows  whether each elbow goes with its shoulder wherever the scene names that: controlled as a
-            hinge, wanting what the shoulder wants
+    elbows  whether elbows are hinges, each of which goes with its shoulder wherever the scene names
+            that: with its strength and its objectives
     """
 
     mass: Positive = 73.0

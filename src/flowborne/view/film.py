@@ -49,19 +49,28 @@ def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | No
               is drawn), if the shot does not fit the run, or if the run has three dimensions and
               this machine cannot draw them; OSError if a file cannot be written
     """
-    files = RunFolder(folder)
     run = Run(folder)
     shot = run.shot if shot is None else shot
     numbers = shot.frames(run.times, run.frames_per_second)
-    # a picture of a given size has that size
-    with closing(Picture(run, PICTURE_SCALE if shot.size is None else 1.0, shot)) as picture:
-        _write_image(files.picture, picture.draw(numbers[-1]), shot)
+    _draw_picture(run, numbers[-1], shot)
     if len(numbers) < 2:
         raise ValueError(
             f"{folder} has one frame, which makes a picture and no film; "
             "continue the run with --resume"
         )
-    write_film(run, files.film, progress, shot)
+    write_film(run, RunFolder(folder).film, progress, shot)
+
+
+def make_picture(folder: Path) -> None:
+    """Draw preview.png alone. Raises as `make_preview`, but draws a run of one frame."""
+    run = Run(folder)
+    _draw_picture(run, run.shot.frames(run.times, run.frames_per_second)[-1], run.shot)
+
+
+def _draw_picture(run: Run, number: int, shot: Shot) -> None:
+    # a picture of a given size has that size
+    with closing(Picture(run, PICTURE_SCALE if shot.size is None else 1.0, shot)) as picture:
+        _write_image(RunFolder(run.folder).picture, picture.draw(number), shot)
 
 
 def write_shot(
