@@ -125,6 +125,30 @@ def test_a_failing_clip_stops_no_other_and_the_same_call_continues(clips, monkey
     assert f"Failed: {batch.clips[0].failure}" in batch.page.read_text()
 
 
+def test_without_an_effort_as_captured_the_page_says_why(clips):
+    folder = clips.parent / "fin"
+    folder.mkdir()
+    joints = "<freejoint name='root'/><geom size='0.1'/>"
+    fin = "<body><joint name='fin'/><geom size='0.1' pos='0.3 0 0'/></body>"
+    (folder / "fin.xml").write_text(
+        f"<mujoco><worldbody><body>{joints}{fin}</body></worldbody></mujoco>"
+    )
+    free = "[time]\nframes = 2\n[solids]\nmodel = 'fin.xml'\ndensity = 500.0\n[clip]\n"
+    driven = "[[control]]\njoints = ['fin']\nstrength = 30.0\nprobe = 2.0\n"
+    (folder / "free.toml").write_text(free + f"file = '{clips / 'b.bvh'}'\n")
+    (folder / "fin.toml").write_text(
+        (folder / "free.toml").read_text() + driven + "[[objectives]]\nkind = 'effort'\n"
+    )
+    for scene, why, effort in (
+        ("free", "no joint is controlled", "none: no joint is controlled"),
+        ("fin", "the clip has no motion of fin", "N m in the run"),
+    ):
+        batch = run_clips(folder / f"{scene}.toml", clips, clips.parent / scene, film=False)
+        assert [(d.failure, d.before, d.captured) for d in batch.clips] == [("", None, None)] * 2
+        assert batch.clips[0].notes[0] == f"no effort as captured: {why}"
+        assert effort in batch.page.read_text()
+
+
 def test_a_run_of_another_scene_is_not_continued(clips):
     batch_of(clips)
     batch = batch_of(clips, overrides=FEW | {"human.mass": "90"})
@@ -167,7 +191,7 @@ def test_a_page_of_others_is_not_replaced(clips):
     assert page.read_text() == "<title>mine</title>"
 
 
-def test_pictures_are_drawn_of_both_runs(clips):
+def test_pictures_are_drawn_of_both_runs(clips, monkeypatch):
     (clips / "b.bvh").unlink()
     overrides = FEW | {"time.frames": "2", "film.size": "[160, 96]"}
     batch = batch_of(clips, overrides=overrides, film=True)
@@ -176,6 +200,16 @@ def test_pictures_are_drawn_of_both_runs(clips):
     assert RunFolder(done.folder).film.exists()
     assert RunFolder(done.captured).picture.exists()
     assert 'src="captured/a%20walk/preview.png"' in batch.page.read_text()
+
+    def fail(folder):
+        raise ValueError("this machine cannot draw")
+
+    monkeypatch.setattr("flowborne.view.film.make_picture", fail)
+    drawn_before = batch_of(clips, overrides=overrides, film=True)
+    assert drawn_before.clips == batch.clips
+    RunFolder(done.captured).picture.unlink()
+    (without,) = batch_of(clips, overrides=overrides, film=True).clips
+    assert (without.failure, without.notes[0]) == ("", "no picture: this machine cannot draw")
 
 
 def test_the_command_names_each_clip_and_ends_with_1_if_one_failed(clips, capsys, monkeypatch):

@@ -9,7 +9,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from flowborne.files.atomic import write_text
-from flowborne.runs.run_folder import RunFolder
+from flowborne.runs.run_folder import RunFolder, cannot_write
 
 PAGE = "index.html"
 
@@ -99,11 +99,15 @@ def is_own_page(path: Path) -> bool:
 
 
 def write_page(batch: Batch) -> None:
-    """Write the page of a batch, whose links are relative to its folder."""
-    write_text(
-        batch.page,
-        "\n".join([HEAD + f"<title>{escape(batch.scene)}: clips</title>", *_body(batch)]) + "\n",
-    )
+    """Write the page of a batch, whose links are relative to its folder.
+
+    raises  RunFolderError if it cannot be written
+    """
+    title = f"<title>{escape(batch.scene)}: clips</title>"
+    try:
+        write_text(batch.page, "\n".join([HEAD + title, *_body(batch), ""]))
+    except OSError as error:
+        raise cannot_write(batch.page, error) from error
 
 
 def effort_text(done: ClipRun) -> str:

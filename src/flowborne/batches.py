@@ -145,14 +145,15 @@ class _Batch:
         scene = load_scene(self.scene, self.settings | {"clip.file": str(clip.absolute())})
         scene, duration = _until_the_end(scene)
         joints, lacking = scene.controlled_joints(), _lacking(scene)
-        notes, before, captured = [], None, None
+        notes: list[str] = []
+        before, captured = None, None
         if lacking:
             notes.append(f"no effort as captured: {lacking}")
         else:
             captured = self.out / CAPTURED / clip.stem
             self._summary(_as_captured(scene), captured, ", as captured", film=False)
             before = _effort(captured, joints)
-            self._draw(captured)
+            notes += self._draw(RunFolder(captured))
         summary = self._summary(scene, done.folder, "", film=self.film)
         notes += summary["warnings"]
         notes += [note for note in summary["notes"] if note.startswith("[clip]")]
@@ -193,12 +194,20 @@ class _Batch:
             raise RunFolderError(result.message)
         return result.summary
 
-    def _draw(self, folder: Path) -> None:
-        """The picture of a run without a film."""
-        if self.film and missing_to_draw() is None and not RunFolder(folder).picture.exists():
-            from flowborne.view.film import make_picture
+    def _draw(self, folder: RunFolder) -> list[str]:
+        """Draw the picture of a run without a film; notes on why there is none."""
+        if not self.film or missing_to_draw() is not None:
+            return []
+        drawn = folder.picture.exists() and folder.picture.stat().st_mtime
+        if drawn >= folder.history.stat().st_mtime:
+            return []
+        from flowborne.view.film import make_picture
 
-            make_picture(folder)
+        try:
+            make_picture(folder.path)
+        except ValueError as error:
+            return [f"no picture: {error}"]
+        return []
 
     def _show(self, label: str, frames: int) -> None:
         if self.options["progress"] is not None:
