@@ -171,6 +171,8 @@ def test_wrong_folders_are_refused_before_anything_is_written(clips, small_scene
         run_clips(small_scene, clips, out)
     with pytest.raises(flowborne.SceneError, match="unknown key 'colour'"):
         run_clips(SCENE, clips, out, overrides={"human.colour": "1"})
+    with pytest.raises(RunFolderError, match="workers is 0; give 1 or more"):
+        run_clips(SCENE, clips, out, workers=0)
     (clips / "captured.bvh").write_text("")
     with pytest.raises(
         RunFolderError, match="and the clips as captured would both be written to captured; rename"
@@ -186,7 +188,7 @@ def test_a_page_of_others_is_not_replaced(clips):
     page = clips.parent / "out" / "index.html"
     page.parent.mkdir()
     page.write_text("<title>mine</title>")
-    with pytest.raises(RunFolderError, match=r"index.html is not of flowborne; name another"):
+    with pytest.raises(RunFolderError, match=r"index.html was not made by flowborne; name another"):
         batch_of(clips)
     assert page.read_text() == "<title>mine</title>"
 

@@ -20,6 +20,7 @@ from flowborne.console import fault_of
 from flowborne.errors import SceneError
 from flowborne.extras import missing_to_draw
 from flowborne.motion.human.body import ELBOWS
+from flowborne.phrases import listed
 from flowborne.progress import RunProgress
 from flowborne.running import RunOutcome, run
 from flowborne.runs.history import history_columns, read_history
@@ -66,6 +67,8 @@ def run_clips(
     raises     RunFolderError if a folder is wrong and SceneError if the scene is, before anything
                is written; KeyboardInterrupt after Ctrl-C: the same call continues
     """
+    if workers is not None and workers < 1:
+        raise RunFolderError(f"workers is {workers}; give 1 or more")
     settings = dict(overrides or {})
     names, skipped = _clips_in(Path(clips))
     wanted = load_scene(scene, settings)
@@ -77,7 +80,7 @@ def run_clips(
     folder = Path("runs") / f"{wanted.name}-clips" if out is None else Path(out)
     page = folder / PAGE
     if page.exists() and not is_own_page(page):
-        raise RunFolderError(f"{page} is not of flowborne; name another folder with --out")
+        raise RunFolderError(f"{page} was not made by flowborne; name another folder with --out")
     make_folder(folder)
     batch = Batch(wanted.name, wanted.controlled_joints(), page, len(names), skipped)
     job = _Batch(scene, settings, folder, {"workers": workers, "progress": progress}, replace, film)
@@ -86,9 +89,8 @@ def run_clips(
         try:
             batch.clips.append(job.run(clip))
         except KeyboardInterrupt as stop:
-            raise KeyboardInterrupt(
-                f"stopped in {job.label}; the same command continues there"
-            ) from stop
+            same = "the same command" + " without --replace" * replace
+            raise KeyboardInterrupt(f"stopped in {job.label}; {same} continues there") from stop
         write_page(batch)
     return batch
 
@@ -102,7 +104,7 @@ def _clips_in(folder: Path) -> tuple[list[Path], tuple[str, ...]]:
     clips = [path for path in found if path.suffix.lower() == ENDING and path.is_file()]
     others = tuple(p.name + "/" * p.is_dir() for p in found if p not in clips)
     if not clips:
-        has = f"only {', '.join(others[:3])}" if others else "nothing"
+        has = f"only {listed(others)}" if others else "nothing"
         raise RunFolderError(f"{folder} has {has} and no BVH file; give --clips a folder of clips")
     taken = {CAPTURED: "the clips as captured", PAGE: "the page"}
     for clip in clips:
