@@ -3,6 +3,7 @@
 The public names are here and in these modules:
 
     bodies     models, poses, momentum and energy, flesh, prescribed motions, simple winds
+    gym        Gymnasium environments of scenes
     machine    threads, memory, seconds by part, executors
     parts      objectives, rules, gradients, shapes and exporters, and how to add your own
     pictures   pictures and plots
@@ -111,6 +112,7 @@ __all__ = [
 PAGES = (
     "parts",
     "bodies",
+    "gym",
     "machine",
     "pictures",
     "worlds",

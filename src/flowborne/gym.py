@@ -38,6 +38,8 @@ from flowborne.scenes.schema import Scene
 from flowborne.simulation import BlowUpError, Simulation
 from flowborne.solids.model import SLIDE
 
+__all__ = ["ENVIRONMENTS", "SceneEnv"]
+
 gymnasium = optional("gymnasium", "Gymnasium", "gym", "environments")
 
 ENVIRONMENTS = {
