@@ -1,4 +1,5 @@
-"""Every key of a scene, told by the schema: the middle of docs/scene-keys.md."""
+"""Every key of a scene and of a study, told by their schemas: parts of docs/scene-keys.md and
+docs/studies.md."""
 
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ from pydantic.fields import FieldInfo
 from docstrings import meanings, prose
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_film import Pixels
+from flowborne.studies.schema import Study
 from flowborne.tables import Corner, JointValues, OwnTable, Table, Vector
 from markdown_text import plain, table
 
@@ -118,7 +120,8 @@ def said(hint: Any) -> str:
 
 def default_of(name: str, field: FieldInfo) -> str:
     """What a key is when it is not given."""
-    if field is Scene.model_fields.get(name) and name in FROM_FILE:
+    tops = (Scene.model_fields.get(name), Study.model_fields.get(name))
+    if name in FROM_FILE and any(field is top for top in tops):
         return FROM_FILE[name]
     if field.is_required():
         return "must be given"
@@ -201,11 +204,16 @@ def holders(model: type[Table]) -> Iterator[tuple[str, Any]]:
             yield from holders(one)
 
 
-def page() -> str:
+def study() -> str:
+    """The keys of a study."""
+    return page(Study)
+
+
+def page(root: type[Table] = Scene) -> str:
     """The keys of the top, then a section for each table of a scene, and for what is in them."""
-    hints = hints_of(Scene)
+    hints = hints_of(root)
     tables = {name: hint for name, hint in hints.items() if any(True for _ in tables_in(hint))}
-    text = [table(HEAD, rows(Scene, frozenset(tables)))]
+    text = [table(HEAD, rows(root, frozenset(tables)))]
     inner: dict[tuple[type[Table], ...], list[str]] = {}
     for name, hint in tables.items():
         many = get_origin(unwrapped(hint)) is tuple

@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from flowborne.solids.model import SolidModel
     from flowborne.solids.state import SolidState
     from flowborne.solids.tissue.growth import Tissue
+    from flowborne.studies.result import StudyResult
+    from flowborne.studies.running import study
     from flowborne.worlds import advance, make_world
 
 __all__ = [
@@ -86,6 +88,7 @@ __all__ = [
     "SolidState",
     "StepReport",
     "StrengthInPhase",
+    "StudyResult",
     "Tissue",
     "Torque",
     "Velocities",
@@ -106,6 +109,7 @@ __all__ = [
     "run",
     "run_clips",
     "step",
+    "study",
     "worlds",
 ]
 
@@ -157,6 +161,7 @@ _PLACES = {
     "SolidState": "flowborne.solids.state",
     "StepReport": "flowborne.coupling.report",
     "StrengthInPhase": "flowborne.control.controller",
+    "StudyResult": "flowborne.studies.result",
     "Tissue": "flowborne.solids.tissue.growth",
     "Torque": "flowborne.control.commands",
     "Velocities": "flowborne.control.trial",
@@ -172,6 +177,7 @@ _PLACES = {
     "run": "flowborne.running",
     "run_clips": "flowborne.batches",
     "step": "flowborne.coupling.step",
+    "study": "flowborne.studies.running",
 }
 
 

@@ -237,6 +237,58 @@ def _say_if_not_drawn(film: bool) -> None:
 
 
 @app.command()
+def study(
+    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="File of the study.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write.", show_default="studies/<study name>")
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Runs at once; changes no number.", show_default="one per core"),
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster to run on.")
+    ] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Repeat runs that failed.")] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Only check the study, and say how many runs it has.")
+    ] = False,
+    plot: Annotated[
+        list[str] | None,
+        typer.Option(metavar="X,Y", help="Plot column Y against X too; may be repeated."),
+    ] = None,
+) -> None:
+    """Run a scene many times over its keys, or optimise them; the same command continues.
+
+    See docs/studies.md.
+    """
+    from flowborne.progress import ProgressDisplay
+    from flowborne.studies.running import Plan, run_plan
+
+    plan = Plan.of(file)
+    print(plan, flush=True)
+    if check:
+        return
+    with ProgressDisplay() as progress:
+        try:
+            result = run_plan(plan, out, workers=workers, dask=dask, retry=retry, progress=progress)
+        except KeyboardInterrupt as stop:
+            raise StoppedError("interrupted; the same command continues the study") from stop
+    for pair in plot or ():
+        x, _, y = (part.strip() for part in pair.partition(","))
+        with _writing(result.folder, ValueError):
+            picture = result.folder / f"{y} over {x}.svg".replace("/", " per ")
+            result.plot(x, y, picture)
+        print(f"drawn: {picture}")
+    print(f"written: {result.folder / 'result.parquet'}, {result.folder / 'index.html'}")
+    for name, message in result.failed.items():
+        complain(f"run {name} failed: {message}")
+    if result.failed:
+        complain(f"{len(result.failed)} of {len(result)} runs failed; --retry repeats them")
+        raise typer.Exit(FAILED)
+
+
+@app.command()
 def check(
     scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="Scene file to check.")],
     settings: SceneOption = None,

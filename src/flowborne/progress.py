@@ -12,7 +12,7 @@ from typing import Literal, TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-Stage = Literal["clip", "start", "compiling", "frame", "film"]
+Stage = Literal["clip", "start", "compiling", "frame", "film", "member"]
 
 COMPILING = "compiling kernels (first run only) …"
 
@@ -25,9 +25,10 @@ class RunProgress:
     """News of a run.
 
     stage      "clip" (before each run of a batch), "start" (once), "compiling" (at every kernel),
-               "frame" (after every frame), "film" (after every frame drawn)
-    frame      frames done, or drawn
-    frames     frames wanted
+               "frame" (after every frame), "film" (after every frame drawn), "member" (after every
+               run of a study)
+    frame      frames done, or drawn; runs finished
+    frames     frames wanted, or runs
     seconds    since the run began
     kernels    number of kernels compiled so far
     warnings   number of warnings about the scene
@@ -100,7 +101,7 @@ class ProgressDisplay:
                 total=None if news.stage in ("clip", "start", "compiling") else news.frames,
                 completed=news.frame,
             )
-        elif news.stage in ("frame", "film"):
+        elif news.stage in ("frame", "film", "member"):
             last = news.frame == news.frames
             if monotonic() >= self._line_due or last:
                 self._line_due = monotonic() + LINE_SECONDS
@@ -114,6 +115,8 @@ class ProgressDisplay:
             return f"{COMPILING} {news.kernels} kernels, {news.seconds:.0f} s"
         if news.stage == "film":
             return f"drawing the film …  frame {news.frame}/{news.frames}"
+        if news.stage == "member":
+            return f"run {news.frame}/{news.frames}"
         words = [f"frame {news.frame}/{news.frames}"]
         if not math.isnan(news.objective):
             words.append(f"objective {news.objective:.4g}")

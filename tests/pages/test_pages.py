@@ -4,6 +4,7 @@ Each page has a folder of its own. The rule by which its commands are cut down, 
 
   flowborne run      2 frames, no film, and at most COARSE cells along the longest side
   FRAMES, GRIDS      in a piece of Python: 2, and (16, 24, 32)
+  a study            2 samples, 2 frames, 24 cells, and grids as above
 
 A run that a page takes for granted is made first. What no test can run is named in ELSEWHERE.
 """
@@ -24,6 +25,7 @@ from flowborne import cli
 from flowborne.scenes.load import library
 from flowborne.scenes.plugins import LOADED
 from flowborne.scenes.schema import Scene
+from flowborne.studies.schema import Study
 
 from ..characters import rigged
 from .blocks import Block, blocks_of
@@ -41,6 +43,15 @@ CUT = {
     re.compile(r"^GRIDS = .*$", re.M): "GRIDS = (16, 24, 32)",
 }
 
+STUDY = {
+    re.compile(r"^count = .*$", re.M): "count = 2",
+    re.compile(r"^time\.frames = .*$", re.M): "time.frames = 2",
+    re.compile(r"^domain\.resolution = .*$", re.M): "domain.resolution = 24",
+    re.compile(r"^values = \[61, 122, 244\]$", re.M): "values = [16, 24, 32]",
+    re.compile(r"^after = .*$", re.M): "after = 0.0",
+}
+"""Of the file of a study, which has tables [[vary]]."""
+
 ELSEWHERE = {
     "python3 -m venv": "makes an environment; `make demo` does that",
     "python -m venv": "makes an environment for Blender, which is no part of the tests",
@@ -49,6 +60,7 @@ ELSEWHERE = {
     "pip install": "installs",
     "source": "is for a shell",
     "ssh": "needs another machine",
+    "dask worker": "works until it is stopped; tests/studies/test_kills.py starts one",
     "flowborne view": "serves until it is stopped; tests/view/browser has its tests",
 }
 """Beginning of a command that is not run -> why."""
@@ -127,16 +139,26 @@ def make(words: list[str], kept: Path) -> None:
         shutil.copytree(copy, folder)
 
 
+def less_of(text: str, cuts: dict[re.Pattern[str], str]) -> str:
+    """A text, cut down."""
+    for pattern, less in cuts.items():
+        text = pattern.sub(less, text)
+    return text
+
+
 def execute(text: str, module: ModuleType) -> None:
     """Run a piece of Python, cut down, with the names that those before it have left."""
-    for pattern, less in CUT.items():
-        text = pattern.sub(less, text)
-    exec(compile(text, module.__name__, "exec"), module.__dict__)
+    exec(compile(less_of(text, CUT), module.__name__, "exec"), module.__dict__)
+
+
+def is_study(block: Block) -> bool:
+    return "[[vary]]" in block.text
 
 
 def check_snippet(block: Block) -> None:
-    """A part of a scene: its tables are known."""
-    assert set(tomllib.loads(block.text)) <= set(Scene.model_fields)
+    """A part of a scene or a study: its tables are known."""
+    tables = set(tomllib.loads(block.text))
+    assert tables <= set(Scene.model_fields) or tables <= set(Study.model_fields)
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +190,8 @@ def test_what_a_page_says_works(
             stand_in(tmp_path / name)
     for block in blocks:
         if block.file:
-            Path(block.file).write_text(block.text, encoding="utf-8")
+            text = less_of(block.text, STUDY) if is_study(block) else block.text
+            Path(block.file).write_text(text, encoding="utf-8")
     checked = set()
     for block in blocks:
         for words in block.commands():
@@ -182,7 +205,8 @@ def test_what_a_page_says_works(
             check_snippet(block)
     for block in blocks:
         if block.file.endswith(".toml"):
-            assert f"check {block.file}" in checked, f"{block.file}: `flowborne check` it"
+            verb = "study" if is_study(block) else "check"
+            assert f"{verb} {block.file}" in checked, f"{block.file}: `flowborne {verb}` it"
 
 
 def test_no_exemption_is_out_of_date() -> None:

@@ -42,22 +42,28 @@ BOUNDS = {
 """pydantic's type of error -> its key of the bound, what the value is, and the remedy."""
 
 
-def place(file: str, keys: tuple[Key, ...], numbers: dict[str, list[int]] | None = None) -> str:
+def place(
+    file: str,
+    keys: tuple[Key, ...],
+    numbers: dict[str, list[int]] | None = None,
+    root: type[Table] = Scene,
+) -> str:
     """Where something is: "scene swim.toml, [[control]] 2, joints".
 
     keys     from the top of the file, list entries counted from 0
     numbers  table -> number that each of its entries has in the file, from 1
+    root     table of the whole file; its name says what the file is
     """
-    where = f"scene {file}"
+    where = f"{root.__name__.lower()} {file}"
     if not keys:
         return where
     top, rest = keys[0], list(keys[1:])
-    listed = bool(rest) and isinstance(rest[0], int) and _is_list_of_tables(str(top))
+    listed = bool(rest) and isinstance(rest[0], int) and _is_list_of_tables(str(top), root)
     if listed:
         index = int(rest.pop(0))
         number = numbers[str(top)][index] if numbers and str(top) in numbers else index + 1
         where += f", [[{top}]] {number}"
-    elif isinstance(top, str) and tables_of(Scene, top):
+    elif isinstance(top, str) and tables_of(root, top):
         where += f", [{top}]"
     else:
         where += f", {top}"
@@ -79,28 +85,28 @@ def _tables_in(annotation: Any) -> list[type[Table]]:
     return [table for part in get_args(annotation) for table in _tables_in(part)]
 
 
-def _tables_at(keys: tuple[Key, ...]) -> list[type[Table]]:
-    """The tables that may stand at `keys`, from the top of a scene."""
-    tables: list[type[Table]] = [Scene]
+def _tables_at(keys: tuple[Key, ...], root: type[Table]) -> list[type[Table]]:
+    """The tables that may stand at `keys`, from the top of a file."""
+    tables: list[type[Table]] = [root]
     for key in keys:
         if isinstance(key, str):
             tables = [inner for table in tables for inner in tables_of(table, key)]
     return tables
 
 
-def _is_list_of_tables(key: str) -> bool:
-    field = Scene.model_fields.get(key)
+def _is_list_of_tables(key: str, root: type[Table]) -> bool:
+    field = root.model_fields.get(key)
     listed = field is not None and get_origin(field.annotation) is tuple
-    return listed and bool(tables_of(Scene, key))
+    return listed and bool(tables_of(root, key))
 
 
 def _kind_of(value: Any) -> Any:
     return value.get("kind") if isinstance(value, dict) else value
 
 
-def _allowed(keys: tuple[Key, ...], raw: Any) -> list[str]:
+def _allowed(keys: tuple[Key, ...], raw: Any, root: type[Table]) -> list[str]:
     """Keys that the table at `keys` may have."""
-    tables, kind = _tables_at(keys), _kind_of(reduce(_inside, keys, raw))
+    tables, kind = _tables_at(keys, root), _kind_of(reduce(_inside, keys, raw))
     fitting = [table for table in tables if kind in _kinds(table)] or tables
     return sorted({name for table in fitting for name in table.model_fields})
 
@@ -117,10 +123,10 @@ def _inside(value: Any, key: Key) -> Any:
         return None
 
 
-def keys_of(location: tuple[Key, ...], raw: Any) -> tuple[Key, ...]:
+def keys_of(location: tuple[Key, ...], raw: Any, root: type[Table] = Scene) -> tuple[Key, ...]:
     """pydantic's location without the kinds that it puts in where a table was chosen by kind."""
     keys: list[Key] = []
-    tables: list[type[Table]] = [Scene]
+    tables: list[type[Table]] = [root]
     value = raw
     choosing = False
     for key in location:
@@ -137,24 +143,24 @@ def keys_of(location: tuple[Key, ...], raw: Any) -> tuple[Key, ...]:
     return tuple(keys)
 
 
-def explain(error: ErrorDetails, raw: Any, file: str) -> str:
-    """One of pydantic's errors for people."""
-    keys = keys_of(error["loc"], raw)
+def explain(error: ErrorDetails, raw: Any, file: str, root: type[Table] = Scene) -> str:
+    """One of pydantic's errors for people; `root` is the table of the whole file."""
+    keys = keys_of(error["loc"], raw, root)
     kind, value, context = error["type"], error["input"], error.get("ctx", {})
-    where = place(file, keys)
+    where, around = place(file, keys, root=root), place(file, keys[:-1], root=root)
     if kind == "extra_forbidden":
         name = str(keys[-1])
-        end = suggestion(name, _allowed(keys[:-1], raw), "The keys here are")
-        return f"{place(file, keys[:-1])}: unknown key '{name}'{end}"
+        end = suggestion(name, _allowed(keys[:-1], raw, root), "The keys here are")
+        return f"{around}: unknown key '{name}'{end}"
     if kind == "missing":
-        return f"{place(file, keys[:-1])}: key '{keys[-1]}' is missing. Add it."
+        return f"{around}: key '{keys[-1]}' is missing. Add it."
     if kind == "union_tag_not_found":
-        kinds = [k for table in _tables_at(keys) for k in _kinds(table)]
+        kinds = [k for table in _tables_at(keys, root) for k in _kinds(table)]
         return f"{where}: key 'kind' is missing. Give one of: {', '.join(kinds)}."
     if kind in ("union_tag_invalid", "literal_error"):
         known = str(context.get("expected_tags", context.get("expected", "")))
         names = [part.strip(" '") for part in known.replace(" or ", ",").split(",")]
-        own = [table for table in _tables_at(keys) if issubclass(table, OwnTable)]
+        own = [table for table in _tables_at(keys, root) if issubclass(table, OwnTable)]
         names += [kind for table in own for kind in table.registry.kinds]
         given = context.get("tag", value)
         return f"{where}: '{given}' is not known{suggestion(str(given), names, 'Give one of')}"
@@ -163,8 +169,8 @@ def explain(error: ErrorDetails, raw: Any, file: str) -> str:
     if kind in BOUNDS:
         key, compared, remedy = BOUNDS[kind]
         return f"{where}: {_shown(value)} {compared} {context[key]:g}. Give a {remedy} number."
-    if kind == "tuple_type" and isinstance(value, dict) and _is_list_of_tables(str(keys[0])):
-        return f"scene {file}: [{keys[0]}] may be there several times. Write [[{keys[0]}]]."
+    if kind == "tuple_type" and isinstance(value, dict) and _is_list_of_tables(str(keys[0]), root):
+        return f"{around}: [{keys[0]}] may be there several times. Write [[{keys[0]}]]."
     what = WHAT.get(kind, f"is not right ({error['msg'].lower()}). Correct it")
     return f"{where}: {_shown(value)} {what}."
 

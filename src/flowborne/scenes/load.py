@@ -119,7 +119,7 @@ def read_scene(path: Path) -> Scene:
     raises  RunFolderError for a file that is no scene
     """
     with reading(path.parent):
-        raw = _read(path)
+        raw = read_tables(path)
         _check_depth(raw, path)
         draft, problems = _understood(raw, path)
         if draft is None or problems:
@@ -137,7 +137,7 @@ def _examine(
 ) -> tuple[Scene | None, list[str]]:
     try:
         path = find(name_or_path)
-        raw = _read(path)
+        raw = read_tables(path)
         for key, text in (overrides or {}).items():
             override(raw, key, text)
         _check_depth(raw, path)
@@ -204,14 +204,15 @@ def find(name_or_path: str | Path) -> Path:
     raise SceneError(f"there is no scene '{text}'{end}")
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_tables(path: Path, kind: str = "scene") -> dict[str, Any]:
+    """Tables of a TOML file, which messages call `kind`. Raises SceneError where it is none."""
     try:
         return tomllib.loads(read_file(path).decode("utf-8-sig"))
     except OSError as error:
-        raise SceneError(f"scene {path} cannot be read: {error.strerror}. Mend that.") from None
+        raise SceneError(f"{kind} {path} cannot be read: {error.strerror}. Mend that.") from None
     except UnicodeDecodeError as error:
         raise SceneError(
-            f"scene {path.name}: byte {error.start + 1} is not UTF-8 text. Save it as UTF-8."
+            f"{kind} {path.name}: byte {error.start + 1} is not UTF-8 text. Save it as UTF-8."
         ) from None
     except tomllib.TOMLDecodeError as error:
         text = str(error)
@@ -219,15 +220,15 @@ def _read(path: Path) -> dict[str, Any]:
         what, line, column = found.groups() if found else (text, None, None)
         where = f", line {line}, column {column}" if line else ", at its end" if found else ""
         raise SceneError(
-            f"scene {path.name}{where}: this is not TOML ({what[:1].lower() + what[1:]}). "
+            f"{kind} {path.name}{where}: this is not TOML ({what[:1].lower() + what[1:]}). "
             "Correct it there."
         ) from None
     except ValueError:
         raise SceneError(
-            f"scene {path.name}: there is a number of thousands of digits in it. Shorten it."
+            f"{kind} {path.name}: there is a number of thousands of digits in it. Shorten it."
         ) from None
     except RecursionError:
-        raise _too_deep(path) from None
+        raise _too_deep(path, kind) from None
 
 
 def _check_depth(raw: dict[str, Any], path: Path) -> None:
@@ -242,9 +243,9 @@ def _check_depth(raw: dict[str, Any], path: Path) -> None:
         raise _too_deep(path)
 
 
-def _too_deep(path: Path) -> SceneError:
+def _too_deep(path: Path, kind: str = "scene") -> SceneError:
     return SceneError(
-        f"scene {path.name}: its arrays or tables are nested more than {DEEPEST} deep. "
+        f"{kind} {path.name}: its arrays or tables are nested more than {DEEPEST} deep. "
         "Flatten them."
     )
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -272,6 +273,57 @@ def plot_courses(strips: dict[str, dict[str, tuple[Array, Array]]], path: Path) 
     legend(axes[0], lines)
     axes[-1].set_xlabel("time (s)", fontsize=9, color=style.MUTED)
     _save(figure, path)
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points of a plot; nan in either coordinate leaves one out.
+
+    x, y      (n,)
+    x_bar     (n,) half widths of error bars along x; None without
+    y_bar     (n,) along y
+    """
+
+    x: Array
+    y: Array
+    x_bar: Array | None = None
+    y_bar: Array | None = None
+
+
+def plot_points(
+    points: Points, labels: tuple[str, str], front: NDArray[np.int64], path: Path | str | IO[bytes]
+) -> None:
+    """Plot one number of many runs against another.
+
+    labels  of the axes x and y
+    front   indices of points to connect, in the order of their x
+    path    .png, .svg or .pdf, overwritten; or an open file, which becomes SVG
+    """
+    figure, (axes,) = _figure(1, (5.2, 3.6))
+    ordinary = np.setdiff1d(np.arange(len(points.x)), front)
+    best = front[np.argsort(points.x[front], kind="stable")]
+    for rows, colour, line in ((ordinary, style.CURVES[1], ""), (best, style.CURVES[0], "-")):
+        bars = [None if bar is None else bar[rows] for bar in (points.x_bar, points.y_bar)]
+        axes.errorbar(
+            points.x[rows],
+            points.y[rows],
+            bars[1],
+            bars[0],
+            fmt="o" + line,
+            ms=4.0,
+            lw=1.2,
+            color=colour,
+            mec=style.EDGE,
+            mew=0.4,
+            elinewidth=0.8,
+        )
+    axes.set_xlabel(labels[0], fontsize=9, color=style.MUTED)
+    axes.set_title(labels[1], loc="left", fontsize=9, color=style.MUTED)
+    if isinstance(path, str | Path):
+        _save(figure, Path(path))
+    else:
+        with rc_context({"svg.hashsalt": "flowborne"}):
+            figure.savefig(path, format="svg", metadata={"Date": None})
 
 
 def _figure(rows: int, inches: tuple[float, float]) -> tuple[Figure, list[Axes]]:
