@@ -92,3 +92,9 @@ def test_a_policy_that_fails_ends_the_run_with_its_own_message(tmp_path: Path) -
         pytest.raises(fb.BlowUpError, match=r"frame 1, step 1: policy .* tells joint_5: name it"),
     ):
         simulation.advance_frame()
+
+
+def test_a_policy_is_python_that_needs_trust(tmp_path: Path) -> None:
+    scene = eel(tmp_path, "steer_trusted")
+    with pytest.raises(fb.SceneError, match=r"brings Python, .* function steer_trusted:steer"):
+        fb.load_scene(scene, trust=False)
