@@ -22,7 +22,7 @@ from flowborne.extras import missing_to_draw
 from flowborne.motion.human.body import ELBOWS
 from flowborne.phrases import listed
 from flowborne.progress import RunProgress
-from flowborne.running import RunOutcome, run
+from flowborne.running import COMPLETE, run
 from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, make_folder
 from flowborne.scenes.bodies import load_model
@@ -38,9 +38,6 @@ CAPTURED = "captured"
 """Folder of the runs without a controller."""
 
 ENDING = ".bvh"
-
-WHOLE = tuple(one.name.lower() for one in (RunOutcome.DONE, RunOutcome.DOUBTFUL))
-"""Outcomes of complete runs."""
 
 
 def run_clips(
@@ -192,7 +189,7 @@ class _Batch:
             film=film,
             **self.options,
         )
-        if result.outcome.name.lower() not in WHOLE:
+        if result.outcome.name.lower() not in COMPLETE:
             raise RunFolderError(result.message)
         return result.summary
 
@@ -224,7 +221,7 @@ def _named(text: str, clip: Path) -> str:
 def _is_whole(folder: RunFolder, scene: Scene) -> bool:
     """Whether a run is complete. Raises RunFolderError if it is one of another scene."""
     summary = folder.read_summary()
-    if summary["outcome"] not in WHOLE or summary["frames"] != scene.time.frames:
+    if summary["outcome"] not in COMPLETE or summary["frames"] != scene.time.frames:
         return False
     scene_to_resume(folder, scene)
     return True

@@ -55,6 +55,10 @@ class RunOutcome(Enum):
     INTERRUPTED = "the run was interrupted"
 
 
+COMPLETE = (RunOutcome.DONE.name.lower(), RunOutcome.DOUBTFUL.name.lower())
+"""Outcomes of runs with all frames, as in their summaries."""
+
+
 @dataclass(frozen=True)
 class RunResult:
     """Result of a run.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -250,12 +250,11 @@ class Simulation:
     def _apply_changes(self) -> None:
         """Remake setup and controller where the coming frame has other values than the last one."""
         from flowborne.scenes.build import changed
-        from flowborne.scenes.load import at, raw_of, with_values
+        from flowborne.scenes.load import at, with_values
 
         if not self._changes:
             return
-        raw = raw_of(self.scene)
-        start = {key: at(raw, key) for change in self._changes for key in change.values}
+        start = {key: at(self._raw, key) for change in self._changes for key in change.values}
         values = values_at(self._changes, start, self.time, self.frame_time)
         if values == self._values:
             return
@@ -263,6 +262,13 @@ class Simulation:
         setup, controller = changed(scene, self.setup, self._executor)
         self._moment = replace(self._moment, world=replace(self.world, setup=setup))
         self.controller, self._values = controller, values
+
+    @cached_property
+    def _raw(self) -> dict[str, Any]:
+        """The scene as its file has it."""
+        from flowborne.scenes.load import raw_of
+
+        return raw_of(self.scene)
 
     def _drives(self) -> Drives:
         """Those of the scene itself."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from flowborne.control.creature import within_range
 from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
+from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo, driven
 from flowborne.coupling.told import Told, TrajectoryKnots
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import SceneError
@@ -108,9 +108,7 @@ def told_by(
             beyond += said
             end = world.time + span
             times = np.array([world.time, end, end + span])
-            motion: Trajectory = TrajectoryKnots(model, dofs, times, poses)
-            exact = isinstance(servo, ServoExact) and np.all(np.isinf(servo.torque_limit))
-            motions.append(motion if exact else TrajectoryServo(motion, servo))
+            motions.append(driven(TrajectoryKnots(model, dofs, times, poses), servo))
         else:
             raise SceneError(
                 f"the command to '{joint}' is {command!r:.60}: "
@@ -207,10 +205,10 @@ def drives_of(setup: Setup, others: Drives) -> Drives:
 
 def servo_of(dofs: Integers, drives: Drives) -> Servo:
     """The servo of dofs: exact where none is known."""
-    for driven, servo in drives:
-        own = np.isin(driven, dofs)
+    for owner, servo in drives:
+        own = np.isin(owner, dofs)
         if own.any():
-            limit = np.broadcast_to(servo.torque_limit, driven.shape)[own]
+            limit = np.broadcast_to(servo.torque_limit, owner.shape)[own]
             if is_dataclass(servo) and np.ndim(servo.torque_limit):
                 return replace(servo, torque_limit=tuple(limit.tolist()))
             return servo

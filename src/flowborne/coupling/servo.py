@@ -120,6 +120,12 @@ class TrajectoryServo:
         return self.trajectory.velocity(time)
 
 
+def driven(motion: Trajectory, servo: Servo) -> Trajectory:
+    """The motion as a servo follows it; itself where the servo keeps every promise."""
+    exact = isinstance(servo, ServoExact) and bool(np.all(np.isinf(servo.torque_limit)))
+    return motion if exact else TrajectoryServo(motion, servo)
+
+
 def joint_command(world: World, dt: float, command: JointCommand | None) -> JointCommand:
     """The command with prescribed motions, what joints are told, and a slab's locked dofs added.
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD
-from flowborne.scenes.motions import driven
+from flowborne.coupling.servo import Servo, ServoExact, ServoPD, driven
 from flowborne.scenes.schema import Scene
 from flowborne.solids.actuators import actuators
 from flowborne.solids.model import BALL, HINGE, SLIDE, SolidModel

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
+from flowborne.coupling.servo import ServoExact, ServoPD, driven
 from flowborne.errors import SceneError
 from flowborne.motion.formula import RESERVED, Formula
 from flowborne.motion.tracks import (
@@ -67,12 +67,6 @@ class ServoPDTable(Table):
 ServoTable = Annotated[ServoExactTable | ServoPDTable, *ByKind]
 
 EXACT = ServoExactTable(kind="exact")
-
-
-def driven(motion: Trajectory, servo: Servo) -> Trajectory:
-    """The motion as a servo follows it; itself where the servo keeps every promise."""
-    exact = isinstance(servo, ServoExact) and bool(np.all(np.isinf(servo.torque_limit)))
-    return motion if exact else TrajectoryServo(motion, servo)
 
 
 class DrivenTable(Table):

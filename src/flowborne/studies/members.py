@@ -25,7 +25,7 @@ from flowborne.errors import PartError, SceneError, described
 from flowborne.files.atomic import write_atomically, write_json
 from flowborne.files.given import read_json
 from flowborne.kernels.jit import kernel_threads
-from flowborne.running import RunOutcome, run
+from flowborne.running import COMPLETE, RunOutcome, run
 from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.scenes.load import load_scene
@@ -36,9 +36,6 @@ Array = NDArray[np.float64]
 
 FAILED = "failed"
 """Outcome of a member without a run: its scene is wrong, or its process died."""
-
-COMPLETE = (RunOutcome.DONE.name.lower(), RunOutcome.DOUBTFUL.name.lower())
-"""Outcomes with all frames."""
 
 _one_at_a_time = threading.Lock()
 """Held by a run: its limit of BLAS threads is of the whole process."""
