@@ -23,13 +23,18 @@ Marks = NDArray[np.uint8]
 Indices = NDArray[np.int32]
 Labels = NDArray[np.int32]
 
-Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Real, Marks, Indices, Indices]
+Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Marks, Real, Marks, Indices, Indices]
 """Table of levels; which axes are periodic; packed over the levels: weights across each axis, what
-is added to the diagonal, the inverse of that, interpolation coefficients (see
-`centres.interpolation_weights`), marks, orphans and their aggregates (see `aggregates`)."""
+is added to the diagonal, the inverse of that, which rows are even (see `even`), interpolation
+coefficients (see `centres.interpolation_weights`), marks, orphans and their aggregates (see
+`aggregates`)."""
 
 Finest = tuple[Array, Array, Array, Array]
 """Padded weights across each axis and diagonal of the finest level."""
+
+Operator = tuple[Real, Real, Real, Real, Marks, int]
+"""K on one level, padded: weights across each axis, the diagonal or its inverse, which rows are
+even, and the cell whose weights these have (see `even`)."""
 
 Vectors = tuple[Array, Array, Array, Array, Array]
 """Padded x, right-hand side, and three of scratch."""

@@ -9,10 +9,10 @@ import numpy as np
 
 from flowborne.kernels.arrays import (
     Array,
-    Finest,
     Hierarchy,
     Labels,
     MobilityArrays,
+    Operator,
     Real,
     Rows,
     Triple,
@@ -52,7 +52,7 @@ def apply_low_rank(out: Array, p: Array, rows: Rows, mobility: MobilityArrays) -
 def solve(
     hierarchy: Hierarchy,
     cycle: Triple,
-    finest: Finest,
+    finest: Operator,
     vectors: Vectors,
     rows: Rows,
     mobility: MobilityArrays,
@@ -66,7 +66,7 @@ def solve(
     """Solve (K + J A^-1 J^T) x = rhs from the guess in x; all of it on one thread, or on all.
 
     hierarchy  of K in the precision of the preconditioner, at any scale; cycle: its x, b, r
-    finest     padded weights and diagonal of K
+    finest     K on the finest level, with its diagonal
     vectors    padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
                vectors, x as well at the end
     rows       of J with padded flat cells; response: A^-1 (see `mobility`)

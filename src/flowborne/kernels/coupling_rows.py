@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Rows
+from flowborne.kernels.jit import kernel
 
 Kinds = NDArray[np.int8]
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
@@ -14,33 +15,34 @@ ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
 open face, but none by half; a face open by half or more."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
     """(nx, ny, nz) kind of each cell.
 
     walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
     """
-    n = oy.shape[0], ox.shape[1], ox.shape[2]
-    kind = np.empty(n, np.int8)
-    for i in range(n[0]):
-        for j in range(n[1]):
-            for k in range(n[2]):
-                cell, widest, at_side = (i, j, k), 0.0, False
-                for axis in range(2 if n[2] == 1 else 3):
-                    opened = ox if axis == 0 else (oy if axis == 1 else oz)
-                    x, y, z = i + int(axis == 0), j + int(axis == 1), k + int(axis == 2)
-                    if cell[axis] == 0 and walls[axis, 0] == 1:
-                        at_side = True
-                    else:
-                        widest = max(widest, opened[i, j, k])
-                    if cell[axis] == n[axis] - 1 and walls[axis, 1] == 1:
-                        at_side = True
-                    else:
-                        widest = max(widest, opened[x, y, z])
-                if widest > 0.0:
-                    kind[i, j, k] = WIDE if widest >= 0.5 else NARROW
-                else:
-                    kind[i, j, k] = ENCLOSED if at_side else COVERED
+    n0, n1, n2 = oy.shape[0], ox.shape[1], ox.shape[2]
+    kind = np.empty((n0, n1, n2), np.int8)
+    left = 1.0 - walls  # of what is open at a side
+    for i in prange(n0):
+        below0, above0 = left[0, 0] if i == 0 else 1.0, left[0, 1] if i == n0 - 1 else 1.0
+        for j in range(n1):
+            below1, above1 = left[1, 0] if j == 0 else 1.0, left[1, 1] if j == n1 - 1 else 1.0
+            beside = below0 + above0 + below1 + above1 < 4.0
+            for k in range(n2):
+                widest = max(below0 * ox[i, j, k], above0 * ox[i + 1, j, k])
+                widest = max(widest, max(below1 * oy[i, j, k], above1 * oy[i, j + 1, k]))
+                at_side = beside
+                if n2 > 1:
+                    below2, above2 = (
+                        left[2, 0] if k == 0 else 1.0,
+                        left[2, 1] if k == n2 - 1 else 1.0,
+                    )
+                    widest = max(widest, max(below2 * oz[i, j, k], above2 * oz[i, j, k + 1]))
+                    at_side = beside or below2 + above2 < 2.0
+                opened = WIDE if widest >= 0.5 else NARROW
+                shut = ENCLOSED if at_side else COVERED
+                kind[i, j, k] = opened if widest > 0.0 else shut
     return kind
 
 

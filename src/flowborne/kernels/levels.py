@@ -33,13 +33,14 @@ from flowborne.kernels.arrays import (
     Triple,
 )
 from flowborne.kernels.centres import distance_ratio, interpolation_weights
+from flowborne.kernels.even import SINGLE, find_even
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.orphans import add_orphan_weights, assign_orphans
 
-OFFSET, N0, N1, N2, INTERPOLATION, S0, S1, S2, ORPHANS = range(9)
+OFFSET, N0, N1, N2, INTERPOLATION, S0, S1, S2, ORPHANS, ROW, COMMON = range(11)
 """Columns of the table of levels: where it begins in the packed arrays, cells along each axis,
 where its interpolation coefficients begin, the finest cells in one of its cells, how many of its
-cells are orphans."""
+cells are orphans, where its rows begin, its common cell (see `even`)."""
 
 
 @kernel
@@ -63,6 +64,14 @@ def weights_at(packed: Triple, table: Integers, level: int) -> Triple:
     """The weights across each axis of one level."""
     w0, w1, w2 = packed
     return at_level(w0, table, level), at_level(w1, table, level), at_level(w2, table, level)
+
+
+@kernel
+def even_at(even: Marks, table: Integers, level: int) -> Marks:
+    """Which padded rows of one level are even."""
+    p0 = table[level, N0] + 2 if table[level, N0] > 1 else 1
+    p1, first = table[level, N1] + 2, table[level, ROW]
+    return even[first : first + p0 * p1].reshape((p0, p1))
 
 
 @kernel
@@ -213,14 +222,27 @@ def coarse_sums(
 
 @kernel
 def coarsen(hierarchy: Hierarchy) -> None:
-    """Fill all levels from the weights of the finest, and from what is added to its diagonal."""
-    table, periodic, weights, reaction, inverse, interpolation, marks, orphans, aggregates = (
-        hierarchy
-    )
+    """Fill all levels from the weights of the finest, from what is added to its diagonal, and from
+    which of its rows are even."""
+    (
+        table,
+        periodic,
+        weights,
+        reaction,
+        inverse,
+        even,
+        interpolation,
+        marks,
+        orphans,
+        aggregates,
+    ) = hierarchy
     reacts = np.any(at_level(reaction, table, 0))
     for level in range(table.shape[0] - 1):
         w, share = weights_at(weights, table, level), at_level(inverse, table, level)
         added = at_level(reaction, table, level)
+        if level > 0:
+            rows = even_at(even, table, level)
+            table[level, COMMON] = find_even(w, added, periodic, rows, SINGLE)
         inverse_diagonal(w, added, share)
         if level == table.shape[0] - 2:
             break

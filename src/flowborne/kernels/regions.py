@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Array, Labels, Periodic, Rows
+from flowborne.kernels.arrays import Array, Finest, Labels, Periodic, Rows
 from flowborne.kernels.jit import inlined, kernel
 
 NULL = 1e-10
@@ -52,7 +52,7 @@ def is_crossed(w: Array, i: int, j: int) -> bool:
 
 @kernel
 def label_regions(
-    finest: tuple[Array, Array, Array, Array],
+    finest: Finest,
     periodic: Periodic,
     label: Labels,
     parent: Labels,

@@ -17,8 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Real, Triple
+from flowborne.kernels.arrays import Operator, Real
 from flowborne.kernels.blocks import BLOCK, reach
+from flowborne.kernels.even import at_cell
 from flowborne.kernels.jit import kernel
 
 STEPS = 3
@@ -29,30 +30,37 @@ WEIGHTS = tuple(1.0 / (1.0 - np.cos(2.0 * np.pi * k / (2 * STEPS + 1))) for k in
 
 
 @kernel
-def smooth_plane(
-    out: Real, x: Real, b: Real, w: Triple, inverse: Real, weight: float, m: int
-) -> None:
+def smooth_plane(out: Real, x: Real, b: Real, operator: Operator, weight: float, m: int) -> None:
     """`smooth` with a weight w_k on plane m."""
-    w0, w1, w2 = w
+    w0, w1, w2, inverse, even, common = operator
     d = 1 if x.shape[0] > 1 else 0
     part, keep = x.dtype.type(weight), x.dtype.type(1.0 - weight)
+    c0, c1, c2 = at_cell(w0, common), at_cell(w1, common), at_cell(w2, common)
     for j in range(1, x.shape[1] - 1):
-        for k in range(1, x.shape[2] - 1):
-            total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
-            total += w1[m, j + 1, k] * x[m, j + 1, k]
-            total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
-            if d:
-                total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
-            out[m, j, k] = keep * x[m, j, k] + part * inverse[m, j, k] * total
+        if even[m, j]:
+            for k in range(1, x.shape[2] - 1):
+                total = b[m, j, k] + c1 * (x[m, j - 1, k] + x[m, j + 1, k])
+                total += c2 * (x[m, j, k - 1] + x[m, j, k + 1])
+                if d:
+                    total += c0 * (x[m - 1, j, k] + x[m + 1, j, k])
+                out[m, j, k] = keep * x[m, j, k] + part * inverse[m, j, k] * total
+        else:
+            for k in range(1, x.shape[2] - 1):
+                total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
+                total += w1[m, j + 1, k] * x[m, j + 1, k]
+                total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
+                if d:
+                    total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
+                out[m, j, k] = keep * x[m, j, k] + part * inverse[m, j, k] * total
 
 
 @kernel
-def smooth(out: Real, x: Real, b: Real, w: Triple, inverse: Real, step: int) -> None:
+def smooth(out: Real, x: Real, b: Real, operator: Operator, step: int) -> None:
     """out = x after a step, counted from 0; ghosts of `out` are left alone."""
     d = 1 if x.shape[0] > 1 else 0
     weight = WEIGHTS[step]
     for i in prange(x.shape[0] - 2 * d):
-        smooth_plane(out, x, b, w, inverse, weight, i + d)
+        smooth_plane(out, x, b, operator, weight, i + d)
 
 
 @kernel
@@ -72,32 +80,41 @@ def first_smooth(x: Real, b: Real, inverse: Real) -> None:
 
 
 @kernel
-def defect_plane(r: Real, x: Real, b: Real, w: Triple, inverse: Real, m: int) -> None:
+def defect_plane(r: Real, x: Real, b: Real, operator: Operator, m: int) -> None:
     """`defect` on plane m."""
-    w0, w1, w2 = w
+    w0, w1, w2, inverse, even, common = operator
     d = 1 if x.shape[0] > 1 else 0
+    c0, c1, c2 = at_cell(w0, common), at_cell(w1, common), at_cell(w2, common)
     for j in range(1, x.shape[1] - 1):
-        for k in range(1, x.shape[2] - 1):
-            total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
-            total += w1[m, j + 1, k] * x[m, j + 1, k]
-            total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
-            if d:
-                total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
-            a = inverse[m, j, k]
-            left = total - np.divide(x[m, j, k], a)  # no check for 0: vector code
-            r[m, j, k] = left if a > 0.0 else x.dtype.type(0)
+        if even[m, j]:
+            for k in range(1, x.shape[2] - 1):
+                total = b[m, j, k] + c1 * (x[m, j - 1, k] + x[m, j + 1, k])
+                total += c2 * (x[m, j, k - 1] + x[m, j, k + 1])
+                if d:
+                    total += c0 * (x[m - 1, j, k] + x[m + 1, j, k])
+                r[m, j, k] = total - np.divide(x[m, j, k], inverse[m, j, k])
+        else:
+            for k in range(1, x.shape[2] - 1):
+                total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
+                total += w1[m, j + 1, k] * x[m, j + 1, k]
+                total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
+                if d:
+                    total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
+                a = inverse[m, j, k]
+                left = total - np.divide(x[m, j, k], a)  # no check for 0: vector code
+                r[m, j, k] = left if a > 0.0 else x.dtype.type(0)
 
 
 @kernel
-def defect(r: Real, x: Real, b: Real, w: Triple, inverse: Real) -> None:
+def defect(r: Real, x: Real, b: Real, operator: Operator) -> None:
     """r = b - K x in active cells, else 0; ghosts of r are left alone."""
     d = 1 if x.shape[0] > 1 else 0
     for i in prange(x.shape[0] - 2 * d):
-        defect_plane(r, x, b, w, inverse, i + d)
+        defect_plane(r, x, b, operator, i + d)
 
 
 @kernel
-def smooth_down(x: Real, r: Real, b: Real, w: Triple, inverse: Real) -> None:
+def smooth_down(x: Real, r: Real, b: Real, operator: Operator) -> None:
     """All steps from x = 0, and r what they leave, without periodic axes; r holds every other step
     meanwhile."""
     d = 1 if x.shape[0] > 1 else 0
@@ -110,25 +127,25 @@ def smooth_down(x: Real, r: Real, b: Real, w: Triple, inverse: Real) -> None:
         low, high = reach(block, blocks, planes, 3)
         for i in range(start, end + 3):
             if i < end:
-                begin_plane(x, b, inverse, i + d)
+                begin_plane(x, b, operator[3], i + d)
             if first <= i - 1 < last:
-                smooth_plane(r, x, b, w, inverse, WEIGHTS[1], i - 1 + d)
+                smooth_plane(r, x, b, operator, WEIGHTS[1], i - 1 + d)
             if one <= i - 2 < two:
-                smooth_plane(x, r, b, w, inverse, WEIGHTS[2], i - 2 + d)
+                smooth_plane(x, r, b, operator, WEIGHTS[2], i - 2 + d)
             if low <= i - 3 < high:
-                defect_plane(r, x, b, w, inverse, i - 3 + d)
+                defect_plane(r, x, b, operator, i - 3 + d)
     for between in prange(blocks - 1):
         i = planes * (between + 1) // blocks
         for m in range(i - 1, i + 1):
-            smooth_plane(r, x, b, w, inverse, WEIGHTS[1], m + d)
+            smooth_plane(r, x, b, operator, WEIGHTS[1], m + d)
         for m in range(i - 2, i + 2):
-            smooth_plane(x, r, b, w, inverse, WEIGHTS[2], m + d)
+            smooth_plane(x, r, b, operator, WEIGHTS[2], m + d)
         for m in range(i - 3, i + 3):
-            defect_plane(r, x, b, w, inverse, m + d)
+            defect_plane(r, x, b, operator, m + d)
 
 
 @kernel
-def smooth_up(x: Real, r: Real, b: Real, w: Triple, inverse: Real) -> None:
+def smooth_up(x: Real, r: Real, b: Real, operator: Operator) -> None:
     """x = r after all steps, the last one first, without periodic axes; r holds every other step
     meanwhile."""
     d = 1 if x.shape[0] > 1 else 0
@@ -140,14 +157,14 @@ def smooth_up(x: Real, r: Real, b: Real, w: Triple, inverse: Real) -> None:
         one, two = reach(block, blocks, planes, 2)
         for i in range(start, end + 2):
             if i < end:
-                smooth_plane(x, r, b, w, inverse, WEIGHTS[2], i + d)
+                smooth_plane(x, r, b, operator, WEIGHTS[2], i + d)
             if first <= i - 1 < last:
-                smooth_plane(r, x, b, w, inverse, WEIGHTS[1], i - 1 + d)
+                smooth_plane(r, x, b, operator, WEIGHTS[1], i - 1 + d)
             if one <= i - 2 < two:
-                smooth_plane(x, r, b, w, inverse, WEIGHTS[0], i - 2 + d)
+                smooth_plane(x, r, b, operator, WEIGHTS[0], i - 2 + d)
     for between in prange(blocks - 1):
         i = planes * (between + 1) // blocks
         for m in range(i - 1, i + 1):
-            smooth_plane(r, x, b, w, inverse, WEIGHTS[1], m + d)
+            smooth_plane(r, x, b, operator, WEIGHTS[1], m + d)
         for m in range(i - 2, i + 2):
-            smooth_plane(x, r, b, w, inverse, WEIGHTS[0], m + d)
+            smooth_plane(x, r, b, operator, WEIGHTS[0], m + d)

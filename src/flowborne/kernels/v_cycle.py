@@ -9,8 +9,10 @@ from __future__ import annotations
 from flowborne.kernels.arrays import Hierarchy, Real
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.levels import (
+    COMMON,
     OFFSET,
     at_level,
+    even_at,
     interpolation_at,
     orphans_at,
     weights_at,
@@ -40,9 +42,12 @@ SERIAL = 40_000
 def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool) -> None:
     """The cycle's work on one level, on its way down (from x = 0, then b of the next level) or up
     (from x of the next level)."""
-    table, periodic, weights, _, inverse, interpolation, marks, orphans, aggregates = hierarchy
+    table, periodic, weights, _, inverse, even, interpolation, marks, orphans, aggregates = (
+        hierarchy
+    )
     coarsest = table.shape[0] - 2
-    w, a = weights_at(weights, table, level), at_level(inverse, table, level)
+    (w0, w1, w2), a = weights_at(weights, table, level), at_level(inverse, table, level)
+    operator = (w0, w1, w2, a, even_at(even, table, level), table[level, COMMON])
     xl, bl = at_level(x, table, level), at_level(b, table, level)
     rl = at_level(r, table, level)
     fine = not periodic.any() and level < coarsest
@@ -57,9 +62,9 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
             at_level(aggregates, table, level),
         )
     if fine and down:
-        smooth_down(xl, rl, bl, w, a)
+        smooth_down(xl, rl, bl, operator)
     elif fine:
-        smooth_up(xl, rl, bl, w, a)
+        smooth_up(xl, rl, bl, operator)
     else:
         if down:
             first_smooth(xl, bl, a)
@@ -67,11 +72,11 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
         steps = STEPS * COARSEST if level == coarsest else STEPS
         for n in range(1 if down else 0, steps):
             wrap_ghosts(here, periodic)
-            smooth(there, here, bl, w, a, n % STEPS if down else STEPS - 1 - n)
+            smooth(there, here, bl, operator, n % STEPS if down else STEPS - 1 - n)
             here, there = there, here
         wrap_ghosts(xl, periodic)
         if down and level < coarsest:
-            defect(rl, xl, bl, w, a)
+            defect(rl, xl, bl, operator)
             wrap_ghosts(rl, periodic)
     if down and level < coarsest:
         restrict(

@@ -19,10 +19,21 @@ from flowborne.kernels.arrays import (
     Integers,
     Labels,
     Marks,
+    Operator,
     Periodic,
     Real,
 )
-from flowborne.kernels.levels import INTERPOLATION, at_level, coarsen, finest_weights, padded_size
+from flowborne.kernels.even import ROUNDING, find_even
+from flowborne.kernels.levels import (
+    COMMON,
+    INTERPOLATION,
+    ROW,
+    at_level,
+    coarsen,
+    even_at,
+    finest_weights,
+    padded_size,
+)
 from flowborne.kernels.regions import label_regions
 from flowborne.kernels.vectors import largest, scaled
 
@@ -31,13 +42,15 @@ COARSEST = 4
 
 
 def level_table(shape: tuple[int, int, int]) -> Integers:
-    """(levels + 1, 9) hierarchy over a grid of `shape` cells; see `levels.OFFSET` to `ORPHANS`."""
-    rows = []
+    """(levels + 1, 11) hierarchy over a grid of `shape` cells; see `levels.OFFSET` to `COMMON`."""
+    levels = []
     counts, size = list(shape), [1, 1, 1]
-    offset = interpolation = 0
+    offset = interpolation = rows = 0
     while True:
-        rows.append([offset, *counts, interpolation, *size, 0])
-        offset += padded_size(counts[0], counts[1], counts[2])
+        cells = padded_size(counts[0], counts[1], counts[2])
+        levels.append([offset, *counts, interpolation, *size, 0, rows, 0])
+        offset += cells
+        rows += cells // (counts[2] + 2)
         interpolation += sum(counts) + 6
         if max(counts) <= COARSEST:
             break
@@ -45,8 +58,8 @@ def level_table(shape: tuple[int, int, int]) -> Integers:
             if counts[axis] > 2:
                 counts[axis] = (counts[axis] + 1) // 2
                 size[axis] *= 2
-    rows.append([offset, 0, 0, 0, interpolation, 0, 0, 0, 0])
-    return np.array(rows, np.int64)
+    levels.append([offset, 0, 0, 0, interpolation, 0, 0, 0, 0, rows, 0])
+    return np.array(levels, np.int64)
 
 
 def zeros(shape: tuple[int, int, int]) -> Array:
@@ -69,6 +82,7 @@ class Buffers:
         self.weights = packed(total), packed(total), packed(total)
         self.reaction = packed(total)
         self.inverse = packed(total)
+        self.even: Marks = np.zeros(int(self.table[-1, ROW]), np.uint8)
         self.interpolation = packed(int(self.table[-1, INTERPOLATION]))
         self.marks: Marks = np.full(total, OWN, np.uint8)
         self.orphans: Indices = np.zeros(total, np.int32)
@@ -87,6 +101,7 @@ class Buffers:
             self.weights,
             self.reaction,
             self.inverse,
+            self.even,
             self.interpolation,
             self.marks,
             self.orphans,
@@ -119,23 +134,29 @@ def prepare(
     label: Labels,
     parent: Labels,
     count: Labels,
-) -> tuple[int, float]:
+) -> tuple[int, float, Operator]:
     """Fill finest level, hierarchy and region labels from the weights on the faces.
 
     reaction  (cells) of K + D, which the hierarchy is made for; see `pressure.PressureSystem`
-    returns  number of regions without an open side, scale of the hierarchy's weights
+    finest    padded weights and diagonal
+    returns   number of regions without an open side, scale of the hierarchy's weights, and K on the
+              finest level
     """
     *weights, diagonal = finest
-    finest_weights(faces, (weights[0], weights[1], weights[2]), diagonal)
+    table, periodic, w = hierarchy[0], hierarchy[1], (weights[0], weights[1], weights[2])
+    finest_weights(faces, w, diagonal)
     most = largest(diagonal)
     scale = 1.0 / most if most > 0.0 else 1.0
     for source, target in zip(weights, hierarchy[2], strict=True):
         scaled(source, target[: source.size], scale)
-    added = at_level(hierarchy[3], hierarchy[0], 0)
+    added = at_level(hierarchy[3], table, 0)
     added[:] = 0.0
     d = 1 if added.shape[0] > 1 else 0
     if reaction.size:
         inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
         inner[:] = scale * reaction.reshape(inner.shape)
+    even = even_at(hierarchy[5], table, 0)
+    table[0, COMMON] = find_even(w, added, periodic, even, ROUNDING)
     coarsen(hierarchy)
-    return label_regions(finest, hierarchy[1], label, parent, count), scale
+    regions = label_regions(finest, periodic, label, parent, count)
+    return regions, scale, (*w, diagonal, even, int(table[0, COMMON]))

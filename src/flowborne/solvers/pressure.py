@@ -131,7 +131,7 @@ class PressureSystem:
         self.buffers = borrow((inner, wraps), self)
         b = self.buffers
         self.hierarchy = b.hierarchy(self.periodic)
-        self.regions, self.scale = prepare(
+        self.regions, self.scale, self.finest = prepare(
             self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
         )
 
@@ -161,7 +161,7 @@ class PressureSystem:
         iterations, residual, converged = solve(
             self.hierarchy,
             b.cycle,
-            b.finest,
+            self.finest,
             b.vectors,
             added.rows,
             term.mobility.arrays,

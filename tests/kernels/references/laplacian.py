@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Finest, Real, Triple
+from flowborne.kernels.arrays import Array, Operator, Real, Triple
 from flowborne.kernels.vectors import cells_of
 
 
-def apply_laplacian_reference(p: Array, finest: Finest) -> Array:
+def operator(w: Triple, diagonal: Real) -> Operator:
+    """K of weights of which each may be another one; `diagonal` or its inverse."""
+    return w[0], w[1], w[2], diagonal, np.zeros(diagonal.shape[:2], np.uint8), 0
+
+
+def apply_laplacian_reference(p: Array, K: Operator) -> Array:
     """`apply_laplacian` in NumPy, K p with ghosts 0."""
-    *w, diagonal = finest
+    *w, diagonal, _, _ = K
     out = np.zeros_like(p)
     inside = cells_of(p)
     out[inside] = (diagonal * p - neighbour_sum(p, (w[0], w[1], w[2])))[inside]

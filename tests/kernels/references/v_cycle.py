@@ -15,7 +15,7 @@ from .transfer import interpolate_reference, restrict_reference
 
 def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
     """`v_cycle` in NumPy: x of a level for its b, both padded, ghosts of x as the sides have it."""
-    table, periodic, weights, _, inverse, interpolation, marks, orphans, aggregates = hierarchy
+    table, periodic, weights, _, inverse, _, interpolation, marks, orphans, aggregates = hierarchy
     w, a = weights_at(weights, table, level), at_level(inverse, table, level)
     coarsest = level == table.shape[0] - 2
     x = np.zeros(b.shape)
