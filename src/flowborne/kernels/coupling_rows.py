@@ -7,12 +7,18 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Rows
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 Kinds = NDArray[np.int8]
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
 """Kinds of cells: closed in by bodies and solid sides of the domain; all faces closed by bodies; an
 open face, but none by half; a face open by half or more."""
+
+
+@inlined
+def through(walls: Integers, axis: int, end: int, at_end: bool) -> float:
+    """0 for a face on a side that is solid or an inflow, 1 for others."""
+    return 0.0 if at_end and walls[axis, end] == 1 else 1.0
 
 
 @kernel
@@ -23,21 +29,21 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
     """
     n0, n1, n2 = oy.shape[0], ox.shape[1], ox.shape[2]
     kind = np.empty((n0, n1, n2), np.int8)
-    left = 1.0 - walls  # of what is open at a side
+    first, last = through(walls, 2, 0, True), through(walls, 2, 1, True)
     for i in prange(n0):
-        below0, above0 = left[0, 0] if i == 0 else 1.0, left[0, 1] if i == n0 - 1 else 1.0
+        below0 = through(walls, 0, 0, i == 0)
+        above0 = through(walls, 0, 1, i == n0 - 1)
         for j in range(n1):
-            below1, above1 = left[1, 0] if j == 0 else 1.0, left[1, 1] if j == n1 - 1 else 1.0
+            below1 = through(walls, 1, 0, j == 0)
+            above1 = through(walls, 1, 1, j == n1 - 1)
             beside = below0 + above0 + below1 + above1 < 4.0
             for k in range(n2):
                 widest = max(below0 * ox[i, j, k], above0 * ox[i + 1, j, k])
                 widest = max(widest, max(below1 * oy[i, j, k], above1 * oy[i, j + 1, k]))
                 at_side = beside
                 if n2 > 1:
-                    below2, above2 = (
-                        left[2, 0] if k == 0 else 1.0,
-                        left[2, 1] if k == n2 - 1 else 1.0,
-                    )
+                    below2 = first if k == 0 else 1.0
+                    above2 = last if k == n2 - 1 else 1.0
                     widest = max(widest, max(below2 * oz[i, j, k], above2 * oz[i, j, k + 1]))
                     at_side = beside or below2 + above2 < 2.0
                 opened = WIDE if widest >= 0.5 else NARROW
