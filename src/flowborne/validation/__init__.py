@@ -30,6 +30,7 @@ MODULES = {
     "open_water": ("B4", "B5", "B6", "B7", "V9"),
     "rexeel": ("R1",),
     "scalar_cases": ("F4",),
+    "scatter": ("K12", "K13"),
     "settling": ("V1", "V2"),
     "swimmers": ("S1", "S5"),
 }

@@ -51,6 +51,7 @@ def course(
     strength: float = STRENGTH,
     resolution: int | None = None,
     rule: str | None = None,
+    start: float | None = None,
 ) -> AngleHistory:
     """Run a built-in block scene with one worker.
 
@@ -58,6 +59,7 @@ def course(
     strength    degrees/s
     resolution  of the domain; that of the scene when None
     rule        of the controller; that of the scene when None
+    start       angle in degrees; that of the scene when None
     raises      ArithmeticError when the run blows up
     """
     settings = {"control.0.strength": str(strength)}
@@ -65,6 +67,8 @@ def course(
         settings["domain.resolution"] = str(resolution)
     if rule is not None:
         settings["controller.rule.kind"] = rule
+    if start is not None:
+        settings["initial.positions.hinge"] = str(start)
     with Simulation(load_scene(scene, settings), workers=1) as simulation:
         angles = hinge_angles(simulation, simulation.frames if frames is None else frames)
     return judged(angles, strength / FRAMES_PER_SECOND)
