@@ -31,15 +31,15 @@ def differ(a: float, b: float, rounding: float) -> bool:
 
 
 @inlined
-def common_cell(w: Triple, added: Real, rounding: float) -> tuple[int, int, int]:
-    """The first cell that has the same weight on both sides along each axis, above 0, and nothing
-    added to its diagonal; (-1, 0, 0) if there is none."""
+def common_cell(w: Triple, rounding: float) -> tuple[int, int, int]:
+    """The first cell that has the same weight on both sides along each axis, above 0; (-1, 0, 0) if
+    there is none."""
     w0, w1, w2 = w
     d = 1 if w0.shape[0] > 1 else 0
     for m in range(d, w0.shape[0] - d):
         for j in range(1, w0.shape[1] - 1):
             for k in range(1, w0.shape[2] - 1):
-                same = added[m, j, k] == 0.0 and w1[m, j, k] > 0.0 and w2[m, j, k] > 0.0
+                same = w1[m, j, k] > 0.0 and w2[m, j, k] > 0.0
                 same = same and not differ(w1[m, j + 1, k], w1[m, j, k], rounding)
                 same = same and not differ(w2[m, j, k + 1], w2[m, j, k], rounding)
                 if d:
@@ -51,11 +51,12 @@ def common_cell(w: Triple, added: Real, rounding: float) -> tuple[int, int, int]
 
 
 @kernel
-def find_even(w: Triple, added: Real, periodic: Periodic, even: Marks, rounding: float) -> int:
+def find_even(w: Triple, periodic: Periodic, even: Marks, rounding: float) -> int:
     """Mark the rows of which every cell has the weights of a common cell, and return its padded
     flat index.
 
     A weight does not count where nothing lies behind it but the ghosts of a side, which hold 0.
+    Diagonals, which are read in any case, may differ.
 
     even      of each padded row, 1 or 0
     rounding  relative difference of weights that is none
@@ -64,7 +65,7 @@ def find_even(w: Triple, added: Real, periodic: Periodic, even: Marks, rounding:
     d = 1 if w0.shape[0] > 1 else 0
     n1, n2 = w0.shape[1] - 2, w0.shape[2] - 2
     even[:] = 0
-    a, b, c = common_cell(w, added, rounding)
+    a, b, c = common_cell(w, rounding)
     if a < 0:
         return 0
     c0, c1, c2 = w0[a, b, c], w1[a, b, c], w2[a, b, c]
@@ -77,7 +78,6 @@ def find_even(w: Triple, added: Real, periodic: Periodic, even: Marks, rounding:
             other = periodic[2] and differ(w2[m, j, 1], c2, rounding)
             other = other or (periodic[2] and differ(w2[m, j, n2 + 1], c2, rounding))
             for k in range(1, n2 + 1):
-                other |= added[m, j, k] != 0.0
                 other |= before0 and differ(w0[m, j, k], c0, rounding)
                 other |= after0 and differ(w0[m + 1, j, k], c0, rounding)
                 other |= before1 and differ(w1[m, j, k], c1, rounding)

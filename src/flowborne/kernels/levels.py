@@ -242,7 +242,7 @@ def coarsen(hierarchy: Hierarchy) -> None:
         added = at_level(reaction, table, level)
         if level > 0:
             rows = even_at(even, table, level)
-            table[level, COMMON] = find_even(w, added, periodic, rows, SINGLE)
+            table[level, COMMON] = find_even(w, periodic, rows, SINGLE)
         inverse_diagonal(w, added, share)
         if level == table.shape[0] - 2:
             break

@@ -156,7 +156,7 @@ def prepare(
         inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
         inner[:] = scale * reaction.reshape(inner.shape)
     even = even_at(hierarchy[5], table, 0)
-    table[0, COMMON] = find_even(w, added, periodic, even, ROUNDING)
+    table[0, COMMON] = find_even(w, periodic, even, ROUNDING)
     coarsen(hierarchy)
     regions = label_regions(finest, periodic, label, parent, count)
     return regions, scale, (*w, diagonal, even, int(table[0, COMMON]))

@@ -31,7 +31,7 @@ STREAMS = {"ideal": 0.0, "Re 100": 10.0}
 """Viscosities in Pa s; rho U L is 1000 Pa s."""
 
 PART = 0.05
-"""Largest scatter over poses on the finest grid, over the mean: the "some per cent" of the list."""
+"""Largest scatter over poses on the finest grid, over the mean; chosen, see K12's reference."""
 
 
 def arc(middle: float) -> Array:
