@@ -31,6 +31,7 @@ from flowborne.fluid.grid import Array, Grid, faces_of
 from flowborne.fluid.momentum import face_masses
 from flowborne.fluid.momentum import kinetic_energy as kinetic_energy_of_fluid
 from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.inflow import BoundaryInflow
 from flowborne.fluid.sides.no_slip import BoundaryNoSlip
 from flowborne.fluid.sides.open import BoundaryOpen
@@ -47,6 +48,7 @@ __all__ = [
     "Boundaries",
     "Boundary",
     "BoundaryClosed",
+    "BoundaryFar",
     "BoundaryInflow",
     "BoundaryNoSlip",
     "BoundaryOpen",

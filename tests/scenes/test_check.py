@@ -88,6 +88,12 @@ ONE_FAULT = {
         "scene swim.toml, [boundaries]: y_min is periodic and y_max is closed. "
         "Make both of them periodic or neither.",
     ),
+    "far sides of a channel": (
+        {'x_max = "open"': 'y_min = "far"\ny_max = "far"'},
+        "scene swim.toml, [boundaries]: only the sides across one axis are far or open, and an "
+        "endless channel of fluid cannot be set in motion. Make a side across another axis far, or "
+        "these open.",
+    ),
     "a side in z of a plane": (
         {'x_max = "open"': 'x_max = "open"\nz_min = "open"'},
         "scene swim.toml, [boundaries] z_min is open, but a scene of 2 dimensions has no sides "

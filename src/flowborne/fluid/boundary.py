@@ -48,8 +48,8 @@ class Source:
 class Boundaries:
     """The six sides of a domain.
 
-    raises  ValueError when one of two opposite sides is periodic and the other is not, or when a
-            side that is not closed or periodic is given in z of a slab
+    raises  ValueError when one of two opposite sides is periodic and the other is not, or when far
+            sides have nothing open or far across another axis
     """
 
     x_min: Boundary = WALL
@@ -78,7 +78,8 @@ class Boundaries:
     @cached_property
     def _pairs(self) -> tuple[tuple[Boundary, Boundary], ...]:
         sides = [getattr(self, name) for name in SIDES]
-        return tuple(zip(sides[::2], sides[1::2], strict=True))
+        pairs = list(zip(sides[::2], sides[1::2], strict=True))
+        return tuple((low.among(pairs), high.among(pairs)) for low, high in pairs)
 
     @cached_property
     def _periodic(self) -> tuple[bool, bool, bool]:

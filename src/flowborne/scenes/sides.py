@@ -10,6 +10,7 @@ from pydantic import model_validator
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.far import CHANNEL, BoundaryFar, centre_among, in_channel
 from flowborne.fluid.sides.inflow import BoundaryInflow
 from flowborne.fluid.sides.no_slip import BoundaryNoSlip
 from flowborne.fluid.sides.open import BoundaryOpen
@@ -81,6 +82,15 @@ class OpenSide(AnySideTable):
     kind: Literal["open"]
 
 
+class FarSide(AnySideTable):
+    """Open, with a column of fluid behind each face: bodies in still fluid move as if it went on
+    for ever.
+    """
+
+    boundary = BoundaryFar
+    kind: Literal["far"]
+
+
 class PeriodicSide(AnySideTable):
     """Joined to the opposite side."""
 
@@ -127,7 +137,9 @@ class InflowSide(AnySideTable, FactorsTable):
         return peak * factor * sum(map(abs, self.velocity))
 
 
-BoundarySide = Annotated[ClosedSide | NoSlipSide | OpenSide | InflowSide | PeriodicSide, *ByKind]
+BoundarySide = Annotated[
+    ClosedSide | NoSlipSide | OpenSide | FarSide | InflowSide | PeriodicSide, *ByKind
+]
 
 _CLOSED = ClosedSide(kind="closed")
 
@@ -169,6 +181,10 @@ def check_sides(places: Places, boundaries: BoundariesTable, *, slab: bool) -> I
                 )
             for problem in table.check(axis):
                 yield f"{places.at('boundaries', side)}: {problem}"
+    kinds = [side.boundary for side in sides.values()]
+    centre = centre_among(list(zip(kinds[::2], kinds[1::2], strict=True)))
+    if any(kind.endless for kind in kinds) and in_channel(centre):
+        yield f"{places.at('boundaries')}: {CHANNEL}."
 
 
 def check_outlet(

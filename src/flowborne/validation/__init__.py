@@ -21,6 +21,7 @@ MODULES = {
     "flag_in_channel": ("D2", "D3"),
     "flapping_ellipse": ("S3",),
     "flesh": ("D1", "D4", "D5"),
+    "far_sides": ("I10",),
     "fluid_cases": ("F1", "F3", "F6", "F7"),
     "gradients": ("K7",),
     "human": ("K8", "K9", "K10"),

@@ -17,13 +17,15 @@ from flowborne.bodies import JointCommand
 from flowborne.validation.case import Case, reference, table
 from flowborne.validation.findings import Finding, Grids, GridSeries, at_most, falling, near
 from flowborne.validation.worlds import Vector, mjcf, ring_of_boxes, square
-from flowborne.worlds import advance, make_world
+from flowborne.worlds import Boundaries, advance, make_world
 
 DT = 1e-3
 """s, the only step; no figure depends on it."""
 
 LIGHT = 0.01
 """Density of most bodies here over the fluid's."""
+
+WALLS = Boundaries()
 
 UP: Vector = (0.0, 1.0, 0.0)
 SIDEWAYS: Vector = (1.0, 0.0, 0.0)
@@ -79,19 +81,19 @@ def turned(grid: Grid, geom: str) -> float:
     return -float(started(grid, geom, 'axis="0 0 1"')[5])
 
 
-def pushed(grid: Grid, geom: str, direction: Vector) -> float:
+def pushed(grid: Grid, geom: str, direction: Vector, sides: Boundaries = WALLS) -> float:
     """Added mass over the fluid's density, m^3, or m^2 in a slab."""
-    axis = " ".join(str(x) for x in direction)
-    return -float(started(grid, geom, f'type="slide" axis="{axis}"')[:3] @ np.array(direction))
+    joint = f'type="slide" axis="{" ".join(str(x) for x in direction)}"'
+    return -float(started(grid, geom, joint, sides)[:3] @ np.array(direction))
 
 
-def started(grid: Grid, geom: str, joint: str) -> Array:
+def started(grid: Grid, geom: str, joint: str, sides: Boundaries = WALLS) -> Array:
     """(6,) wrench of the pressure while a drive starts the body with unit acceleration.
 
     joint  its attributes in MJCF
     """
     body = f'<body name="body"><joint name="drive" {joint}/>{geom}</body>'
-    world = make_world(mjcf(body), grid, solid_density=1.0, tolerance=1e-11)
+    world = make_world(mjcf(body), grid, solid_density=1.0, boundaries=sides, tolerance=1e-11)
     command = JointCommand.none(1)
     command.set(np.array([0]), 0.0, DT)
     return advance(world, DT, command=command).pressure_wrench[1]

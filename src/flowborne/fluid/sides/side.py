@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -107,17 +107,23 @@ class Boundary:
               What enters through a free side has the mean velocity of the fluid along all of it
     supplies  whether it prescribes a velocity at which fluid enters
     joined    whether the fluid continues at the opposite side
+    endless   whether it continues beyond as if for ever
     """
 
     kind: ClassVar[str]
     free: ClassVar[bool] = False
     supplies: ClassVar[bool] = False
     joined: ClassVar[bool] = False
+    endless: ClassVar[bool] = False
 
     @property
     def prescribes(self) -> bool:
         """Whether it prescribes the flux through it, so that no pressure acts on its faces."""
         return not (self.free or self.joined)
+
+    def among(self, pairs: Sequence[Pair]) -> Boundary:
+        """The side in a domain whose sides are these, the lower and the upper one of each axis."""
+        return self
 
     def prescribed_velocity(
         self, place: Place, component: int, time: float
@@ -158,6 +164,10 @@ class Boundary:
     def entering_scalar(self, name: str, place: Place, time: float) -> Array | None:
         """Values of a scalar in fluid that enters; None for those in the cells at the side."""
         return None
+
+
+Pair = tuple[Boundary | type[Boundary], Boundary | type[Boundary]]
+"""Lower and upper side across an axis, or their kinds."""
 
 
 def hold(field: Field, layers: Layers) -> None:

@@ -1,0 +1,169 @@
+"""Far sides: bodies in a small box are accelerated as in endless fluid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flowborne as fb
+from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.world import World
+from flowborne.fluid.grid import Grid
+from flowborne.simulation import Snapshot
+from flowborne.validation.worlds import Uniform, mjcf, start_at_once
+from flowborne.worlds import (
+    Boundaries,
+    Boundary,
+    BoundaryClosed,
+    BoundaryFar,
+    BoundaryInflow,
+    BoundaryOpen,
+    BoundaryPeriodic,
+    advance,
+    kinetic_energy,
+    make_world,
+)
+
+FAR, OPEN, CLOSED, RING = BoundaryFar(), BoundaryOpen(), BoundaryClosed(), BoundaryPeriodic()
+AROUND = Boundaries(*(FAR,) * 6)
+FLAT = Boundaries(*(FAR,) * 4)
+DT = 1e-9
+
+CIRCLE = '<geom type="cylinder" size="1 5"/>'
+SPHERE = '<geom type="sphere" size="1"/>'
+SLENDER = '<geom type="ellipsoid" size="1 0.1 1"/>'
+
+
+def started(geom: str, grid: Grid, sides: Boundaries, axis: int = 0) -> float:
+    """Added mass of a body that is set going along an axis, in fluid of 1 kg/m^3."""
+    direction = " ".join("1" if a == axis else "0" for a in range(3))
+    body = f'<body><joint name="x" type="slide" axis="{direction}"/>{geom}</body>'
+    world = make_world(mjcf(body), grid, boundaries=sides, solid_density=1.0)
+    command = JointCommand.none(1)
+    command.set(np.array([0]), 0.0, 1.0)
+    report = advance(world, DT, command=command)
+    assert report.momentum.budget_error < 1e-12
+    return -float(report.pressure_wrench[1, axis]) * DT
+
+
+def box(cells: int, lower: tuple[float, ...], upper: tuple[float, ...]) -> Grid:
+    """`cells` along a unit of length."""
+    counts = [round(cells * (b - a)) for a, b in zip(lower, upper, strict=True)]
+    if len(counts) == 2:
+        return Grid.slab(counts[0], counts[1], 1.0 / cells, (lower[0], lower[1]))
+    return Grid((counts[0], counts[1], counts[2]), 1.0 / cells, (lower[0], lower[1], lower[2]))
+
+
+@pytest.mark.parametrize(
+    ("half", "off", "within"),
+    [(1.5, 0.0, 0.015), (2.0, 0.0, 0.01), (3.0, 0.0, 0.01), (2.0, 0.3, 0.02), (3.0, 0.3, 0.01)],
+)
+def test_added_mass_of_a_circle(half: float, off: float, within: float) -> None:
+    """The same in a box that lies aside by `off` along both axes."""
+    grid = box(16, (off - half, off - half), (off + half, off + half))
+    assert started(CIRCLE, grid, FLAT) / math.pi == pytest.approx(1.0, abs=within)
+
+
+def test_added_mass_of_a_circle_in_an_oblong_box_is_off_by_some_per_cent() -> None:
+    """One length of column cannot be right for both directions there."""
+    grid = box(16, (-4.0, -2.0), (4.0, 2.0))
+    along, across = (started(CIRCLE, grid, FLAT, axis) / math.pi for axis in (0, 1))
+    assert [along, across] == pytest.approx([1.073, 0.9625], abs=2e-3)
+
+
+def test_added_mass_of_a_slender_ellipse() -> None:
+    grid = box(32, (-2.0, -2.0), (2.0, 2.0))
+    along, across = (started(SLENDER, grid, FLAT, axis) / math.pi for axis in (0, 1))
+    assert across == pytest.approx(1.0, rel=0.02)
+    assert along == pytest.approx(0.01, rel=0.1)
+
+
+@pytest.mark.parametrize("half", [1.5, 2.0])
+def test_added_mass_of_a_sphere(half: float) -> None:
+    grid = box(6, (-half,) * 3, (half,) * 3)
+    assert started(SPHERE, grid, AROUND) == pytest.approx(2.0 / 3.0 * math.pi, rel=0.01)
+
+
+def test_beside_a_wall_it_is_that_of_the_mirrored_domain() -> None:
+    whole = started(CIRCLE, box(8, (-2.0, -2.0), (2.0, 2.0)), FLAT)
+    half = started(CIRCLE, box(8, (-2.0, 0.0), (2.0, 2.0)), Boundaries(FAR, FAR, CLOSED, FAR))
+    assert 2.0 * half == pytest.approx(whole, rel=1e-4)
+
+
+def test_beside_an_open_side_it_is_that_of_the_domain_mirrored_with_the_sign_changed() -> None:
+    whole = started(CIRCLE, box(8, (-2.0, -2.0), (2.0, 2.0)), FLAT)
+    half = started(CIRCLE, box(8, (0.0, -2.0), (2.0, 2.0)), Boundaries(OPEN, FAR, FAR, FAR))
+    assert 2.0 * half == pytest.approx(whole, rel=1e-4)
+
+
+@pytest.mark.parametrize("ends", [RING, CLOSED], ids=lambda side: side.kind)
+def test_between_periodic_or_closed_sides_it_is_that_of_the_plane(ends: Boundary) -> None:
+    flat = started(CIRCLE, box(8, (-2.0, -2.0), (2.0, 2.0)), FLAT)
+    room = box(8, (-2.0, -2.0, -0.25), (2.0, 2.0, 0.25))
+    deep = started(CIRCLE, room, Boundaries(FAR, FAR, FAR, FAR, ends, ends))
+    assert 2.0 * deep == pytest.approx(flat, rel=3e-3)
+
+
+@pytest.mark.parametrize("ends", [RING, CLOSED], ids=lambda side: side.kind)
+def test_an_endless_channel_is_refused(ends: Boundary) -> None:
+    with pytest.raises(ValueError, match="an endless channel"):
+        Boundaries(FAR, FAR, ends, ends)
+
+
+STREAM = Uniform((1.0, 0.0, 0.0))
+
+
+def held(sides: Boundaries, viscosity: float) -> World:
+    """A circle of 1 m held in a stream of 1 m/s."""
+    grid = box(8, (-2.0, -2.0), (4.0, 2.0))
+    world = make_world(
+        mjcf('<body><geom type="cylinder" size="0.5 1"/></body>'),
+        grid,
+        boundaries=sides,
+        viscosity=viscosity,
+    )
+    world.flow()[1].velocity[0][:] = 1.0
+    return world
+
+
+@pytest.mark.parametrize("viscosity", [0.0, 0.01])
+def test_a_stream_past_a_held_body_stays_bounded_and_its_momentum_closes(viscosity: float) -> None:
+    """With the weight left out of the pressure that the viscous solve predicts, it blows up."""
+    world = held(Boundaries(BoundaryInflow(STREAM), FAR, FAR, FAR), viscosity)
+    start_at_once(world, 1e-9)
+    energy = kinetic_energy(world)
+    for _ in range(20):
+        report = advance(world, 0.05)
+        assert report.momentum.budget_error < 1e-12
+        assert report.fastest < 3.0
+    assert kinetic_energy(world) < 1.1 * energy
+
+
+def test_a_uniform_stream_stays_uniform() -> None:
+    world = make_world(grid=box(8, (0.0, 0.0), (2.0, 1.0)), boundaries=FLAT)
+    for values, speed in zip(world.flow()[1].velocity[:2], (1.0, 0.5), strict=True):
+        values[:] = speed
+    advance(world, 0.05, 10)
+    for values, speed in zip(world.flow()[1].velocity[:2], (1.0, 0.5), strict=True):
+        np.testing.assert_allclose(values, speed, rtol=1e-12)
+
+
+SMALL = {"domain.resolution": "16"} | {
+    f"boundaries.{side}": "far" for side in ("x_max", "y_min", "y_max")
+}
+
+
+def test_trials_workers_and_a_resumed_run_have_the_same_bits() -> None:
+    scene = fb.load_scene("ns-chain-2", SMALL)
+    with fb.Simulation(scene, workers=1) as simulation:
+        simulation.advance_frame()
+        middle = World.from_arrays(simulation.world.setup, simulation.world.copy().arrays())
+        simulation.advance_frame()
+        expected = simulation.world.arrays()
+    with fb.Simulation(scene, workers=2) as resumed:
+        resumed.restore(Snapshot(middle, 1, None))
+        resumed.advance_frame()
+        for name, values in resumed.world.arrays().items():
+            np.testing.assert_array_equal(values, expected[name])
