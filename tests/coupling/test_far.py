@@ -141,6 +141,18 @@ def test_a_stream_past_a_held_body_stays_bounded_and_its_momentum_closes(viscosi
     assert kinetic_energy(world) < 1.1 * energy
 
 
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_the_solve_takes_no_more_iterations_than_with_open_sides(dimensions: int) -> None:
+    grid = box(8, (-2.0,) * dimensions, (2.0,) * dimensions)
+    body = '<body><freejoint/><geom type="sphere" size="1"/></body>'
+    found = []
+    for side in (FAR, OPEN):
+        sides = Boundaries(*(side,) * (2 * dimensions))
+        world = make_world(mjcf(body), grid, boundaries=sides, gravity=(0.0, -1.0, 0.0))
+        found.append(advance(world, 0.01, 3).iterations)
+    assert found[0] <= found[1] + 1
+
+
 def test_a_uniform_stream_stays_uniform() -> None:
     world = make_world(grid=box(8, (0.0, 0.0), (2.0, 1.0)), boundaries=FLAT)
     for values, speed in zip(world.flow()[1].velocity[:2], (1.0, 0.5), strict=True):

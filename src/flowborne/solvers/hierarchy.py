@@ -22,6 +22,7 @@ from flowborne.kernels.arrays import (
     Operator,
     Periodic,
     Real,
+    Triple,
 )
 from flowborne.kernels.even import ROUNDING, find_even
 from flowborne.kernels.levels import (
@@ -33,6 +34,7 @@ from flowborne.kernels.levels import (
     even_at,
     finest_weights,
     padded_size,
+    weights_at,
 )
 from flowborne.kernels.regions import label_regions
 from flowborne.kernels.vectors import largest, scaled
@@ -155,8 +157,29 @@ def prepare(
     if reaction.size:
         inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
         inner[:] = scale * reaction.reshape(inner.shape)
+    columns_to_diagonal(weights_at(hierarchy[2], table, 0), added, periodic)
     even = even_at(hierarchy[5], table, 0)
     table[0, COMMON] = find_even(w, periodic, even, ROUNDING)
     coarsen(hierarchy)
     regions = label_regions(finest, periodic, label, parent, count)
     return regions, scale, (*w, diagonal, even, int(table[0, COMMON]))
+
+
+def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> None:
+    """Move the weights of outer faces behind which p = 0 is more than a cell away to what is added
+    to the diagonal, in place; they are less than those of the faces opposite.
+
+    Such a weight hardly depends on the size of the cells, and p does not fall towards the side: its
+    sums are right on coarse levels, where the side of an open one is halved.
+
+    weights, added  padded
+    """
+    for axis, across in enumerate(weights):
+        faces, cells = np.moveaxis(across, axis, 0), np.moveaxis(added, axis, 0)
+        n = added.shape[axis] - 2
+        if periodic[axis] or n < 1:
+            continue
+        for cell, outer, inner in ((1, 1, 2), (n, n + 1, n)):
+            moved = np.where(faces[outer] < faces[inner], faces[outer], 0.0)
+            cells[cell] += moved
+            faces[outer] -= moved
