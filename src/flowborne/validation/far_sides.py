@@ -1,6 +1,6 @@
-"""Bodies set going in small boxes with far sides: I10, against endless fluid.
+"""Bodies in small boxes with far sides: I10, set going, against endless fluid, and the eel's way.
 
-One step from rest, as in I1 and I2.
+Added mass takes one step from rest, as in I1 and I2.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flowborne import Grid
+from flowborne import Grid, Simulation, load_scene
 from flowborne.validation.added_mass import (
     SIDEWAYS,
     THIN,
@@ -113,9 +113,39 @@ def disc(quick: bool) -> Finding:
     return near(title, without_thickness(cells, values), 1.0, relative=0.02)
 
 
+def eel_way(lower: tuple[float, float], upper: tuple[float, float]) -> float:
+    """How far the head of the robot eel swims along y in 2 s, m."""
+    sides = {f"boundaries.{name}": "far" for name in ("x_min", "x_max", "y_min", "y_max")}
+    cells = round(100 * (upper[1] - lower[1]))
+    domain = {"lower": list(lower), "upper": list(upper), "resolution": cells}
+    changes = sides | {f"domain.{key}": str(value) for key, value in domain.items()}
+    with Simulation(load_scene("eel", changes), workers=1) as simulation:
+        head = simulation.world.solid.q[1]
+        for _ in range(120):
+            simulation.advance_frame()
+        return float(simulation.world.solid.q[1] - head)
+
+
+def eel() -> list[Finding]:
+    """The eel of 0.55 m in small boxes against the largest one; its wake stays inside."""
+    large = eel_way((-1.22, -1.42), (2.44, 2.24))
+    boxes = ((0.36, -0.03), (0.86, 0.87)), ((0.2, -0.1), (1.02, 0.92))
+    return [
+        near(
+            f"way of the eel in {high[0] - low[0]:.2g} x {high[1] - low[1]:.3g} m, over that in "
+            "3.66 x 3.66 m",
+            eel_way(low, high) / large,
+            1.0,
+            relative=0.005,
+        )
+        for low, high in boxes
+    ]
+
+
 def between_far_sides(quick: bool) -> list[Finding]:
-    """I10: added mass in small boxes."""
-    return [*circles(quick), *spheres(quick), *slender(quick), disc(quick)]
+    """I10: added mass in small boxes, and unless quick the way of the eel."""
+    found = [*circles(quick), *spheres(quick), *slender(quick), disc(quick)]
+    return found if quick else [*found, *eel()]
 
 
 CASES = (Case("I10", between_far_sides, full=Tier.HALF_HOUR),)
