@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -185,8 +185,13 @@ class Simulation:
         """The state now. A frame makes a new one, so it costs nothing to keep."""
         return replace(self._moment, world=self.world)
 
-    def restore(self, snapshot: Snapshot) -> None:
-        """Continue from a state of the same scene, to the same bits."""
+    def restore(self, snapshot: Snapshot, changes: Iterable[ChangeTable] | None = None) -> None:
+        """Continue from a state of the same scene, to the same bits.
+
+        changes  all changes of keys, in place of those known now, of which later ones stay
+        """
+        if changes is not None:
+            self._changes = tuple(changes)
         world = replace(snapshot.world, setup=self.setup)
         self._moment, self._started = replace(snapshot, world=world), True
 
@@ -252,7 +257,7 @@ class Simulation:
         from flowborne.scenes.build import changed
         from flowborne.scenes.load import at, with_values
 
-        if not self._changes:
+        if not (self._changes or self._values):
             return
         start = {key: at(self._raw, key) for change in self._changes for key in change.values}
         values = values_at(self._changes, start, self.time, self.frame_time)

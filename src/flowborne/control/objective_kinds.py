@@ -27,10 +27,10 @@ from flowborne.tables import (
     BUILT_IN,
     FUNCTION,
     OWN,
+    NotNegative,
     Number,
     OwnTable,
     Parameters,
-    Positive,
     Table,
     Text,
     Vector,
@@ -49,14 +49,14 @@ class ObjectiveTable(Table):
     """Keys of every objective.
 
     goal       "least" or "most"
-    weight     its factor in the sum
+    weight     its factor in the sum; 0 switches it off
     phases     when it is active; always by default
     wanted_by  controlled joints to which it applies; all by default. Joints with different
                objectives each follow their own sum
     """
 
     goal: Literal["least", "most"] = "least"
-    weight: Positive = 1.0
+    weight: NotNegative = 1.0
     phases: PhaseTable | None = None
     wanted_by: Names | None = None
 

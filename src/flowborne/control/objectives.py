@@ -89,6 +89,7 @@ class ObjectiveCallable:
 class WeightedObjective:
     """An objective in a sum: its weight (negative to maximise), its phases and its joints.
 
+    weight     0 switches it off
     wanted_by  (k,) controlled dofs to which it applies; all when None
     """
 
@@ -96,6 +97,10 @@ class WeightedObjective:
     weight: float = 1.0
     phases: Phases = field(default_factory=PhaseAlways)
     wanted_by: Integers | None = None
+
+    def active(self, time: float) -> bool:
+        """Whether it counts at `time`, s."""
+        return self.weight != 0.0 and self.phases.active(time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +149,7 @@ class ObjectiveSum:
 
     def active(self, time: float) -> bool:
         """Whether any term is active at `time`."""
-        return any(term.phases.active(time) for term in self.terms)
+        return any(term.active(time) for term in self.terms)
 
     def value(self, measurement: Measurement) -> float:
         """Sum of weight times value over the active terms."""
@@ -153,7 +158,7 @@ class ObjectiveSum:
             sum(
                 term.weight * value_of(term.objective, measurement)
                 for term in self.terms
-                if term.phases.active(now)
+                if term.active(now)
             )
         )
 
