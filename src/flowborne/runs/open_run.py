@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,7 +55,7 @@ class OpenRun:
             self._states = tuple(files.state_files())
         if not self._states:
             raise RunFolderError(f"{folder} has no frame yet; continue the run with --resume")
-        self.frames = tuple(int(path.stem) for path in self._states)
+        self.frames: Sequence[int] = tuple(int(path.stem) for path in self._states)
 
     def __len__(self) -> int:
         """Number of states: one per frame, and the start."""

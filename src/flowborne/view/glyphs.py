@@ -76,12 +76,14 @@ class Forces:
     reach  m, length of the arrow of a large force
     large  N (N/m in a slab), size of a large force in the film; 0 if there is none above rounding
     unit   of `large`
+    most   number of bodies, the largest number of arrows
     """
 
     def __init__(self, run: Run, side: float) -> None:
         """`side`: smaller side of the view, m."""
         self._axes = 2 if run.is_slab else 3
         self._bodies = _drawn_bodies(run)
+        self.most = len(self._bodies)
         self.reach = LARGE_FORCE_LENGTH * side
         large = self._large(run)
         self.large = large if large > _rounding(run, side) else 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.view.browser.meshes import counter_clockwise, joined, nothing, prism
+from flowborne.view.browser.meshes import counter_clockwise, joined, nothing, padded, prism
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -40,3 +40,11 @@ def test_meshes_are_joined() -> None:
     vertices, faces = joined([first, second])
     assert np.array_equal(vertices[faces[len(first[1]) :]], second[0][second[1]])
     assert len(joined([])[0]) == len(nothing()[0]) == 0
+
+
+def test_parts_that_are_added_have_no_size() -> None:
+    vertices, faces = prism([SQUARE], 0.0, 1.0)
+    more, added = padded((vertices, faces), 1, 3)
+    assert (len(more), len(added)) == (3 * len(vertices), 3 * len(faces))
+    assert np.abs(areas(more, added)[len(faces) :]).max() == 0.0
+    assert padded((vertices, faces), 1, 1)[0] is vertices

@@ -54,6 +54,18 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
 
 
+def padded(mesh: Mesh, count: int, most: int) -> Mesh:
+    """A mesh of `count` equal parts as one of `most`; those that are added have no size."""
+    vertices, faces = mesh
+    if not 0 < count < most:
+        return mesh
+    each = len(vertices) // count
+    first = faces[: len(faces) // count]
+    added = [first + each * number for number in range(count, most)]
+    points = np.repeat(vertices[:1], each * (most - count), axis=0)
+    return np.concatenate([vertices, points]), np.concatenate([faces, *added])
+
+
 def nothing() -> Mesh:
     """A mesh without vertices."""
     return np.zeros((0, 3)), np.zeros((0, 3), np.int64)

@@ -113,32 +113,46 @@ class Curves:
     def __init__(self, gui: GuiApi, run: Run) -> None:
         self._gui = gui
         self._shown: list[Any] = []
+        self._titles: list[tuple[str, tuple[str, ...]]] = []
+        self.plots: list[Any] = []
         self.extend(run)
 
     def extend(self, run: Run) -> None:
         """Update the curves to a run with new frames."""
-        for shown in self._shown:
-            shown.remove()
         times = run.history["time_s"]
         chosen = np.unique(np.linspace(0, len(times) - 1, MAX_SAMPLES).round().astype(int))
-        self._shown, self._values, self.plots = [], [], []
-        if not len(times):
-            return
-        self._times = times[chosen]
-        for title, curves in strip_curves(run):
-            values = np.stack([curve[chosen] for curve in curves.values()])
-            names = self._gui.add_html(_title(title, list(curves)))
+        strips = strip_curves(run) if len(times) else []
+        titles = [(title, tuple(curves)) for title, curves in strips]
+        self._times = times[chosen] if len(times) else times
+        self._values = [
+            np.stack([curve[chosen] for curve in curves.values()]) for _, curves in strips
+        ]
+        if titles != self._titles:
+            self._replace(titles)
+        for plot, values in zip(self.plots, self._values, strict=True):
+            low, high = steady_limits(*robust_limits(values))
+            x = steady_limits(float(times[0]), float(times[-1]))
+            scales = {"x": {"time": False, "range": x}, "y": {"range": (low, high)}}
+            if scales != plot.scales:
+                plot.scales = scales
+                plot.axes = (_axis(34, "time (s)"), _axis(room_for(low, high)))
+            plot.data = self._data(values, 0.0)
+
+    def _replace(self, titles: list[tuple[str, tuple[str, ...]]]) -> None:
+        """Replace the plots by others with these titles and names of curves."""
+        for shown in self._shown:
+            shown.remove()
+        self._shown, self.plots, self._titles = [], [], titles
+        for (title, names), values in zip(titles, self._values, strict=True):
+            heading = self._gui.add_html(_title(title, names))
             plot = self._gui.add_uplot(
                 self._data(values, 0.0),
-                _series(len(curves)),
-                scales={"x": {"time": False}, "y": {"range": robust_limits(values)}},
-                axes=(_axis(34, "time (s)"), _axis(room_for(*robust_limits(values)))),
+                _series(len(names)),
                 padding=(8, 16, 0, 0),
                 legend={"show": False},
                 height=PLOT_HEIGHT,
             )
-            self._shown += [names, plot]
-            self._values.append(values)
+            self._shown += [heading, plot]
             self.plots.append(plot)
 
     def show(self, time: float) -> None:
@@ -176,6 +190,15 @@ def _colour(curve: int) -> str:
     return style.CURVES[curve % len(style.CURVES)]
 
 
+def steady_limits(low: float, high: float) -> tuple[float, float]:
+    """Limits of an axis around others, which change seldom while these grow: a plot with other
+    limits is drawn anew."""
+    if not high > low:
+        return low, high
+    step = round_number(0.5 * (high - low))
+    return step * float(np.floor(low / step)), step * float(np.ceil(high / step))
+
+
 def room_for(low: float, high: float) -> int:
     """Width of the numbers of an axis from `low` to `high`, at most eight of them, pixels."""
     step = (high - low) / 8.0
@@ -202,6 +225,7 @@ class Panel:
         self._timeline = timeline
         self._controls: dict[str, Any] = {}
         self._slider_time = 0.0
+        self._pace: Any = None
         self._frames_per_second = run.frames_per_second
         gui.set_panel_label(run.name)
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
@@ -225,13 +249,14 @@ class Panel:
         if "slice" in self._controls:
             sliced = self._controls["slice"].value != "none" or self._controls["velocity"].value
             self._controls["axis"].visible = self._controls["coordinate"].visible = sliced
-        self._timeline.pace = PACES[self._pace.value]
+        if self._pace is not None:
+            self._timeline.pace = PACES[self._pace.value]
         if self._slider.value != self._slider_time:
             self._timeline.seek(self._slider.value)
             self._slider_time = self._slider.value
 
     def show(self, run: Run, number: int) -> None:
-        """Show the time of a state of the run, and the curves up to it."""
+        """Show the time of a state of the run."""
         timeline = self._timeline
         state = ", playing" if timeline.playing else ", newest" if timeline.newest else ""
         self._clock.content = CLOCK.format(
@@ -241,7 +266,10 @@ class Panel:
             state=state,
         )
         self._slider_time = self._slider.value = round(float(timeline.time), 4)
-        self.curves.show(timeline.times[number])
+
+    def show_curves(self) -> None:
+        """Show the curves up to the time."""
+        self.curves.show(self._timeline.times[self._timeline.number])
 
     def extend(self, run: Run) -> None:
         """Update to a run with new frames."""

@@ -15,8 +15,8 @@ from flowborne.view.browser.meshes import (
     counter_clockwise,
     joined,
     nothing,
+    padded,
     prism,
-    show_mesh,
 )
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
 from flowborne.view.outlines import Outlines, flesh_loops
@@ -42,26 +42,32 @@ class Bodies:
     meshes  of each geometry
     """
 
-    def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
-        """`side`: smaller side of the view, m."""
+    def __init__(
+        self, scene: SceneApi, run: Run, side: float, name: str = "bodies", share: float = 1.0
+    ) -> None:
+        """`side`: smaller side of the view, m; `name`: in the scene; `share`: of their opacity."""
         self._covered = [geom.covered for geom in run.geoms]
         self.meshes: list[MeshHandle] = []
         for n, mesh in enumerate(_surfaces(run, side)):
-            colour, opacity = colour_of(run.geoms[n], run.accented)
+            colour, own = colour_of(run.geoms[n], run.accented)
+            opacity = share * own
             drawn = {"color": colour, "opacity": None if opacity == 1.0 else opacity}
-            self.meshes.append(add_mesh(scene, f"/run/bodies/{n}", mesh, **drawn))
+            self.meshes.append(
+                add_mesh(scene, f"/run/{name}/{n}", mesh, cast_shadow=share == 1.0, **drawn)
+            )
 
     def show(self, state: State, bones: bool) -> None:
         """Place them; hide those with non-finite poses and, unless `bones`, those in flesh."""
         positions = state["geom_position"].astype(float)
         rotations = state["geom_rotation"].astype(float)
-        poses = zip(self.meshes, self._covered, positions, rotations, strict=True)
-        for mesh, covered, position, rotation in poses:
-            known = np.isfinite(position).all() and np.isfinite(rotation).all()
-            mesh.visible = bool(known) and (bones or not covered)
+        known = np.isfinite(positions).all(axis=1) & np.isfinite(rotations).all(axis=(1, 2))
+        rotations[~known] = np.eye(3)
+        turns = Rotation.from_matrix(rotations).as_quat(scalar_first=True) if len(known) else ()
+        poses = zip(self.meshes, self._covered, known, positions, turns, strict=True)
+        for mesh, covered, there, position, turn in poses:
+            mesh.visible = bool(there) and (bones or not covered)
             if mesh.visible:
-                mesh.position = position
-                mesh.wxyz = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
+                mesh.position, mesh.wxyz = position, turn
 
 
 class SkinMesh:
@@ -77,16 +83,20 @@ class SkinMesh:
         vertices = skin.vertices(state)
         self._vertex, self._faces = creased(vertices, skin.triangles)
         mesh = self._surface(state, vertices)
-        self.mesh = add_mesh(scene, f"/run/skins/{name}", mesh, color=skin.rgb)
+        self.mesh = add_mesh(scene, f"/skins/{name}", mesh, color=skin.rgb)
 
-    def show(self, state: State, bones: bool) -> None:
-        """Show the skin, transparent if `bones`; hide it if its vertices are not finite."""
+    def show(self, state: State, bones: bool, along: Array) -> None:
+        """Show the skin, transparent if `bones`; hide it if its vertices are not finite.
+
+        along  (3,) m, by which the world is moved back. The vertices are moved themselves: a
+               browser shows new ones some frames later than it moves the world
+        """
         vertices = self._skin.vertices(state)
         self.mesh.visible = bool(np.isfinite(vertices).all())
         self.mesh.opacity = style.SEEN_THROUGH if bones else None
         if self.mesh.visible:
             points, faces = self._surface(state, vertices)
-            self.mesh.vertices = points.astype(np.float32)
+            self.mesh.vertices = (points - along).astype(np.float32)
             if self._run.is_slab:
                 self.mesh.faces = faces.astype(np.uint32)
 
@@ -107,24 +117,42 @@ class ForceArrows:
         self.scale = Forces(run, side)
         self._scene, self._slab = scene, run.is_slab
         self._pixel, self._high = side / PIXELS, SLAB_THICKNESS * side
+        self._arrows: MeshHandle | None = None
         self._outside = None
         if not run.is_slab:
             self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
 
-    def show(self, state: State, visible: bool) -> None:
-        """Show the arrows of a state, or none."""
-        mesh = self._mesh(state) if visible else nothing()
-        colour = style.rgb(style.FORCE)
-        show_mesh(self._scene, "/run/forces", mesh, color=colour, cast_shadow=False)
+    def show(self, state: State, visible: bool, along: Array) -> None:
+        """Show the arrows of a state, or none.
+
+        along  (3,) m, by which the world is moved back; see `SkinMesh.show`
+        """
+        vertices, faces = self._mesh(state) if visible else nothing()
+        if self._arrows is not None:
+            self._arrows.visible = len(faces) > 0
+        if not len(faces):
+            return
+        if self._arrows is None:
+            mesh, colour = (vertices - along, faces), style.rgb(style.FORCE)
+            self._arrows = add_mesh(self._scene, "/forces", mesh, color=colour, cast_shadow=False)
+            return
+        self._arrows.vertices = (vertices - along).astype(np.float32)
+        if self._slab:
+            self._arrows.faces = faces.astype(np.uint32)
 
     def _mesh(self, state: State) -> Mesh:
-        """All arrows of a state as one."""
+        """All arrows of a state as one, with the vertices of as many as there can be: a browser
+        that draws slowly never gets to show a mesh that is replaced in each frame."""
         width = SHAFT_WIDTH * self._pixel
         if self._outside is None:
             found = self.scale.arrows(state, self._pixel)
             flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]
-            return joined([prism([one], self._high, 1.5 * self._high) for one in flat])
-        return arrow_mesh(*force_arrows(self.scale, self._outside, state, self._pixel), width)
+            mesh = joined([prism([one], self._high, 1.5 * self._high) for one in flat])
+            return padded(mesh, len(flat), self.scale.most)
+        tails, vectors = force_arrows(self.scale, self._outside, state, self._pixel)
+        if not len(tails):
+            return nothing()
+        return padded(arrow_mesh(tails, vectors, width), len(tails), self.scale.most)
 
 
 def _surfaces(run: Run, side: float) -> list[Mesh]:

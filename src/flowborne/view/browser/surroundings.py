@@ -6,6 +6,7 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
@@ -18,7 +19,9 @@ from flowborne.view.space.lighting import LIGHTS
 from flowborne.view.space.surroundings import SQUARE, stands_on_ground
 
 if TYPE_CHECKING:
-    from viser import SceneApi
+    from viser import FrameHandle, SceneApi
+
+Array = NDArray[np.float64]
 
 MOTES = 20_000
 """Number of motes in a cube around the domain."""
@@ -33,14 +36,14 @@ ABOVE = ((0.25, 0.45, -1.0), 0.75, "#ffffff")
 """Direction, strength and colour of the light on a slab, which is seen from above."""
 
 
-def add_surroundings(scene: SceneApi, run: Run, view: FilmView) -> None:
-    """Add everything to the scene that does not change with time."""
+def add_surroundings(scene: SceneApi, run: Run, view: FilmView) -> FrameHandle:
+    """Add everything to the scene that does not change with time; the frame that follows."""
     scene.set_up_direction(view.up)
     scene.set_background_image(
         np.broadcast_to(style.to_bytes(style.rgb(run.shot.colour)), (4, 4, 3)),
         format="png",
     )
-    scene.add_frame("/run", show_axes=False)
+    root = scene.add_frame("/run", show_axes=False)
     ground = not run.is_slab and stands_on_ground(run)
     _add_lights(scene, run.is_slab, ground)
     if ground:
@@ -49,8 +52,9 @@ def add_surroundings(scene: SceneApi, run: Run, view: FilmView) -> None:
         _add_edges(scene, run.grid)
     if run.grid is not None and not ground and camera_moves(view.path, view.side):
         _add_marks(scene, run.grid, view, run.is_slab)
-    if run.grid is None and run.wind.any():
-        _add_wind(scene, run, view)
+    if run.grid is None:
+        show_wind(scene, run.wind.sum(axis=0), view)
+    return root
 
 
 def _add_lights(scene: SceneApi, slab: bool, shadows: bool) -> None:
@@ -127,10 +131,13 @@ def _add_edges(scene: SceneApi, grid: Grid) -> None:
     )
 
 
-def _add_wind(scene: SceneApi, run: Run, view: FilmView) -> None:
-    """Add a fixed arrow along the wind, upwind of the camera's first target, with its speed."""
-    wind = run.wind.sum(axis=0)
+def show_wind(scene: SceneApi, wind: Array, view: FilmView) -> None:
+    """Show a fixed arrow along a wind (3,), m/s, upwind of the camera's first target, with its
+    speed; remove it without wind."""
     speed = float(np.linalg.norm(wind))
+    if speed == 0.0:
+        scene.remove_by_name("/wind")
+        return
     vector = 0.17 * view.side * wind / speed
     tail = view.first.target - 0.54 * view.side * wind / speed
     mesh = arrow_mesh(tail[None], vector[None], 0.012 * view.side)

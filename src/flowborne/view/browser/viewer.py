@@ -75,18 +75,21 @@ LOOK = 0.5
 """Interval at which folder and cameras are read, s."""
 
 
-class Viewer:
+class RunView:
     """A run in the scene and panel of a server; `tick` keeps them up to date.
 
-    run       with the frames read so far
+    run       with the frames so far
     timeline  the current time
     panel     the controls
     """
 
-    def __init__(self, server: ViserServer, run: GrowingRun, folder: str) -> None:
-        """raises  ValueError if the shot of the run's scene does not fit it"""
+    def __init__(self, server: ViserServer, run: Run, folder: str) -> None:
+        """`folder`: of the run, for commands.
+
+        raises  ValueError if the shot of the run's scene does not fit it
+        """
         self.server, self.folder = server, folder
-        self._shown: tuple[int, bool, bool, Settings] | None = None
+        self._shown: tuple[Any, ...] | None = None
         self._open(run)
 
     def tick(self, seconds: float) -> None:
@@ -94,55 +97,47 @@ class Viewer:
         self.timeline.advance(seconds)
         self.panel.apply_controls()
         timeline, settings = self.timeline, self.panel.settings
-        current = (timeline.number, timeline.playing, timeline.newest, settings)
+        current = (timeline.number, timeline.playing, timeline.newest, settings, self._more())
         if current != self._shown:
             self._show(settings)
             self._shown = current
 
     def look(self) -> None:
-        """Read new frames of the run, and the cameras of all clients."""
-        # a run that is being replaced cannot be read; the old one stays until then
-        with suppress(RunFolderError):
-            new = self.run.grown()
-            if new is not None and new.continues(self.run):
-                self._extend(new)
-            elif new is not None:
-                self._open(new)
+        """Update what changes slowly: texts of the cameras of all clients."""
         self._keys.show(self.server.get_clients(), self._along)
 
-    def _open(self, run: GrowingRun) -> None:
+    def wait(self, seconds: float) -> None:
+        """Wait until the next tick is due."""
+        sleep(seconds)
+
+    def _open(self, run: Run) -> None:
         """Show another run from its beginning."""
         server = self.server
         server.scene.reset()
         server.gui.reset()
         style_page(server, run.name)
-        self.run, self._view = run, FilmView.of(run)
+        self.run, self._view = run, self._first_view(run)
         self.timeline = Timeline(run.times)
         first, side = self._view.first, self._view.side
         server.initial_camera.position = tuple(first.position)
         server.initial_camera.look_at = tuple(first.target)
         server.initial_camera.fov = float(np.radians(first.lens))
-        add_surroundings(server.scene, run, self._view)
+        self._root = add_surroundings(server.scene, run, self._view)
         self._bodies = Bodies(server.scene, run, side)
         self._skins = [
             SkinMesh(server.scene, run, skin, str(n), side) for n, skin in enumerate(run.skins)
         ]
         self._measure()
-        self.panel = Panel(server.gui, run, self._view, self.timeline)
+        self.panel = self._new_panel()
         self._keys = CameraKeys(self.folder, run.is_slab)
         self._along = np.zeros(3)
         self._shown = None
-        if RunFolder(run.folder).is_unfinished():
-            self.timeline.show_newest()
 
-    def _extend(self, run: GrowingRun) -> None:
-        """Update to the run with new frames."""
-        self.run, self._view = run, FilmView.of(run)
-        self.timeline.extend(run.times)
-        if len(run) >= 2 * self._measured:
-            self._measure()
-        self.panel.extend(run)
-        self._shown = None
+    def _first_view(self, run: Run) -> FilmView:
+        return FilmView.of(run)
+
+    def _new_panel(self) -> Panel:
+        return Panel(self.server.gui, self.run, self._view, self.timeline)
 
     def _measure(self) -> None:
         """Take scales from the frames so far; repeated whenever their number doubles."""
@@ -155,22 +150,68 @@ class Viewer:
             self._fluid = Fluid(self.server.scene, run, toward / np.linalg.norm(toward))
 
     def _show(self, settings: Settings) -> None:
-        """Show the current state by the settings."""
+        """Show the current state by the settings, in one message."""
         number = self.timeline.number
         state = self.run.state(number)
-        self._along = self._view.path[number] if settings.follow else np.zeros(3)
+        self._along = self._displacement(number) if settings.follow else np.zeros(3)
         names, scales = ((), ()) if self._fluid is None else self._fluid.legend(settings)
         with self.server.atomic():
-            self.server.scene.add_frame("/run", show_axes=False, position=-self._along)
+            # moved like the bodies, and not added anew: a browser would do that some frames later
+            self._root.position = -self._along
             self._bodies.show(state, settings.bones)
             for skin in self._skins:
-                skin.show(state, settings.bones)
-            self._force_arrows.show(state, settings.forces)
+                skin.show(state, settings.bones, self._along)
+            self._force_arrows.show(state, settings.forces, self._along)
             if self._fluid is not None:
                 self._fluid.show(state, settings)
+            self._show_more(number, settings)
             self.panel.show(self.run, number)
             shown = self._force_arrows.scale if settings.forces else None
             self.panel.legend.content = legend_html(names, scales, shown)
+        self.server.flush()
+
+    def _displacement(self, number: int) -> Array:
+        """(3,) m, of the film's camera in a state since the first one."""
+        return self._view.path[number]
+
+    def _more(self) -> object:
+        """What `_show_more` depends on, besides the state."""
+        return None
+
+    def _show_more(self, number: int, settings: Settings) -> None:
+        """Show what is not in every view; the curves up to the time in this one."""
+        self.panel.show_curves()
+
+
+class Viewer(RunView):
+    """A run in a folder, which may continue."""
+
+    run: GrowingRun
+
+    def look(self) -> None:
+        """Read new frames of the run, and the cameras of all clients."""
+        # a run that is being replaced cannot be read; the old one stays until then
+        with suppress(RunFolderError):
+            new = self.run.grown()
+            if new is not None and new.continues(self.run):
+                self._extend(new)
+            elif new is not None:
+                self._open(new)
+        super().look()
+
+    def _open(self, run: Run) -> None:
+        super()._open(run)
+        if RunFolder(run.folder).is_unfinished():
+            self.timeline.show_newest()
+
+    def _extend(self, run: GrowingRun) -> None:
+        """Update to the run with new frames."""
+        self.run, self._view = run, FilmView.of(run)
+        self.timeline.extend(run.times)
+        if len(run) >= 2 * self._measured:
+            self._measure()
+        self.panel.extend(run)
+        self._shown = None
 
 
 def open_viewer(folder: Path, host: str, port: int) -> Viewer:
@@ -179,15 +220,20 @@ def open_viewer(folder: Path, host: str, port: int) -> Viewer:
     raises  RunFolderError if the folder has nothing to view; SceneError if viser is missing, or
             host and port cannot be used; ValueError if the shot of the run's scene does not fit it
     """
-    viser = optional("viser", "viser", "view", "views in a browser")
     run = GrowingRun(folder)
+    return Viewer(start_server(host, port), run, str(folder))
+
+
+def start_server(host: str, port: int) -> ViserServer:
+    """A server of a page. Raises SceneError as `open_viewer` does."""
+    viser = optional("viser", "viser", "view", "views in a browser")
     _check_free(host, port)
     with only_own_requests(host):
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-    return Viewer(server, run, str(folder))
+        server: ViserServer = viser.ViserServer(host=host, port=port, verbose=False)
+    return server
 
 
-def serve(viewer: Viewer) -> None:
+def serve(viewer: RunView) -> None:
     """Keep a viewer up to date until it is interrupted."""
     before = looked = monotonic()
     while True:
@@ -197,7 +243,7 @@ def serve(viewer: Viewer) -> None:
         if now - looked >= LOOK:
             viewer.look()
             looked = now
-        sleep(max(0.0, TICK - (monotonic() - now)))
+        viewer.wait(max(0.0, TICK - (monotonic() - now)))
 
 
 def _check_free(host: str, port: int) -> None:
