@@ -13,7 +13,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from difflib import get_close_matches
 from functools import wraps
 from inspect import Parameter, signature
@@ -306,20 +306,14 @@ def check(
     Bodies and fluid are started as in a run. A warning does not stop a run; it names a suitable
     value.
     """
-    from flowborne.progress import ProgressDisplay, RunProgress
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.warn import warnings_of
 
     loaded = load_scene(scene, _overrides(settings), trust=trust)
-    began = perf_counter()
-    with ProgressDisplay() as display:
-        from flowborne.kernels.compilation import compilation_watched
+    with _compilation_shown():
         from flowborne.simulation import Simulation
 
-        def show(kernels: int) -> None:
-            display(RunProgress("compiling", 0, 0, perf_counter() - began, kernels))
-
-        with compilation_watched(show), Simulation(loaded, workers=1) as simulation:
+        with Simulation(loaded, workers=1) as simulation:
             setup = simulation.world.setup
     found = warnings_of(loaded, setup)
     print(check_lines(loaded, setup, found))
@@ -381,6 +375,39 @@ def view(
         raise InputError(str(error)) from error
     print(f"viewing {folder} at http://{host}:{port}; Ctrl-C ends it", flush=True)
     with suppress(KeyboardInterrupt):
+        serve(viewer)
+
+
+@app.command()
+def play(
+    scene: Annotated[
+        str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
+    ],
+    settings: SceneOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder to record to.", show_default="runs/<scene name>-played"),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Trials of the controller at once; changes no number.")
+    ] = None,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the page.")] = 8080,
+    host: Annotated[str, typer.Option(help="0.0.0.0 lets other machines connect.")] = "127.0.0.1",
+) -> None:
+    """Run a scene live in a browser, and change winds, streams and objectives meanwhile; see
+    docs/play.md.
+    """
+    optional("pyvista", "PyVista", "view", "views in a browser")
+    from flowborne.play.viewer import open_play
+    from flowborne.scenes.load import load_scene
+    from flowborne.view.browser.viewer import serve
+
+    loaded = load_scene(scene, _overrides(settings))
+    folder = Path("runs") / f"{loaded.name}-played" if out is None else out
+    with _compilation_shown():
+        viewer = open_play(loaded, folder, host=host, port=port, workers=workers)
+    print(f"playing {loaded.name} at http://{host}:{port}; Ctrl-C ends it", flush=True)
+    with closing(viewer), suppress(KeyboardInterrupt):
         serve(viewer)
 
 
@@ -575,6 +602,22 @@ def _writing(path: Path, *refused: type[Exception]) -> Iterator[None]:
         raise InputError(str(error)) from error
     except OSError as error:
         raise cannot_write(path, error) from error
+
+
+@contextmanager
+def _compilation_shown() -> Iterator[None]:
+    """Context that shows how many kernels have been compiled."""
+    from flowborne.progress import ProgressDisplay, RunProgress
+
+    began = perf_counter()
+    with ProgressDisplay() as display:
+        from flowborne.kernels.compilation import compilation_watched
+
+        def show(kernels: int) -> None:
+            display(RunProgress("compiling", 0, 0, perf_counter() - began, kernels))
+
+        with compilation_watched(show):
+            yield
 
 
 def _overrides(settings: list[str] | None) -> dict[str, str]:

@@ -1,10 +1,11 @@
-"""The viewer in a real browser: `make browser`. FLOWBORNE_SCREENSHOTS names a folder for them."""
+"""The viewers in a real browser: `make browser`. FLOWBORNE_SCREENSHOTS names a folder for them."""
 
 from __future__ import annotations
 
 import itertools
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -61,20 +62,20 @@ def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[str]:
-    """Address of the viewer of a run, by the command."""
+def served(*given: str) -> Iterator[str]:
+    """Address of a viewer, by its command."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         port = found.getsockname()[1]
-    command = [sys.executable, "-m", "flowborne", "view", str(folder), "--port", str(port)]
+    command = [sys.executable, "-m", "flowborne", *given, "--port", str(port)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
-            line = next(line for line in process.stdout if line.startswith("viewing"))
+            line = next(line for line in process.stdout if line.startswith(("viewing", "playing")))
             assert str(port) in line
             yield f"http://127.0.0.1:{port}"
         finally:
-            process.terminate()
+            process.send_signal(signal.SIGINT)
 
 
 def picture(page: Any) -> np.ndarray:
@@ -101,11 +102,24 @@ def opened(browser: Any, address: str) -> tuple[Any, float]:
     return page, monotonic() - before
 
 
+def put(page: Any, label: str, value: float) -> None:
+    """Type a number beside a slider, and wait until it has been sent: a page sends the last one of
+    those within some hundredths of a second."""
+    box = page.locator(f'xpath=//label[.="{label}"]/following::input[@type="text"][1]')
+    box.fill(str(value))
+    box.press("Enter")
+    sleep(0.3)
+
+
+def pick(page: Any, label: str, option: str) -> None:
+    """Choose from a list."""
+    page.locator(f'xpath=//label[.="{label}"]/following::input[1]').click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
 def seek(page: Any, time: float) -> None:
     """Type a time beside the slider, and wait until it is shown."""
-    box = page.locator('xpath=//label[text()="time (s)"]/following::input[@type="text"][1]')
-    box.fill(str(time))
-    box.press("Enter")
+    put(page, "time (s)", time)
     page.get_by_text(f"t = {time:.3f} s").wait_for()
     sleep(1.0)
 
@@ -115,7 +129,7 @@ def test_first_picture_and_three_moments(browser: Any, run: Path, tmp_path: Path
     shots = Path(os.environ.get("FLOWBORNE_SCREENSHOTS", tmp_path))
     shots.mkdir(parents=True, exist_ok=True)
     times = flowborne.open_run(run).times
-    with served(run) as address:
+    with served("view", str(run)) as address:
         page, seconds = opened(browser, address)
         assert page.title() == f"{run.name} – flowborne"
         label = page.locator('xpath=//label[text()="time (s)"]')
@@ -133,3 +147,47 @@ def test_first_picture_and_three_moments(browser: Any, run: Path, tmp_path: Path
     for before, after in itertools.pairwise(moments):
         assert (np.abs(after - before).max(axis=-1) > DIFFERENT).mean() > 0.005
     assert all(drawn(image) > 0.02 for image in moments)
+
+
+def lean(run: flowborne.OpenRun) -> np.ndarray:
+    """(n,) degrees by which the thorax leans forward in each state."""
+    thorax = run.bodies.index("thorax")
+    up = run.every("body_rotation")[:, thorax] @ [0.0, 0.0, 1.0]
+    return np.degrees(np.arctan2(up[:, 0], up[:, 2]))
+
+
+def test_a_walker_that_is_played_leans_the_other_way(browser: Any, tmp_path: Path) -> None:
+    """The wind is turned in the page; what was played is recorded, and repeated bit for bit."""
+    shots = Path(os.environ.get("FLOWBORNE_SCREENSHOTS", tmp_path))
+    shots.mkdir(parents=True, exist_ok=True)
+    played = tmp_path / "played"
+    with served("play", "human-wind-back", "--out", str(played)) as address:
+        page, _ = opened(browser, address)
+        pick(page, "input motion", "beside")
+        sleep(3.0)
+        page.screenshot(path=shots / "play-0.png")
+        put(page, "lower_back (°/s)", 60)
+        put(page, "direction (°)", 0)
+        put(page, "speed (m/s)", 16)
+        sleep(4.0)
+        page.screenshot(path=shots / "play-1.png")
+        print(page.get_by_text("frames a second").inner_text())
+        page.get_by_role("button", name="pause").click()
+        page.get_by_text("paused").wait_for()
+        page.get_by_role("button", name="record").click()
+        page.get_by_text("they repeat what was played, bit for bit").wait_for(timeout=60_000)
+        page.screenshot(path=shots / "play-2.png")
+        page.close()
+    again = flowborne.run(played / "scene.toml", tmp_path / "again", film=False)
+    run, repeated = flowborne.open_run(played), flowborne.open_run(again.folder)
+    assert len(run) == len(repeated)
+    for name, values in run.state(-1).items():
+        assert np.array_equal(values, repeated.state(-1)[name])
+    changes = flowborne.load_scene(played / "scene.toml").changes
+    assert changes[-1].values == {"wind.0.velocity": [16.0, 0.0, 0.0]}
+    leaning, second = lean(run), round(run.frames_per_second)
+    first, last = (int(np.searchsorted(run.times, changes[n].time)) for n in (0, -1))
+    before, after = leaning[first - second : first].mean(), leaning[last + second]
+    print(f"leaning {before:.1f}° before the wind turned, {after:.1f}° a second of the walk later")
+    assert before > 3.0
+    assert after < -3.0

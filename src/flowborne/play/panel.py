@@ -1,0 +1,127 @@
+"""The panel of a simulation that is played: time, what can be set, and what is shown."""
+
+from __future__ import annotations
+
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+from flowborne.play.controls import Controls, Settings, Slider
+from flowborne.play.memory import PlayedRun
+from flowborne.view.browser.panel import Panel
+from flowborne.view.browser.settings import Timeline
+from flowborne.view.browser.viewpoint import FilmView
+from flowborne.view.run import Run
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+BUTTONS = ("◀", "run", "pause", "▶", "newest")
+"""What the buttons ask for, as they are labelled."""
+
+KEYS: tuple[tuple[str, Any, str], ...] = (
+    ("frame before", "arrowleft", "◀"),
+    ("next frame", "arrowright", "▶"),
+    ("newest frame", "end", "newest"),
+    ("run or pause", "space", "run or pause"),
+)
+"""Name, key and request of each key."""
+
+RECORD = "record"
+GHOSTS = ("none", "in place", "beside")
+
+EXPANDED = 4
+"""Maximum number of folders of settings that are open at the start."""
+
+
+class PlayPanel(Panel):
+    """Panel with what can be set; its settings and requests are read by the viewer.
+
+    asked  what buttons and keys asked for
+    """
+
+    def __init__(
+        self, gui: GuiApi, run: PlayedRun, view: FilmView, timeline: Timeline, controls: Controls
+    ) -> None:
+        self.asked: SimpleQueue[str] = SimpleQueue()
+        self._has_ghost = run.moments[0].ghost is not None
+        self._ghost: Any = None
+        self._controls_of_play = controls
+        self._dials: dict[str, Any] = {}
+        super().__init__(gui, run, view, timeline)
+
+    @property
+    def dials(self) -> dict[str, float | str]:
+        """The settings now."""
+        return {
+            name: dial.value if isinstance(dial.value, str) else float(dial.value)
+            for name, dial in self._dials.items()
+        }
+
+    def set_dials(self, settings: Settings) -> None:
+        """Show other settings."""
+        for name, value in settings.items():
+            if self._dials[name].value != value:
+                self._dials[name].value = value
+
+    @property
+    def ghost(self) -> str:
+        """Which of GHOSTS is chosen."""
+        return "none" if self._ghost is None else str(self._ghost.value)
+
+    def say(self, text: str) -> None:
+        """Show a text below the buttons; Markdown."""
+        if text != self._said.content:
+            self._said.content = text
+
+    def extend_time(self) -> None:
+        """Let the slider reach over the frames now."""
+        times = self._timeline.times
+        first, last = float(times[0]), float(times[-1])
+        if self._slider.min != first:
+            self._slider.min = first
+        # seldom, as a slider that changes its ends is drawn anew
+        if not last <= self._slider.max <= 2.0 * last + 2.0:
+            self._slider.max = 1.5 * last + 1.0
+
+    def _add_time(self, gui: GuiApi) -> None:
+        self._clock = gui.add_html("")
+        first = float(self._timeline.times[0])
+        self._slider = gui.add_slider("time (s)", first, first + 1.0, 1e-4, first)
+        self._slider_time = self._slider.value
+        buttons = gui.add_button_group("", list(BUTTONS))
+        buttons.on_click(lambda event: self.asked.put(event.target.value))
+        for name, key, request in KEYS:
+            self._ask_by(gui.add_command(name, hotkey=key), request)
+        self._said = gui.add_markdown("")
+        self._add_dials(gui)
+        gui.add_button(RECORD).on_click(lambda _: self.asked.put(RECORD))
+
+    def _ask_by(self, command: Any, request: str) -> None:
+        command.on_trigger(lambda _: self.asked.put(request))
+
+    def _add_dials(self, gui: GuiApi) -> None:
+        """Add a control for all that can be set, in folders by the first part of its name."""
+        folders: dict[str, Any] = {}
+        titles = {control.name.rpartition(": ")[0] for control in self._controls_of_play.all}
+        opened = len(titles) <= EXPANDED
+        for control in self._controls_of_play.all:
+            title, _, label = control.name.rpartition(": ")
+            if title not in folders:
+                folders[title] = gui.add_folder(title, expand_by_default=opened)
+            with folders[title]:
+                if isinstance(control, Slider):
+                    low, high, step = control.low, control.high, control.step
+                    dial: Any = gui.add_slider(label, low, high, step, control.value)
+                else:
+                    dial = gui.add_dropdown(
+                        label, list(control.options), initial_value=control.value
+                    )
+            self._dials[control.name] = dial
+
+    def _add_shown(self, gui: GuiApi, run: Run, view: FilmView) -> None:
+        super()._add_shown(gui, run, view)
+        if "follow" not in self._controls and run.shot.camera.follow != "nothing":
+            walks = run.grid is None and not run.is_slab
+            self._controls["follow"] = gui.add_checkbox("follow", walks)
+        if self._has_ghost:
+            self._ghost = gui.add_dropdown("input motion", list(GHOSTS), initial_value="none")
