@@ -50,13 +50,16 @@ def test_K13_the_final_pose_may_be_on_either_side_but_not_anywhere(
 ) -> None:
     def ending(scene: str, resolution: int, start: float) -> controller_in_flow.AngleHistory:
         across = 8.0 if start < 45.0 else -8.0
-        final = across if scene == "ns-block-drag-max" else start + 45.0
+        final = across if resolution == 128 else start
         return controller_in_flow.judged(np.full(20, final), 1.0)
 
     monkeypatch.setattr(scatter, "course", ending)
-    most, same, least, spread = scatter.scatter_over_starts(False)
-    assert (most.value, same.value) == (pytest.approx(82.0), pytest.approx(0.0))
-    assert (most.passed, same.passed, least.passed, spread.passed) == (True, True, True, False)
+    mean, deviation = scatter.scatter_over_starts(False)
+    assert (mean.value, deviation.value) == (pytest.approx(82.0), pytest.approx(0.0))
+    assert (mean.passed, deviation.passed) == (True, True)
+    mean, deviation = scatter.scatter_over_starts(True)
+    assert (mean.value, deviation.value) == (pytest.approx(45.0), pytest.approx(10.5, abs=0.1))
+    assert (mean.passed, deviation.passed) == (False, False)
 
 
 def test_K13_starts_where_asked() -> None:
