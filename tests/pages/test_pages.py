@@ -62,6 +62,7 @@ ELSEWHERE = {
     "ssh": "needs another machine",
     "dask worker": "works until it is stopped; tests/studies/test_kills.py starts one",
     "flowborne view": "serves until it is stopped; tests/view/browser has its tests",
+    "flowborne play": "serves until it is stopped; tests/play has its tests",
 }
 """Beginning of a command that is not run -> why."""
 

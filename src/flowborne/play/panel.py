@@ -30,7 +30,7 @@ RECORD = "record"
 GHOSTS = ("none", "in place", "beside")
 
 EXPANDED = 4
-"""Maximum number of folders of settings that are open at the start."""
+"""Number of folders of settings up to which all are open at the start; else the first one is."""
 
 
 class PlayPanel(Panel):
@@ -103,11 +103,11 @@ class PlayPanel(Panel):
         """Add a control for all that can be set, in folders by the first part of its name."""
         folders: dict[str, Any] = {}
         titles = {control.name.rpartition(": ")[0] for control in self._controls_of_play.all}
-        opened = len(titles) <= EXPANDED
+        few = len(titles) <= EXPANDED
         for control in self._controls_of_play.all:
             title, _, label = control.name.rpartition(": ")
             if title not in folders:
-                folders[title] = gui.add_folder(title, expand_by_default=opened)
+                folders[title] = gui.add_folder(title, expand_by_default=few or not folders)
             with folders[title]:
                 if isinstance(control, Slider):
                     low, high, step = control.low, control.high, control.step

@@ -58,6 +58,7 @@ class PlayViewer(RunView):
 
     run: PlayedRun
     panel: PlayPanel
+    image_side = 384
 
     def __init__(self, server: ViserServer, play: Play, run: PlayedRun, out: Path) -> None:
         """`out`: folder to record to; a number is appended if it exists."""

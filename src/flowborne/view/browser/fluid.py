@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
 MIN_IMAGE_SIDE = 768
-"""Minimum longer side of the image that is sent, pixels."""
+"""Minimum longer side of the image that is sent, pixels, unless it has to be fast."""
 
 ARROWS = 28
 """Arrows along the longer side of the plane."""
@@ -106,10 +106,10 @@ def velocity_arrows(grid: Grid, state: State, axis: int, coordinate: float, spee
     return joined(meshes)
 
 
-def enlarged(image: Pixels) -> Pixels:
-    """An image (n, m, 3), smoothly enlarged until its longer side has MIN_IMAGE_SIDE pixels."""
+def enlarged(image: Pixels, side: int) -> Pixels:
+    """An image (n, m, 3), smoothly enlarged until its longer side has `side` pixels."""
     height, width = image.shape[:2]
-    scale = MIN_IMAGE_SIDE / max(height, width)
+    scale = side / max(height, width)
     if scale <= 1.0:
         return image
     small = Image.fromarray(np.ascontiguousarray(image))
@@ -126,8 +126,12 @@ class Fluid:
     toward  (3,) to the camera, which defines clockwise
     """
 
-    def __init__(self, scene: SceneApi, run: Run, toward: Array) -> None:
+    def __init__(
+        self, scene: SceneApi, run: Run, toward: Array, side: int = MIN_IMAGE_SIDE
+    ) -> None:
+        """`side`: minimum longer side of an image, pixels."""
         assert run.grid is not None
+        self._side = side
         self.grid: Grid = run.grid
         self.toward = toward
         self._scene, self._run = scene, run
@@ -185,7 +189,7 @@ class Fluid:
         rotation = np.column_stack([*axes, np.cross(*axes)])
         self._scene.add_image(
             "/run/slice",
-            enlarged(image),
+            enlarged(image, self._side),
             float(high[first] - low[first]),
             float(high[second] - low[second]),
             format="jpeg",

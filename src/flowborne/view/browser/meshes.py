@@ -34,15 +34,22 @@ def prism(outlines: Sequence[Array], low: float, high: float) -> Mesh:
     here = np.arange(len(flat))
     loops = np.split(here, np.cumsum(sizes)[:-1])
     there = np.concatenate([np.roll(loop, -1) for loop in loops])
-    top = np.pad(flat, ((0, 0), (0, 1)), constant_values=high)
-    bottom = np.pad(flat, ((0, 0), (0, 1)), constant_values=low)
+    points = prism_points(flat, low, high)
+    top = points[: len(flat)]
     upper, lower = len(flat), 2 * len(flat)
     sides = [
         (lower + here, lower + there, upper + there),
         (lower + here, upper + there, upper + here),
     ]
     faces = [_inside(top, loops), *(np.stack(corners, axis=1) for corners in sides)]
-    return np.concatenate([top, top, bottom]), np.concatenate(faces)
+    return points, np.concatenate(faces)
+
+
+def prism_points(flat: Array, low: float, high: float) -> Array:
+    """(3 k, 3) m, vertices of a prism on the corners (k, 2) of outlines: those of the top, and
+    those of the sides at the top and at the bottom."""
+    top, bottom = (np.pad(flat, ((0, 0), (0, 1)), constant_values=z) for z in (high, low))
+    return np.concatenate([top, top, bottom])
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:

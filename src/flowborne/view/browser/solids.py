@@ -17,6 +17,7 @@ from flowborne.view.browser.meshes import (
     nothing,
     padded,
     prism,
+    prism_points,
 )
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
 from flowborne.view.outlines import Outlines, flesh_loops
@@ -31,6 +32,9 @@ Array = NDArray[np.float64]
 
 SLAB_THICKNESS = 0.02
 """Thickness of drawn slabs, in smaller sides of the view."""
+
+FLAT_ARROW = prism([arrow(np.zeros(2), np.array([1.0, 0.0]), 0.1)[::-1]], 0.0, 1.0)[1]
+"""Triangles of every flat arrow that is raised to a prism."""
 
 PIXELS = 700.0
 """Approximate number of pixels along the smaller side of the view in a browser."""
@@ -115,7 +119,7 @@ class ForceArrows:
 
     def __init__(self, scene: SceneApi, run: Run, side: float) -> None:
         self.scale = Forces(run, side)
-        self._scene, self._slab = scene, run.is_slab
+        self._scene = scene
         self._pixel, self._high = side / PIXELS, SLAB_THICKNESS * side
         self._arrows: MeshHandle | None = None
         self._outside = None
@@ -137,8 +141,6 @@ class ForceArrows:
             self._arrows = add_mesh(self._scene, "/forces", mesh, color=colour, cast_shadow=False)
             return
         self._arrows.vertices = (vertices - along).astype(np.float32)
-        if self._slab:
-            self._arrows.faces = faces.astype(np.uint32)
 
     def _mesh(self, state: State) -> Mesh:
         """All arrows of a state as one, with the vertices of as many as there can be: a browser
@@ -146,8 +148,11 @@ class ForceArrows:
         width = SHAFT_WIDTH * self._pixel
         if self._outside is None:
             found = self.scale.arrows(state, self._pixel)
+            if not found:
+                return nothing()
             flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]
-            mesh = joined([prism([one], self._high, 1.5 * self._high) for one in flat])
+            points = [prism_points(one, self._high, 1.5 * self._high) for one in flat]
+            mesh = joined([(vertices, FLAT_ARROW) for vertices in points])
             return padded(mesh, len(flat), self.scale.most)
         tails, vectors = force_arrows(self.scale, self._outside, state, self._pixel)
         if not len(tails):

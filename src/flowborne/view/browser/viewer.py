@@ -15,7 +15,7 @@ from flowborne.errors import SceneError
 from flowborne.extras import optional
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
-from flowborne.view.browser.fluid import Fluid
+from flowborne.view.browser.fluid import MIN_IMAGE_SIDE, Fluid
 from flowborne.view.browser.page import only_own_requests, style_page
 from flowborne.view.browser.panel import Panel, legend_html
 from flowborne.view.browser.settings import Settings, Timeline
@@ -83,6 +83,8 @@ class RunView:
     panel     the controls
     """
 
+    image_side = MIN_IMAGE_SIDE
+
     def __init__(self, server: ViserServer, run: Run, folder: str) -> None:
         """`folder`: of the run, for commands.
 
@@ -147,7 +149,8 @@ class RunView:
         toward = view.first.position - view.first.target
         self._fluid = None
         if run.grid is not None:
-            self._fluid = Fluid(self.server.scene, run, toward / np.linalg.norm(toward))
+            toward = toward / np.linalg.norm(toward)
+            self._fluid = Fluid(self.server.scene, run, toward, self.image_side)
 
     def _show(self, settings: Settings) -> None:
         """Show the current state by the settings, in one message."""
