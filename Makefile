@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: closeness demo lint test browser dist docs gltf-validator imports failing gallery paper exporters fuzz messages size strangers validation-page clean
+.PHONY: baselines closeness demo lint test browser dist docs gltf-validator imports failing gallery paper exporters fuzz messages size strangers validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -63,6 +63,10 @@ messages: $(VENV)/installed-test
 
 closeness: $(VENV)/installed-test
 	$(BIN)/python tools/closeness.py
+
+baselines: $(VENV)/installed-test
+	$(BIN)/python tools/baselines.py $(NAMES)
+	$(BIN)/python tools/learning_page.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -41,6 +41,15 @@ def test_gymnasium_finds_nothing_wrong(name: str, kind: str) -> None:
         check_env(env, skip_render_check=True)
 
 
+@pytest.mark.parametrize("name", [name for name in ENVIRONMENTS if name != "swimmer"])
+def test_stable_baselines_finds_nothing_wrong(name: str) -> None:
+    """It needs PyTorch, which is no part of the tests."""
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        checker.check_env(SceneEnv(coarse(ENVIRONMENTS[name])), skip_render_check=True)
+
+
 def test_environments_are_made_by_name() -> None:
     env = gymnasium.make("flowborne/block-v0", scene=coarse("ns-block-drag-max"))
     assert env.unwrapped.observed[:3] == (

@@ -99,7 +99,7 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         self.observed = tuple(self._observed())
         self._start = self.simulation.snapshot()
         rate = self.scene.time.frames_per_second / every
-        self.metadata = {"render_modes": ["rgb_array"], "render_fps": rate}
+        self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": rate}
         box, inf = gymnasium.spaces.Box, np.inf
         self.action_space = box(-1.0, 1.0, self._low.shape, np.float32)
         self.observation_space = box(-inf, inf, self._observation().shape, np.float32)
