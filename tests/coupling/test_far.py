@@ -12,6 +12,7 @@ from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.simulation import Snapshot
+from flowborne.validation.far_sides import box
 from flowborne.validation.worlds import Uniform, mjcf, start_at_once
 from flowborne.worlds import (
     Boundaries,
@@ -46,14 +47,6 @@ def started(geom: str, grid: Grid, sides: Boundaries, axis: int = 0) -> float:
     report = advance(world, DT, command=command)
     assert report.momentum.budget_error < 1e-12
     return -float(report.pressure_wrench[1, axis]) * DT
-
-
-def box(cells: int, lower: tuple[float, ...], upper: tuple[float, ...]) -> Grid:
-    """`cells` along a unit of length."""
-    counts = [round(cells * (b - a)) for a, b in zip(lower, upper, strict=True)]
-    if len(counts) == 2:
-        return Grid.slab(counts[0], counts[1], 1.0 / cells, (lower[0], lower[1]))
-    return Grid((counts[0], counts[1], counts[2]), 1.0 / cells, (lower[0], lower[1], lower[2]))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ eigenvalues lie between 0 and 2, the best of n steps in a V-cycle that is known 
 one that they are to damp (Lottes 2023). Two sweeps by colours cost more than three steps, half of
 whose results they throw away, and damp less.
 
-Rows are worked on whole and without branches, so that the compiler makes vector code of them.
+Rows are worked on whole and without branches, so that the compiler makes vector code of them. It
+makes none where the sums over neighbours are a function of their own (19 ns a cell for 1.6).
 """
 
 from __future__ import annotations

@@ -20,7 +20,6 @@ Centre = tuple[float | None, float | None, float | None]
 """Along each axis the part of the way from the lower to the upper side; None along one on which the
 pressure outside does not depend."""
 
-
 CHANNEL = (
     "only the sides across one axis are far or open, and an endless channel of fluid cannot be set "
     "in motion. Make a side across another axis far, or these open"
