@@ -56,6 +56,8 @@ class Measures:
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
       <body>_centre_x_m … _torque_z_Nm          of bodies named in the scene's output; see
                                                 `body_measures`
+      window_x_m … _z_m                         lower corner of a domain that follows bodies, along
+                                                the axes along which it moves
       momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
       momentum_{exchanged,advection,…}_…_Ns     given to the bodies by pressure; made in advection
                                                 or lost (0 but in the paper's scheme); given to the
@@ -85,6 +87,8 @@ class Measures:
         self._model = setup.solid
         self._controller = controller
         self._blows = bool(setup.mouths)
+        window = None if setup.fluid is None else setup.fluid.window
+        self._window = () if window is None else window.axes
         self._dyed = setup.fluid is not None and bool(setup.fluid.scalars)
         self._along, self._across = _axes(stream)
         self._named = BodyMeasures(setup.solid, bodies)
@@ -103,6 +107,8 @@ class Measures:
         values |= self._joints.values(world.solid.q, world.time, report)
         values |= self._poses(world.solid.q) | self._flesh(world.solid.q)
         values |= self._named.values(world.solid.q, report)
+        for axis in self._window:
+            values[f"window_{'xyz'[axis]}_m"] = world.flow()[0].grid.origin[axis]
         if report is not None:
             values |= self._of_frame(report)
         return values
@@ -133,6 +139,7 @@ class Measures:
         for body in self._model.body_names[1:]:
             names += [f"{body}_{axis}_m" for axis in "xyz"] + [f"{body}_q{axis}" for axis in "wxyz"]
         names += self._named.columns
+        names += [f"window_{'xyz'[axis]}_m" for axis in self._window]
         for part in ("solid", "fluid", *IMPULSES, *(["jet"] if self._blows else [])):
             names += [f"momentum_{part}_{axis}_Ns" for axis in "xyz"]
         names += ["expelled_m3"] if self._blows else []

@@ -192,7 +192,7 @@ class Simulation:
         """
         if changes is not None:
             self._changes = tuple(changes)
-        world = replace(snapshot.world, setup=self.setup)
+        world = replace(snapshot.world, setup=self.setup.where(snapshot.world.setup))
         self._moment, self._started = replace(snapshot, world=world), True
 
     def advance_frame(self, commands: Commands | None = None) -> FrameReport:
@@ -219,7 +219,7 @@ class Simulation:
                 self._advance(world, self.frame + 1), beyond=beyond, values=self._values
             )
         if commands:
-            world.setup = self.setup
+            world.setup = self.setup.where(world.setup)
         lost = self.measures.lost(self.measures.values(world, report.frame, report))
         if lost:
             raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")

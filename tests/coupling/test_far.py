@@ -172,3 +172,14 @@ def test_trials_workers_and_a_resumed_run_have_the_same_bits() -> None:
         resumed.advance_frame()
         for name, values in resumed.world.arrays().items():
             np.testing.assert_array_equal(values, expected[name])
+
+
+def test_momentum_closes_where_a_body_reaches_through_a_side() -> None:
+    """The side pushes the fluid on the open part of its faces, and the body on the rest."""
+    moving = '<body><joint type="slide" axis="1 0 0"/><geom type="cylinder" size="0.5 5"/></body>'
+    wall = '<geom type="box" size="0.5 0.5 5" pos="3 0.3 0"/>'
+    grid = Grid.slab(48, 48, 1 / 8, (-3, -3))
+    world = make_world(mjcf(wall + moving), grid, boundaries=FLAT, solid_density=1.0)
+    world.solid.v[:] = 1.0
+    for _ in range(10):
+        assert advance(world, 0.05).momentum.budget_error < 1e-12

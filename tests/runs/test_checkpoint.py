@@ -101,5 +101,5 @@ def test_what_is_no_checkpoint_is_refused(tmp_path, world, contents):
 def test_state_bytes_counts_every_array_once(world):
     cells = 6 * 4
     faces = 7 * 4 + 6 * 5 + 2 * cells
-    clock, bodies, target = 4, 2, 2
-    assert state_bytes(world) == 8 * (3 * cells + 3 * faces + clock + bodies + target)
+    clock, bodies, target, corner = 4, 2, 2, 3
+    assert state_bytes(world) == 8 * (3 * cells + 3 * faces + clock + bodies + target + corner)

@@ -101,6 +101,8 @@ def side_push(pressure: Array, opened: Faces, grid: Grid, boundaries: Boundaries
     for place, side in boundaries.around(grid):
         met = pressure[place.layer] * beside_open(place, opened, boundaries)
         met *= 1.0 - side.pressure_weight(place)
+        if side.free:
+            met *= opened[place.axis][place.layer]
         force[place.axis] += (1 - 2 * place.upper) * grid.face_area * float(met.sum())
     return force
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, SupportsIndex
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.state import FluidState, under
+from flowborne.fluid.window import Window
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 from flowborne.solids.wind import Wind
@@ -41,6 +42,8 @@ class Fluid:
     advection     scheme that carries the velocity
     tolerance     relative residual of the pressure solve
     one_way       whether the bodies do not act on the fluid, which acts on them as a wind alone
+    window        how the grid follows bodies; None if it stays where it is
+    raises        ValueError when the grid is to move across sides beyond which there is no fluid
     """
 
     grid: Grid
@@ -53,6 +56,15 @@ class Fluid:
     advection: Advection = field(default_factory=FluxForm)
     tolerance: float = 1e-9
     one_way: bool = False
+    window: Window | None = None
+
+    def __post_init__(self) -> None:
+        for axis in () if self.window is None else self.window.axes:
+            for side in self.boundaries.pair(axis):
+                if not (side.free or side.supplies):
+                    raise ValueError(
+                        f"the grid cannot move along {'xyz'[axis]}, as a side there is {side.kind}"
+                    )
 
 
 @dataclass(frozen=True)
@@ -97,6 +109,26 @@ class Setup:
         if self.fluid is not None:
             vars(other)["shapes"] = self.shapes
         return other
+
+    def on(self, grid: Grid) -> Setup:
+        """The same on a grid that has moved. Workers that have this setup are not sent it again."""
+        assert self.fluid is not None
+        if grid == self.fluid.grid:
+            return self
+        home: Setup = vars(self).get("home", self)
+        other = self.but(fluid=replace(self.fluid, grid=grid))
+        vars(other)["home"] = home
+        return other
+
+    def where(self, other: Setup) -> Setup:
+        """The same on the grid of another."""
+        return self if other.fluid is None else self.on(other.fluid.grid)
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
+        if "home" not in vars(self):
+            return super().__reduce_ex__(protocol)
+        assert self.fluid is not None
+        return Setup.on, (vars(self)["home"], self.fluid.grid)
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -169,12 +201,16 @@ class World:
         named |= {"solid/q": self.solid.q, "solid/v": self.solid.v}
         if self.fluid is not None:
             named |= {f"fluid/{k}": v for k, v in self.fluid.arrays().items()}
+            named["grid/origin"] = np.array(self.flow()[0].grid.origin)
         return named | {f"memory/{k}": v for k, v in self.memory.items()}
 
     @classmethod
     def from_arrays(cls, setup: Setup, arrays: dict[str, Array]) -> World:
         """World of `setup` in the state that `arrays` gave. Raises KeyError when one is missing."""
         time, steps, ahead, parts = arrays["clock"]
+        if setup.fluid is not None:
+            x, y, z = arrays["grid/origin"].tolist()
+            setup = setup.on(replace(setup.fluid.grid, origin=(x, y, z)))
         return cls(
             setup,
             SolidState(arrays["solid/q"], arrays["solid/v"]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,6 +44,12 @@ class Grid:
     def slab(cls, nx: int, ny: int, spacing: float, origin: tuple[float, float]) -> Grid:
         """Two-dimensional grid of nx by ny cells with its lower left corner at `origin`."""
         return cls((nx, ny, 1), spacing, (*origin, -0.5 * spacing))
+
+    def moved(self, axis: int, cells: int) -> Grid:
+        """The same grid some cells further along an axis."""
+        origin = list(self.origin)
+        origin[axis] += cells * self.spacing
+        return replace(self, origin=(origin[0], origin[1], origin[2]))
 
     @property
     def is_slab(self) -> bool:

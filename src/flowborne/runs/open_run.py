@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from flowborne.files.given import read_json
 from flowborne.fluid.grid import Grid
 from flowborne.runs.history import history_arrays, history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
-from flowborne.runs.states import DYE, StateArray, quantity, read_state
+from flowborne.runs.states import DYE, Arrays, StateArray, quantity, read_state
 
 if TYPE_CHECKING:
     import xarray
@@ -37,7 +38,7 @@ class OpenRun:
     frames             frame number of each state, 0 for the start
     frames_per_second  of the run
     is_slab            whether it is two-dimensional, with forces per metre of depth
-    grid               of the fluid; None without a fluid
+    grid               of the fluid at the start; None without a fluid
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -98,6 +99,16 @@ class OpenRun:
         on the faces, pressure, scalar_<dye>, and open, the part of each cell outside all bodies.
         """
         return read_state(self._states[number])
+
+    def grid_at(self, state: Arrays) -> Grid:
+        """The grid in a state: where the window is then, if the domain follows bodies.
+
+        raises  ValueError without a fluid
+        """
+        if self.grid is None:
+            raise ValueError(f"{self.folder} has no grid, as its scene has no fluid")
+        x, y, z = np.asarray(state.get("grid_origin", self.grid.origin)).tolist()
+        return replace(self.grid, origin=(x, y, z))
 
     def every(self, name: str) -> Array:
         """(n, ...) one array of all states, such as "body_position".

@@ -28,9 +28,10 @@ BYTES_PER_MEMBER = 300
 class Recorder:
     """Writes states/NNNNNN.npz of a run.
 
-    Each file contains, in single precision except for the time,
+    Each file contains, in single precision except for the first two,
 
       time                                       s
+      grid_origin (3,)                           m, lower corner of the grid, which may move
       q (nq,), v (nv,)                           generalised coordinates
       geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
       fluid_force (nb, 3)                        N, force of fluid and winds on each body: mean over
@@ -103,8 +104,10 @@ class Recorder:
             scalars = [name for name in named if name.startswith("scalar_")]
             kept |= {name: named[name] for name in ("pressure", *axes, *scalars)}
             kept["open"] = open_cells(world, pose)
-        single: dict[str, NDArray[Any]] = {k: v.astype(np.float32) for k, v in kept.items()}
-        return {"time": np.array(world.time)} | single
+        exact = {"time": np.array(world.time)}
+        if world.setup.fluid is not None:
+            exact["grid_origin"] = np.array(world.setup.fluid.grid.origin)
+        return exact | {name: values.astype(np.float32) for name, values in kept.items()}
 
 
 def open_cells(world: World, pose: Kinematics) -> Array:

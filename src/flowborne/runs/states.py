@@ -42,6 +42,7 @@ class Quantity(NamedTuple):
 
 QUANTITIES = {
     "time": Quantity((), "s", "time"),
+    "grid_origin": Quantity(("axis",), "m", "lower corner of the grid"),
     "q": Quantity(("position_number",), "m, rad or 1", "generalised positions as MuJoCo has them"),
     "v": Quantity(("dof",), "m/s or rad/s", "generalised velocities as MuJoCo has them"),
     "geom_position": Quantity(("geom", "axis"), "m", "origin of each geometry"),

@@ -155,18 +155,20 @@ def doubts_of(history: Path, bodies: Sequence[str], fluid: Fluid | None) -> list
 def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
     """The first body more than a cell outside the domain of the fluid; None when all stay inside.
 
-    Periodic sides do not count.
+    Periodic sides do not count. A domain that follows bodies is where the history has it.
     """
-    grid, periodic = fluid.grid, fluid.boundaries.periodic()
-    axes = [axis for axis in grid.axes if not periodic[axis]]
+    grid, periodic, window = fluid.grid, fluid.boundaries.periodic(), fluid.window
+    axes = np.array([axis for axis in grid.axes if not periodic[axis]], np.int64)
     columns = [f"{body}_{'xyz'[axis]}_m" for body in bodies for axis in axes]
     if not columns:
         return None
-    low = np.array([grid.origin[axis] - grid.spacing for axis in axes])
-    high = np.array([grid.origin[axis] + (grid.shape[axis] + 1) * grid.spacing for axis in axes])
-    for frame, *coordinates in history_rows(history, ["frame", *columns]):
-        at = np.reshape(coordinates, (len(bodies), len(axes)))
-        left = np.any((at < low) | (at > high), axis=1)
+    moving = () if window is None else window.axes
+    corners = [f"window_{'xyz'[axis]}_m" for axis in moving]
+    corner, size = np.array(grid.origin), grid.spacing * np.array(grid.shape)
+    for frame, *numbers in history_rows(history, ["frame", *corners, *columns]):
+        corner[list(moving)] = numbers[: len(moving)]
+        at = np.reshape(numbers[len(moving) :], (len(bodies), len(axes))) - corner[axes]
+        left = np.any((at < -grid.spacing) | (at > size[axes] + grid.spacing), axis=1)
         if left.any():
             return (
                 f"body '{bodies[int(left.argmax())]}' left the fluid's domain in frame "

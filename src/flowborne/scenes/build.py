@@ -22,6 +22,7 @@ from flowborne.scenes.controller import controller_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.fluid import fluid_of
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.window import with_window
 from flowborne.solids.model import SolidModel
 
 
@@ -95,9 +96,11 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     motions = trajectories_of(scene, model, posed(scene, model).q)
     fluid, around = fluid_of(scene), surroundings_of(scene, model)
     winds = tuple(wind for table in scene.wind if (wind := table.build(around)) is not None)
+    start = initial_state(scene, model)
+    fluid = None if fluid is None else with_window(fluid, scene, model, start.q)
     setup = Setup(model, fluid, motions, winds, mouths_of(scene, model), splits=True)
     world = World.at_rest(setup)
-    world.solid = initial_state(scene, model)
+    world.solid = start
     if world.fluid is not None:
         _set_velocity(world.fluid, scene)
     controller = None

@@ -19,6 +19,7 @@ from flowborne.scenes.flesh import check_flesh, check_flesh_places
 from flowborne.scenes.fluid import check_dimensions, check_fluid, fluid_of
 from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
+from flowborne.scenes.window import check_followed
 from flowborne.solids.joint_kinds import (
     FREE,
     HINGE,
@@ -114,6 +115,7 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         named += draft.unknown_joint(model, joint, "output", "joints")
     if scene.film.camera.follow not in ("bodies", "nothing"):
         named += draft.unknown_body(model, scene.film.camera.follow, "film", "camera", "follow")
+    named += check_followed(draft, model)
     for index, wind in enumerate(scene.wind):
         named += [f"{draft.at('wind', index)}: {problem}" for problem in wind.check(around)]
     if scene.policy is not None:

@@ -13,7 +13,7 @@ from flowborne.coupling.advection.scheme import Advection
 from flowborne.coupling.advection.semi_lagrangian import SemiLagrangian
 from flowborne.fluid.grid import Grid
 from flowborne.runs.summary import machine_memory
-from flowborne.tables import Corner, Count, NotNegative, Places, Positive, Table, Vector
+from flowborne.tables import Corner, Count, NotNegative, Places, Positive, Table, Text, Vector
 
 FEWEST_CELLS = 4
 """Cells that a domain has at least along each axis."""
@@ -30,12 +30,17 @@ class Domain(Table):
                   `size` may be given
     resolution    cells along the longest side; the other sides are rounded up to whole cells
     cells         instead of `resolution`: cells along each axis
+    follow        the box is a window that moves with the centre of mass of a body, of all
+                  "bodies", or of "nothing"; it moves by whole cells
+    along         axes along which it moves; all of them unless given
     """
 
     lower: Corner
     upper: Corner
     resolution: Count | None = None
     cells: tuple[Count, ...] | None = None
+    follow: Text = "nothing"
+    along: tuple[Literal["x", "y", "z"], ...] | None = None
 
     @model_validator(mode="before")
     @classmethod

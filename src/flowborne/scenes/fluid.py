@@ -13,6 +13,7 @@ from flowborne.scenes.draft import Draft, Key
 from flowborne.scenes.dye import DyeBands, DyeBox, check_bands, check_boxes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import DyeValue, check_outlet, check_sides
+from flowborne.scenes.window import check_window
 from flowborne.tables import triple
 
 NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")
@@ -116,6 +117,7 @@ def check_fluid(draft: Draft) -> Iterator[str]:
     if len(scene.domain.lower) != scene.dimensions:
         return
     yield from check_memory(draft, scene.domain)
+    yield from check_window(draft)
     if scene.boundaries is not None and draft.sound("boundaries"):
         yield from check_sides(draft, scene.boundaries, slab=scene.is_slab)
         free = any(side.boundary.free for _, side in scene.boundaries)

@@ -1,0 +1,105 @@
+"""A grid that moves by whole cells, and what the fluid is in the cells that come in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import edge
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.sides.side import Boundary, Place
+from flowborne.fluid.state import FluidState
+
+
+@dataclass(frozen=True)
+class Window:
+    """How a grid follows bodies.
+
+    bodies  numbers of those whose common centre of mass it follows
+    centre  (x, y, z) from the grid's lower corner to where that is at the start, m
+    axes    along which the grid moves
+    """
+
+    bodies: tuple[int, ...]
+    centre: tuple[float, float, float]
+    axes: tuple[int, ...]
+
+
+def moved_fluid(
+    state: FluidState, grid: Grid, sides: Boundaries, axis: int, cells: int, time: float
+) -> tuple[FluidState, Grid]:
+    """State and grid after the grid has moved by some cells along an axis.
+
+    Each layer of cells that comes in continues the fluid beyond the side: with the velocity that
+    the side prescribes, and behind a free side without vorticity and divergence. Pressure and what
+    the last step changed are those at the side; there is no dye but what the side lets in.
+    """
+    upper = cells > 0
+    for _ in range(abs(cells)):
+        velocity = _with_layer(state.velocity, grid, sides, Place(grid, axis, upper), time)
+        grid = grid.moved(axis, 1 if upper else -1)
+        place = Place(grid, axis, upper)
+        side = sides.pair(axis)[upper]
+        state = replace(
+            state,
+            velocity=velocity,
+            velocity_change=faces_of([shifted(u, axis, upper) for u in state.velocity_change]),
+            acceleration=faces_of([shifted(u, axis, upper) for u in state.acceleration]),
+            pressure=shifted(state.pressure, axis, upper),
+            previous_pressure=shifted(state.previous_pressure, axis, upper),
+            cell_volume=shifted(state.cell_volume, axis, upper),
+            scalars={
+                name: shifted(dye, axis, upper, _entering(name, side, place, time))
+                for name, dye in state.scalars.items()
+            },
+        )
+    return state, grid
+
+
+def _entering(name: str, side: Boundary, place: Place, time: float) -> Array | float:
+    """Dye in the fluid beyond a side."""
+    found = side.entering_scalar(name, place, time)
+    return 0.0 if found is None else found
+
+
+def _with_layer(
+    velocity: Faces, grid: Grid, sides: Boundaries, beyond: Place, time: float
+) -> Faces:
+    """Velocity on the faces of a grid that has moved by a cell beyond a side."""
+    axis, upper = beyond.axis, beyond.upper
+    side, new = sides.pair(axis)[upper], Place(grid.moved(axis, 1 if upper else -1), axis, upper)
+    outwards, through = 1.0 if upper else -1.0, velocity[axis][beyond.layer]
+    found, spread = list(velocity), np.zeros(through.shape)
+    for component in grid.axes:
+        if component == axis:
+            continue
+        layer = velocity[component][beyond.layer].copy()
+        slope = outwards * np.diff(through, axis=component)
+        layer[edge(component, slice(1, -1))] += slope
+        if sides.periodic()[component]:
+            layer[edge(component, slice(None, None, layer.shape[component] - 1))] -= slope.sum(
+                axis=component, keepdims=True
+            )
+        told = side.prescribed_velocity(new, component, time)
+        if told is not None:
+            layer[:] = told
+        spread += np.diff(layer, axis=component)
+        found[component] = shifted(velocity[component], axis, upper, layer)
+    found[axis] = shifted(velocity[axis], axis, upper, through - outwards * spread)
+    side.impose(found[axis], new, time)
+    return faces_of(found)
+
+
+def shifted(values: Array, axis: int, upper: bool, layer: Array | float | None = None) -> Array:
+    """A field on a grid that has moved by a cell along an axis, towards its upper end or its lower.
+
+    layer  what comes in; what was at that end when None
+    """
+    along = edge(axis, slice(None, -1)), edge(axis, slice(1, None))
+    found = values.copy()
+    found[along[not upper]] = values[along[upper]]
+    if layer is not None:
+        found[edge(axis, slice(-1, None) if upper else slice(1))] = layer
+    return found
