@@ -33,7 +33,7 @@ def test_what_comes_in_has_the_mean_velocity_and_what_leaves_its_own(
     u, cells = random.normal(size=grid.face_shape(component)), random.random(grid.shape)
     axis, shape = component + 1, np.array([1, *grid.face_shape(component)[:2]])
     padded = np.pad(u.reshape(shape), [(GHOSTS * (n > 0),) * 2 for n in range(3)])
-    table = packed_sides(component, grid, sides, [0.0])
+    table = packed_sides(component, grid, sides, [0.0], faces_of(flux))
     through = Fluxes(planes(faces_of(flux), grid), *neighbours(int(shape[axis]), False))
     marks = np.empty(padded.shape, np.uint8)
     mark_volumes(marks, np.zeros(0, np.int64), table, shape, 0 * shape, axis)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.irrotational import comes_in, tangential_change
 from flowborne.fluid.sides.side import Boundary, Layers, hold
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.carry import HELD, JOINED, MIRRORED, PRESCRIBED, Sides
@@ -89,6 +90,12 @@ def pad_faces(
             if isinstance(wall, np.ndarray):
                 wall = pad(wall, tuple(a for a in grid.axes if a != place.axis))
             fill(padded[component], side, component, Layers(place, 1), wall)
+            if component != place.axis and side.irrotational_inflow(place) and not rate:
+                normal, ring = velocity[place.axis][place.layer], boundaries.periodic()[component]
+                change = tangential_change(normal, place, component, ring)
+                change *= comes_in(normal, place, component, ring)
+                wide = pad(change, tuple(a for a in grid.axes if a != place.axis))
+                padded[component][Layers(place, 1).outside(0)] += wide
     return padded[0], padded[1], padded[2]
 
 
@@ -109,15 +116,20 @@ def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: floa
         side.impose(velocity[place.axis], place, time)
 
 
-def packed_sides(component: int, grid: Grid, boundaries: Boundaries, times: list[float]) -> Sides:
+def packed_sides(
+    component: int, grid: Grid, boundaries: Boundaries, times: list[float], flux: Faces
+) -> Sides:
     """The sides as a component's kernels take them, and what they prescribe to it at these times;
     see `kernels.carry`.
+
+    flux  volume per time through each face, m^3/s
 
     Along the component's own axis ghosts hold what the side's faces do. Along the others the mean
     of the first ghost and its neighbour is what the side prescribes, and the second mirrors the
     next neighbour likewise.
     """
-    table, walls, shape, first = [], [], grid.face_shape(component), 0
+    table, walls, changes, first = [], [], [], 0
+    shape = grid.face_shape(component)
     for place, side in boundaries.around(grid):
         own, layer = place.axis == component, list(shape)
         layer[place.axis] = 1
@@ -133,9 +145,14 @@ def packed_sides(component: int, grid: Grid, boundaries: Boundaries, times: list
             if not own:
                 beyond = PRESCRIBED
             prescribed[n] = np.broadcast_to(np.asarray(wall), layer).reshape(-1)
+        change, still = np.zeros(layer), not own and side.irrotational_inflow(place)
+        if still:
+            normal = flux[place.axis][place.layer] / grid.face_area
+            change = tangential_change(normal, place, component, boundaries.periodic()[component])
         axis = place.axis + grid.is_slab
-        table.append((axis, place.upper, beyond, side.free, side.supplies, first))
+        table.append((axis, place.upper, beyond, side.free, side.supplies, first, still))
         walls.append(prescribed)
+        changes.append(change.reshape(-1))
         first += size
-    wide = np.concatenate(walls, axis=1)
-    return Sides(np.array(table, np.int64), wide, np.zeros(first), np.zeros(first))
+    wide, along = np.concatenate(walls, axis=1), np.concatenate(changes)
+    return Sides(np.array(table, np.int64), wide, along, np.zeros(first), np.zeros(first))

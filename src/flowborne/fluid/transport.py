@@ -182,7 +182,7 @@ def carry_component(
     count, (axis, shape, wraps) = transport.substeps(grid), kernel_axes(component, grid, sides)
     before, after, dt = transport.before, transport.after, transport.dt / count
     times = [transport.time + n * dt for n in range(count + 1)]
-    table = packed_sides(component, grid, sides, times)
+    table = packed_sides(component, grid, sides, times, transport.flux)
     ring = sides.periodic()[component]
     flux = Fluxes(planes(transport.flux, grid), *neighbours(int(shape[axis]), ring))
     given = passed_on(before.transfers[component], after.transfers[component], transport.dt)

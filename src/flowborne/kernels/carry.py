@@ -31,22 +31,25 @@ MIRRORED, HELD, PRESCRIBED, JOINED = range(4)
 """Ghosts beyond a side: those inside mirrored, the layer at the side held, such that the mean of
 both is what the side prescribes, or what is inside the opposite side."""
 
-AXIS, UPPER, BEYOND, FREE, SUPPLIES, FIRST = range(6)
+AXIS, UPPER, BEYOND, FREE, SUPPLIES, FIRST, IRROTATIONAL = range(7)
 """Columns of the table of sides: where the side lies, what is beyond it, whether it is free and
-whether it supplies fluid (see `fluid.sides.side`), and where its layer begins in packed layers."""
+whether it supplies fluid (see `fluid.sides.side`), where its layer begins in packed layers, and
+whether what comes in through a free side is beyond it `Sides.change` more than inside."""
 
 
 class Sides(NamedTuple):
     """The sides of the domain to one component.
 
-    table  (n, 6) integers, one row for each side
-    wall   (times, k) packed layers of what they prescribe when each stage begins and ends
-    rate   (k,) volume per time that comes in
-    share  (k,) of each control volume in the volume of its layer
+    table   (n, 7) integers, one row for each side
+    wall    (times, k) packed layers of what they prescribe when each stage begins and ends
+    change  (k,) see IRROTATIONAL
+    rate    (k,) volume per time that comes in
+    share   (k,) of each control volume in the volume of its layer
     """
 
     table: Integers
     wall: Array
+    change: Array
     rate: Array
     share: Array
 
@@ -314,8 +317,9 @@ def joined(table: Integers, axis: int) -> bool:
 
 @njit(nogil=True, cache=True)
 def draw_in(field: Array, marks: Marks, sides: Sides, shape: Integers) -> float:
-    """Give what comes in through free sides the mean velocity of the layer beside it, in the
-    ghosts of a padded field; gives volume x velocity that comes in through all sides per time."""
+    """Give what comes in through free sides its velocity, the mean of the layer beside it or one
+    without vorticity, in the ghosts of a padded field; gives volume x velocity that comes in
+    through all sides per time."""
     flat, mark, came = field.reshape(-1), marks.reshape(-1), 0.0
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
@@ -332,7 +336,10 @@ def draw_in(field: Array, marks: Marks, sides: Sides, shape: Integers) -> float:
                 at, rate = start + a * one + b * other, sides.rate[first + a * m + b]
                 upstream = mark[at] == UPSTREAM
                 if row[FREE] and rate > 0.0:
-                    flat[at + out] = mean if upstream else 2.0 * mean - flat[at]
+                    if row[IRROTATIONAL]:
+                        flat[at + out] = flat[at] + sides.change[first + a * m + b]
+                    else:
+                        flat[at + out] = mean if upstream else 2.0 * mean - flat[at]
                 near, far = flat[at], flat[at + out]
                 if upstream:
                     came += rate * (far if rate > 0.0 else near)

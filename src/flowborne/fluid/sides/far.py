@@ -45,6 +45,9 @@ class BoundaryFar(BoundaryOpen):
             raise ValueError(f"boundaries: {CHANNEL}")
         return replace(self, centre=centre)
 
+    def irrotational_inflow(self, place: Place) -> bool:
+        return True
+
     def pressure_weight(self, place: Place) -> Array:
         grid, at = place.grid, place.cell_coordinates()
         lengths = {

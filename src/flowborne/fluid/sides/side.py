@@ -161,6 +161,11 @@ class Boundary:
         """
         return 1.0 if self.free or self.joined else 0.0
 
+    def irrotational_inflow(self, place: Place) -> bool:
+        """Whether fluid that comes in has no vorticity: its tangential velocity is then that of
+        `irrotational.tangential_change`, and not the mean along a free side."""
+        return False
+
     def entering_scalar(self, name: str, place: Place, time: float) -> Array | None:
         """Values of a scalar in fluid that enters; None for those in the cells at the side."""
         return None
