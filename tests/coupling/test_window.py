@@ -199,3 +199,15 @@ def test_dye_that_leaves_is_gone_and_none_comes_in() -> None:
 def test_a_window_does_not_move_across_a_side_without_fluid_beyond(side: Boundary) -> None:
     with pytest.raises(ValueError, match=f"cannot move along x, as a side there is {side.kind}"):
         windowed(CIRCLE, small(), (0.0, 0.0), Boundaries(x_min=side, x_max=side))
+
+
+def test_a_channel_stays_tight_as_the_window_moves_along_it() -> None:
+    walls = Boundaries(BoundaryOpen(), BoundaryOpen())
+    world = windowed(CIRCLE, small(24), (1.0, 0.0), walls, axes=(0,))
+    start(world, DT)
+    for _ in range(20):
+        follow(world)
+        for end in (0, -1):
+            assert not world.flow()[1].velocity[1][:, end].any()
+        step(world, DT)
+    assert corner(world)[0] > -1.0

@@ -9,6 +9,7 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.irrotational import tangential_change
 from flowborne.fluid.sides.side import Boundary, Place
 from flowborne.fluid.state import FluidState
 
@@ -75,13 +76,11 @@ def _with_layer(
     for component in grid.axes:
         if component == axis:
             continue
-        layer = velocity[component][beyond.layer].copy()
-        slope = outwards * np.diff(through, axis=component)
-        layer[edge(component, slice(1, -1))] += slope
-        if sides.periodic()[component]:
-            layer[edge(component, slice(None, None, layer.shape[component] - 1))] -= slope.sum(
-                axis=component, keepdims=True
-            )
+        change = tangential_change(through, beyond, component, sides.periodic()[component])
+        for end, beside in zip((slice(1), slice(-1, None)), sides.pair(component), strict=True):
+            if beside.prescribes:
+                change[edge(component, end)] = 0.0
+        layer = velocity[component][beyond.layer] + change
         told = side.prescribed_velocity(new, component, time)
         if told is not None:
             layer[:] = told
