@@ -8,6 +8,36 @@ import time
 
 import flowborne
 
+DRIFTER = """<mujoco><worldbody><body name="drifter"><freejoint name="root"/>
+<geom type="sphere" size="0.1" density="1000"/></body></worldbody></mujoco>"""
+
+DRIFT = """
+name = "drift"
+[time]
+frames_per_second = 20.0
+frames = 6
+[domain]
+lower = [-0.4, -0.3, -0.3]
+upper = [0.4, 0.3, 0.3]
+resolution = 16
+follow = "drifter"
+along = ["x", "z"]
+[fluid]
+[boundaries]
+x_min = "far"
+x_max = "far"
+z_min = "far"
+z_max = "far"
+[solids]
+model = "drifter.xml"
+[initial]
+velocities = { root = [1.0, 0.0, -0.4, 0.0, 0.0, 0.0] }
+[[dye]]
+kind = "box"
+lower = [-0.2, -0.2, -0.2]
+upper = [0.2, 0.2, 0.2]
+"""
+
 
 def run(scene, out, **options):
     return flowborne.run(scene, out, **{"film": False, "workers": 1} | options)
@@ -40,3 +70,10 @@ def wait_for_rows(process, path, rows):
     while not path.exists() or path.read_text().count("\n") <= rows:
         assert process.poll() is None, f"the run ended before {path} had {rows} rows"
         time.sleep(0.005)
+
+
+def drift_scene(folder):
+    """File of a scene of a sphere with dye around it, whose far-sided domain follows it."""
+    (folder / "drifter.xml").write_text(DRIFTER)
+    (folder / "drift.toml").write_text(DRIFT)
+    return folder / "drift.toml"

@@ -1,4 +1,4 @@
-"""Three tiny runs that the exporters are tried on. Not to be written into."""
+"""Tiny runs that the exporters are tried on. Not to be written into."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 import flowborne as fb
+
+from ..made_runs import drift_scene
 
 WALK = """
 name = "walk"
@@ -46,3 +48,10 @@ def walk(runs: Path) -> Path:
     (runs / "walk.toml").write_text(WALK)
     fb.run(runs / "walk.toml", runs / "walk", film=False)
     return runs / "walk"
+
+
+@pytest.fixture(scope="session")
+def drift(runs: Path) -> Path:
+    """A sphere with dye around it that sets out through a far-sided domain, which follows it."""
+    fb.run(drift_scene(runs), runs / "drift", film=False)
+    return runs / "drift"

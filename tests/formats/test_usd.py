@@ -24,16 +24,16 @@ FAR = 1e-5
 TURNED = 1e-3
 """Angle from the run that is accepted, degrees."""
 
-RUNS = ["chain", "fish", "walk"]
+RUNS = ["chain", "fish", "walk", "drift"]
 
 
 @pytest.fixture(scope="module")
 def stages(
-    tmp_path_factory: pytest.TempPathFactory, chain: Path, fish: Path, walk: Path
+    tmp_path_factory: pytest.TempPathFactory, chain: Path, fish: Path, walk: Path, drift: Path
 ) -> dict[str, tuple[Creature, Usd.Stage]]:
     """Name -> creature of the run, and its stage."""
     folder, opened = tmp_path_factory.mktemp("usd"), {}
-    for run, ending in ((chain, ".usda"), (fish, ".usd"), (walk, ".usdc")):
+    for run, ending in ((chain, ".usda"), (fish, ".usd"), (walk, ".usdc"), (drift, ".usda")):
         path = folder / f"{run.name}{ending}"
         fb.export(run, path)
         opened[run.name] = (Creature(fb.open_run(run)), Usd.Stage.Open(str(path)))
@@ -160,7 +160,7 @@ def test_paths_go_through_the_bones_and_the_camera_sees_them(name: str, stages: 
     assert all(camera.frustum.Intersects(Gf.Vec3d(*corner)) for corner in corners)
 
 
-@pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke")])
+@pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke"), ("drift", "dye")])
 def test_dye_is_a_volume_in_files_beside(name: str, dye: str, stages: Stages) -> None:
     tinyvdb = pytest.importorskip("tinyvdb")
     creature, stage = stages[name]
@@ -173,6 +173,8 @@ def test_dye_is_a_volume_in_files_beside(name: str, dye: str, stages: Stages) ->
             (found,) = (file.grid(n) for n in range(file.grid_count) if file.grid(n).name == dye)
             values = creature.run.state(frame)[f"scalar_{dye}"]
             assert found.active_voxel_count() == (values != 0.0).sum()
+        grid = creature.run.grid_at(creature.run.state(frame))
+        assert_allclose(volume.GetExtentAttr().Get(frame), [grid.origin, grid.upper], atol=1e-6)
 
 
 def test_a_missing_library_is_one_message(

@@ -38,7 +38,7 @@ model = "ball.xml"
 """
 
 
-@pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke")])
+@pytest.mark.parametrize(("name", "dye"), [("chain", "dye"), ("fish", "smoke"), ("drift", "dye")])
 def test_volumes_are_exact(
     name: str, dye: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
@@ -59,7 +59,7 @@ def test_volumes_are_exact(
             assert_array_equal(velocity, cell_velocity(run.grid, state).squeeze())
             for grid in grids.values():
                 assert_allclose(grid.transform["voxel_size"], run.grid.spacing)
-                first = [along[0] for along in run.grid.cell_coordinates()]
+                first = [along[0] for along in run.grid_at(state).cell_coordinates()]
                 assert_allclose(grid.transform["translation"], first)
 
 

@@ -32,6 +32,7 @@ def opened(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[OpenRun, Any
 Opened = tuple[OpenRun, Any]
 every = pytest.mark.parametrize("opened", ["chain", "fish", "walk"], indirect=True)
 wet = pytest.mark.parametrize("opened", ["chain", "fish"], indirect=True)
+drifting = pytest.mark.parametrize("opened", ["drift"], indirect=True)
 
 
 @every
@@ -65,6 +66,31 @@ def test_fields_are_exact(opened: Opened) -> None:
                 .reshape(-1, field[0, 0, 0].size)
             )
             assert_array_equal(read_back.cells_of(block, name).reshape(flat.shape), flat)
+
+
+@drifting
+def test_a_domain_that_moves_is_at_its_place_and_the_rest_is_hidden(opened: Opened) -> None:
+    run, read = opened
+    for number in range(len(run)):
+        block, state = read.blocks(number)["fluid"], run.state(number)
+        grid = run.grid_at(state)
+        shown = np.array([block.IsCellVisible(n) for n in range(block.GetNumberOfCells())], bool)
+        middles = centres_of(block)
+        inside = ((middles > grid.origin) & (middles < grid.upper)).all(axis=1)
+        assert_array_equal(shown, inside)
+        assert inside.sum() == np.prod(grid.shape)
+        pressure = read_back.cells_of(block, "pressure")
+        assert_array_equal(pressure[inside], state["pressure"].transpose(2, 1, 0).ravel())
+        assert np.isnan(pressure[~inside]).all()
+    assert not inside.all()
+
+
+def centres_of(block: Any) -> np.ndarray:
+    """(n, 3) middles of the cells of an image."""
+    low, h = np.array(block.GetOrigin()), np.array(block.GetSpacing())
+    nx, ny, nz = np.array(block.GetDimensions()) - 1
+    k, j, i = np.meshgrid(*(np.arange(n) for n in (nz, ny, nx)), indexing="ij")
+    return np.asarray(low + h * (np.stack([i, j, k], axis=-1).reshape(-1, 3) + 0.5))
 
 
 @every

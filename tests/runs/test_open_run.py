@@ -12,6 +12,33 @@ from numpy.testing import assert_allclose, assert_array_equal
 import flowborne as fb
 from flowborne.runs.states import StateArray
 
+DRIFTER = """<mujoco><worldbody><body name="drifter">
+<joint name="x" type="slide" axis="1 0 0"/><geom type="cylinder" size="0.1 1" density="1000"/>
+</body></worldbody></mujoco>"""
+
+DRIFT = """
+dimensions = 2
+[time]
+frames_per_second = 20.0
+frames = 4
+[domain]
+lower = [-0.4, -0.3]
+upper = [0.4, 0.3]
+resolution = 16
+follow = "bodies"
+along = ["x"]
+[fluid]
+[boundaries]
+x_min = "far"
+x_max = "far"
+y_min = "far"
+y_max = "far"
+[solids]
+model = "drifter.xml"
+[initial]
+velocities = { x = 1.0 }
+"""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -73,6 +100,26 @@ def test_a_data_set_has_units_and_places(folder: Path) -> None:
     assert float(found["pressure"].sel(time=1 / 24, method="nearest").max()) == pytest.approx(
         float(run.state(1)["pressure"].max())
     )
+
+
+def test_cells_of_a_domain_that_moves_are_counted_from_its_corner(tmp_path: Path) -> None:
+    pytest.importorskip("xarray")
+    (tmp_path / "drifter.xml").write_text(DRIFTER)
+    (tmp_path / "drift.toml").write_text(DRIFT)
+    fb.run(tmp_path / "drift.toml", tmp_path / "out", film=False)
+    run = fb.open_run(tmp_path / "out")
+    assert run.window_axes == (0,)
+    assert run.grid is not None
+    found, origins = run.dataset(), run.origins()
+    assert len(set(origins[:, 0])) > 2
+    assert found["x"].attrs == {"units": "m", "long_name": "offset from grid_origin"}
+    assert found["y"].attrs == {"units": "m"}
+    assert_array_equal(found["y_face"], run.grid.face_coordinates(1)[1])
+    for number in range(len(run)):
+        now, grid = found.isel(time=number), run.grid_at(run.state(number))
+        corner = float(now["grid_origin"].sel(axis="x"))
+        assert_allclose(now["x"] + corner, grid.cell_coordinates()[0], atol=1e-12)
+        assert_allclose(now["x_face"] + corner, grid.face_coordinates(0)[0], atol=1e-12)
 
 
 def test_a_data_set_has_the_drives_of_joints_by_name(folder: Path) -> None:

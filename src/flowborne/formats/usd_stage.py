@@ -178,10 +178,14 @@ def _dye(stage: Usd.Stage, run: OpenRun, volumes: Sequence[str]) -> None:
     if run.grid is None or not volumes:
         return
     scope, names = _scope(stage, "Dye"), Names()
+    size = np.array(run.grid.upper) - run.grid.origin
     for dye in run.dyes:
         volume = UsdVol.Volume.Define(stage, scope.AppendChild(names.of(dye)))
         volume.GetPrim().SetDisplayName(dye)
-        volume.CreateExtentAttr(_vectors(np.array([run.grid.origin, run.grid.upper])))
+        extent = volume.CreateExtentAttr(_vectors(np.array([run.grid.origin, run.grid.upper])))
+        if run.window_axes:
+            for frame, low in zip(run.frames, run.origins(), strict=True):
+                extent.Set(_vectors(np.array([low, low + size])), frame)
         field = UsdVol.OpenVDBAsset.Define(stage, volume.GetPath().AppendChild("field"))
         field.CreateFieldNameAttr(dye)
         field.CreateFieldDataTypeAttr("float")

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically
-from flowborne.fluid.grid import Grid
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.states import cell_velocity
@@ -51,27 +50,28 @@ class ExporterVdb:
     """smoke.vdb stands for smoke_0000.vdb, smoke_0001.vdb and so on, a file for each state.
 
     A grid for each dye, by its name, and "velocity", m/s, the mean of the two faces of a cell.
-    Index (0, 0, 0) is the first cell; coordinates are in m, z up.
+    Index (0, 0, 0) is the first cell; coordinates are in m, z up, of where the domain is in the
+    state.
     """
 
     def write(self, run: OpenRun, path: Path) -> Written:
         if run.grid is None:
             raise SceneError(f"{run.folder} has no flow: {_without_flow(run)}.")
-        return Written(_write_states(run, run.grid, path, velocity=True))
+        return Written(_write_states(run, path, velocity=True))
 
 
 def write_dye(run: OpenRun, path: Path) -> tuple[Path, ...]:
     """Write a file for each state, named like `path`, with the dyes alone; returns the files."""
-    assert run.grid is not None
-    return _write_states(run, run.grid, path, velocity=False)
+    return _write_states(run, path, velocity=False)
 
 
-def _write_states(run: OpenRun, grid: Grid, path: Path, *, velocity: bool) -> tuple[Path, ...]:
+def _write_states(run: OpenRun, path: Path, *, velocity: bool) -> tuple[Path, ...]:
     """Write the dyes, and the velocity if asked for, of each state; returns the files."""
     files = tuple(path.with_name(f"{path.stem}_{n:04d}{path.suffix}") for n in run.frames)
-    x, y, z = (float(along[0]) for along in grid.cell_coordinates())
     for number, file in enumerate(files):
         state = run.state(number)
+        grid = run.grid_at(state)
+        x, y, z = (float(along[0]) for along in grid.cell_coordinates())
         grids = []
         for dye in run.dyes:
             values = state[f"scalar_{dye}"]

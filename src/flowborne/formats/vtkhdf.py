@@ -3,7 +3,9 @@
 Lengths are in m, times in s. The blocks are, each only if the run has it:
 
     fluid   cells: velocity (m/s, mean of the faces), vorticity (1/s), pressure (Pa), open (open
-            fraction of the cell), and the dyes by name
+            fraction of the cell), and the dyes by name. VTKHDF has one place of an image for all
+            times: of a domain that follows bodies the cells are all that it ever has, nan and
+            hidden (vtkGhostType) where it is not at a time
     bodies  triangles of all geometries; cells: body and geometry by number
     forces  a point for each body, at its centroid: force (N) of fluid and winds, body by number
     flesh   quadratic elements; cells: stress (Pa, elastic Cauchy stress), von_mises (Pa),
@@ -25,7 +27,6 @@ from numpy.typing import NDArray
 
 from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole
-from flowborne.fluid.grid import Grid
 from flowborne.formats.creature import Array, Creature, Integers, has_bodies
 from flowborne.kernels.elastic import STABLE_NEO_HOOKEAN
 from flowborne.runs.exporters import provided
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     import h5py
 
 VERSION = (2, 3)
+
+GHOSTS, HIDDEN = "vtkGhostType", 32
+"""Array by which VTK hides cells, and its number for a hidden one (vtkDataSetAttributes)."""
 
 QUADRATIC = {6: (22, (0, 1, 2, 3, 5, 4)), 10: (24, (0, 1, 2, 3, 4, 7, 5, 6, 8, 9))}
 """Nodes of an element -> VTK's number of its cell type, and our nodes in VTK's order."""
@@ -66,7 +70,7 @@ def _write_blocks(run: OpenRun, file: h5py.File) -> None:
     _steps(root, run)
     names = []
     if run.grid is not None:
-        _fluid(root.create_group("fluid"), run, run.grid)
+        _fluid(root.create_group("fluid"), run)
         names.append("fluid")
     if has_bodies(run) or run.grid is None:
         creature = Creature(run)
@@ -82,18 +86,22 @@ def _write_blocks(run: OpenRun, file: h5py.File) -> None:
         tree[name] = h5py.SoftLink(f"/VTKHDF/{name}")
 
 
-def _fluid(group: h5py.Group, run: OpenRun, grid: Grid) -> None:
+def _fluid(group: h5py.Group, run: OpenRun) -> None:
     """Write the fields of the cells; a step is a slice of each array."""
     _set_type(group, "ImageData")
-    nx, ny, nz = grid.shape
-    group.attrs["WholeExtent"] = (0, nx, 0, ny, 0, nz)
-    group.attrs["Origin"], group.attrs["Spacing"] = grid.origin, (grid.spacing,) * 3
+    start, origins = run.grid_at({}), run.origins()
+    h, origin = start.spacing, origins.min(axis=0)
+    first = np.rint((origins - origin) / h).astype(np.int64)
+    whole = tuple((first.max(axis=0) + start.shape).tolist())
+    group.attrs["WholeExtent"] = np.stack([np.zeros(3, int), whole], axis=1).ravel()
+    group.attrs["Origin"], group.attrs["Spacing"] = origin, (h,) * 3
     group.attrs["Direction"] = np.eye(3).ravel()
     steps = _steps(group, run)
     fields = group.create_group("CellData")
     offsets = steps.create_group("CellDataOffsets")
     for number in range(len(run)):
         state = run.state(number)
+        grid = run.grid_at(state)
         values: dict[str, NDArray[Any]] = {
             "velocity": cell_velocity(grid, state),
             "vorticity": cell_vorticity(grid, state),
@@ -101,13 +109,28 @@ def _fluid(group: h5py.Group, run: OpenRun, grid: Grid) -> None:
             "open": state["open"],
             **{dye: state[f"scalar_{dye}"] for dye in run.dyes},
         }
+        if whole != grid.shape:
+            place = tuple(slice(a, a + n) for a, n in zip(first[number], grid.shape, strict=True))
+            values = {name: _within(whole, place, v, np.nan) for name, v in values.items()}
+            shown = np.zeros(grid.shape, np.uint8)
+            values[GHOSTS] = _within(whole, place, shown, HIDDEN)
         for name, field in values.items():
             ordered = np.moveaxis(field, (0, 2), (2, 0))  # z slowest
             if number == 0:
                 shape, chunk = (len(run), *ordered.shape), (1, *ordered.shape)
-                fields.create_dataset(name, shape, np.float32, chunks=chunk, compression="gzip")
+                kind = np.uint8 if name == GHOSTS else np.float32
+                fields.create_dataset(name, shape, kind, chunks=chunk, compression="gzip")
                 offsets[name] = np.arange(len(run))
             fields[name][number] = ordered
+
+
+def _within(
+    whole: tuple[int, ...], place: tuple[slice, ...], values: NDArray[Any], outside: float
+) -> NDArray[Any]:
+    """Values (nx, ny, nz, ...) of a domain at a place in a whole (3,) of cells."""
+    found = np.full((*whole, *values.shape[3:]), outside, values.dtype)
+    found[place] = values
+    return found
 
 
 def _bodies(group: h5py.Group, creature: Creature) -> None:

@@ -42,7 +42,7 @@ def dataset_of(
     rows: NDArray[np.int64],
     bodies: Sequence[str],
     joints: Sequence[str],
-    grid: Grid | None,
+    cells: Mapping[str, Any],
     about: Mapping[str, Any],
 ) -> xarray.Dataset:
     """The arrays of a run, see `OpenRun.dataset`.
@@ -52,7 +52,7 @@ def dataset_of(
     rows     (k,) frame of each of its rows
     bodies   names of the bodies
     joints   names of the joints
-    grid     of the fluid, None without a fluid
+    cells    coordinates of cells and faces; none without a fluid
     about    attributes of the data set
     """
     variables = {name: _of_history(array, rows, frames) for name, array in history.items()}
@@ -67,9 +67,8 @@ def dataset_of(
         "body": ("body", list(bodies)),
         "joint": ("joint", list(joints)),
         "axis": ("axis", list("xyz")),
+        **cells,
     }
-    if grid is not None:
-        coordinates |= _coordinates(grid)
     return xarray.Dataset(variables, coordinates, about)
 
 
@@ -86,12 +85,18 @@ def _of_history(
     )
 
 
-def _coordinates(grid: Grid) -> dict[str, Any]:
-    """Coordinates of cells and faces along the axes that have them."""
+def cell_coordinates(grid: Grid, window_axes: Sequence[int] = ()) -> dict[str, Any]:
+    """Coordinates of cells and faces along the axes that have them.
+
+    window_axes  along which the grid moves: coordinates are offsets from its lower corner
+    """
     found: dict[str, Any] = {}
     for axis, name in enumerate("xyz"):
-        found[name] = (name, grid.cell_coordinates()[axis], {"units": "m"})
+        start, about = 0.0, {"units": "m"}
+        if axis in window_axes:
+            start, about["long_name"] = grid.origin[axis], "offset from grid_origin"
+        found[name] = (name, grid.cell_coordinates()[axis] - start, about)
         if axis in grid.axes:
             face = f"{name}_face"
-            found[face] = (face, grid.face_coordinates(axis)[axis], {"units": "m"})
+            found[face] = (face, grid.face_coordinates(axis)[axis] - start, about)
     return found

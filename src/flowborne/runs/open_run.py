@@ -110,6 +110,24 @@ class OpenRun:
         x, y, z = np.asarray(state.get("grid_origin", self.grid.origin)).tolist()
         return replace(self.grid, origin=(x, y, z))
 
+    @property
+    def window_axes(self) -> tuple[int, ...]:
+        """Axes along which the domain follows bodies; none if it stays where it is."""
+        domain = self.scene.get("domain", {})
+        if self.grid is None or domain.get("follow", "nothing") == "nothing":
+            return ()
+        along = domain.get("along")
+        return self.grid.axes if along is None else tuple(sorted({"xyz".index(a) for a in along}))
+
+    def origins(self) -> Array:
+        """(n, 3) m, lower corner of the grid in each state; see `grid_at`.
+
+        raises  ValueError without a fluid
+        """
+        if self.window_axes:
+            return self.every("grid_origin")
+        return np.broadcast_to(self.grid_at({}).origin, (len(self), 3))
+
     def every(self, name: str) -> Array:
         """(n, ...) one array of all states, such as "body_position".
 
@@ -121,7 +139,8 @@ class OpenRun:
         """All arrays and the history as an xarray data set; states are read lazily.
 
         Each array has its dimensions, and its unit and meaning as attributes; times, bodies,
-        joints, and positions of cells and faces are coordinates. The history gives `torque`,
+        joints, and positions of cells and faces are coordinates. Along an axis on which the domain
+        follows bodies, these positions are offsets from `grid_origin`. The history gives `torque`,
         `force`, `power`, `angle`, `position`, `target_angle` and `target_position` of joints,
         `torque_xyz` and `force_xyz` of ball and free joints, `body_force` and so on of the bodies
         that the scene names, and other columns by their names without the unit. They are nan at the
@@ -129,10 +148,11 @@ class OpenRun:
         raises  SceneError when xarray is not installed
         """
         optional("xarray", "xarray", "xarray", "data sets")
-        from flowborne.runs.dataset import dataset_of
+        from flowborne.runs.dataset import cell_coordinates, dataset_of
 
         about: dict[str, Any] = {"scene": self.name, "frames_per_second": self.frames_per_second}
         about["slab"] = int(self.is_slab)
+        cells = {} if self.grid is None else cell_coordinates(self.grid, self.window_axes)
         history, rows = self.history, self.history["frame"].astype(np.int64)
         return dataset_of(
             self.arrays,
@@ -141,7 +161,7 @@ class OpenRun:
             rows,
             self.bodies,
             self.joints,
-            self.grid,
+            cells,
             about,
         )
 
