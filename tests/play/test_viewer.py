@@ -17,6 +17,8 @@ pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowbo
 
 from flowborne.play.viewer import PlayViewer, free_folder, open_play
 
+from ..made_runs import drift_scene
+
 DIRECTION = "wind: direction (°)"
 
 
@@ -50,6 +52,19 @@ def stepped(viewer: PlayViewer, frames: int) -> None:
         viewer.panel.asked.put("▶")
         until(viewer, lambda before=before: len(viewer.run) > before)
     viewer.tick(0.0)
+
+
+def test_a_domain_that_moves_is_where_it_is(tmp_path: Path) -> None:
+    scene = fb.load_scene(drift_scene(tmp_path))
+    played = open_play(scene, tmp_path / "out", host="127.0.0.1", port=free_port(), workers=1)
+    played.running = False
+    stepped(played, 5)
+    run, handles = played.run, played.server.scene._handle_from_node_name
+    moved = run.origins()[-1] - run.origins()[0]
+    assert moved[0] > 0.1
+    assert handles["/run/domain"].position == pytest.approx(moved)
+    assert handles["/run"].position == pytest.approx(-played._path[-1])
+    played.close()
 
 
 def test_runs_until_it_is_paused(viewer: PlayViewer) -> None:

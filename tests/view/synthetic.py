@@ -10,6 +10,7 @@ import numpy as np
 
 SPACING = 4.0 / 96
 FRAMES_PER_SECOND = 24.0
+ORIGIN = np.array([-1.5, -2.0, -0.5 * SPACING])
 CENTRE = np.array([0.4, 0.3])
 """Of the block, off the middle in x and y, so that a picture upside down is noticed."""
 
@@ -28,12 +29,17 @@ def write_run(
     objective: bool = True,
     force: tuple[float, float] = (30.0, 12.0),
     wind: tuple[float, float] | None = None,
+    window: tuple[float, float] | None = None,
 ) -> Path:
-    """Run folder with the start and `frames` frames; a block, and a fixed square on its left."""
+    """Run folder with the start and `frames` frames; a block, and a fixed square on its left.
+
+    window  cells per frame by which the domain moves, in whole cells, over water that stands still
+    """
     (folder / "states").mkdir(parents=True)
     (folder / "summary.json").write_text(json.dumps({"flowborne": "0", "outcome": "done"}))
     scene = f'name = "made-up-block"\ndimensions = 2\n[film]\nfield = "{field}"\n'
     scene += "[fluid]\ndensity = 1000.0\n" if fluid else ""
+    scene += '[domain]\nfollow = "bodies"\n' if window else ""
     (folder / "scene.toml").write_text(scene)
     (folder / "model.json").write_text(json.dumps(_model(fluid, wind)))
     columns = ["frame", "time_s", "angle_hinge_rad", "target_hinge_rad"]
@@ -41,8 +47,12 @@ def write_run(
     rows = [",".join(columns)]
     for frame in range(frames + 1):
         time = frame / FRAMES_PER_SECOND
-        arrays = _state(frame, fluid, dyes, np.array([*force, 0.0]))
-        np.savez(folder / "states" / f"{frame:06d}.npz", time=np.float64(time), **arrays)
+        cells = np.trunc(frame * np.array(window or (0.0, 0.0)))
+        arrays = _state(frame, fluid, dyes, np.array([*force, 0.0]), cells, still=bool(window))
+        exact = {"time": np.float64(time)}
+        if window:
+            exact["grid_origin"] = ORIGIN + SPACING * np.append(cells, 0.0)
+        np.savez(folder / "states" / f"{frame:06d}.npz", **exact, **arrays)
         if frame:
             angle = angle_at(frame)
             values = [frame, time, angle, angle, -np.exp(-time) * (1.0 + 0.2 * np.cos(9 * time))]
@@ -58,7 +68,7 @@ def _model(fluid: bool, wind: tuple[float, float] | None) -> dict[str, Any]:
         "joints": ["hinge"],
         "joint_bodies": [1],
         "controlled": ["hinge"],
-        "grid": {"shape": [96, 96, 1], "spacing": SPACING, "origin": [-1.5, -2.0, -0.5 * SPACING]}
+        "grid": {"shape": [96, 96, 1], "spacing": SPACING, "origin": ORIGIN.tolist()}
         if fluid
         else None,
         "geoms": [
@@ -70,8 +80,10 @@ def _model(fluid: bool, wind: tuple[float, float] | None) -> dict[str, Any]:
     }
 
 
-def _state(frame: int, fluid: bool, dyes: tuple[str, ...], force: Any) -> dict[str, Any]:
-    angle = angle_at(frame)
+def _state(
+    frame: int, fluid: bool, dyes: tuple[str, ...], force: Any, cells: Any, *, still: bool
+) -> dict[str, Any]:
+    angle = angle_at(0 if still else frame)
     turn = np.array(
         [[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]]
     )
@@ -86,13 +98,13 @@ def _state(frame: int, fluid: bool, dyes: tuple[str, ...], force: Any) -> dict[s
         "fluid_centre": np.array([[0.0, 0.0, 0.0], [*CENTRE, 0.0]]),
     }
     if fluid:
-        arrays |= _fluid(frame, turn, dyes)
+        arrays |= _fluid(0 if still else frame, turn, dyes, ORIGIN[:2] + SPACING * cells)
     return {name: values.astype(np.float32) for name, values in arrays.items()}
 
 
-def _fluid(frame: int, turn: Any, dyes: tuple[str, ...]) -> dict[str, Any]:
+def _fluid(frame: int, turn: Any, dyes: tuple[str, ...], corner: Any) -> dict[str, Any]:
     """A row of vortices that drifts to the right, and bands of dye that they roll up."""
-    nodes_x, nodes_y = -1.5 + SPACING * np.arange(97), -2.0 + SPACING * np.arange(97)
+    nodes_x, nodes_y = (x + SPACING * np.arange(97) for x in corner)
     x, y = np.meshgrid(nodes_x, nodes_y, indexing="ij")
     stream = y.copy()
     for n in range(6):

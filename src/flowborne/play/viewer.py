@@ -28,7 +28,7 @@ from flowborne.view.browser.solids import Bodies
 from flowborne.view.browser.surroundings import show_wind
 from flowborne.view.browser.viewer import RunView, start_server
 from flowborne.view.browser.viewpoint import FilmView
-from flowborne.view.run import Run
+from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -242,6 +242,11 @@ class PlayViewer(RunView):
 
     def _displacement(self, number: int) -> Array:
         return self._path[number]
+
+    def _domain_moved(self, number: int, state: State) -> Array:
+        if self.run.grid is None:
+            return np.zeros(3)
+        return np.array(self.run.grid_at(state).origin) - self.run.grid.origin
 
     def _more(self) -> object:
         return self.panel.ghost, len(self.run)

@@ -37,6 +37,10 @@ STRONGER_CIRCULATION = 0.4
 UNCUT = 0.999
 """Open fraction above which a cell counts as not cut by a body."""
 
+FADED = 0.08
+"""Part of a domain that follows bodies, at each side, in which what is shown fades into plain
+water: there is water beyond, of which nothing is known."""
+
 REFINED_SIDE = 256
 """Minimum number of points along the longer side of a refined field."""
 
@@ -205,6 +209,26 @@ def over(image: Pixels, background: str) -> Pixels:
     return np.rint(image[..., :3] * share + 255.0 * style.rgb(background) * (1.0 - share)).astype(
         np.uint8
     )
+
+
+def faded(image: Pixels, axes: Sequence[int]) -> Pixels:
+    """An image (ny, nx, 4) that fades out towards its sides across `axes`, 0 for x and 1 for y."""
+    weight = side_weight(image.shape[:2], [1 - axis for axis in axes])
+    opacity = np.rint(image[..., 3:] * weight[..., None]).astype(np.uint8)
+    return np.concatenate([image[..., :3], opacity], axis=-1)
+
+
+def side_weight(shape: Sequence[int], axes: Sequence[int]) -> Array:
+    """Weights (...) of cells: 1, and going to 0 towards the sides across `axes`; see FADED."""
+    weight = np.ones(tuple(shape))
+    for axis in axes:
+        count = shape[axis]
+        depth = np.minimum(np.arange(count), np.arange(count)[::-1]) + 0.5
+        share = np.clip(depth / (FADED * count), 0.0, 1.0)
+        along = [1] * len(shape)
+        along[axis] = count
+        weight *= np.reshape(share * share * (3.0 - 2.0 * share), along)
+    return weight
 
 
 def slab_vorticity(state: State, grid: Grid) -> Array:

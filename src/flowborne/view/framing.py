@@ -6,18 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from flowborne.shapes.shape import DIRECTIONS
 from flowborne.view.fields import SAMPLES
 from flowborne.view.outlines import Outlines, flesh_loops
+from flowborne.view.paths import domain_shown, smoothed
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 
 Array = NDArray[np.float64]
-
-SMOOTHING = 0.4
-"""Standard deviation of the Gaussian that smooths the camera's path, s."""
 
 MAX_WHOLE_DOMAIN = 6.0
 """Largest fluid domain that is shown whole, in sizes of the volume swept by the bodies."""
@@ -27,6 +24,9 @@ ROOM = 3.0
 
 ASPECT = 0.75
 """Default height of a window over its width."""
+
+MIN_SIDE = 0.4
+"""Smaller side of a window that shows the whole way of a domain, at least, in larger sides."""
 
 
 def followed(run: Run, shot: Shot) -> tuple[Array, Array]:
@@ -49,7 +49,7 @@ def followed(run: Run, shot: Shot) -> tuple[Array, Array]:
         middle = 0.5 * (known.min(axis=0) + known.max(axis=0)) if len(known) else np.zeros(3)
         path = np.broadcast_to(middle, (len(run), 3))
     else:
-        path = _smoothed(points, SMOOTHING * run.frames_per_second)
+        path = smoothed(points.mean(axis=1), run.frames_per_second)
     return path, points - path[:, None]
 
 
@@ -83,25 +83,6 @@ def _flesh_points(run: Run) -> Array:
     return vertices[:, np.unique(farthest)]
 
 
-def _smoothed(points: Array, deviation: float) -> Array:
-    """(frames, 3) smoothed path of the mean of points (frames, n, 3); `deviation` is in frames.
-
-    The path is extrapolated beyond its ends, so that a steady walk keeps its speed to the end.
-    Frames with non-finite numbers keep the last finite position.
-    """
-    middle = points.mean(axis=1)
-    good = np.flatnonzero(np.isfinite(middle).all(axis=1))
-    if good.size == 0:
-        return np.zeros_like(middle)
-    # the extended path has a period of 2 n frames, damped by exp(-5 deviation^2 / n^2)
-    deviation = min(deviation, 2.0 * good.size)
-    pad = int(4.0 * deviation) + 1
-    padded = np.pad(middle[good], ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
-    smooth = gaussian_filter1d(padded, deviation, axis=0)[pad:-pad]
-    last = np.searchsorted(good, np.arange(len(middle)), side="right") - 1
-    return np.asarray(smooth[np.maximum(last, 0)])
-
-
 def windows(run: Run, outlines: Outlines, shot: Shot, aspect: float | None) -> Array:
     """(frames, 4) m, (x0, x1, y0, y1) that is shown in each frame; all of one size.
 
@@ -116,24 +97,52 @@ def windows(run: Run, outlines: Outlines, shot: Shot, aspect: float | None) -> A
         )
     path, seen = followed(run, shot)
     radius = radius_of(seen[..., :2])
-    default = camera.target is None and camera.distance is None and camera.follow == "bodies"
-    if default and (run.grid is None or radius == 0.0 or _is_small(run, radius)):
-        low, high = _extent(run, outlines)
-        centre = np.broadcast_to(0.5 * (low + high), (len(run), 2))
-        half = _enlarged(0.5 * (high - low), aspect)
-    else:
-        centre = path[:, :2]
-        height = ROOM * radius
-        if camera.distance is not None:
-            height = camera.distance * np.tan(0.5 * np.radians(camera.lens))
-        half = height * np.array([1.0 / (aspect or ASPECT), 1.0])
+    if camera.target is None and camera.distance is None:
+        whole = _whole_domain(run, shot, radius)
+        if whole is None and run.grid is None and camera.follow == "bodies":
+            whole = _swept_area(run, outlines)
+        if whole is not None:
+            centre, half = whole
+            return _around(centre, _enlarged(half, aspect))
+    height = ROOM * radius
+    if camera.distance is not None:
+        height = camera.distance * np.tan(0.5 * np.radians(camera.lens))
+    return _around(path[:, :2], height * np.array([1.0 / (aspect or ASPECT), 1.0]))
+
+
+def _around(centre: Array, half: Array) -> Array:
+    """(frames, 4) m, windows (x0, x1, y0, y1) of half sides (2,) around centres (frames, 2)."""
     return np.stack([centre - half, centre + half], axis=2).reshape(-1, 4)
 
 
-def _extent(run: Run, outlines: Outlines) -> tuple[Array, Array]:
-    """(2,) m, lower and upper corner of the fluid's domain, or of the swept area with a margin."""
-    if run.grid is not None:
-        return np.array(run.grid.origin[:2]), np.array(run.grid.upper[:2])
+def _whole_domain(run: Run, shot: Shot, radius: float) -> tuple[Array, Array] | None:
+    """Centres (frames, 2) and half sides (2,) m of the fluid's domain; None if it is too large.
+
+    From a camera that follows nothing, a domain that moves is shown with its whole way. A camera
+    that follows the bodies has a smooth path, and shows what is always inside the domain.
+
+    radius  of the bodies, m
+    """
+    from_world = shot.camera.follow == "nothing" and bool(run.window_axes)
+    if run.grid is None or not (from_world or shot.camera.follow == "bodies"):
+        return None
+    low, high, path = domain_shown(run, from_world=from_world)
+    low, size, path = low[:2], (high - low)[:2], path[:, :2]
+    if radius > 0.0 and size.min() > 2.0 * MAX_WHOLE_DOMAIN * radius:
+        return None
+    half, centre = 0.5 * size, low + 0.5 * size + path
+    if from_world:
+        half = np.maximum(half, MIN_SIDE * half.max())
+    elif run.window_axes:
+        gaps = run.origins()[:, :2] - low - path
+        least, most = gaps.min(axis=0), gaps.max(axis=0)
+        centre = centre + 0.5 * (least + most)
+        half = np.maximum(half - 0.5 * (most - least), 0.5 * half)
+    return centre, half
+
+
+def _swept_area(run: Run, outlines: Outlines) -> tuple[Array, Array]:
+    """Centres (frames, 2) and half sides (2,) m of the area that bodies sweep, with a margin."""
     placed = [
         outline
         for state in run.sampled(SAMPLES)
@@ -145,14 +154,7 @@ def _extent(run: Run, outlines: Outlines) -> tuple[Array, Array]:
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     half = half + 0.6 * max(half.max(), 1e-6)
     half = np.maximum(half, 0.8 * half.max())
-    return middle - half, middle + half
-
-
-def _is_small(run: Run, radius: float) -> bool:
-    """Whether the fluid's domain is small enough to show it whole."""
-    assert run.grid is not None
-    size = np.array(run.grid.upper) - np.array(run.grid.origin)
-    return bool(size[:2].min() <= 2.0 * MAX_WHOLE_DOMAIN * radius)
+    return np.broadcast_to(middle, (len(run), 2)), half
 
 
 def _enlarged(half: Array, aspect: float | None) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from flowborne.view import style
-from flowborne.view.fields import Legend, Scale, field_of, over
+from flowborne.view.fields import Legend, Scale, faded, field_of, over
 from flowborne.view.framing import windows
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow, camera_moves, crosses
 from flowborne.view.outlines import Outlines, flesh_loops
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from flowborne.view.space.stage import Stage
 
 Array = NDArray[np.float64]
+
+ROUNDING = 1e-6
+"""Share of a pixel that an image may lack and still fills it."""
 
 WIND_ROWS = 9
 """Rows of arrows that show a wind, along the map's smaller side."""
@@ -66,15 +69,15 @@ class MapImage(Artist):
 
     It takes a fifth of the time of matplotlib's own images.
 
-    image  (ny, nx, 3 or 4) colours, lowest row first
+    image   (ny, nx, 3 or 4) colours, lowest row first
+    extent  (x0, x1, y0, y1) of the image on the axes; None fills them
     """
 
-    def __init__(self, axes: Axes, extent: tuple[float, float, float, float] | None = None) -> None:
-        """`extent`: (x0, x1, y0, y1) of the image on the axes; None fills them."""
+    def __init__(self, axes: Axes) -> None:
         super().__init__()
         self.image = np.zeros((1, 1, 3), np.uint8)
         self._axes = axes
-        self._extent = extent
+        self.extent: tuple[float, float, float, float] | None = None
         self.set_animated(True)
         axes.add_artist(self)
 
@@ -105,21 +108,23 @@ class MapImage(Artist):
         (left, upper, right, lower) in its own pixels; None if it is not on the map."""
         left, bottom, right, top = self._edges()
         rows, columns = self.image.shape[:2]
-        if self._extent is None:
+        if self.extent is None:
             return (left, bottom, right - left, top - bottom), (0.0, 0.0, columns, rows)
-        x0, x1, y0, y1 = self._extent
+        x0, x1, y0, y1 = self.extent
         (low, high), (lower, upper) = self._axes.get_xlim(), self._axes.get_ylim()
         across, along = (right - left) / (high - low), (top - bottom) / (upper - lower)
-        first = np.round([left + across * (x0 - low), bottom + along * (y0 - lower)]).astype(int)
-        last = np.round([left + across * (x1 - low), bottom + along * (y1 - lower)]).astype(int)
-        begin = np.maximum(first, [left, bottom])
-        end = np.minimum(last, [right, top])
+        first = np.array([left + across * (x0 - low), bottom + along * (y0 - lower)])
+        last = np.array([left + across * (x1 - low), bottom + along * (y1 - lower)])
+        begin = np.maximum(np.ceil(first - ROUNDING).astype(int), [left, bottom])
+        end = np.minimum(np.floor(last + ROUNDING).astype(int), [right, top])
         if (end <= begin).any():
             return None
         whole = np.array([columns, rows])
         share = whole / (last - first)
-        # rounding must not take the part beyond the image, which Pillow refuses
-        (a, b), (c, d) = (begin - first) * share, np.minimum((end - first) * share, whole)
+        # pixels are whole, the part of the image is not, so that a slow motion is smooth; Pillow
+        # refuses a part beyond the image
+        a, b = np.clip((begin - first) * share, 0.0, whole)
+        c, d = np.clip((end - first) * share, 0.0, whole)
         size = end - begin
         box = (int(begin[0]), int(begin[1]), int(size[0]), int(size[1]))
         return box, (float(a), float(rows - d), float(c), float(rows - b))
@@ -147,6 +152,7 @@ class MapSlab:
         self.width = float(x1 - x0)
         self.aspect = float((y1 - y0) / (x1 - x0))
         self._side = float(min(x1 - x0, y1 - y0))
+        self._faded = faded_axes(run, self.views)
         self.forces = Forces(run, self._side)
         self.legend = () if self._field is None else self._field.legend
         self.scale = None if self._field is None else self._field.scale
@@ -158,9 +164,8 @@ class MapSlab:
         self._look(0)
         moving: list[Artist] = []
         self._wind = PolyCollection([], facecolors=style.WIND, edgecolors="none", animated=True)
-        if self._field is not None and self.run.grid is not None:
-            (x0, y0, _), (x1, y1, _) = self.run.grid.origin, self.run.grid.upper
-            self._water = MapImage(axes, (x0, x1, y0, y1))
+        if self._field is not None:
+            self._water = MapImage(axes)
             moving.append(self._water)
         elif self.run.wind.any():
             axes.add_collection(self._wind)
@@ -192,8 +197,12 @@ class MapSlab:
         """Update the moving artists to the `number`-th state."""
         self._look(number)
         if self._field is not None:
-            image = self._field.image(state)
+            image, grid = self._field.image(state), self.run.grid_at(state)
+            if self._faded:
+                image = faded(image, self._faded)
+            (x0, y0, _), (x1, y1, _) = grid.origin, grid.upper
             self._water.image = image if self._shot.transparent else over(image, self._shot.colour)
+            self._water.extent = (x0, x1, y0, y1)
         elif self.run.wind.any():
             corner, wind = self.views[0, [0, 2]], self.run.wind.sum(axis=0)[:2]
             self._wind.set_verts(wind_arrows(self.views[number], corner, wind))
@@ -221,6 +230,21 @@ class MapSlab:
 
 def _closed(loops: list[Array]) -> list[Path]:
     return [Path(np.concatenate([loop, loop[:1]]), closed=True) for loop in loops]
+
+
+def faded_axes(run: Run, views: Array) -> tuple[int, ...]:
+    """Axes along which the domain follows bodies and views (frames, 4) reach beyond it, m."""
+    if not run.window_axes:
+        return ()
+    low, grid = run.origins(), run.grid_at({})
+    high = low + grid.spacing * np.array(grid.shape)
+    slack = 1e-6 * grid.spacing
+    return tuple(
+        axis
+        for axis in run.window_axes
+        if (views[:, 2 * axis] < low[:, axis] - slack).any()
+        or (views[:, 2 * axis + 1] > high[:, axis] + slack).any()
+    )
 
 
 def wind_arrows(view: Array, corner: Array, wind: Array) -> list[Array]:

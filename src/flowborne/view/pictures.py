@@ -41,7 +41,10 @@ PLAIN_SIDE = 600.0
 """Smaller side of a map above which the text on it grows with it, pixels."""
 
 NAMED_JOINTS = 3
-"""Maximum number of joint positions that are written next to the time."""
+"""Maximum number of joint positions that are written next to the time, if there is room."""
+
+MIN_SCALE = 60
+"""Minimum length of a colour scale, pixels of the layout."""
 
 
 class Picture:
@@ -77,6 +80,7 @@ class Picture:
         axes.spines[:].set_visible(False)
         self._moving = list(self.map.draw_on(axes, self.layout.map.width))
         self._clock: Text | None = None
+        self._named = 0
         if shot.scale_bar and not shot.plots and not shot.transparent:
             self._moving += self._bar_on_map(self.layout.axes(figure, self.layout.map))
         if self.layout.legend is not None:
@@ -119,8 +123,14 @@ class Picture:
         left, right = MARGIN / self.layout.width, 1.0 - MARGIN / self.layout.width
         middle = 1.0 - 0.5 * self.layout.map.top / height
         drawn = {"color": style.TEXT, "va": "center_baseline"}
-        figure.text(left, middle, self.run.name, fontsize=15, weight="bold", **drawn)
-        return figure.text(right, middle, "", fontsize=11, ha="right", animated=True, **drawn)
+        title = figure.text(left, middle, self.run.name, fontsize=15, weight="bold", **drawn)
+        clock = figure.text(right, middle, "", fontsize=11, ha="right", animated=True, **drawn)
+        first = 0 if len(self.run.history["frame"]) else None
+        for self._named in range(NAMED_JOINTS, -1, -1):
+            clock.set_text(self._words(0.0, first))
+            if clock.get_window_extent().x0 > title.get_window_extent().x1 + MARGIN:
+                break
+        return clock
 
     def _draw_legend(self, axes: Axes, box: Box) -> None:
         """Draw the scales of length, force and colour in a row below the map."""
@@ -140,7 +150,9 @@ class Picture:
             x = _write(axes, x + 16, middle, name)
         if self.map.scale is not None:
             colours, low, high, name = self.map.scale
-            left, right, half = width - 260, width - 60, 5
+            words = f"{name}   {_signed(low)}"
+            right, half = width - 60, 5
+            left = min(max(width - 260, x + _width(axes, words) + 8), right - MIN_SCALE)
             axes.imshow(
                 colours[None],
                 extent=(left, right, middle - half, middle + half),
@@ -149,7 +161,7 @@ class Picture:
             )
             axes.set(xlim=(0, width), ylim=(0, height))
             _write(axes, right + 8, middle, _signed(high))
-            _write(axes, left - 8, middle, f"{name}   {_signed(low)}", "right")
+            _write(axes, left - 8, middle, words, "right")
 
     def _bar(self, most: float) -> tuple[float, float]:
         """Length of a bar in m, a round number, and in pixels of the layout, at most `most`."""
@@ -199,7 +211,7 @@ class Picture:
         words = []
         title, joints = joint_curves(self.run)
         unit, digits = ("°", 1) if "°" in title else (" m", 3)
-        for name, values in list(joints.items())[:NAMED_JOINTS] if row is not None else ():
+        for name, values in list(joints.items())[: self._named] if row is not None else ():
             number = f"{values[row]:+{digits + 5}.{digits}f}".replace(" ", FIGURE_SPACE)
             words.append(
                 f"{shortened(name, LETTERS_IN_LEGEND // 5)} {number.replace('-', '−')}{unit}"
@@ -219,6 +231,14 @@ def _bar_outline(left: float, middle: float, pixels: float, size: float) -> Arra
 
 def _signed(value: float) -> str:
     return f"{value:.2g}".replace("-", "−")
+
+
+def _width(axes: Axes, words: str) -> float:
+    """Width of a text in a legend."""
+    text = axes.text(0.0, 0.0, words, fontsize=8.5)
+    box = text.get_window_extent().transformed(axes.transData.inverted())
+    text.remove()
+    return float(box.width)
 
 
 def _write(axes: Axes, x: float, y: float, words: str, align: str = "left") -> float:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import flowborne as fb
 from flowborne.cli import main
 from flowborne.errors import SceneError
 from flowborne.files.colours import to_linear
@@ -25,13 +26,15 @@ from flowborne.view import style
 from flowborne.view.browser.fluid import velocity_arrows
 from flowborne.view.browser.page import CSS
 from flowborne.view.browser.panel import room_for
-from flowborne.view.browser.surroundings import add_surroundings
+from flowborne.view.browser.surroundings import Surroundings
 from flowborne.view.browser.viewer import GrowingRun, Viewer, open_viewer
 from flowborne.view.browser.viewpoint import FilmView, Viewpoint, camera_text
 from flowborne.view.framing import windows
 from flowborne.view.outlines import Outlines
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
+
+from ...made_runs import drift_scene
 
 pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")
 
@@ -98,13 +101,66 @@ def test_marks_stand_in_the_water_where_the_view_goes_along(viewer: Viewer, slab
     run.is_slab = slab
     assert run.grid is not None
     for path, there in ((view.path, False), (np.outer(np.arange(13.0), [1.0, 0.0, 0.0]), True)):
-        add_surroundings(scene, run, replace(view, path=path))
+        Surroundings(scene, run, replace(view, path=path))
         assert ("/run/marks" in scene._handle_from_node_name) == there
     handle = scene._handle_from_node_name["/run/marks"]
     places = np.asarray(handle.points).reshape(-1, 3)[:, :2]
     low, high = np.array(run.grid.origin[:2]), np.array(run.grid.upper[:2])
     assert len(places) > 50
     assert ((places > low - 0.1) & (places < high + 0.1)).all()
+
+
+@pytest.fixture
+def moving(write_run: Write) -> Iterator[Viewer]:
+    """Viewer of a slab past whose water the domain moves."""
+    opened = open_viewer(write_run(frames=24, window=(0.6, -0.4)), "127.0.0.1", free_port())
+    yield opened
+    opened.server.stop()
+
+
+def test_a_domain_that_moves_is_where_it_is(moving: Viewer) -> None:
+    run, scene = moving.run, moving.server.scene
+    assert run.grid is not None
+    for number in (0, 24):
+        moving.timeline.seek(run.times[number])
+        moving.tick(0.0)
+        grid = run.grid_at(run.state(number))
+        middle = 0.5 * (np.array(grid.origin) + grid.upper)[:2]
+        image = scene._handle_from_node_name["/run/slice"]
+        assert image.position[:2] == pytest.approx(middle)
+        marks = np.asarray(scene._handle_from_node_name["/run/marks"].points).reshape(-1, 3)
+        assert np.abs(0.5 * (marks.min(axis=0) + marks.max(axis=0))[:2] - middle).max() < 0.5
+        root = scene._handle_from_node_name["/run"].position[:2]
+        moved = np.array(grid.origin[:2]) - run.grid.origin[:2]
+        assert np.abs(root + moved).max() < 2.0 * grid.spacing
+
+
+def test_a_domain_that_moves_in_space_is_where_it_is(tmp_path: Path) -> None:
+    fb.run(drift_scene(tmp_path), tmp_path / "run", film=False)
+    viewer = open_viewer(tmp_path / "run", "127.0.0.1", free_port())
+    run, scene = viewer.run, viewer.server.scene
+    controls = viewer.panel._controls
+    controls["field"].value, controls["slice"].value = "dye", "speed"
+    assert run.grid is not None
+    for number in (1, len(run) - 1):
+        viewer.timeline.seek(run.times[number])
+        viewer.tick(0.0)
+        state = run.state(number)
+        grid = run.grid_at(state)
+        moved = np.array(grid.origin) - run.grid.origin
+        edges = scene._handle_from_node_name["/run/domain"]
+        assert np.abs(edges.position - moved).max() < 1.6 * grid.spacing
+        image = scene._handle_from_node_name["/run/slice"]
+        wanted = 0.5 * (np.array(grid.origin) + grid.upper)
+        wanted[1] = controls["coordinate"].value
+        assert image.position == pytest.approx(wanted)
+        dye = scene._handle_from_node_name["/run/dye"]
+        cells = np.stack(np.meshgrid(*grid.cell_coordinates(), indexing="ij"), axis=-1)
+        weight = state["scalar_dye"][..., None]
+        middle = (weight * cells).sum(axis=(0, 1, 2)) / weight.sum()
+        assert np.abs(dye.centers.mean(axis=0) - middle).max() < 1.5 * grid.spacing
+    assert moved[0] > 0.1
+    viewer.server.stop()
 
 
 def test_bodies_are_where_the_run_has_them(viewer: Viewer) -> None:

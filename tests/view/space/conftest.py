@@ -97,9 +97,13 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
         *,
         accented: tuple[int, ...] = (),
         force: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        origins: np.ndarray | None = None,
         **options: object,
     ) -> Run:
-        """`centres` (frames, n, 3) of the geometries, each of a body of its own."""
+        """`centres` (frames, n, 3) of the geometries, each of a body of its own.
+
+        origins  (frames, 3) of a grid that follows them
+        """
         frames, count = np.shape(centres)[:2]
         paths = []
         for frame, places in enumerate(np.asarray(centres, np.float32)):
@@ -114,11 +118,13 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
                 geom_rotation=np.broadcast_to(np.eye(3, dtype=np.float32), (count, 3, 3)),
                 fluid_centre=bodies,
                 fluid_force=forces,
+                **({} if origins is None else {"grid_origin": origins[frame]}),
             )
             paths.append(path)
         plain = np.array([0.5, 0.5, 0.5, 1.0])
         values: dict[str, object] = {
             "name": "made up",
+            "scene": {},
             "bodies": ("world", *(f"body {n}" for n in range(count))),
             "accented": frozenset(accented),
             "controlled": (),
@@ -140,6 +146,8 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
             "_states": tuple(paths),
             "frames": tuple(range(frames)),
         }
+        if origins is not None:
+            values["scene"] = {"domain": {"follow": "bodies"}}
         run = Run.__new__(Run)
         vars(run).update(values | options)
         return run

@@ -31,7 +31,9 @@ def turning(grid: Grid, spin: np.ndarray, strain: float = 0.0) -> State:
 
 def shown(grid: Grid, *states: State) -> SimpleNamespace:
     """As much of a run as is read."""
-    return SimpleNamespace(grid=grid, state=lambda n: states[n], sampled=lambda most: states)
+    return SimpleNamespace(
+        grid=grid, window_axes=(), state=lambda n: states[n], sampled=lambda most: states
+    )
 
 
 @pytest.mark.parametrize(("rate", "strain"), [(3.0, 0.0), (0.0, 2.0), (2.0, 2.0), (2.0, 1.0)])

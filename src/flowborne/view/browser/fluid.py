@@ -22,6 +22,7 @@ from flowborne.view.fields import (
     FieldNumber,
     Legend,
     Scale,
+    faded,
     field_of,
     over,
 )
@@ -122,7 +123,6 @@ def enlarged(image: Pixels, side: int) -> Pixels:
 class Fluid:
     """The visible fluid of a run, on scales that are taken from its frames on first use.
 
-    grid    of the fluid
     toward  (3,) to the camera, which defines clockwise
     """
 
@@ -130,9 +130,7 @@ class Fluid:
         self, scene: SceneApi, run: Run, toward: Array, side: int = MIN_IMAGE_SIDE
     ) -> None:
         """`side`: minimum longer side of an image, pixels."""
-        assert run.grid is not None
         self._side = side
-        self.grid: Grid = run.grid
         self.toward = toward
         self._scene, self._run = scene, run
         self._fields: dict[str, Field | None] = {}
@@ -140,13 +138,14 @@ class Fluid:
 
     def show(self, state: State, settings: Settings) -> None:
         """Show a state by the settings."""
+        grid = self._run.grid_at(state)
         if self._run.is_slab:
-            self._show_slab(state, settings)
+            self._show_slab(state, grid, settings)
         else:
-            self._show_dye(state, settings.field == "dye")
-            self._show_vortices(state, settings.field == "vorticity")
-            self._show_slice(state, settings)
-        self._show_velocity(state, settings)
+            self._show_dye(state, grid, settings.field == "dye")
+            self._show_vortices(state, grid, settings.field == "vorticity")
+            self._show_slice(state, grid, settings)
+        self._show_velocity(state, grid, settings)
 
     def legend(self, settings: Settings) -> tuple[Legend, Sequence[Scale]]:
         """(name, colour) of what is shown in its own colour, and the colour scales."""
@@ -163,26 +162,37 @@ class Fluid:
         scale = None if settings.slice == "none" else self._number(settings.slice).scale
         return names, () if scale is None else (scale,)
 
-    def _show_slab(self, state: State, settings: Settings) -> None:
+    def _show_slab(self, state: State, grid: Grid, settings: Settings) -> None:
         field = self._slab_field(settings.field)
         image = np.zeros((1, 1, 4), np.uint8) if field is None else field.image(state)
-        self._show_image(over(image, self._run.shot.colour), 2, 0.0)
+        if self._run.window_axes:
+            image = faded(image, self._run.window_axes)
+        self._show_image(over(image, self._run.shot.colour), grid, 2, 0.0)
 
-    def _show_slice(self, state: State, settings: Settings) -> None:
+    def _show_slice(self, state: State, grid: Grid, settings: Settings) -> None:
         if settings.slice == "none":
             self._scene.remove_by_name("/run/slice")
             return
-        cell = (settings.coordinate - self.grid.origin[settings.axis]) / self.grid.spacing
-        image = self._number(settings.slice).layer(state, settings.axis, cell)
-        self._show_image(image.swapaxes(0, 1), settings.axis, settings.coordinate)
+        axis, coordinate = self._plane(grid, settings)
+        image = self._number(settings.slice).layer(
+            state, axis, (coordinate - grid.origin[axis]) / grid.spacing
+        )
+        self._show_image(image.swapaxes(0, 1), grid, axis, coordinate)
 
-    def _show_image(self, image: Pixels, axis: int, coordinate: float) -> None:
+    def _plane(self, grid: Grid, settings: Settings) -> tuple[int, float]:
+        """Axis normal to the plane that is shown, and its coordinate on the grid of a state, m."""
+        if self._run.is_slab:
+            return 2, 0.0
+        moved = grid.origin[settings.axis] - self._run.grid_at({}).origin[settings.axis]
+        return settings.axis, settings.coordinate + moved
+
+    def _show_image(self, image: Pixels, grid: Grid, axis: int, coordinate: float) -> None:
         """Show colours (n, m, 3) of the cells in a plane normal to an axis at `coordinate`, m.
 
         Rows are along the later of the other two axes, columns along the earlier one.
         """
         first, second = across(axis)
-        low, high = np.array(self.grid.origin), np.array(self.grid.upper)
+        low, high = np.array(grid.origin), np.array(grid.upper)
         centre = 0.5 * (low + high)
         centre[axis] = coordinate
         axes = np.eye(3)[[first, second]]
@@ -200,12 +210,12 @@ class Fluid:
             position=centre,
         )
 
-    def _show_velocity(self, state: State, settings: Settings) -> None:
+    def _show_velocity(self, state: State, grid: Grid, settings: Settings) -> None:
         """Show arrows of the velocity in the plane; that of the limit reaches the next arrow."""
         mesh = nothing()
         if settings.velocity:
-            plane = (2, 0.0) if self._run.is_slab else (settings.axis, settings.coordinate)
-            mesh = velocity_arrows(self.grid, state, *plane, self._number("speed").limit)
+            plane = self._plane(grid, settings)
+            mesh = velocity_arrows(grid, state, *plane, self._number("speed").limit)
         show_mesh(
             self._scene,
             "/run/velocity",
@@ -217,11 +227,11 @@ class Fluid:
             receive_shadow=False,
         )
 
-    def _show_vortices(self, state: State, visible: bool) -> None:
+    def _show_vortices(self, state: State, grid: Grid, visible: bool) -> None:
         """Show one mesh for each sense of rotation."""
         points, faces, warm = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, bool)
         if visible:
-            surface = self._surfaces.of(state, self.toward)
+            surface = self._surfaces.of(state, grid, self.toward)
             if surface.n_points:
                 points, faces = surface.points, surface.regular_faces
                 warm = surface.point_data["sense"][faces].mean(axis=1) > 0.0
@@ -239,9 +249,9 @@ class Fluid:
                 receive_shadow=False,
             )
 
-    def _show_dye(self, state: State, visible: bool) -> None:
+    def _show_dye(self, state: State, grid: Grid, visible: bool) -> None:
         """Show a Gaussian for each cell with dye, lit as smoke."""
-        smoke = cloud(self.grid, self._dye, state, self.toward) if visible else None
+        smoke = cloud(grid, self._dye, state, self.toward) if visible else None
         if smoke is None or not len(smoke[0]):
             self._scene.remove_by_name("/run/dye")
             return
@@ -264,7 +274,7 @@ class Fluid:
 
     @cached_property
     def _surfaces(self) -> VortexSurfaces:
-        return VortexSurfaces(self.grid, self._vortices, FINE)
+        return VortexSurfaces(self._vortices, FINE)
 
     def _number(self, name: str) -> FieldNumber:
         if name not in self._numbers:

@@ -313,7 +313,8 @@ class Panel:
         controls["forces"] = gui.add_checkbox("forces", True)
         if run.skins or any(geom.covered for geom in run.geoms):
             controls["bones"] = gui.add_checkbox("bones", shot.bones)
-        if np.ptp(view.path, axis=0).max() > 0.0:
+        windowed = bool(run.window_axes) and shot.camera.follow != "nothing"
+        if windowed or np.ptp(view.path, axis=0).max() > 0.0:
             controls["follow"] = gui.add_checkbox("follow", True)
 
     def _add_slice(self, gui: GuiApi, run: Run, view: FilmView) -> None:

@@ -19,12 +19,15 @@ from flowborne.view.space.lighting import LIGHTS
 from flowborne.view.space.surroundings import SQUARE, stands_on_ground
 
 if TYPE_CHECKING:
-    from viser import FrameHandle, SceneApi
+    from viser import LineSegmentsHandle, SceneApi
 
 Array = NDArray[np.float64]
 
 MOTES = 20_000
 """Number of motes in a cube around the domain."""
+
+MARKED_AGAIN = 0.05
+"""Way of the domain after which the marks in it are chosen again, in its smaller sides."""
 
 LIGHT_RATIO = 3.0
 """Strength of a light in a browser over that in a film: browsers divide it by pi."""
@@ -36,25 +39,47 @@ ABOVE = ((0.25, 0.45, -1.0), 0.75, "#ffffff")
 """Direction, strength and colour of the light on a slab, which is seen from above."""
 
 
-def add_surroundings(scene: SceneApi, run: Run, view: FilmView) -> FrameHandle:
-    """Add everything to the scene that does not change with time; the frame that follows."""
-    scene.set_up_direction(view.up)
-    scene.set_background_image(
-        np.broadcast_to(style.to_bytes(style.rgb(run.shot.colour)), (4, 4, 3)),
-        format="png",
-    )
-    root = scene.add_frame("/run", show_axes=False)
-    ground = not run.is_slab and stands_on_ground(run)
-    _add_lights(scene, run.is_slab, ground)
-    if ground:
-        _add_ground(scene, view)
-    if run.grid is not None and not run.is_slab:
-        _add_edges(scene, run.grid)
-    if run.grid is not None and not ground and camera_moves(view.path, view.side):
-        _add_marks(scene, run.grid, view, run.is_slab)
-    if run.grid is None:
-        show_wind(scene, run.wind.sum(axis=0), view)
-    return root
+class Surroundings:
+    """All in the scene that is neither fluid nor bodies, with the domain where it is.
+
+    root  the frame that all is in, by which a view follows
+    """
+
+    def __init__(self, scene: SceneApi, run: Run, view: FilmView) -> None:
+        self._scene, self._run, self._view = scene, run, view
+        scene.set_up_direction(view.up)
+        scene.set_background_image(
+            np.broadcast_to(style.to_bytes(style.rgb(run.shot.colour)), (4, 4, 3)),
+            format="png",
+        )
+        self.root = scene.add_frame("/run", show_axes=False)
+        ground = not run.is_slab and stands_on_ground(run)
+        _add_lights(scene, run.is_slab, ground)
+        if ground:
+            _add_ground(scene, view)
+        self._edges: LineSegmentsHandle | None = None
+        if run.grid is not None and not run.is_slab:
+            self._edges = _add_edges(scene, run.grid)
+        follows = bool(run.window_axes) or camera_moves(view.path, view.side)
+        self._has_marks = run.grid is not None and not ground and follows
+        self._marked: Array | None = None
+        if run.grid is None:
+            show_wind(scene, run.wind.sum(axis=0), view)
+        self.show(np.zeros(3))
+
+    def show(self, moved: Array) -> None:
+        """Show the domain moved by (3,) m from its start; marks are fixed in the water."""
+        if self._edges is not None:
+            self._edges.position = moved
+        if not self._has_marks:
+            return
+        run, view = self._run, self._view
+        grid = run.grid_at({})
+        step = MARKED_AGAIN * min(grid.spacing * n for n in grid.shape[: len(grid.axes)])
+        around = step * np.round(moved / step)
+        if self._marked is None or not np.array_equal(around, self._marked):
+            self._marked = around
+            _add_marks(self._scene, around + grid.origin, around + grid.upper, view, run.is_slab)
 
 
 def _add_lights(scene: SceneApi, slab: bool, shadows: bool) -> None:
@@ -92,9 +117,8 @@ def _add_ground(scene: SceneApi, view: FilmView) -> None:
     )
 
 
-def _add_marks(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
-    """Add marks that are fixed in the water, to show that the view moves."""
-    low, high = np.array(grid.origin), np.array(grid.upper)
+def _add_marks(scene: SceneApi, low: Array, high: Array, view: FilmView, slab: bool) -> None:
+    """Add marks that are fixed in the water between two corners, to show that the view moves."""
     if slab:
         strokes = crosses(low[:2], high[:2], view.side)
         above = 1e-3 * view.side
@@ -118,11 +142,11 @@ def _add_marks(scene: SceneApi, grid: Grid, view: FilmView, slab: bool) -> None:
     )
 
 
-def _add_edges(scene: SceneApi, grid: Grid) -> None:
+def _add_edges(scene: SceneApi, grid: Grid) -> LineSegmentsHandle:
     """Add the edges of the fluid's domain."""
     corners = np.array(list(product(*zip(grid.origin, grid.upper, strict=True))))
     ends = [(a, b) for a, b in combinations(corners, 2) if np.count_nonzero(a != b) == 1]
-    scene.add_line_segments(
+    return scene.add_line_segments(
         "/run/domain",
         np.array(ends, np.float32),
         style.rgb(style.LINE),

@@ -20,9 +20,10 @@ from flowborne.view.browser.page import only_own_requests, style_page
 from flowborne.view.browser.panel import Panel, legend_html
 from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.solids import Bodies, ForceArrows, SkinMesh
-from flowborne.view.browser.surroundings import add_surroundings
+from flowborne.view.browser.surroundings import Surroundings
 from flowborne.view.browser.viewpoint import CameraKeys, FilmView
-from flowborne.view.run import Run
+from flowborne.view.paths import window_path
+from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -124,7 +125,8 @@ class RunView:
         server.initial_camera.position = tuple(first.position)
         server.initial_camera.look_at = tuple(first.target)
         server.initial_camera.fov = float(np.radians(first.lens))
-        self._root = add_surroundings(server.scene, run, self._view)
+        self._surroundings = Surroundings(server.scene, run, self._view)
+        self._window = window_path(run)
         self._bodies = Bodies(server.scene, run, side)
         self._skins = [
             SkinMesh(server.scene, run, skin, str(n), side) for n, skin in enumerate(run.skins)
@@ -160,7 +162,8 @@ class RunView:
         names, scales = ((), ()) if self._fluid is None else self._fluid.legend(settings)
         with self.server.atomic():
             # moved like the bodies, and not added anew: a browser would do that some frames later
-            self._root.position = -self._along
+            self._surroundings.root.position = -self._along
+            self._surroundings.show(self._domain_moved(number, state))
             self._bodies.show(state, settings.bones)
             for skin in self._skins:
                 skin.show(state, settings.bones, self._along)
@@ -176,6 +179,10 @@ class RunView:
     def _displacement(self, number: int) -> Array:
         """(3,) m, of the film's camera in a state since the first one."""
         return self._view.path[number]
+
+    def _domain_moved(self, number: int, state: State) -> Array:
+        """(3,) m, displacement of the fluid's domain in a state from its start."""
+        return self._window[number]
 
     def _more(self) -> object:
         """What `_show_more` depends on, besides the state."""
@@ -209,7 +216,7 @@ class Viewer(RunView):
 
     def _extend(self, run: GrowingRun) -> None:
         """Update to the run with new frames."""
-        self.run, self._view = run, FilmView.of(run)
+        self.run, self._view, self._window = run, FilmView.of(run), window_path(run)
         self.timeline.extend(run.times)
         if len(run) >= 2 * self._measured:
             self._measure()

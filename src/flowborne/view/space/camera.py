@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.view.framing import followed, radius_of
+from flowborne.view.paths import domain_shown
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
 
@@ -72,8 +73,9 @@ class Camera:
 def camera_of(run: Run, shot: Shot, aspect: float | None = None) -> Camera:
     """The camera of a run; the scale is constant unless the position of the camera is fixed.
 
-    The domain of a fluid is shown whole if the bodies fill much of it, or if there are none. If dye
-    is shown, sources of dye near the bodies are in the view.
+    The domain of a fluid is shown whole if the bodies fill much of it, or if there are none. A
+    domain that follows bodies is shown with its whole way if the camera follows nothing. If dye is
+    shown, sources of dye near the bodies are in the view.
 
     aspect  required height over width of the map, if any
     raises  ValueError if it follows a body that does not exist
@@ -81,7 +83,8 @@ def camera_of(run: Run, shot: Shot, aspect: float | None = None) -> Camera:
     path, seen = followed(run, shot)
     radius, filled = radius_of(seen), FILLED
     if run.grid is not None and shot.camera.follow in ("bodies", "nothing"):
-        low, high = np.asarray(run.grid.origin), np.asarray(run.grid.upper)
+        from_world = shot.camera.follow == "nothing"
+        low, high, moved = domain_shown(run, from_world=from_world)
         filled = FILLED_BY_FLUID
         if radius > 0.0 and np.linalg.norm(high - low) > 2.0 * MAX_WHOLE_DOMAIN * radius:
             seen = ROOM * seen
@@ -91,9 +94,9 @@ def camera_of(run: Run, shot: Shot, aspect: float | None = None) -> Camera:
                 )
         else:
             if shot.camera.target is None:
-                path = np.broadcast_to(0.5 * (low + high), path.shape)
+                path = 0.5 * (low + high) + moved
             whole = np.array(list(product(*zip(low, high, strict=True))))
-            seen = np.asarray(whole - path[:, None])
+            seen = np.asarray(whole + (moved - path)[:, None])
     elif shot.camera.follow != "bodies":
         seen = ROOM * seen
     return _placed(path, seen, shot.camera, run.times, filled, aspect)

@@ -48,8 +48,11 @@ SLICE_PIXELS = 1024
 class DrawnFluid(Protocol):
     """The fluid in a plotter."""
 
-    def show(self, state: State, focus: Array, toward: Array) -> None:
-        """Show a state to a camera with target `focus` (3,) m in the direction `toward` (3,)."""
+    def show(self, state: State, grid: Grid, focus: Array, toward: Array) -> None:
+        """Show a state on a grid to a camera in the direction `toward` (3,).
+
+        focus  (3,) m, through which a slice goes
+        """
         ...
 
 
@@ -58,7 +61,7 @@ def fluid_in(plotter: pv.Plotter, grid: Grid, visible: Visible, camera: Camera) 
     if isinstance(visible, VisibleDye):
         return Smoke(plotter, grid, visible, camera.height)
     if isinstance(visible, VisibleVortices):
-        return Vortices(plotter, grid, visible)
+        return Vortices(plotter, visible)
     return Slice(plotter, grid, visible, camera.axes(0)[2])
 
 
@@ -67,7 +70,7 @@ class Smoke:
 
     def __init__(self, plotter: pv.Plotter, grid: Grid, dye: VisibleDye, height: float) -> None:
         """`height`: of the view, m."""
-        self._grid, self._dye = grid, dye
+        self._dye = dye
         self._depth = max(
             SMOKE_DEPTH * min(max(grid.shape), height / grid.spacing), MIN_SMOKE_DEPTH
         )
@@ -80,7 +83,7 @@ class Smoke:
         self._added = False
         self._plotter = plotter
 
-    def show(self, state: State, focus: Array, toward: Array) -> None:
+    def show(self, state: State, grid: Grid, focus: Array, toward: Array) -> None:
         colour, strength = self._dye.smoke(state)
         share = np.clip((strength - FAINT) / (FULL - FAINT), 0.0, 1.0)
         density = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
@@ -97,11 +100,11 @@ class Smoke:
         finer = 2 if 8 * size <= MAX_FINE_VOXELS else 1
         lit = np.clip(colour[part] * light[part], 0.0, 1.0)
         voxels = _voxels(lit, share[part], finer)
-        h = self._grid.spacing / finer
+        h = grid.spacing / finer
         image = pv.ImageData(
             dimensions=voxels.shape[:3],
             spacing=(h, h, h),
-            origin=np.array(self._grid.origin) + first * self._grid.spacing + 0.5 * h,
+            origin=np.array(grid.origin) + first * grid.spacing + 0.5 * h,
         )
         image.point_data["voxels"] = voxels.transpose(2, 1, 0, 3).reshape(-1, 4)
         self._mapper.SetInputData(image)
@@ -145,41 +148,39 @@ class VortexSurfaces:
     max_fine  points up to which they are found on a grid twice as fine
     """
 
-    def __init__(
-        self, grid: Grid, vortices: VisibleVortices, max_fine: int = MAX_FINE_POINTS
-    ) -> None:
-        self._vortices = vortices
-        self._finer = 2 if 8 * np.prod(grid.shape) <= max_fine else 1
-        h = grid.spacing / self._finer
-        self._image = pv.ImageData(
-            dimensions=[self._finer * n for n in grid.shape],
+    def __init__(self, vortices: VisibleVortices, max_fine: int = MAX_FINE_POINTS) -> None:
+        self._vortices, self._max_fine = vortices, max_fine
+
+    def of(self, state: State, grid: Grid, toward: Array) -> pv.PolyData:
+        """Triangles; "sense" of their vertices is -1 (clockwise seen from `toward` (3,)) to 1."""
+        finer = 2 if 8 * np.prod(grid.shape) <= self._max_fine else 1
+        h = grid.spacing / finer
+        image = pv.ImageData(
+            dimensions=[finer * n for n in grid.shape],
             spacing=(h, h, h),
             origin=[x + 0.5 * h for x in grid.origin],
         )
-
-    def of(self, state: State, toward: Array) -> pv.PolyData:
-        """Triangles; "sense" of their vertices is -1 (clockwise seen from `toward` (3,)) to 1."""
         for name, values, order in (
             ("q", self._vortices.q(state), 3),
             ("sense", self._vortices.sense(state, toward), 1),
         ):
             fine = values.astype(np.float32)
-            if self._finer > 1:
-                fine = zoom(fine, self._finer, order=order, grid_mode=True, mode="nearest")
-            self._image.point_data[name] = fine.ravel(order="F")
-        return self._image.contour([self._vortices.level], scalars="q")
+            if finer > 1:
+                fine = zoom(fine, finer, order=order, grid_mode=True, mode="nearest")
+            image.point_data[name] = fine.ravel(order="F")
+        return image.contour([self._vortices.level], scalars="q")
 
 
 class Vortices:
     """Surfaces of vortices in a plotter."""
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, vortices: VisibleVortices) -> None:
-        self._surfaces = VortexSurfaces(grid, vortices)
+    def __init__(self, plotter: pv.Plotter, vortices: VisibleVortices) -> None:
+        self._surfaces = VortexSurfaces(vortices)
         self._plotter = plotter
         self._actor: pv.Actor | None = None
 
-    def show(self, state: State, focus: Array, toward: Array) -> None:
-        surface = self._surfaces.of(state, toward)
+    def show(self, state: State, grid: Grid, focus: Array, toward: Array) -> None:
+        surface = self._surfaces.of(state, grid, toward)
         if self._actor is not None:
             self._plotter.remove_actor(self._actor, render=False)
             self._actor = None
@@ -206,13 +207,12 @@ class Slice:
     """
 
     def __init__(self, plotter: pv.Plotter, grid: Grid, number: FieldNumber, toward: Array) -> None:
-        self._grid, self._number = grid, number
+        self._number = number
         self._axis = int(np.argmax(np.abs(toward[:2])))
         first, second = (n for n in range(3) if n != self._axis)
-        low, high = np.array(grid.origin), np.array(grid.upper)
-        self._corners = np.tile(low, (4, 1))
-        self._corners[[1, 2], first] = high[first]
-        self._corners[[2, 3], second] = high[second]
+        self._corners = np.zeros((4, 3))
+        self._corners[[1, 2], first] = grid.spacing * grid.shape[first]
+        self._corners[[2, 3], second] = grid.spacing * grid.shape[second]
         self._quad = pv.PolyData(self._corners, faces=[4, 0, 1, 2, 3])
         self._quad.active_texture_coordinates = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
         sides = np.array([grid.shape[first], grid.shape[second]])
@@ -222,12 +222,13 @@ class Slice:
             self._quad, lighting=False, texture=pv.Texture(np.zeros((2, 2, 3), np.uint8))
         )
 
-    def show(self, state: State, focus: Array, toward: Array) -> None:
+    def show(self, state: State, grid: Grid, focus: Array, toward: Array) -> None:
         """Show the slice of a state through `focus` (3,) m."""
-        cell = (focus[self._axis] - self._grid.origin[self._axis]) / self._grid.spacing
+        cell = (focus[self._axis] - grid.origin[self._axis]) / grid.spacing
         image = self._number.layer(state, self._axis, cell)
         small = Image.fromarray(np.ascontiguousarray(image.transpose(1, 0, 2)[::-1]))
         large = np.asarray(small.resize(self._pixels, Image.Resampling.BICUBIC))
         self._actor.texture = pv.Texture(large)
-        self._corners[:, self._axis] = focus[self._axis]
-        self._quad.points = self._corners.copy()
+        corner = np.array(grid.origin)
+        corner[self._axis] = focus[self._axis]
+        self._quad.points = self._corners + corner

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves
+from flowborne.view.paths import through_window, window_path
 from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows, WindArrows
@@ -23,7 +24,7 @@ from flowborne.view.space.surfaces import (
     force_arrows,
     mesh_of,
 )
-from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground
+from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground, water_of
 from flowborne.view.space.visible import Visible
 
 Array = NDArray[np.float64]
@@ -52,6 +53,7 @@ class Stage:
         shot: Shot,
     ) -> None:
         self._plotter, self._camera, self._forces, self._shot = plotter, camera, forces, shot
+        self._run = run
         self._pixel = pixel
         _light(plotter)
         meshes = [mesh_of(geom) for geom in run.geoms]
@@ -72,15 +74,16 @@ class Stage:
             behind = None if shot.transparent else shot.colour
             self._ground = Ground(plotter, camera.height, np.array(KEY), behind)
         elif camera_moves(camera.focus, camera.height) and not shot.transparent:
-            self._motes = Motes(plotter, camera.height, run.grid)
+            self._motes = Motes(plotter, camera.height, *water_of(run))
         self._edges: list[tuple[Array, pv.Actor]] = []
         if run.grid is not None:
-            self._edges = _edges(plotter, run.grid)
+            self._edges, self._path = _edges(plotter, run.grid), window_path(run)
         elif run.wind.any():
             self._wind = WindArrows(plotter, run, camera, 0.0 if self._ground else -np.inf)
         self._fluid = None
         if run.grid is not None and visible is not None:
             self._fluid = fluid_in(plotter, run.grid, visible, camera)
+            self._through = through_window(run, camera.focus)
 
     def image(self, number: int, state: State) -> Pixels:
         """(height, width, 3 or 4) picture of the `number`-th state, lowest row first."""
@@ -100,8 +103,9 @@ class Stage:
         if self._wind is not None:
             self._wind.show(number, float(state["time"]))
         if self._fluid is not None:
-            self._fluid.show(state, focus, toward)
+            self._fluid.show(state, self._run.grid_at(state), self._through[number], toward)
         for facing, edge in self._edges:
+            edge.position = self._path[number]
             edge.visibility = bool((facing @ toward < 0.0).any())
         shown = force_arrows(self._forces, self._outside, state, self._pixel)
         self._arrows.show(*shown, SHAFT_WIDTH * self._pixel)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.spatial import ConvexHull, QhullError
 
-from flowborne.fluid.grid import Grid
 from flowborne.view import style
 from flowborne.view.framing import swept
 from flowborne.view.glyphs import motes, round_number
@@ -159,15 +158,26 @@ def _texture(shade: NDArray[np.uint8]) -> pv.Texture:
     return pv.Texture(pixels)
 
 
+def water_of(run: Run) -> tuple[Array, Array]:
+    """Lower and upper corner (3,) m of the water; it is endless along axes on which its domain
+    follows bodies, and where there is no fluid."""
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    if run.grid is not None:
+        walled = [axis for axis in range(3) if axis not in run.window_axes]
+        low[walled] = np.array(run.grid.origin)[walled]
+        high[walled] = np.array(run.grid.upper)[walled]
+    return low, high
+
+
 class Motes:
     """Motes, points that are fixed in the water, in a plotter.
 
-    height  m, of the view
-    grid    of the fluid that contains them; None for all of space
+    height     m, of the view
+    low, high  (3,) m, corners of the water
     """
 
-    def __init__(self, plotter: pv.Plotter, height: float, grid: Grid | None) -> None:
-        self._reach, self._grid = MOTES_REACH * height, grid
+    def __init__(self, plotter: pv.Plotter, height: float, low: Array, high: Array) -> None:
+        self._reach, self._low, self._high = MOTES_REACH * height, low, high
         self._mesh = pv.PolyData(motes(MOTES, np.zeros(3), self._reach))
         self._mesh.point_data["colour"] = np.tile(
             style.to_bytes(np.append(style.rgb(style.MOTES), 1.0)), (MOTES, 1)
@@ -183,9 +193,7 @@ class Motes:
         offset = points - focus
         share = 1.0 - np.linalg.norm(offset, axis=1) / self._reach
         share = np.minimum(share, -(offset @ toward) / self._reach)
-        if self._grid is not None:
-            low, high = np.array(self._grid.origin), np.array(self._grid.upper)
-            share[((points < low) | (points > high)).any(axis=1)] = 0.0
+        share[((points < self._low) | (points > self._high)).any(axis=1)] = 0.0
         self._mesh.points = points
         self._mesh.point_data["colour"][:, 3] = style.to_bytes(np.clip(3.0 * share, 0.0, 1.0))
         self._mesh.Modified()

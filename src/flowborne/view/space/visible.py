@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flowborne.runs.states import cell_vorticity, velocity_gradients
 from flowborne.view import style
-from flowborne.view.fields import NUMBERS, FieldNumber, Legend, Scale, dye_colours
+from flowborne.view.fields import NUMBERS, FieldNumber, Legend, Scale, dye_colours, side_weight
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 
@@ -45,6 +45,7 @@ class VisibleDye:
 
     def __init__(self, run: Run) -> None:
         self._dyes, self.legend = dye_colours(run, SAMPLES)
+        self._axes = run.window_axes
 
     def smoke(self, state: State) -> tuple[Single, Single]:
         """Colours (nx, ny, nz, 3) and densities (nx, ny, nz) of the cells, from 0 to 1."""
@@ -54,8 +55,8 @@ class VisibleDye:
             strength = np.clip(np.nan_to_num(state[dye]) / full, 1e-6, 1.0)
             colour += strength[..., None] * style.rgb(name).astype(np.float32)
             weight += strength
-        density = (np.minimum(weight, 1.0) * state["open"]).astype(np.float32)
-        return (colour / weight[..., None]).astype(np.float32), density
+        density = np.minimum(weight, 1.0) * state["open"] * side_weight(weight.shape, self._axes)
+        return (colour / weight[..., None]).astype(np.float32), density.astype(np.float32)
 
 
 class VisibleVortices:
@@ -71,7 +72,7 @@ class VisibleVortices:
 
     def __init__(self, run: Run) -> None:
         assert run.grid is not None
-        self._grid = run.grid
+        self._grid, self._axes = run.grid, run.window_axes
         levels = [_level_of(self.q(state), VORTEX_SHARE) for state in run.sampled(SAMPLES)]
         self.level = float(f"{max(float(np.median(levels)), 1e-12):.2g}")
         self.legend: Legend = (
@@ -80,9 +81,13 @@ class VisibleVortices:
         )
 
     def q(self, state: State) -> Array:
-        """(nx, ny, nz) Q in the cells, 1/s^2; 0 in bodies and where it is not finite."""
+        """(nx, ny, nz) Q in the cells, 1/s^2; 0 in bodies and where it is not finite.
+
+        It goes to 0 at the sides of a domain that follows bodies, so that vortices have ends there.
+        """
         gradients = velocity_gradients(self._grid, state)
         q = -0.5 * np.einsum("ij...,ji...->...", gradients, gradients)
+        q *= side_weight(q.shape, self._axes)
         return np.where(state["open"] > 0.5, np.nan_to_num(q), 0.0)
 
     def sense(self, state: State, toward: Array) -> Array:
