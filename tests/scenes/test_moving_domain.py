@@ -10,6 +10,8 @@ import pytest
 
 import flowborne as fb
 from flowborne.errors import SceneError
+from flowborne.scenes.warn_bodies import fixed_outside
+from flowborne.scenes.window import window_notes
 
 from ..made_runs import numbers, run
 
@@ -27,6 +29,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def toml(value: Any) -> str:
+    """A value of a scene file."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml(one)}" for key, one in value.items()) + " }"
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
 def scene(folder: Path, **domain: Any) -> fb.Scene:
     path = folder / "drift.toml"
     table = {"lower": [-0.4, -0.4], "upper": [0.4, 0.4], "resolution": 32, **domain}
@@ -35,13 +44,8 @@ def scene(folder: Path, **domain: Any) -> fb.Scene:
     lines += ["[solids]", 'model = "drifter.xml"', "[initial]", "velocities = { x = 1.0 }"]
     for name, keys in (("domain", table), ("boundaries", sides)):
         lines += [f"[{name}]"]
-        lines += [
-            f"{key} = " + (f'"{value}"' if isinstance(value, str) else str(list(value)))
-            if not isinstance(value, int)
-            else f"{key} = {value}"
-            for key, value in keys.items()
-        ]
-    path.write_text("\n".join([*lines, "[fluid]"]))
+        lines += [f"{key} = {toml(value)}" for key, value in keys.items()]
+    path.write_text("\n".join([*lines, "[fluid]", ""]))
     return fb.load_scene(path)
 
 
@@ -67,6 +71,44 @@ def test_a_resumed_run_gives_the_same_bits(folder: Path) -> None:
     assert numbers(folder / "whole") == numbers(folder / "parts")
 
 
+def notes(drift: fb.Scene) -> list[str]:
+    return list(window_notes(drift))
+
+
+def test_what_a_domain_leaves_behind_is_said(folder: Path) -> None:
+    assert not notes(scene(folder))
+    assert notes(scene(folder, follow="bodies")) == [
+        "[domain]: it follows bodies, and vortices and dye that it leaves behind are lost"
+    ]
+    drift = scene(folder, follow="drifter", along=["x"])
+    assert notes(drift)[0].startswith("[domain]: it follows drifter along x, and")
+    (folder / "drift.toml").write_text(
+        (folder / "drift.toml").read_text()
+        + '[[dye]]\nkind = "box"\nlower = [-0.1, 0.2]\nupper = [0.1, 0.3]\n'
+    )
+    _, kept = notes(fb.load_scene(folder / "drift.toml"))
+    assert kept == "[domain]: [[dye]] 1 stays in place, and acts only while the domain is there"
+
+
+def test_dye_in_a_stream_goes_along_unless_the_side_moves_across_it(folder: Path) -> None:
+    """Bands through x_min have places in y."""
+    stream = {**SEA, "x_min": {"kind": "inflow", "velocity": [0.1, 0.0]}}
+    bands = '[[dye]]\nkind = "bands"\nside = "x_min"\ncount = 3\nwidth = 0.05\n'
+    for along, expected in ((["x"], 1), (["x", "y"], 2)):
+        scene(folder, follow="bodies", along=along, sides=stream)
+        drift = folder / "drift.toml"
+        drift.write_text(drift.read_text() + bands)
+        assert len(notes(fb.load_scene(drift))) == expected
+
+
+def test_a_body_ahead_of_the_domain_is_not_called_lost(folder: Path) -> None:
+    (folder / "drifter.xml").write_text(DRIFTER.replace('"0.3 0.3 0"', '"0.8 0.2 0"'))
+    for along, lost in ((["x"], False), (["y"], True)):
+        drift = scene(folder, follow="drifter", along=along)
+        setup = fb.Simulation(drift).world.setup
+        assert any(fixed_outside(drift, setup)) == lost
+
+
 @pytest.mark.parametrize(
     ("domain", "said"),
     [
@@ -81,6 +123,16 @@ def test_a_resumed_run_gives_the_same_bits(folder: Path) -> None:
         (
             {"follow": "bodies", "along": ["y"], "sides": {**SEA, "y_min": "closed"}},
             "Make the side far, open or inflow[.]",
+        ),
+        (
+            {
+                "follow": "bodies",
+                "sides": {
+                    **SEA,
+                    "x_min": {"kind": "inflow", "velocity": [1.0, 0.0], "profile": "parabolic"},
+                },
+            },
+            r'x_min: its profile is 0 at the edges of the side, which move along y.*"uniform"',
         ),
     ],
 )

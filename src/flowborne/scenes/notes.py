@@ -23,6 +23,7 @@ from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import SolidsTable
+from flowborne.scenes.window import window_notes
 from flowborne.solids.compiler import MjSpec
 from flowborne.solids.geoms import floors
 from flowborne.solids.joint_kinds import HINGE, SLIDE, joint_kind, joint_unit
@@ -45,6 +46,7 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     yield from clip_notes(scene)
     yield from _standing_still(scene)
     yield from _wide_probes(scene, model)
+    yield from window_notes(scene)
 
 
 def _moved_into_range(scene: Scene, model: SolidModel) -> Iterator[str]:

@@ -214,7 +214,7 @@ def bodies_not_met(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def fixed_outside(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Geoms of bodies that do not move, wholly outside the domain."""
+    """Geoms of bodies that do not move, wholly outside the domain and where it may come to."""
     if setup.fluid is None or scene.domain is None:
         return
     model, domain = setup.solid, scene.domain
@@ -222,6 +222,8 @@ def fixed_outside(scene: Scene, setup: Setup) -> Iterator[str]:
     axes = slice(0, scene.dimensions)
     gone = (high[:, axes] <= domain.lower) | (low[:, axes] >= domain.upper)
     gone &= ~np.array(setup.fluid.boundaries.periodic())[axes]
+    if setup.fluid.window is not None:
+        gone[:, list(setup.fluid.window.axes)] = False
     fixed = ~model.moving[model.geom_body]
     names = [model.geom_names[g] for g in np.flatnonzero(gone.any(axis=1) & fixed)]
     if names:

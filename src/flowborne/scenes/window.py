@@ -11,8 +11,11 @@ from flowborne.coupling.window import centre_of
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.grid import Array
 from flowborne.fluid.window import Window
+from flowborne.phrases import listed
 from flowborne.scenes.draft import Draft
+from flowborne.scenes.dye import DyeBox
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.sides import InflowSide
 from flowborne.solids.model import SolidModel
 from flowborne.tables import triple
 
@@ -74,6 +77,37 @@ def check_window(draft: Draft) -> Iterator[str]:
                 f"beyond a {kind.kind} side there is no fluid. Make the side far, open or inflow"
                 + (f", or give [domain] along = [{others}]." if others else ".")
             )
+        across = [a for a in axes if a != "xyz".index(name[0])]
+        if isinstance(side, InflowSide) and side.profile == "parabolic" and across:
+            yield (
+                f"{draft.at('boundaries', name)}: its profile is 0 at the edges of the side, which "
+                f"move along {listed(['xyz'[a] for a in across])} with the domain. Give profile = "
+                f'"uniform", or [domain] along = ["{name[0]}"].'
+            )
+
+
+def window_notes(scene: Scene) -> Iterator[str]:
+    """What a domain that moves leaves behind, without full stops."""
+    if not followed_by(scene):
+        return
+    assert scene.domain is not None
+    axes = axes_of(scene)
+    along = "" if len(axes) == scene.dimensions else f" along {listed(['xyz'[a] for a in axes])}"
+    yield (
+        f"[domain]: it follows {scene.domain.follow}{along}, and vortices and dye that it leaves "
+        "behind are lost"
+    )
+    fixed = [f"[[sources]] {n}" for n, _ in enumerate(scene.sources, start=1)]
+    fixed += [
+        f"[[dye]] {n}"
+        for n, dye in enumerate(scene.dye, start=1)
+        if isinstance(dye, DyeBox) or dye.axis in axes
+    ]
+    if fixed:
+        yield (
+            f"[domain]: {listed(fixed)} {'stays' if len(fixed) == 1 else 'stay'} in place, and "
+            f"{'acts' if len(fixed) == 1 else 'act'} only while the domain is there"
+        )
 
 
 def check_followed(draft: Draft, model: SolidModel) -> Iterator[str]:
