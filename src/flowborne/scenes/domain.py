@@ -30,8 +30,9 @@ class Domain(Table):
                   `size` may be given
     resolution    cells along the longest side; the other sides are rounded up to whole cells
     cells         instead of `resolution`: cells along each axis
-    follow        the box is a window that moves with the centre of mass of a body, of all
-                  "bodies", or of "nothing"; it moves by whole cells
+    follow        the box moves, by whole cells, with the centre of mass of a body or of all
+                  "bodies"; "nothing" keeps it in place. Dye and vortices that leave it are gone.
+                  The sides across the axes along which it moves are far, open or inflow
     along         axes along which it moves; all of them unless given
     """
 
