@@ -146,15 +146,6 @@ def test_the_solve_takes_no_more_iterations_than_with_open_sides(dimensions: int
     assert found[0] <= found[1] + 1
 
 
-def test_a_uniform_stream_stays_uniform() -> None:
-    world = make_world(grid=box(8, (0.0, 0.0), (2.0, 1.0)), boundaries=FLAT)
-    for values, speed in zip(world.flow()[1].velocity[:2], (1.0, 0.5), strict=True):
-        values[:] = speed
-    advance(world, 0.05, 10)
-    for values, speed in zip(world.flow()[1].velocity[:2], (1.0, 0.5), strict=True):
-        np.testing.assert_allclose(values, speed, rtol=1e-12)
-
-
 SMALL = {"domain.resolution": "16"} | {
     f"boundaries.{side}": "far" for side in ("x_max", "y_min", "y_max")
 }

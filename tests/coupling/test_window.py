@@ -211,3 +211,18 @@ def test_a_channel_stays_tight_as_the_window_moves_along_it() -> None:
             assert not world.flow()[1].velocity[1][:, end].any()
         step(world, DT)
     assert corner(world)[0] > -1.0
+
+
+def test_a_uniform_sea_stays_uniform() -> None:
+    sea = BoundaryFar(velocity=(0.4, 0.3, 0.0))
+    world = windowed(CIRCLE, small(24), (-1.0, 0.4), Boundaries(*(sea,) * 4))
+    assert world.setup.fluid is not None
+    world.setup = world.setup.but(fluid=replace(world.setup.fluid, one_way=True))
+    vars(world.setup).pop("shapes")
+    set_velocity(world, lambda x, y, z: (np.full_like(x, 0.4), np.full_like(x, 0.3), 0.0 * x))
+    before = corner(world)
+    for _ in range(30):
+        step(world, DT)
+    assert corner(world)[0] <= before[0] - 1.0
+    for axis, speed in enumerate((0.4, 0.3)):
+        assert np.abs(world.flow()[1].velocity[axis] - speed).max() < 1e-12

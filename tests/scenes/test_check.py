@@ -12,6 +12,8 @@ from flowborne.scenes.load import check_scene, load_scene
 
 Write = Callable[..., Path]
 
+TURNING = '{ kind = "far", times = [0.0, 1.0], factors = [1.0, -1.0] }'
+
 ONE_FAULT = {
     "a key that is unknown": (
         {"density = 1000.0": "densty = 1000.0"},
@@ -93,6 +95,23 @@ ONE_FAULT = {
         "scene swim.toml, [boundaries]: only the sides across one axis are far or open, and an "
         "endless channel of fluid cannot be set in motion. Make a side across another axis far, or "
         "these open.",
+    ),
+    "far sides in different seas": (
+        {'x_max = "open"': 'x_max = { kind = "far", velocity = [1.0, 0.0] }\ny_min = "far"'},
+        "scene swim.toml, [boundaries] y_min has another velocity or another change in time than "
+        "x_max. Give all of them the same: there is one sea.",
+    ),
+    "a sea that others take part in": (
+        {'x_max = "open"': 'x_max = { kind = "far", velocity = [1.0, 0.0] }\ny_min = "open"'},
+        "scene swim.toml, [boundaries]: far sides have a velocity, and other sides take part in "
+        "the flow. Make every side far, or closed opposite a far one.",
+    ),
+    "a sea that turns back": (
+        {
+            'x_max = "open"': f"x_max = {TURNING}\ny_min = {TURNING}",
+        },
+        "scene swim.toml, [boundaries] x_max: factors [1.0, -1.0] turn the sea's stream around, "
+        "and it leaves through one side only. Keep them at 0 or above.",
     ),
     "a side in z of a plane": (
         {'x_max = "open"': 'x_max = "open"\nz_min = "open"'},

@@ -275,6 +275,18 @@ LIMP = {' stiffness="1"': "", 'joints = ["wrist"]': 'joints = ["shoulder"]'}
 MOVED = SCENE[SCENE.index("[[motion]]") : SCENE.index("[[control]]")]
 
 
+def test_a_fluid_that_starts_unlike_the_sea_around(warned: Warned) -> None:
+    sides = {f"boundaries.{name}_{end}": FLOWING for name in "xy" for end in ("min", "max")}
+    (warning,) = warned(sides)
+    assert warning.startswith(
+        "[fluid] velocity: the fluid starts with [0.0, 0.0, 0.0] m/s in a sea"
+    )
+    assert warned(sides | {"fluid.velocity": "[1.0, 0.5]"}) == []
+
+
+FLOWING = '{ kind = "far", velocity = [1.0, 0.5] }'
+
+
 def test_a_joint_that_hangs_limp_and_what_holds_it(warned: Warned) -> None:
     """The shoulder hangs on the world: a creature may swing there."""
     new = {MOVED: ""} | LIMP

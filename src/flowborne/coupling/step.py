@@ -35,6 +35,7 @@ from flowborne.coupling.bodies_step import (
     step_bodies,
 )
 from flowborne.coupling.cut import cut_by_bodies, departure, jets_at
+from flowborne.coupling.far_field import far_field
 from flowborne.coupling.flow import (
     advect,
     apply_body_force_and_sides,
@@ -103,6 +104,7 @@ def step_coupled(
     fluid, end = world.flow()[0], world.time + dt
     start = departure(world)
     timer.lap("geometry")
+    far = far_field(world, start, dt)
     half = explicit_half_pressure(world, start, dt)  # 1
     timer.lap("advection")
     move_bodies(world, command, dt)  # 2
@@ -113,7 +115,8 @@ def step_coupled(
     transport = leak_proof_transport(world, start, cut, dt)  # 4
     advected, dyed = advect(world, start, half.velocity, transport)  # 5
     mass = face_masses(advected.volumes, fluid.density)
-    velocity = apply_body_force_and_sides(advected.velocity, cut.open, mass, fluid, end, dt)
+    driven_sides = far.drive(advected, mass, cut.open, fluid)
+    velocity = apply_body_force_and_sides(driven_sides.velocity, cut.open, mass, fluid, end, dt)
     timer.lap("advection")
     if not all(np.isfinite(u).all() for u in velocity):
         done.outcome = Outcome.ADVECTION_NOT_FINITE
@@ -124,7 +127,8 @@ def step_coupled(
     jets, limit = jets_at(world, cut, end, pose), command.torque_limit
     solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit, timer)  # 6
     store_state(world, half, advected, dyed, solved, cut, pose)  # 7
-    done.momentum = momentum_balance(world, cut, mass, half, advected, solved)
+    far.store(world)
+    done.momentum = momentum_balance(world, cut, mass, half, driven_sides, solved)
     done.dye_error = dyed.error
     report_coupled(done, world, pose, half.impulse, solved)
     timer.lap("advection")

@@ -19,6 +19,7 @@ from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.state import FluidState, under
+from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
@@ -171,12 +172,12 @@ class World:
     @classmethod
     def at_rest(cls, setup: Setup) -> World:
         """World of `setup` in its model's rest pose, in still fluid."""
-        fluid = setup.fluid
-        return cls(
-            setup,
-            setup.solid.rest(),
-            None if fluid is None else FluidState.at_rest(fluid.grid, fluid.scalars),
-        )
+        fluid, state = setup.fluid, None
+        if fluid is not None:
+            grid = fluid.grid
+            wake = wake_shape(grid, fluid.boundaries.sea(grid))
+            state = FluidState.at_rest(grid, fluid.scalars, wake)
+        return cls(setup, setup.solid.rest(), state)
 
     def flow(self) -> tuple[Fluid, FluidState]:
         """The fluid and its state. Raises ValueError when the world has none."""

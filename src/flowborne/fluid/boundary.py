@@ -12,6 +12,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.sea import Sea, sea_of
 from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.side import Boundary, Place
 from flowborne.kernels.arrays import Integers, Marks
@@ -49,7 +50,7 @@ class Boundaries:
     """The six sides of a domain.
 
     raises  ValueError when one of two opposite sides is periodic and the other is not, or when far
-            sides have nothing open or far across another axis
+            sides have nothing open or far across another axis, or different velocities
     """
 
     x_min: Boundary = WALL
@@ -104,6 +105,10 @@ class Boundaries:
     def _codes(self) -> Integers:
         code = {(False, False): CLOSED, (True, False): OPEN, (False, True): PERIODIC}
         return np.array([[code[side.free, side.joined] for side in pair] for pair in self._pairs])
+
+    def sea(self, grid: Grid) -> Sea | None:
+        """The sea around a grid; raises ValueError as `sea_of` does."""
+        return sea_of(list(self.around(grid)))
 
     def has_free_side(self, grid: Grid) -> bool:
         """Whether the pressure decides what crosses one of the sides."""

@@ -145,8 +145,10 @@ def packed_sides(
             if not own:
                 beyond = PRESCRIBED
             prescribed[n] = np.broadcast_to(np.asarray(wall), layer).reshape(-1)
-        change, still = np.zeros(layer), not own and side.irrotational_inflow(place)
-        if still:
+        change, still = np.zeros(layer), side.irrotational_inflow(place)
+        if own:
+            still &= boundaries.sea(grid) is not None
+        elif still:
             normal = flux[place.axis][place.layer] / grid.face_area
             change = tangential_change(normal, place, component, boundaries.periodic()[component])
         axis = place.axis + grid.is_slab

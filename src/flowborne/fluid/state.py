@@ -23,6 +23,9 @@ class FluidState:
     previous_pressure  p^{n-3/2}, (nx, ny, nz), Pa
     cell_volume        V^n, (nx, ny, nz) open volume of each cell, m^3; empty before the first step
     pose               q^n, (nq,) positions of the bodies for which the volumes hold
+    wake               (sides, bins, k) what has left a domain in a sea, by the side that it left
+                       through (see `fluid.wake`); empty elsewhere
+    sea                (3,) velocity of the sea, m/s; empty before the first step and without one
     scalars            c^n, name -> (nx, ny, nz): dye and smoke
     """
 
@@ -33,17 +36,22 @@ class FluidState:
     previous_pressure: Array
     cell_volume: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     pose: Array = field(default_factory=lambda: np.zeros(0))
+    wake: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    sea: Array = field(default_factory=lambda: np.zeros(0))
     scalars: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
-    def at_rest(cls, grid: Grid, scalars: tuple[str, ...] = ()) -> FluidState:
-        """Still fluid without pressure or dye."""
+    def at_rest(
+        cls, grid: Grid, scalars: tuple[str, ...] = (), wake: tuple[int, int, int] = (0, 0, 0)
+    ) -> FluidState:
+        """Still fluid without pressure or dye, with a wake of this shape."""
         return cls(
             grid.zeros_faces(),
             grid.zeros_faces(),
             grid.zeros_faces(),
             np.zeros(grid.shape),
             np.zeros(grid.shape),
+            wake=np.zeros(wake),
             scalars={name: np.zeros(grid.shape) for name in scalars},
         )
 
@@ -52,7 +60,7 @@ class FluidState:
 
     def arrays(self) -> dict[str, Array]:
         """Every array by a name; `from_arrays` is the way back."""
-        whole = "pressure", "previous_pressure", "cell_volume", "pose"
+        whole = "pressure", "previous_pressure", "cell_volume", "pose", "wake", "sea"
         named = {name: getattr(self, name) for name in whole}
         for name in ("velocity", "velocity_change", "acceleration"):
             for axis, values in zip("xyz", getattr(self, name), strict=True):
@@ -72,6 +80,8 @@ class FluidState:
             arrays["previous_pressure"],
             arrays["cell_volume"],
             arrays["pose"],
+            arrays["wake"],
+            arrays["sea"],
             under("scalar_", arrays),
         )
 

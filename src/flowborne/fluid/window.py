@@ -12,6 +12,7 @@ from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.irrotational import tangential_change
 from flowborne.fluid.sides.side import Boundary, Place
 from flowborne.fluid.state import FluidState
+from flowborne.fluid.wake import followed
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ def moved_fluid(
     upper = cells > 0
     for _ in range(abs(cells)):
         velocity = _with_layer(state.velocity, grid, sides, Place(grid, axis, upper), time)
-        grid = grid.moved(axis, 1 if upper else -1)
+        before, grid = grid, grid.moved(axis, 1 if upper else -1)
         place = Place(grid, axis, upper)
         side = sides.pair(axis)[upper]
         state = replace(
@@ -51,12 +52,21 @@ def moved_fluid(
             pressure=shifted(state.pressure, axis, upper),
             previous_pressure=shifted(state.previous_pressure, axis, upper),
             cell_volume=shifted(state.cell_volume, axis, upper),
+            wake=wake_after_move(state, before, grid, sides),
             scalars={
                 name: shifted(dye, axis, upper, _entering(name, side, place, time))
                 for name, dye in state.scalars.items()
             },
         )
     return state, grid
+
+
+def wake_after_move(state: FluidState, before: Grid, after: Grid, sides: Boundaries) -> Array:
+    """The wake beyond the exit of a domain in a sea, after the grid has moved by a cell."""
+    seas = sides.sea(before), sides.sea(after)
+    if state.wake.size == 0 or seas[0] is None or seas[1] is None:
+        return state.wake
+    return followed(state.wake, state.velocity, seas[0], seas[1])
 
 
 def _entering(name: str, side: Boundary, place: Place, time: float) -> Array | float:

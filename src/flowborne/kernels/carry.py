@@ -34,7 +34,7 @@ both is what the side prescribes, or what is inside the opposite side."""
 AXIS, UPPER, BEYOND, FREE, SUPPLIES, FIRST, IRROTATIONAL = range(7)
 """Columns of the table of sides: where the side lies, what is beyond it, whether it is free and
 whether it supplies fluid (see `fluid.sides.side`), where its layer begins in packed layers, and
-whether what comes in through a free side is beyond it `Sides.change` more than inside."""
+whether what comes in through a free side has `Sides.change` more beyond it than inside."""
 
 
 class Sides(NamedTuple):

@@ -62,7 +62,7 @@ def _check_arrays(
     for name, like in at_rest.items():
         shapes = {like.shape}
         if setup.fluid is not None and like.size == 0:  # the first step fills it
-            shapes |= {setup.fluid.grid.shape, (setup.solid.nq,)}
+            shapes |= {setup.fluid.grid.shape, (setup.solid.nq,), (3,)}
         _check_array(name, arrays[name], shapes, like.dtype)
     for own, shape in memory.items():
         name = f"memory/{own}"

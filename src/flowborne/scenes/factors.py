@@ -6,9 +6,9 @@ from typing import Self
 
 from pydantic import model_validator
 
-from flowborne.motion.inflow import FactorKeyframes
+from flowborne.motion.inflow import Factor, FactorKeyframes, FactorRamp, FactorSteady
 from flowborne.motion.tracks import Curve
-from flowborne.tables import Number, Table, check_keyframes
+from flowborne.tables import NotNegative, Number, Table, check_keyframes
 
 
 class FactorsTable(Table):
@@ -32,3 +32,27 @@ class FactorsTable(Table):
         if self.times is None or self.factors is None:
             return None
         return FactorKeyframes(Curve(self.times, self.factors))
+
+
+class RampTable(FactorsTable):
+    """A table whose amount may rise from rest, or change otherwise.
+
+    ramp  s over which it rises smoothly from rest
+    """
+
+    ramp: NotNegative = 0.0
+
+    @model_validator(mode="after")
+    def _check_ramp(self) -> Self:
+        if self.ramp > 0.0 and self.times is not None:
+            raise ValueError("has both a ramp and keyframes. Keep one of them")
+        return self
+
+    def factor(self) -> Factor:
+        """The part of the amount there is, over time."""
+        ramp = FactorRamp(self.ramp) if self.ramp > 0.0 else FactorSteady()
+        return self.keyframes() or ramp
+
+    def strongest(self) -> float:
+        """Largest size of that part at any time."""
+        return max(map(abs, self.factors)) if self.factors else 1.0

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from typing import Annotated, ClassVar, Literal, Self
-
-from pydantic import model_validator
+from typing import Annotated, ClassVar, Literal
 
 from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.sea import stream_problem
 from flowborne.fluid.sides.closed import BoundaryClosed
-from flowborne.fluid.sides.far import CHANNEL, BoundaryFar, centre_among, in_channel
+from flowborne.fluid.sides.far import CHANNEL, ONE_SEA, BoundaryFar, centre_among, in_channel
 from flowborne.fluid.sides.inflow import BoundaryInflow
 from flowborne.fluid.sides.no_slip import BoundaryNoSlip
 from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.fluid.sides.periodic import BoundaryPeriodic
 from flowborne.fluid.sides.side import Boundary
-from flowborne.motion.inflow import FactorRamp, FactorSteady, InflowProfile
+from flowborne.motion.inflow import InflowProfile
 from flowborne.scenes.domain import Domain
-from flowborne.scenes.factors import FactorsTable
-from flowborne.tables import ByKind, NotNegative, Places, Table, Vector, triple
+from flowborne.scenes.factors import RampTable
+from flowborne.tables import ByKind, Places, Table, Vector, triple
 
 DyeValue = Callable[[Array, Array, Array, float], Array]
 Side = Literal["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
@@ -82,13 +81,26 @@ class OpenSide(AnySideTable):
     kind: Literal["open"]
 
 
-class FarSide(AnySideTable):
-    """Open, with a column of fluid behind each face: bodies in still fluid move as if it went on
-    for ever.
+class FarSide(AnySideTable, RampTable):
+    """Open to a sea, in which bodies move as if the fluid went on for ever.
+
+    velocity  of the sea, m/s; all far sides have the same
+    ramp      s over which it rises smoothly from rest
+    times     s, instead of ramp: keyframes between which `factors` of the velocity change smoothly
     """
 
     boundary = BoundaryFar
     kind: Literal["far"]
+    velocity: Vector = (0.0, 0.0, 0.0)
+
+    def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> BoundaryFar:
+        return BoundaryFar(triple(self.velocity), self.factor())
+
+    def stream(self) -> Vector | None:
+        return self.velocity if any(self.velocity) else None
+
+    def fastest(self, dimensions: int) -> float:
+        return self.strongest() * sum(map(abs, self.velocity))
 
 
 class PeriodicSide(AnySideTable):
@@ -98,7 +110,7 @@ class PeriodicSide(AnySideTable):
     kind: Literal["periodic"]
 
 
-class InflowSide(AnySideTable, FactorsTable):
+class InflowSide(AnySideTable, RampTable):
     """Fluid enters with a given velocity.
 
     velocity  m/s; with profile "parabolic" its mean over the side
@@ -111,16 +123,9 @@ class InflowSide(AnySideTable, FactorsTable):
     kind: Literal["inflow"]
     velocity: Vector
     profile: Literal["uniform", "parabolic"] = "uniform"
-    ramp: NotNegative = 0.0
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.ramp > 0.0 and self.times is not None:
-            raise ValueError("has both a ramp and keyframes. Keep one of them")
-        return self
 
     def build(self, grid: Grid, normal: int, dyes: dict[str, DyeValue]) -> BoundaryInflow:
-        factor = self.keyframes() or (FactorRamp(self.ramp) if self.ramp > 0.0 else FactorSteady())
+        factor = self.factor()
         if self.profile == "uniform":
             return BoundaryInflow(InflowProfile(triple(self.velocity), factor), dyes)
         spans = tuple(
@@ -133,8 +138,7 @@ class InflowSide(AnySideTable, FactorsTable):
 
     def fastest(self, dimensions: int) -> float:
         peak = 1.5 ** (dimensions - 1) if self.profile == "parabolic" else 1.0
-        factor = max(map(abs, self.factors)) if self.factors else 1.0
-        return peak * factor * sum(map(abs, self.velocity))
+        return peak * self.strongest() * sum(map(abs, self.velocity))
 
 
 BoundarySide = Annotated[
@@ -185,6 +189,36 @@ def check_sides(places: Places, boundaries: BoundariesTable, *, slab: bool) -> I
     centre = centre_among(list(zip(kinds[::2], kinds[1::2], strict=True)))
     if any(kind.endless for kind in kinds) and in_channel(centre):
         yield f"{places.at('boundaries')}: {CHANNEL}."
+    yield from _check_sea(places, sides, 2 if slab else 3)
+
+
+def _check_sea(places: Places, sides: dict[str, BoundarySide], dimensions: int) -> Iterator[str]:
+    """All far sides have one velocity, and a stream needs a sea all around."""
+    far = {name: side for name, side in sides.items() if isinstance(side, FarSide)}
+    if not far:
+        return
+    (name, first), *others = far.items()
+    for other, side in others:
+        if side != first:
+            yield (
+                f"{places.at('boundaries', other)} has another velocity or another change in time "
+                f"than {name}. {ONE_SEA}."
+            )
+            return
+    if first.factors and min(first.factors) < 0.0:
+        yield (
+            f"{places.at('boundaries', name)}: factors {list(first.factors)} turn the sea's stream "
+            "around, and it leaves through one side only. Keep them at 0 or above."
+        )
+        return
+    there = [
+        ("xyz".index(name[0]), side.boundary)
+        for name, side in sides.items()
+        if name[0] in "xyz"[:dimensions]
+    ]
+    problem = stream_problem(triple(first.velocity), there)
+    if problem:
+        yield f"{places.at('boundaries')}: {problem}."
 
 
 def check_outlet(

@@ -31,7 +31,7 @@ from flowborne.scenes.warn_bodies import (
     mass_apart,
     thin_bodies,
 )
-from flowborne.scenes.warn_speed import fast_bodies, fast_flow
+from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
 from flowborne.solids.joint_kinds import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -144,6 +144,7 @@ WARNINGS: tuple[Warn, ...] = (
     too_slow,
     limp_joints,
     lying,
+    unlike_the_sea,
 )
 """In the order in which they are listed."""
 

@@ -182,6 +182,21 @@ def _driven_moves(
             yield ends
 
 
+def unlike_the_sea(scene: Scene, setup: Setup) -> Iterator[str]:
+    """A fluid that starts with another velocity than the sea around it."""
+    if scene.fluid is None or setup.fluid is None:
+        return
+    sea = setup.fluid.boundaries.sea(setup.fluid.grid)
+    if sea is None:
+        return
+    inside, around = list(scene.fluid.velocity), sea.velocity(0.0).tolist()
+    if inside != around:
+        yield (
+            f"[fluid] velocity: the fluid starts with {inside} m/s in a sea of {around} m/s, which "
+            f"stops it within a step; give [fluid] velocity = {around}, or far sides its velocity"
+        )
+
+
 def _fastest_times(scene: Scene, setup: Setup, dt: float) -> list[float]:
     """The FASTEST_TIMES steps of the run, s, in whose middle the prescribed motions are fastest."""
     if not setup.motions:

@@ -12,3 +12,4 @@ class BoundaryClosed(Boundary):
     """Free-slip wall: beyond it the field is mirrored."""
 
     kind = "closed"
+    mirrors = True

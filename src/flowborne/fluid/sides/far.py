@@ -5,12 +5,16 @@ Of all multiples of p, dp/dn = -(D - 1) (n.r) / r^2 p fits it best over all dire
 column of fluid of the length r^2 / ((D - 1) n.r) behind each face with p = 0 at its end. r is
 measured from the middle of the domain, so that the matrix stays the same while bodies move; where
 one end of an axis is a mirror, that is at the mirror.
+
+What the vorticity inside does is in `coupling.far_field`. The sea may flow: the side through which
+its stream leaves is open.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from flowborne.fluid.grid import Array
 from flowborne.fluid.sides.open import BoundaryOpen
@@ -26,29 +30,73 @@ CHANNEL = (
 )
 """What is wrong with far sides `in_channel`, and the remedy."""
 
+ONE_SEA = "Give all of them the same: there is one sea"
+"""The remedy where far sides differ."""
+
+
+Velocity = tuple[float, float, float]
+
+
+class Strength(Protocol):
+    """How strong a stream is over time."""
+
+    def at(self, time: float) -> float:
+        """Part of the full velocity at `time` (s), at least 0."""
+        ...
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Always the full velocity."""
+
+    def at(self, time: float) -> float:
+        """1."""
+        return 1.0
+
 
 @dataclass(frozen=True)
 class BoundaryFar(BoundaryOpen):
     """An open side with a column of fluid behind each of its faces.
 
-    centre  from which r is measured; `Boundaries` sets it to that of `centre_among` its sides
+    velocity  of the sea, m/s; all far sides of a domain have the same
+    strength  of it, over time
+    centre    from which r is measured; `Boundaries` sets it to that of `centre_among` its sides
     """
 
+    velocity: Velocity = (0.0, 0.0, 0.0)
+    strength: Strength = Steady()
     centre: Centre = (0.5, 0.5, 0.5)
     kind = "far"
     endless = True
 
     def among(self, pairs: Sequence[Pair]) -> BoundaryFar:
-        """Raises ValueError when nothing is open or far across other axes."""
+        """Raises ValueError when nothing is open or far across other axes, or another far side has
+        another velocity."""
+        for side in (side for pair in pairs for side in pair):
+            if isinstance(side, BoundaryFar) and side.stream != self.stream:
+                raise ValueError(
+                    f"boundaries: far sides have the velocities {list(self.velocity)} and "
+                    f"{list(side.velocity)}, or other strengths. {ONE_SEA}"
+                )
         centre = centre_among(pairs)
         if in_channel(centre):
             raise ValueError(f"boundaries: {CHANNEL}")
         return replace(self, centre=centre)
 
-    def irrotational_inflow(self, place: Place) -> bool:
-        return True
+    @property
+    def stream(self) -> tuple[Velocity, Strength]:
+        return self.velocity, self.strength
 
-    def pressure_weight(self, place: Place) -> Array:
+    def is_exit(self, place: Place) -> bool:
+        """Whether the stream leaves through the side at a place."""
+        return exit_of(self.velocity) == (place.axis, place.upper)
+
+    def irrotational_inflow(self, place: Place) -> bool:
+        return not self.is_exit(place)
+
+    def pressure_weight(self, place: Place) -> Array | float:
+        if self.is_exit(place):
+            return 1.0
         grid, at = place.grid, place.cell_coordinates()
         lengths = {
             axis: at[axis] - (1.0 - part) * grid.origin[axis] - part * grid.upper[axis]
@@ -59,6 +107,13 @@ class BoundaryFar(BoundaryOpen):
         column = distance2 / ((len(lengths) - 1) * abs(lengths[place.axis]))
         half = 0.5 * grid.spacing
         return half / (half + column)
+
+
+def exit_of(velocity: Velocity) -> tuple[int, bool] | None:
+    """Axis, and whether the upper side across it, through which a stream leaves: that which most of
+    it crosses; None without a stream."""
+    axis = max(range(3), key=lambda axis: abs(velocity[axis]))
+    return (axis, velocity[axis] > 0.0) if velocity[axis] else None
 
 
 def centre_among(pairs: Sequence[Pair]) -> Centre:

@@ -108,6 +108,7 @@ class Boundary:
     supplies  whether it prescribes a velocity at which fluid enters
     joined    whether the fluid continues at the opposite side
     endless   whether it continues beyond as if for ever
+    mirrors   whether the flow beyond would be the mirror image of that inside
     """
 
     kind: ClassVar[str]
@@ -115,6 +116,7 @@ class Boundary:
     supplies: ClassVar[bool] = False
     joined: ClassVar[bool] = False
     endless: ClassVar[bool] = False
+    mirrors: ClassVar[bool] = False
 
     @property
     def prescribes(self) -> bool:

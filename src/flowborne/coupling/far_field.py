@@ -1,0 +1,156 @@
+"""The velocity that the sea around a domain gives to its far sides.
+
+At the start of a step, from the state alone (after Weymouth and Lauber 2024, without their
+iteration): the leak-proof field, in which bodies move as they do, is the sea's stream, plus what
+its own circulation induces, that of the wake beyond the exit included (`fluid.wake`), plus what
+mouths and sources bring. The sides have that normal velocity before the solve, which adds what
+happens in the step itself, with a column of fluid behind each face (`fluid.sides.far`):
+
+    u_n+ = u_n + dt p / (rho (h/2 + l))
+
+In a step after the bodies or the flow have been set by hand the sides keep their velocity, as the
+circulation is not yet that of a flow around the bodies. Where the sea's velocity U changes, p is
+the pressure without that which moves the sea, -rho x.dU/dt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flowborne.coupling.advection.scheme import AdvectionResult, Departure
+from flowborne.coupling.cut import moved_since
+from flowborne.coupling.operators import boundary_velocity, leak_proof
+from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.biot_savart import (
+    mirrored,
+    node_circulation,
+    nodes_of,
+    normal_velocity,
+    on_side,
+    source_velocity,
+    stream_function,
+    with_images,
+)
+from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.projection import accelerated
+from flowborne.fluid.sea import Sea, number_of
+from flowborne.fluid.sides.side import Place
+from flowborne.fluid.wake import leaving, moved, wake_line, with_all_circulation_0
+from flowborne.solids.dynamics import kinematics
+
+Normal = tuple[tuple[Place, Array], ...]
+"""Velocity across the faces of sides, like their layers, m/s."""
+
+
+@dataclass(frozen=True)
+class FarField:
+    """What the sea does in a step.
+
+    normal    of each far side but the exit, before the solve
+    wake      at the end of the step, see `FluidState`
+    velocity  (3,) of the sea then, m/s; empty without a sea
+    gained    (3,) what that has changed by, m/s
+    """
+
+    normal: Normal
+    wake: Array
+    velocity: Array
+    gained: Array
+
+    def drive(
+        self, advected: AdvectionResult, mass: Faces, opened: Faces, fluid: Fluid
+    ) -> AdvectionResult:
+        """The fluid after advection where the sides have their velocity; what that took they gave.
+
+        mass, opened  of the faces at the end of the step, kg and open parts
+        """
+        if not self.normal:
+            return advected
+        velocity, stopped = faces_of([u.copy() for u in advected.velocity]), advected.stopped.copy()
+        for place, across in self.normal:
+            velocity[place.axis][place.layer] = across
+        if self.gained.any():
+            rate = accelerated(opened, mass, fluid.grid, fluid.boundaries)
+            for place, pressure in self.beyond(fluid):
+                push = rate[place.axis][place.layer] * pressure
+                velocity[place.axis][place.layer] += push if not place.upper else -push
+        for place in far_places(fluid):
+            change = (velocity[place.axis] - advected.velocity[place.axis])[place.layer]
+            stopped[place.axis] += float((mass[place.axis][place.layer] * change).sum())
+        return replace(advected, velocity=velocity, stopped=stopped)
+
+    def store(self, world: World) -> None:
+        """The sea's part of the state at the end of the step, in place."""
+        state = world.flow()[1]
+        state.wake, state.sea = self.wake, self.velocity
+
+    def beyond(self, fluid: Fluid) -> Iterator[tuple[Place, Array]]:
+        """Of each far side p dt of the sea's change at the end of the columns, Pa s, so that a
+        uniform flow changes alike."""
+        for place in far_places(fluid):
+            at = list(place.cell_coordinates())
+            if any(place is driven for driven, _ in self.normal):
+                inside = -0.5 if place.upper else 0.5
+                at[place.axis] = at[place.axis] + inside * fluid.grid.spacing
+            yield (
+                place,
+                -fluid.density * sum(x * du for x, du in zip(at, self.gained, strict=True)),
+            )
+
+
+def far_places(fluid: Fluid) -> tuple[Place, ...]:
+    """Where the far sides of a domain in a sea are."""
+    sea = fluid.boundaries.sea(fluid.grid)
+    return () if sea is None else sea.far
+
+
+def far_field(world: World, start: Departure, dt: float) -> FarField:
+    """What the sea does in a step of dt (s) from `start`."""
+    fluid, state = world.flow()
+    sea = fluid.boundaries.sea(fluid.grid)
+    if sea is None or not fluid.grid.is_slab:
+        return FarField((), state.wake, state.sea, np.zeros(3))
+    velocity = sea.velocity(world.time + dt)
+    gained = velocity - (state.sea if state.sea.size else sea.velocity(world.time))
+    if moved_since(world):
+        kept = tuple(
+            (place, state.velocity[place.axis][place.layer] + gained[place.axis])
+            for place in sea.driven
+        )
+        return FarField(kept, state.wake, velocity, gained)
+    moving = boundary_velocity(kinematics(start.solid, start.bodies.q), start.bodies.v)
+    field = leak_proof(state.velocity, start.cut, moving, fluid.grid)
+    induced, wake = induced_in_slab(field, sea, state.wake, dt)
+    cells = np.flatnonzero(start.rate)
+    x, y, _ = fluid.grid.cell_coordinates()
+    i, j, _ = np.unravel_index(cells, start.rate.shape)
+    points = mirrored(np.stack([x[i], y[j]], axis=1), sea.mirrors)
+    rates = np.tile(start.rate.reshape(-1)[cells], len(points) // max(1, cells.size))
+    normal = tuple(
+        (place, velocity[place.axis] + across + source_velocity(points, rates, place))
+        for place, across in induced
+    )
+    return FarField(normal, wake, velocity, gained)
+
+
+def induced_in_slab(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
+    """What the circulation of a leak-proof field and of its wake induces across the far sides but
+    the exit, and the wake a step later."""
+    circulation = node_circulation(field, sea.far[0].grid)
+    extended, inside = with_images(circulation, sea.mirrors)
+    potential = stream_function(extended)[inside] if circulation.any() else circulation
+    sides = {place: on_side(potential, place) for place in sea.driven}
+    later = np.zeros(wake.shape)
+    if sea.exit is not None:
+        line, bins = wake_line(sea), wake[number_of(sea.exit)]
+        if not sea.mirrors:
+            bins = with_all_circulation_0(bins, float(circulation.sum()))
+        for place, values in sides.items():
+            values += line.stream_function(bins, nodes_of(place), bool(sea.mirrors))
+        rate, speed = leaving(circulation, field, sea.exit, line)
+        part = min(1.0, speed * dt / line.length)
+        later[number_of(sea.exit)] = moved(bins, rate, part, dt)
+    return tuple((place, normal_velocity(values, place)) for place, values in sides.items()), later
