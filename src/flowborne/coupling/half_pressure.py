@@ -50,6 +50,8 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
 
     It is 0 if the bodies have been moved since, with the paper's own advection, and in a domain
     with an open side: fluid that comes in there brings energy, which the step without it damps.
+    Behind a far side there is a sea, and what comes in has no more energy than that has; the
+    pressure that changes the sea's velocity is not half of it given beforehand.
 
     The rest of the last pressure stays in the state, as the first guess of the solve.
     """
@@ -58,7 +60,8 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     mass = face_masses(start.volumes, fluid.density)
     momentum = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
-    plain = sides.has_free_side(grid) or not fluid.advection.explicit_half_pressure
+    plain = sides.gain_energy(grid) or not fluid.advection.explicit_half_pressure
+    plain |= sea_changes(world, dt)
     if plain or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)
         return HalfPressure(state.velocity, *still, momentum)
@@ -80,6 +83,18 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     pushed = dt * side_push(half, opened, grid, sides)
     impulse = pressure_push(start.cut, dt * half, size)
     return HalfPressure(velocity, half, impulse, pushed, momentum)
+
+
+def sea_changes(world: World, dt: float) -> bool:
+    """Whether the sea around the domain has another velocity at the end of a step of dt (s) than at
+    its start, or than a step before."""
+    fluid, state = world.flow()
+    sea = fluid.boundaries.sea(fluid.grid)
+    if sea is None:
+        return False
+    before = sea.velocity(max(0.0, world.time - dt)), state.sea if state.sea.size else None
+    after = sea.velocity(world.time + dt)
+    return any(known is not None and not np.array_equal(known, after) for known in before)
 
 
 def pressure_increment_ratio(earlier: float) -> float:

@@ -114,6 +114,10 @@ class Boundaries:
         """Whether the pressure decides what crosses one of the sides."""
         return any(side.free for _, side in self.around(grid))
 
+    def gain_energy(self, grid: Grid) -> bool:
+        """Whether fluid that comes in through one of the sides may bring energy."""
+        return any(side.free and not side.endless for _, side in self.around(grid))
+
     def check(self, grid: Grid) -> None:
         """Raise ValueError when a slab's z sides are not closed."""
         if grid.is_slab and self.pair(2) != (WALL, WALL):
