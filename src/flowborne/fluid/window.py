@@ -35,12 +35,13 @@ def moved_fluid(
     """State and grid after the grid has moved by some cells along an axis.
 
     Each layer of cells that comes in continues the fluid beyond the side: with the velocity that
-    the side prescribes, and behind a free side without vorticity and divergence. Pressure and what
-    the last step changed are those at the side; there is no dye but what the side lets in.
+    the side prescribes, else without vorticity and divergence where far sides answer the vorticity
+    inside, else with that which the side has beyond it. Pressure and what the last step changed
+    are those at the side; there is no dye but what the side lets in.
     """
     upper = cells > 0
     for _ in range(abs(cells)):
-        velocity = _with_layer(state.velocity, grid, sides, Place(grid, axis, upper), time)
+        velocity = _with_layer(state, sides, Place(grid, axis, upper), time)
         before, grid = grid, grid.moved(axis, 1 if upper else -1)
         place = Place(grid, axis, upper)
         side = sides.pair(axis)[upper]
@@ -75,30 +76,47 @@ def _entering(name: str, side: Boundary, place: Place, time: float) -> Array | f
     return 0.0 if found is None else found
 
 
-def _with_layer(
-    velocity: Faces, grid: Grid, sides: Boundaries, beyond: Place, time: float
-) -> Faces:
+def _with_layer(state: FluidState, sides: Boundaries, beyond: Place, time: float) -> Faces:
     """Velocity on the faces of a grid that has moved by a cell beyond a side."""
-    axis, upper = beyond.axis, beyond.upper
+    grid, axis, upper = beyond.grid, beyond.axis, beyond.upper
     side, new = sides.pair(axis)[upper], Place(grid.moved(axis, 1 if upper else -1), axis, upper)
-    outwards, through = 1.0 if upper else -1.0, velocity[axis][beyond.layer]
-    found, spread = list(velocity), np.zeros(through.shape)
-    for component in grid.axes:
-        if component == axis:
-            continue
-        change = tangential_change(through, beyond, component, sides.periodic()[component])
-        for end, beside in zip((slice(1), slice(-1, None)), sides.pair(component), strict=True):
-            if beside.prescribes:
-                change[edge(component, end)] = 0.0
-        layer = velocity[component][beyond.layer] + change
+    # far sides that answer the vorticity inside hold what the next move starts from. Where they do
+    # not, waves that grow outwards, by 1 + k h in a cell, would do so again with every move
+    layers = (
+        _irrotational(state.velocity, sides, beyond)
+        if state.wake.size > 0
+        else [
+            side.velocity_beyond(state.velocity[component][beyond.layer], beyond, component, time)
+            for component in grid.axes
+        ]
+    )
+    found = list(state.velocity)
+    for component, layer in enumerate(layers):
         told = side.prescribed_velocity(new, component, time)
-        if told is not None:
-            layer[:] = told
-        spread += np.diff(layer, axis=component)
-        found[component] = shifted(velocity[component], axis, upper, layer)
-    found[axis] = shifted(velocity[axis], axis, upper, through - outwards * spread)
+        if told is not None and component != axis:
+            layer = np.broadcast_to(told, layer.shape)
+        found[component] = shifted(state.velocity[component], axis, upper, layer)
     side.impose(found[axis], new, time)
     return faces_of(found)
+
+
+def _irrotational(velocity: Faces, sides: Boundaries, beyond: Place) -> list[Array]:
+    """Layers of the components a cell beyond a side, without vorticity and divergence, m/s."""
+    axis, upper = beyond.axis, beyond.upper
+    through = velocity[axis][beyond.layer]
+    layers, spread = [], np.zeros(through.shape)
+    for component in beyond.grid.axes:
+        layer = velocity[component][beyond.layer]
+        if component != axis:
+            change = tangential_change(through, beyond, component, sides.periodic()[component])
+            for end, beside in zip((slice(1), slice(-1, None)), sides.pair(component), strict=True):
+                if beside.prescribes:
+                    change[edge(component, end)] = 0.0
+            layer = layer + change
+            spread += np.diff(layer, axis=component)
+        layers.append(layer)
+    layers[axis] = through - spread if upper else through + spread
+    return layers
 
 
 def shifted(values: Array, axis: int, upper: bool, layer: Array | float | None = None) -> Array:

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from flowborne.fluid.grid import Array
+from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.fluid.sides.side import Boundary, Pair, Place
 
@@ -97,16 +97,30 @@ class BoundaryFar(BoundaryOpen):
     def pressure_weight(self, place: Place) -> Array | float:
         if self.is_exit(place):
             return 1.0
-        grid, at = place.grid, place.cell_coordinates()
-        lengths = {
+        lengths = self._lengths(place.grid, place.cell_coordinates())
+        distance2 = sum(length**2 for length in lengths.values())
+        column = distance2 / ((len(lengths) - 1) * abs(lengths[place.axis]))
+        half = 0.5 * place.grid.spacing
+        return half / (half + column)
+
+    def velocity_beyond(self, velocity: Array, place: Place, component: int, time: float) -> Array:
+        """That of the sea, and what differs from it falls as the velocity of a dipole, r^-D."""
+        lengths, h = (
+            self._lengths(place.grid, place.face_coordinates(component)),
+            place.grid.spacing,
+        )
+        distance2 = sum(length**2 for length in lengths.values())
+        farther2 = distance2 + h * (2.0 * abs(lengths[place.axis]) + h)
+        sea = self.strength.at(time) * self.velocity[component]
+        return sea + (velocity - sea) * (distance2 / farther2) ** (0.5 * len(lengths))
+
+    def _lengths(self, grid: Grid, at: tuple[Array, Array, Array]) -> dict[int, Array]:
+        """Components of r at places, by axis, m."""
+        return {
             axis: at[axis] - (1.0 - part) * grid.origin[axis] - part * grid.upper[axis]
             for axis in grid.axes
             if (part := self.centre[axis]) is not None
         }
-        distance2 = sum(length**2 for length in lengths.values())
-        column = distance2 / ((len(lengths) - 1) * abs(lengths[place.axis]))
-        half = 0.5 * grid.spacing
-        return half / (half + column)
 
 
 def exit_of(velocity: Velocity) -> tuple[int, bool] | None:

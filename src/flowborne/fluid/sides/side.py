@@ -168,6 +168,13 @@ class Boundary:
         `irrotational.tangential_change`, and not the mean along a free side."""
         return False
 
+    def velocity_beyond(self, velocity: Array, place: Place, component: int, time: float) -> Array:
+        """A component of velocity a cell beyond the side, from that in the layer at it, m/s.
+
+        velocity  indexed as `Place.face_coordinates` of the component
+        """
+        return velocity
+
     def entering_scalar(self, name: str, place: Place, time: float) -> Array | None:
         """Values of a scalar in fluid that enters; None for those in the cells at the side."""
         return None
