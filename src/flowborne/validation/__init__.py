@@ -32,6 +32,7 @@ MODULES = {
     "rexeel": ("R1",),
     "scalar_cases": ("F4",),
     "scatter": ("K12", "K13"),
+    "sea": ("B8", "I11"),
     "settling": ("V1", "V2"),
     "swimmers": ("S1", "S5"),
 }
