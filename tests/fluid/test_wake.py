@@ -8,19 +8,13 @@ import pytest
 from flowborne.fluid.biot_savart import node_circulation, nodes_of
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.induced import after_move
 from flowborne.fluid.sea import Sea
 from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.side import Place
-from flowborne.fluid.wake import (
-    BIN,
-    BINS,
-    followed,
-    leaving,
-    moved,
-    wake_line,
-    with_all_circulation_0,
-)
+from flowborne.fluid.wake import BIN, BINS, moved, wake_line, with_all_circulation_0
+from flowborne.fluid.wake_slab import across, leaving, stream_function
 
 GRID = Grid.slab(12, 8, 0.5, (-1.0, 2.0))
 
@@ -57,10 +51,10 @@ def test_far_away_bins_induce_what_their_vortices_do() -> None:
     bins, nodes = np.zeros((BINS, 2)), nodes_of(Place(GRID, 1, False))
     offsets, vortices = np.array([0.4, -0.2]), np.array([1.0, -0.7])
     bins[40] = vortices.sum(), vortices @ offsets
-    places = line.middles()[40] + offsets[:, None] * line.across
+    places = line.middles[40] + offsets[:, None] * across(line)
     away = np.linalg.norm(nodes[:, None] - places, axis=2)
     expected = -np.log(away) @ vortices / (2.0 * np.pi)
-    found = line.stream_function(bins, nodes, False)
+    found = stream_function(line, bins, nodes)
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-4)
 
 
@@ -69,11 +63,11 @@ def test_the_last_bin_goes_on_for_ever() -> None:
     line, nodes = wake_line(sea(1.0, 0.0)), nodes_of(Place(GRID, 1, True))
     bins = np.zeros((BINS, 2))
     bins[:, 1] = 0.3
-    found = np.diff(line.stream_function(bins, nodes, False))
+    found = np.diff(stream_function(line, bins, nodes))
     many = line.start + np.multiply.outer(line.length * (np.arange(100 * BINS) + 0.5), line.along)
     away = nodes[:, None] - many
     square = (away**2).sum(axis=2)
-    expected = np.diff((0.3 * (away @ line.across) / square).sum(axis=1) / (2.0 * np.pi))
+    expected = np.diff((0.3 * (away @ across(line)) / square).sum(axis=1) / (2.0 * np.pi))
     np.testing.assert_allclose(found, expected, rtol=0.02)
 
 
@@ -88,16 +82,16 @@ def test_what_leaves_goes_on_and_is_kept() -> None:
     total = circulation[-2].sum()
     assert speed == pytest.approx(2.0)
     np.testing.assert_allclose(rate, [4.0 * total, 4.0 * total * -0.5])
-    bins = moved(np.zeros((BINS, 2)), rate, 0.1, 0.25)
+    bins = moved(np.zeros((BINS, 2)), 0.25 * rate, 0.1)
     for _ in range(100):
-        bins = moved(bins, np.zeros(2), 0.1, 0.25)
+        bins = moved(bins, np.zeros(2), 0.1)
     np.testing.assert_allclose(bins.sum(axis=0), 0.25 * rate)
     assert np.average(np.arange(BINS), weights=np.abs(bins[:, 0])) == pytest.approx(10.0, abs=0.1)
 
 
 def test_all_circulation_adds_up_to_0() -> None:
     bins = np.random.default_rng(2).normal(size=(BINS, 2))
-    closed = with_all_circulation_0(bins, 0.75)
+    closed = with_all_circulation_0(bins, np.array([0.75]))
     assert closed[:, 0].sum() == pytest.approx(-0.75)
     np.testing.assert_array_equal(closed[1:], bins[1:])
     np.testing.assert_array_equal(closed[:, 1], bins[:, 1])
@@ -116,7 +110,7 @@ def test_the_wake_stays_in_the_world_when_the_domain_moves(way: tuple[int, int])
     def induced(grid: Grid, wake: Array) -> Array:
         sea = sides.sea(grid)
         assert sea is not None
-        return wake_line(sea).stream_function(wake[1], far, mirrored=False)
+        return stream_function(wake_line(sea), wake[1], far)
 
     still, here, wake = grid.zeros_faces(), grid, bins
     for axis, cells in enumerate(way):
@@ -125,7 +119,7 @@ def test_the_wake_stays_in_the_world_when_the_domain_moves(way: tuple[int, int])
             before, after = sides.sea(here), sides.sea(there)
             assert before is not None
             assert after is not None
-            wake, here = followed(wake, still, before, after), there
+            wake, here = after_move(wake, still, before, after), there
     assert induced(here, wake) == pytest.approx(induced(grid, bins), rel=2e-3)
 
 
@@ -137,6 +131,6 @@ def test_what_the_exit_leaves_behind_goes_into_the_wake() -> None:
     seas = sides.sea(grid), sides.sea(grid.moved(0, -1))
     assert seas[0] is not None
     assert seas[1] is not None
-    wake = followed(np.zeros((4, BINS, 2)), velocity, *seas)
+    wake = after_move(np.zeros((4, BINS, 2)), velocity, *seas)
     assert wake[1, 0] == pytest.approx([0.0, 0.1 * 0.1 * 1.0])
     assert not wake[1, 1:].any()

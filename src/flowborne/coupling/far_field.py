@@ -24,25 +24,11 @@ from flowborne.coupling.advection.scheme import AdvectionResult, Departure
 from flowborne.coupling.cut import moved_since
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.biot_savart import (
-    mirrored,
-    node_circulation,
-    nodes_of,
-    normal_velocity,
-    on_side,
-    source_velocity,
-    stream_function,
-    with_images,
-)
 from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.induced import Normal, brought, induced
 from flowborne.fluid.projection import accelerated
-from flowborne.fluid.sea import Sea, number_of
 from flowborne.fluid.sides.side import Place
-from flowborne.fluid.wake import leaving, moved, wake_line, with_all_circulation_0
 from flowborne.solids.dynamics import kinematics
-
-Normal = tuple[tuple[Place, Array], ...]
-"""Velocity across the faces of sides, like their layers, m/s."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +56,7 @@ class FarField:
         if not self.normal:
             return advected
         velocity, stopped = faces_of([u.copy() for u in advected.velocity]), advected.stopped.copy()
-        for place, across in self.normal:
+        for place, across in self.normal.items():
             velocity[place.axis][place.layer] = across
         if self.gained.any():
             rate = accelerated(opened, mass, fluid.grid, fluid.boundaries)
@@ -92,7 +78,7 @@ class FarField:
         uniform flow changes alike."""
         for place in far_places(fluid):
             at = list(place.cell_coordinates())
-            if any(place is driven for driven, _ in self.normal):
+            if place in self.normal:
                 inside = -0.5 if place.upper else 0.5
                 at[place.axis] = at[place.axis] + inside * fluid.grid.spacing
             yield (
@@ -111,46 +97,24 @@ def far_field(world: World, start: Departure, dt: float) -> FarField:
     """What the sea does in a step of dt (s) from `start`."""
     fluid, state = world.flow()
     sea = fluid.boundaries.sea(fluid.grid)
-    if sea is None or not fluid.grid.is_slab:
-        return FarField((), state.wake, state.sea, np.zeros(3))
+    if sea is None:
+        return FarField({}, state.wake, state.sea, np.zeros(3))
     velocity = sea.velocity(world.time + dt)
     gained = velocity - (state.sea if state.sea.size else sea.velocity(world.time))
     if moved_since(world):
-        kept = tuple(
-            (place, state.velocity[place.axis][place.layer] + gained[place.axis])
+        kept = {
+            place: state.velocity[place.axis][place.layer] + gained[place.axis]
             for place in sea.driven
-        )
+        }
         return FarField(kept, state.wake, velocity, gained)
     moving = boundary_velocity(kinematics(start.solid, start.bodies.q), start.bodies.v)
     field = leak_proof(state.velocity, start.cut, moving, fluid.grid)
-    induced, wake = induced_in_slab(field, sea, state.wake, dt)
-    cells = np.flatnonzero(start.rate)
-    x, y, _ = fluid.grid.cell_coordinates()
-    i, j, _ = np.unravel_index(cells, start.rate.shape)
-    points = mirrored(np.stack([x[i], y[j]], axis=1), sea.mirrors)
-    rates = np.tile(start.rate.reshape(-1)[cells], len(points) // max(1, cells.size))
-    normal = tuple(
-        (place, velocity[place.axis] + across + source_velocity(points, rates, place))
-        for place, across in induced
+    normal, wake = induced(field, sea, state.wake, dt)
+    for place, values in brought(start.rate, sea).items():
+        normal[place] = normal[place] + values
+    return FarField(
+        {place: values + velocity[place.axis] for place, values in normal.items()},
+        wake,
+        velocity,
+        gained,
     )
-    return FarField(normal, wake, velocity, gained)
-
-
-def induced_in_slab(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
-    """What the circulation of a leak-proof field and of its wake induces across the far sides but
-    the exit, and the wake a step later."""
-    circulation = node_circulation(field, sea.far[0].grid)
-    extended, inside = with_images(circulation, sea.mirrors)
-    potential = stream_function(extended)[inside] if circulation.any() else circulation
-    sides = {place: on_side(potential, place) for place in sea.driven}
-    later = np.zeros(wake.shape)
-    if sea.exit is not None:
-        line, bins = wake_line(sea), wake[number_of(sea.exit)]
-        if not sea.mirrors:
-            bins = with_all_circulation_0(bins, float(circulation.sum()))
-        for place, values in sides.items():
-            values += line.stream_function(bins, nodes_of(place), bool(sea.mirrors))
-        rate, speed = leaving(circulation, field, sea.exit, line)
-        part = min(1.0, speed * dt / line.length)
-        later[number_of(sea.exit)] = moved(bins, rate, part, dt)
-    return tuple((place, normal_velocity(values, place)) for place, values in sides.items()), later

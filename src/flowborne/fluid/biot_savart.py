@@ -1,17 +1,14 @@
 """What vorticity in a slab induces on the sides of the domain, by Biot and Savart's law.
 
 A field without divergence has the stream function  psi = -(1/2 pi) sum w ln r  of the circulations
-w around its nodes, up to an irrotational stream. The sum over all nodes is a convolution, computed
-by Fourier transforms of twice the size: with no images, and to rounding.
+w around its nodes, up to an irrotational stream (`convolution`).
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
-from scipy import fft
 
+from flowborne.fluid.convolution import on_planes
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.sides.side import Place
 
@@ -23,24 +20,6 @@ def node_circulation(velocity: Faces, grid: Grid) -> Array:
     turning = np.diff(v[:, 1:-1], axis=0) - np.diff(u[1:-1], axis=1)
     np.multiply(grid.spacing, turning, out=nodes[1:-1, 1:-1])
     return nodes
-
-
-@lru_cache(maxsize=8)
-def _transform(size: tuple[int, int]) -> Array:
-    """Transform of -(1/2 pi) ln r, r in cells, around a ring of `size` cells each way."""
-    x, y = (np.minimum(np.arange(n), n - np.arange(n)) for n in size)
-    square = np.add.outer(x**2, y**2)
-    square[0, 0] = 1
-    found: Array = fft.rfft2(np.log(square) / (-4.0 * np.pi)).real.copy()
-    return found
-
-
-def stream_function(circulation: Array) -> Array:
-    """(nx+1, ny+1) stream function at the nodes, m^2/s, of circulations (nx+1, ny+1) there."""
-    nx, ny = circulation.shape
-    size = fft.next_fast_len(2 * nx - 1, real=True), fft.next_fast_len(2 * ny - 1, real=True)
-    product = fft.rfft2(circulation, size) * _transform(size)
-    return np.asarray(fft.irfft2(product, size)[:nx, :ny])
 
 
 def with_images(circulation: Array, mirrors: tuple[Place, ...]) -> tuple[Array, tuple[slice, ...]]:
@@ -60,10 +39,19 @@ def with_images(circulation: Array, mirrors: tuple[Place, ...]) -> tuple[Array, 
     return circulation, tuple(inside)
 
 
-def on_side(field: Array, place: Place) -> Array:
-    """Copy of the values of a field of the nodes (nx+1, ny+1) on a side of a slab."""
-    end = -1 if place.upper else 0
-    return (field[end] if place.axis == 0 else field[:, end]).copy()
+def stream_functions(
+    circulation: Array, grid: Grid, mirrors: tuple[Place, ...]
+) -> dict[Place, Array]:
+    """Stream function at the nodes of each side of a slab, m^2/s, of circulations (nx+1, ny+1)
+    around the nodes inside and of their images."""
+    extended, inside = with_images(circulation, mirrors)
+    found = {}
+    for axis in (0, 1):
+        first, stop, _ = inside[axis].indices(extended.shape[axis])
+        planes = on_planes(extended, axis, (first, stop - 1))
+        for upper, values in zip((False, True), planes, strict=True):
+            found[Place(grid, axis, upper)] = values[inside[1 - axis]]
+    return found
 
 
 def nodes_of(place: Place) -> Array:
@@ -89,20 +77,8 @@ def source_velocity(points: Array, rates: Array, place: Place) -> Array:
     points  (n, 2) m
     rates   (n,) m^2/s
     """
-    if not rates.any():
-        return np.zeros(())
     x, y = (nodes_of(place)[:, None, :] - points).transpose(2, 0, 1)
     cross, along = x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:]
     flux = np.abs(np.arctan2(cross, along)) @ rates / (2.0 * np.pi * place.grid.spacing)
     outward = flux if place.upper else -flux
     return outward[None, :, None] if place.axis == 0 else outward[:, None, None]
-
-
-def mirrored(points: Array, mirrors: tuple[Place, ...]) -> Array:
-    """Points (n, 2) in m, and their images behind mirrors (m n, 2)."""
-    for place in mirrors:
-        image = points.copy()
-        at = (place.grid.upper if place.upper else place.grid.origin)[place.axis]
-        image[:, place.axis] = 2.0 * at - image[:, place.axis]
-        points = np.concatenate([points, image])
-    return points

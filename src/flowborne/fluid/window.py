@@ -9,10 +9,10 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.induced import after_move
 from flowborne.fluid.irrotational import tangential_change
 from flowborne.fluid.sides.side import Boundary, Place
 from flowborne.fluid.state import FluidState
-from flowborne.fluid.wake import followed
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def wake_after_move(state: FluidState, before: Grid, after: Grid, sides: Boundar
     seas = sides.sea(before), sides.sea(after)
     if state.wake.size == 0 or seas[0] is None or seas[1] is None:
         return state.wake
-    return followed(state.wake, state.velocity, seas[0], seas[1])
+    return after_move(state.wake, state.velocity, seas[0], seas[1])
 
 
 def _entering(name: str, side: Boundary, place: Place, time: float) -> Array | float:

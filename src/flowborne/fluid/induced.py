@@ -1,0 +1,118 @@
+"""What the circulation of a field and of its wake induces across the far sides of a domain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flowborne.fluid import biot_savart, vector_potential, wake_room, wake_slab
+from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.sea import Sea, number_of
+from flowborne.fluid.sides.side import Place
+from flowborne.fluid.wake import followed, moved, wake_line, with_all_circulation_0
+
+Normal = dict[Place, Array]
+"""Velocity across the faces of sides, like their layers, m/s."""
+
+POOL = 8
+"""Cells along each edge of a block in which sources of one sign act as one."""
+
+
+def induced(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
+    """Of a leak-proof field, for every far side but the exit; and the wake a step later."""
+    in_domain = in_slab if sea.far[0].grid.is_slab else in_room
+    return in_domain(field, sea, wake, dt)
+
+
+def in_slab(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
+    """`induced` in two dimensions."""
+    grid, later = sea.far[0].grid, np.zeros(wake.shape)
+    circulation = biot_savart.node_circulation(field, grid)
+    sides = biot_savart.stream_functions(circulation, grid, sea.mirrors)
+    if sea.exit is not None:
+        line, number = wake_line(sea), number_of(sea.exit)
+        bins = with_all_circulation_0(wake[number], circulation.sum(keepdims=True).ravel())
+        whole = bins * wake_slab.IMAGES if sea.mirrors else bins
+        for place in sea.driven:
+            sides[place] += wake_slab.stream_function(line, whole, biot_savart.nodes_of(place))
+        rate, speed = wake_slab.leaving(circulation, field, sea.exit, line)
+        later[number] = moved(bins, dt * rate, min(1.0, speed * dt / line.length))
+    return {p: biot_savart.normal_velocity(sides[p], p) for p in sea.driven}, later
+
+
+def in_room(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
+    """`induced` in three dimensions."""
+    grid, later = sea.far[0].grid, np.zeros(wake.shape)
+    x, y, z = (vector_potential.edge_circulation(field, grid, axis) for axis in range(3))
+    sides = vector_potential.potentials((x, y, z), grid, sea.mirrors)
+    ends: Normal = {place: np.zeros(()) for place in sea.driven}
+    if sea.exit is not None:
+        line, number = wake_line(sea), number_of(sea.exit)
+        inside = grid.spacing * np.array([x.sum(), y.sum(), z.sum()])
+        bins = with_all_circulation_0(wake[number], inside)
+        whole = bins * wake_room.images(sea.mirrors)
+        source = np.array([wake_room.source_rate(line, whole)])
+        groups = wake_room.grouped(line, whole)
+        for place in sea.driven:
+            for axis, values in sides[place].items():
+                edges = vector_potential.edges_of(place, axis)
+                values += wake_room.potential(groups, edges, axis).reshape(values.shape)
+            if source.any():
+                ends[place] = vector_potential.source_velocity(line.end, source, place)
+        rate, speed = wake_room.leaving((x, y, z), field, sea.exit, line)
+        later[number] = moved(bins, dt * rate, min(1.0, speed * dt / line.length))
+    return {
+        place: vector_potential.normal_velocity(sides[place], place) + ends[place]
+        for place in sea.driven
+    }, later
+
+
+def after_move(wake: Array, velocity: Faces, before: Sea, after: Sea) -> Array:
+    """The wake beyond a domain that has moved by a cell.
+
+    velocity       on the faces before, m/s
+    before, after  the sea around the domain
+    """
+    if before.exit is None or after.exit is None:
+        return wake
+    place, grid, found = before.exit, before.exit.grid, wake.copy()
+    old, new = wake_line(before), wake_line(after)
+    if grid.is_slab:
+        circulation = biot_savart.node_circulation(velocity, grid)
+        left = wake_slab.summed(wake_slab.column(circulation, place), place, new)
+    else:
+        x, y, z = (vector_potential.edge_circulation(velocity, grid, axis) for axis in range(3))
+        left = grid.spacing * wake_room.summed(wake_room.layer((x, y, z), place), place, new)
+    found[number_of(place)] = followed(wake[number_of(place)], left, old, new)
+    return found
+
+
+def brought(rate: Array, sea: Sea) -> Normal:
+    """What sources in the cells bring to each far side but the exit.
+
+    rate  (nx, ny, nz) of each cell, m^3/s (m^2/s in a slab)
+    """
+    grid = sea.far[0].grid
+    if not rate.any():
+        return {}
+    points, rates = pooled(rate, sea)
+    through = (biot_savart if grid.is_slab else vector_potential).source_velocity
+    return {place: through(points, rates, place) for place in sea.driven}
+
+
+def pooled(rate: Array, sea: Sea) -> tuple[Array, Array]:
+    """Middles (n, d), m, and rates (n,) of the sources of either sign in each block of cells, and
+    of their images behind mirrors."""
+    grid = sea.far[0].grid
+    cells, coordinates = np.stack(np.nonzero(rate)), grid.cell_coordinates()
+    places = np.stack([coordinates[axis][cells[axis]] for axis in grid.axes], axis=1)
+    values = rate[tuple(cells)]
+    keys = np.stack([*(cells // POOL), values > 0.0])
+    _, block = np.unique(keys, axis=1, return_inverse=True)
+    rates = np.asarray(np.bincount(block.ravel(), values), float)
+    weighted = [np.bincount(block.ravel(), values * along) / rates for along in places.T]
+    points = np.stack(weighted, axis=1)
+    for place in sea.mirrors:
+        image, at = points.copy(), (grid.upper if place.upper else grid.origin)[place.axis]
+        image[:, place.axis] = 2.0 * at - image[:, place.axis]
+        points, rates = np.concatenate([points, image]), np.concatenate([rates, rates])
+    return points, rates
