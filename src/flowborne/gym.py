@@ -47,6 +47,9 @@ ENVIRONMENTS = {
     "block": "ns-block-drag-max",
     "walker": "human-wind-drag",
     "swimmer": "swimmer",
+    "eel-sea": "eel-sea",
+    "swimmer-sea": "swimmer-sea",
+    "flyer": "flyer-air",
 }
 """Name of an environment -> its scene."""
 

@@ -9,7 +9,7 @@ arrays, for research on the numerics; the operators change with the numerics.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -21,6 +21,7 @@ from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.start import set_going, start
 from flowborne.coupling.step import step
 from flowborne.coupling.stream import Sampled
+from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.advection import CENTRE, carry, cells_per_step
 from flowborne.fluid.boundary import Boundaries, Source
@@ -67,6 +68,7 @@ __all__ = [
     "control_volumes",
     "cut_by_bodies",
     "faces_of",
+    "follow_bodies",
     "kinetic_energy",
     "make_world",
     "nothing_brought",
@@ -143,6 +145,17 @@ def advance(
         if report.outcome is not Outcome.DONE:
             raise ArithmeticError(f"step {world.steps}: {report.outcome.value}")
     return report
+
+
+def follow_bodies(world: World, bodies: Sequence[int], along: Sequence[int]) -> None:
+    """Make the grid follow the centre of mass of some bodies by whole cells, from now on.
+
+    along   axes along which it moves, 0 to 2
+    raises  ValueError when beyond a side across one of them there is no fluid
+    """
+    fluid, _ = world.flow()
+    followed = following(fluid, world.setup.solid, world.solid.q, bodies, along)
+    world.setup = world.setup.but(fluid=followed)
 
 
 def set_velocity(world: World, field: Field) -> None:

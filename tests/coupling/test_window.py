@@ -10,10 +10,9 @@ import pytest
 
 from flowborne.control.executors import pack
 from flowborne.coupling.step import step
-from flowborne.coupling.window import cells_to_follow, centre_of, follow
+from flowborne.coupling.window import cells_to_follow, follow
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.window import Window
 from flowborne.validation.worlds import Uniform, mjcf
 from flowborne.worlds import (
     Boundaries,
@@ -24,6 +23,7 @@ from flowborne.worlds import (
     BoundaryOpen,
     BoundaryPeriodic,
     Source,
+    follow_bodies,
     make_world,
     set_velocity,
     start,
@@ -52,12 +52,7 @@ def windowed(
 ) -> World:
     """A body of the fluid's density that moves, and a window that follows it."""
     world = make_world(mjcf(body), grid, boundaries=sides, solid_density=1.0, **fluid)  # type: ignore[arg-type]
-    window = Window((1,), (0.0, 0.0, 0.0), axes)
-    centre = centre_of(window, world.setup.solid, world.solid.q) - np.array(grid.origin)
-    x, y, z = centre.tolist()
-    assert world.setup.fluid is not None
-    window = replace(window, centre=(x, y, z))
-    world.setup = world.setup.but(fluid=replace(world.setup.fluid, window=window))
+    follow_bodies(world, [1], axes)
     world.solid.v[:] = velocity
     return world
 

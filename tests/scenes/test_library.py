@@ -16,7 +16,14 @@ from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn import warnings_of
 
 NAMES = scene_names()
-UNCONTROLLED = ("flyer-base", "swimmer-jet-only", "swimmer-no-control", "eel", "eel-room")
+UNCONTROLLED = (
+    "flyer-base",
+    "swimmer-jet-only",
+    "swimmer-no-control",
+    "eel",
+    "eel-room",
+    "eel-pair",
+)
 
 
 @cache

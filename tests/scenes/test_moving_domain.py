@@ -109,6 +109,22 @@ def test_a_body_ahead_of_the_domain_is_not_called_lost(folder: Path) -> None:
         assert any(fixed_outside(drift, setup)) == lost
 
 
+def test_worker_processes_give_the_same_bits_as_the_window_moves() -> None:
+    sea = fb.load_scene(
+        "eel-sea", {"domain.resolution": "45", "initial.velocities": "{ head_y = 0.5 }"}
+    )
+    worlds = []
+    for executor in ("serial", "processes"):
+        with fb.Simulation(sea, workers=2, executor=executor) as simulation:
+            for _ in range(12):
+                report = simulation.advance_frame()
+                assert report.step.momentum.budget_error < 1e-11
+            worlds.append(simulation.world)
+    first, second = (world.arrays() for world in worlds)
+    assert first["grid/origin"][1] > sea.domain.lower[1] + 1e-3
+    assert all(np.array_equal(second[name], values) for name, values in first.items())
+
+
 @pytest.mark.parametrize(
     ("domain", "said"),
     [

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from flowborne.coupling.cut import cut_by_bodies, volumes_of
-from flowborne.coupling.world import World
+from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array
 from flowborne.fluid.momentum import face_masses, fluid_momentum
@@ -41,6 +44,18 @@ def cells_to_follow(world: World) -> list[int]:
     moved = centre_of(window, model, world.solid.q) - np.array(grid.origin) - window.centre
     cells = moved / grid.spacing
     return [int(cells[axis]) if axis in window.axes else 0 for axis in range(3)]
+
+
+def following(
+    fluid: Fluid, model: SolidModel, q: Array, bodies: Sequence[int], axes: Sequence[int]
+) -> Fluid:
+    """The fluid with a grid that follows bodies along some axes, from the positions q (nq,) on.
+
+    raises  ValueError when beyond a side across one of the axes there is no fluid
+    """
+    window = Window(tuple(bodies), (0.0, 0.0, 0.0), tuple(axes))
+    x, y, z = (centre_of(window, model, q) - fluid.grid.origin).tolist()
+    return replace(fluid, window=replace(window, centre=(x, y, z)))
 
 
 def centre_of(window: Window, model: SolidModel, q: Array) -> Array:

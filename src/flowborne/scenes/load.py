@@ -79,6 +79,10 @@ BUILT_IN = (
     "eel",
     "eel-room",
     "eel-free",
+    "eel-sea",
+    "eel-pair",
+    "swimmer-sea",
+    "flyer-air",
 )
 
 

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
-from flowborne.coupling.window import centre_of
+from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.grid import Array
-from flowborne.fluid.window import Window
 from flowborne.phrases import listed
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.dye import DyeBox
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import InflowSide
 from flowborne.solids.model import SolidModel
-from flowborne.tables import triple
 
 
 def followed_by(scene: Scene) -> bool:
@@ -38,11 +35,14 @@ def with_window(fluid: Fluid, scene: Scene, model: SolidModel, q: Array) -> Flui
         return fluid
     assert scene.domain is not None
     name = scene.domain.follow
-    moving = np.flatnonzero(model.moving)
-    bodies = moving if name == "bodies" else [model.body_names.index(name)]
-    window = Window(tuple(int(body) for body in bodies), (0.0, 0.0, 0.0), axes_of(scene))
-    centre = centre_of(window, model, q) - np.array(fluid.grid.origin)
-    return replace(fluid, window=replace(window, centre=triple(centre.tolist())))
+    bodies = np.flatnonzero(model.moving).tolist()
+    return following(
+        fluid,
+        model,
+        q,
+        bodies if name == "bodies" else [model.body_names.index(name)],
+        axes_of(scene),
+    )
 
 
 def check_window(draft: Draft) -> Iterator[str]:

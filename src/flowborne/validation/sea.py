@@ -10,8 +10,6 @@ import numpy as np
 
 from flowborne import Grid, Simulation, World, load_scene, step
 from flowborne.bodies import JointCommand
-from flowborne.coupling.window import centre_of
-from flowborne.fluid.window import Window
 from flowborne.validation.case import Case, Tier, reference
 from flowborne.validation.findings import Finding, Grids, falling, near
 from flowborne.validation.shedding import (
@@ -30,6 +28,7 @@ from flowborne.validation.worlds import force_on, mjcf, refined
 from flowborne.worlds import (
     Boundaries,
     BoundaryFar,
+    follow_bodies,
     make_world,
     set_going,
     set_velocity,
@@ -107,11 +106,7 @@ def towed(cells: int) -> World:
     """The cylinder that is towed through still water in a window that follows it."""
     sea, grid = Boundaries(*(BoundaryFar(),) * 4), box(cells, 12, 8)
     world = make_world(TOWED, grid, viscosity=0.01, boundaries=sea, tolerance=1e-7)
-    window = Window((1,), (0.0, 0.0, 0.0), (0, 1))
-    x, y, z = (centre_of(window, world.setup.solid, world.solid.q) - grid.origin).tolist()
-    fluid, _ = world.flow()
-    followed = replace(fluid, window=replace(window, centre=(x, y, z)))
-    world.setup = world.setup.but(fluid=followed)
+    follow_bodies(world, [1], [0, 1])
     return world
 
 
