@@ -245,6 +245,15 @@ PERIODIC_Y = {
 }
 
 
+def test_a_model_is_no_scene(write: Write) -> None:
+    model = write({}).parent / "squid.xml"
+    model.write_text("<mujoco/>")
+    assert check_scene(model) == [
+        f"scene {model} is a model, without a fluid. Write a TOML file beside it, with "
+        'model = "squid.xml" under [solids], and give that.'
+    ]
+
+
 def test_a_body_may_start_across_periodic_sides(write: Write) -> None:
     problems = check_scene(write({"lower = [-1.0, -1.0]": "lower = [-1.0, -0.5]"} | PERIODIC_Y))
     assert not problems

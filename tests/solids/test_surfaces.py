@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.solids.model import SolidModel
-from flowborne.solids.surfaces import Patches, surfaces
+from flowborne.solids.surfaces import Patches, geom_boxes, surfaces
 
 
 def patches(geom: str, slab: bool = False) -> tuple[SolidModel, Patches]:
@@ -69,3 +69,12 @@ def test_box_has_patches_no_longer_than_an_eighth(slab: bool) -> None:
     _, p = patches('type="box" size=".05 .4 .1"', slab)
     ends = p.centre[np.abs(p.normal[:, 0]) > 0.5]
     assert np.unique(ends[:, 1].round(9)).size == 8
+
+
+def test_the_box_of_a_mesh_touches_it_however_it_is_turned() -> None:
+    """MuJoCo turns a mesh to its principal axes, so that a box along these would be larger."""
+    model, _ = patches('type="mesh" mesh="m"')
+    low, high = geom_boxes(model, np.zeros(1))
+    np.testing.assert_allclose([low[0], high[0]], [[0.0] * 3, [2.0] * 3], atol=1e-6)
+    low, high = geom_boxes(model, np.array([0.5 * np.pi]))
+    np.testing.assert_allclose([low[0], high[0]], [[-2.0, 0.0, 0.0], [0.0, 2.0, 2.0]], atol=1e-6)

@@ -30,6 +30,9 @@ from flowborne.solids.joint_kinds import (
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import geom_boxes
 
+FLOAT32_ROUNDING = float(np.finfo(np.float32).eps)
+"""Relative error of the vertices of a mesh, which MuJoCo keeps in single precision."""
+
 
 def cross_check(draft: Draft) -> list[str]:
     """Everything that is wrong with a scene that the schema accepts."""
@@ -177,7 +180,9 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
     low, high = geom_boxes(model, start.q)
     axes = min(len(domain.lower), scene.dimensions)
     moving = model.moving[model.geom_body] & np.isfinite(low).all(axis=1)
-    outside = (low[:, :axes] < domain.lower[:axes]) | (high[:, :axes] > domain.upper[:axes])
+    slack = FLOAT32_ROUNDING * np.array(domain.extent()[:axes])
+    outside = low[:, :axes] < domain.lower[:axes] - slack
+    outside |= high[:, :axes] > domain.upper[:axes] + slack
     outside &= moving[:, None]
     for axis in (axis for axis in range(axes) if scene.boundaries.periodic(axis)):
         for body in np.unique(model.geom_body[outside[:, axis]]):

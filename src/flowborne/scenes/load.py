@@ -86,6 +86,9 @@ BUILT_IN = (
 )
 
 
+MODELS = (".xml", ".mjcf", ".urdf")
+"""Endings of models, which a scene names."""
+
 DEEPEST = 30
 """Most tables and arrays in each other of a scene."""
 
@@ -196,6 +199,11 @@ def find(name_or_path: str | Path) -> Path:
         return library() / f"{text}.toml"
     path = Path(name_or_path)
     try:
+        if path.is_file() and path.suffix.lower() in MODELS:
+            raise SceneError(
+                f"scene {text} is a model, without a fluid. Write a TOML file beside it, with "
+                f'model = "{path.name}" under [solids], and give that.'
+            )
         if path.is_file():
             return path
         if path.is_dir():

@@ -114,8 +114,16 @@ class Outline:
 
 
 def geom_boxes(model: SolidModel, q: Array) -> tuple[Array, Array]:
-    """(ngeom, 3) lowest and highest corners of boxes around the geometries at `q` (nq,), m."""
+    """(ngeom, 3) lowest and highest corners of boxes around the geometries at `q` (nq,), m.
+
+    Those of boxes and meshes touch them; those of tilted round shapes may be larger.
+    """
     pose, reach = kinematics(model, q), model.mj.geom_aabb[model.geom_id]
     centre = pose.geom_position + np.einsum("gij,gj->gi", pose.geom_rotation, reach[:, :3])
     half = np.einsum("gij,gj->gi", np.abs(pose.geom_rotation), reach[:, 3:])
-    return centre - half, centre + half
+    low, high = centre - half, centre + half
+    for g, shape in enumerate(model.geom_shape):
+        if (skin := shape.skin()) is not None:
+            corners = pose.geom_position[g] + skin[0] @ pose.geom_rotation[g].T
+            low[g], high[g] = corners.min(axis=0), corners.max(axis=0)
+    return low, high
