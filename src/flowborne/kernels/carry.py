@@ -373,6 +373,30 @@ def hold(
 
 
 @njit(nogil=True, cache=True)
+def empty_at_walls(
+    amount: Array, volume: Array, sides: Sides, shape: Integers, component: int, nothing: float
+) -> float:
+    """Take from the faces of prescribed sides across the component what is left in control volumes
+    that a body has filled, in place; gives what that changes volume times velocity by.
+
+    amount  velocities, but volume times velocity where a control volume holds nothing
+    """
+    flat, volumes, given = amount.reshape(-1), volume.reshape(-1), 0.0
+    for s in range(sides.table.shape[0]):
+        row = sides.table[s]
+        if row[FREE] or row[BEYOND] == JOINED or row[AXIS] != component:
+            continue
+        start, _, one, other, n, m, _ = layer(row, amount, shape)
+        for a in range(n):
+            for b in range(m):
+                at = start + a * one + b * other
+                if volumes[at] <= nothing:
+                    given -= flat[at]
+                    flat[at] = 0.0
+    return given
+
+
+@njit(nogil=True, cache=True)
 def join(u: Array, axis: int) -> None:
     """Make the last layer across an axis the first one, in place."""
     layer, flat = 1, u.reshape(-1)
@@ -535,6 +559,8 @@ def carry(
                     target, net, field, high, own, to, row, through, arriving, leaving, part,
                     nothing,
                 )  # fmt: skip
+            if turn == 1:
+                held += empty_at_walls(target, high, sides, shape, c, nothing)
             settle(target, high, volumes, dt, least, most, scratch.nought)
             crossed += 0.5 * dt * came
             drained += 0.5 * dt * inlets
