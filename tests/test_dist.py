@@ -53,9 +53,10 @@ def test_the_wheel_holds_the_package_and_its_data(archives: tuple[Path, Path]) -
     code = {path.relative_to(ROOT / "src").as_posix() for path in ROOT.glob("src/**/*.py")}
     assert held >= code
     described = {name for name in held if ".dist-info/" in name}
-    assert held - described == code | DATA | {"flowborne/validation/rexeel/LICENSE"}
+    packed = {f"flowborne/validation/{robot}/LICENSE" for robot in ("fishrobot", "rexeel")}
+    assert held - described == code | DATA | packed
     licences = {name.partition("/licenses/")[2] for name in described if "/licenses/" in name}
-    assert licences == {"LICENSE", "src/flowborne/validation/rexeel/LICENSE"}
+    assert licences == {"LICENSE", *(f"src/{name}" for name in packed)}
 
 
 def test_the_sdist_holds_the_sources_and_no_tests(archives: tuple[Path, Path]) -> None:

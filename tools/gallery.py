@@ -93,7 +93,10 @@ GROUPS = (
         320,
         {"domain.resolution": "36"},
     ),
-    Group(OPEN, follows, 40, {"domain.resolution": "30"}),
+    Group(
+        OPEN, lambda scene: follows(scene) and bool(scene.flesh), 40, {"domain.resolution": "30"}
+    ),
+    Group(OPEN, follows, 140),
     Group("Walkers", lambda scene: scene.human is not None, 60),
     Group("Blocks in a prescribed wind", lambda scene: scene.domain is None, 80),
     Group("Blocks in a stream", has_inflow, 100, {"domain.resolution": "64"}),

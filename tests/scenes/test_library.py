@@ -23,6 +23,7 @@ UNCONTROLLED = (
     "eel",
     "eel-room",
     "eel-pair",
+    "fish-robot",
 )
 
 
@@ -45,7 +46,7 @@ def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
     assert scene.description
     assert "\n" not in scene.description
     assert scene.controlled_joints() or name in UNCONTROLLED
-    still = ("human-gravity", "flyer", "swimmer", "eel")
+    still = ("human-gravity", "flyer", "swimmer", "eel", "fish")
     assert scene.stream() is not None or name.startswith(still)
 
 
@@ -80,6 +81,7 @@ TRUE_WARNINGS = {
     "eel": ("[domain]: head is 0.016 m thick, 1.6 cells,",),
     "eel-room": ("[domain]: head is 0.016 m thick, 1.6 cells,",),
     "eel-free": ("[domain]: head is 0.016 m thick, 1.6 cells,",),
+    "fish-robot": ("[domain]: segment_0 is 0.003 m thick, 0.2 cells,",),
 }
 """Scene -> how its warnings begin. Arms that a wind holds back cannot follow the walk; wings and
 links are thinner than two cells; held legs at their full strength cross a little over one."""

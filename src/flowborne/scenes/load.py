@@ -83,6 +83,7 @@ BUILT_IN = (
     "eel-pair",
     "swimmer-sea",
     "flyer-air",
+    "fish-robot",
 )
 
 

@@ -18,6 +18,7 @@ MODULES = {
     "controller": ("K1", "K2", "K3", "K4"),
     "controller_in_flow": ("K5", "K6"),
     "creatures": ("K11",),
+    "fishrobot": ("R2",),
     "flag_in_channel": ("D2", "D3"),
     "flapping_ellipse": ("S3",),
     "flesh": ("D1", "D4", "D5"),
