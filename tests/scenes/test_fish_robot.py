@@ -11,7 +11,7 @@ from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 from flowborne.validation import fishrobot
 
-COARSE = {"domain.resolution": "75"}
+COARSE = {"domain.resolution": "45"}
 """Cells of 2 cm."""
 
 MASS, CENTRE, INERTIA = 1.481, 0.1172, 0.0201
