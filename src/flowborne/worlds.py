@@ -39,6 +39,7 @@ from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.fluid.sides.periodic import BoundaryPeriodic
 from flowborne.fluid.sides.side import Boundary, Profile
 from flowborne.fluid.transport import Transport
+from flowborne.fluid.wake import resampled
 from flowborne.solids import momentum
 from flowborne.solids.model import SolidModel
 from flowborne.solids.wind import Wind
@@ -185,7 +186,7 @@ def kinetic_energy(world: World) -> float:
 
 
 def start_from(coarse: World, fine: World) -> None:
-    """Set velocity and pressure of `fine` to those of `coarse`, interpolated."""
+    """Set velocity, pressure and wake of `fine` to those of `coarse`, interpolated."""
     (fluid, to), (rough, of) = fine.flow(), coarse.flow()
     for axis in fluid.grid.axes:
         known, wanted = (g.face_coordinates(axis) for g in (rough.grid, fluid.grid))
@@ -194,6 +195,7 @@ def start_from(coarse: World, fine: World) -> None:
         to.velocity_change[axis][:] = found
     known, wanted = rough.grid.cell_coordinates(), fluid.grid.cell_coordinates()
     to.pressure[:] = _interpolated(of.pressure, known, wanted)
+    to.wake, to.sea = resampled(of.wake, fluid.grid.spacing / rough.grid.spacing), of.sea.copy()
 
 
 def _interpolated(

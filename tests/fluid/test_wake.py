@@ -13,7 +13,14 @@ from flowborne.fluid.sea import Sea
 from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.side import Place
-from flowborne.fluid.wake import BIN, BINS, moved, wake_line, with_all_circulation_0
+from flowborne.fluid.wake import (
+    BIN,
+    BINS,
+    moved,
+    resampled,
+    wake_line,
+    with_all_circulation_0,
+)
 from flowborne.fluid.wake_slab import across, leaving, stream_function
 
 GRID = Grid.slab(12, 8, 0.5, (-1.0, 2.0))
@@ -134,3 +141,20 @@ def test_what_the_exit_leaves_behind_goes_into_the_wake() -> None:
     wake = after_move(np.zeros((4, BINS, 2)), velocity, *seas)
     assert wake[1, 0] == pytest.approx([0.0, 0.1 * 0.1 * 1.0])
     assert not wake[1, 1:].any()
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 0.7, 2.0])
+def test_bins_of_another_grid_have_the_same_wake(ratio: float) -> None:
+    """What lies between the exit and a distance from it, up to where both lines reach."""
+    bins = np.random.default_rng(1).normal(size=(4, BINS, 2))
+    found = resampled(bins, ratio)
+    ends = np.arange(1, BINS + 1)
+    sums = np.cumsum(bins, axis=1)[2, :, 1]
+    known = np.interp(ratio * ends, np.arange(BINS + 1), np.concatenate([[0.0], sums]))
+    inside = ratio * ends <= BINS
+    assert np.cumsum(found, axis=1)[2, inside, 1] == pytest.approx(known[inside])
+    assert found[:, -1] == pytest.approx(ratio * bins[:, -1] if ratio > 1.0 else found[:, -1])
+
+
+def test_no_bins_stay_none() -> None:
+    assert resampled(np.zeros((0, 0, 0)), 0.5).shape == (0, 0, 0)

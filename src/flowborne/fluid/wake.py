@@ -112,3 +112,17 @@ def followed(bins: Array, left: Array, before: WakeLine, after: WakeLine) -> Arr
     if away < 0.0:
         found[0] += left
     return found
+
+
+def resampled(bins: Array, ratio: float) -> Array:
+    """Bins (sides, BINS, k) of a grid whose cells are `ratio` times as large, with the same wake.
+
+    Where the line becomes longer, its last bin is continued.
+    """
+    if bins.size == 0:
+        return bins
+    filled = np.concatenate([np.zeros_like(bins[:, :1]), np.cumsum(bins, axis=1)], axis=1)
+    edges = ratio * np.arange(BINS + 1.0)
+    below = np.minimum(edges.astype(int), BINS - 1)
+    within = filled[:, below] + (edges - below)[:, None] * bins[:, below]
+    return np.diff(within, axis=1)
