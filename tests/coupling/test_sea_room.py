@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import flowborne as fb
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
+from flowborne.simulation import Snapshot
 from flowborne.validation.far_sides import box
 from flowborne.validation.worlds import Uniform, force_on, mjcf, start_at_once
 from flowborne.worlds import (
@@ -93,3 +95,35 @@ def test_the_sides_let_through_what_a_source_brings() -> None:
     for axis, values in enumerate(world.flow()[1].velocity):
         low, high = (0.01 * float(values.take(end, axis).sum()) for end in (0, -1))
         assert [-low, high] == pytest.approx([0.1, 0.1], rel=1e-2)
+
+
+JETTING = {f"boundaries.{axis}_{end}": "far" for axis in "xyz" for end in ("min", "max")} | {
+    "domain.lower": "[-3.2, -3.2, -4.8]",
+    "domain.upper": "[3.2, 3.2, 4.8]",
+    "domain.resolution": "34",
+    "initial.positions": "{}",
+    "control": "[]",
+    "objectives": "[]",
+}
+
+
+def test_a_swimmer_of_flesh_draws_in_and_a_resumed_run_has_the_same_bits() -> None:
+    """Its mouth draws in as much as comes through the sides, but for what the flesh gives way."""
+    scene = fb.load_scene("swimmer", JETTING)
+    with fb.Simulation(scene, workers=1) as simulation:
+        simulation.advance_frame()
+        middle = World.from_arrays(simulation.world.setup, simulation.world.copy().arrays())
+        report = simulation.advance_frame()
+        assert max(step.momentum.budget_error for step in report.steps) < 1e-10
+        expected, world = simulation.world.arrays(), simulation.world
+    fluid, state = world.flow()
+    through = 0.0
+    for axis in range(3):
+        ends = (state.velocity[axis].take(end, axis).sum() for end in (-1, 0))
+        through += fluid.grid.face_area * (next(ends) - next(ends))
+    assert through == pytest.approx(-5.0 * np.sin(2.0 * np.pi * world.time), rel=0.1)
+    with fb.Simulation(scene, workers=2) as resumed:
+        resumed.restore(Snapshot(middle, 1, None))
+        resumed.advance_frame()
+        for name, values in resumed.world.arrays().items():
+            np.testing.assert_array_equal(values, expected[name])

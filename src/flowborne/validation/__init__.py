@@ -35,6 +35,7 @@ MODULES = {
     "scatter": ("K12", "K13"),
     "sea": ("B8", "I11"),
     "settling": ("V1", "V2"),
+    "small_domains": ("I12",),
     "swimmers": ("S1", "S5"),
 }
 """Module -> its cases; a module is imported when one of them is run."""
