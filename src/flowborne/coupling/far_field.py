@@ -3,8 +3,9 @@
 At the start of a step, from the state alone (after Weymouth and Lauber 2024, without their
 iteration): the leak-proof field, in which bodies move as they do, is the sea's stream, plus what
 its own circulation induces, that of the wake beyond the exit included (`fluid.wake`), plus what
-mouths and sources bring. The sides have that normal velocity before the solve, which adds what
-happens in the step itself, with a column of fluid behind each face (`fluid.sides.far`):
+mouths, sources and flesh that swells bring. The sides have that normal velocity before the solve,
+which adds what happens in the step itself, with a column of fluid behind each face
+(`fluid.sides.far`):
 
     u_n+ = u_n + dt p / (rho (h/2 + l))
 
@@ -110,7 +111,7 @@ def far_field(world: World, start: Departure, dt: float) -> FarField:
     moving = boundary_velocity(kinematics(start.solid, start.bodies.q), start.bodies.v)
     field = leak_proof(state.velocity, start.cut, moving, fluid.grid)
     normal, wake = induced(field, sea, state.wake, dt)
-    for place, values in brought(start.rate, sea).items():
+    for place, values in brought(field, sea).items():
         normal[place] = normal[place] + values
     return FarField(
         {place: values + velocity[place.axis] for place, values in normal.items()},

@@ -9,12 +9,17 @@ from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.sea import Sea, number_of
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.wake import followed, moved, wake_line, with_all_circulation_0
+from flowborne.kernels.outflow import net_out
 
 Normal = dict[Place, Array]
 """Velocity across the faces of sides, like their layers, m/s."""
 
 POOL = 8
 """Cells along each edge of a block in which sources of one sign act as one."""
+
+SOLVED = 1e-6
+"""Net outflow of a cell, over that through one face at the largest velocity, up to which it is what
+the pressure solve has left, and no source."""
 
 
 def induced(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
@@ -86,12 +91,15 @@ def after_move(wake: Array, velocity: Faces, before: Sea, after: Sea) -> Array:
     return found
 
 
-def brought(rate: Array, sea: Sea) -> Normal:
-    """What sources in the cells bring to each far side but the exit.
-
-    rate  (nx, ny, nz) of each cell, m^3/s (m^2/s in a slab)
-    """
+def brought(field: Faces, sea: Sea) -> Normal:
+    """What a leak-proof field's sources bring to each far side but the exit: mouths, sources, flesh
+    that swells."""
     grid = sea.far[0].grid
+    rate = np.empty(grid.shape)
+    net_out(rate, *field)
+    rate *= grid.face_area
+    fastest = max(float(np.abs(field[axis]).max()) for axis in grid.axes)
+    rate[np.abs(rate) < SOLVED * fastest * grid.face_area] = 0.0
     if not rate.any():
         return {}
     points, rates = pooled(rate, sea)
