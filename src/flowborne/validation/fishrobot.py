@@ -29,7 +29,7 @@ RUNS = ("0.50", "1.00", "1.50", "2.00")
 FRAMES = 40
 """Frames per beat."""
 
-SKIPPED, COUNTED = 2, 3
+SKIPPED, COUNTED = 6, 3
 """Beats from the start that are left out, and those that are measured after them."""
 
 HEAD = -0.006
