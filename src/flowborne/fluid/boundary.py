@@ -20,6 +20,9 @@ from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 WALL = BoundaryClosed()
 
+SEAS = 16
+"""Grids for which the sea around is kept, at most: one that moves has another origin each time."""
+
 SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
 
@@ -108,7 +111,17 @@ class Boundaries:
 
     def sea(self, grid: Grid) -> Sea | None:
         """The sea around a grid; raises ValueError as `sea_of` does."""
-        return sea_of(list(self.around(grid)))
+        found = self._seas.get(grid)
+        if found is None:
+            found = (sea_of(list(self.around(grid))),)
+            if len(self._seas) >= SEAS:
+                self._seas.clear()
+            self._seas[grid] = found
+        return found[0]
+
+    @cached_property
+    def _seas(self) -> dict[Grid, tuple[Sea | None]]:
+        return {}
 
     def has_free_side(self, grid: Grid) -> bool:
         """Whether the pressure decides what crosses one of the sides."""
