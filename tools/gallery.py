@@ -45,6 +45,9 @@ QUALITIES = (88, 80, 70, 60, 50, 40)
 MAX_GAS_DENSITY = 10.0
 """kg/m^3"""
 
+MANY_JOINTS = 10
+"""Controlled joints from which a creature in three dimensions runs on a coarser grid."""
+
 
 @dataclass(frozen=True)
 class Group:
@@ -91,6 +94,12 @@ GROUPS = (
         OPEN,
         lambda scene: follows(scene) and has_gas(scene),
         320,
+        {"domain.resolution": "36"},
+    ),
+    Group(
+        OPEN,
+        lambda scene: follows(scene) and len(scene.controlled_joints()) >= MANY_JOINTS,
+        48,
         {"domain.resolution": "36"},
     ),
     Group(

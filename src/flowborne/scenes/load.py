@@ -84,6 +84,7 @@ BUILT_IN = (
     "swimmer-sea",
     "flyer-air",
     "fish-robot",
+    "fish",
 )
 
 
