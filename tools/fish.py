@@ -144,7 +144,8 @@ def mesh() -> tuple[FleshMesh, dict[str, Array]]:
     ]
     points = np.concatenate([*places, [[-LENGTH * s, 0.0, 0.0] for s in (NOSE, TAIL)]])
     nose, tail = len(points) - 2, len(points) - 1
-    holders, hulls, elements = [""] * len(points), {}, []
+    holders, elements = [""] * len(points), []
+    hulls: dict[str, Array] = {}
     for station, bone in enumerate(bones):
         low, high = station * count, (station + 1) * count
         for triangle in flat.shell if bone else flat.core + flat.shell:
