@@ -58,6 +58,7 @@ def first_step(scene: Scene) -> np.ndarray:
 
 
 def test_bent_the_other_way_it_decides_the_mirror_image() -> None:
+    """Exactly so in front; the tail is thinner than a cell of this grid."""
     settings = {"domain.resolution": "24", "controller.gradient": "central"}
     bent = "{ joint_1 = 2.0, joint_10 = -2.0 }", "{ joint_1 = -2.0, joint_10 = 2.0 }"
     left, right = (
@@ -65,4 +66,6 @@ def test_bent_the_other_way_it_decides_the_mirror_image() -> None:
         for positions in bent
     )
     assert np.abs(left).max() > np.radians(10.0)
-    np.testing.assert_allclose(right, -left, rtol=0.0, atol=0.05 * np.abs(left).max())
+    front = slice(6)
+    np.testing.assert_allclose(right[front], -left[front], rtol=0.0, atol=1e-3)
+    np.testing.assert_allclose(right, -left, rtol=0.0, atol=0.1 * np.abs(left).max())
