@@ -10,10 +10,8 @@ head's first harmonic, as published.
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from time import perf_counter
 
 import numpy as np
@@ -21,6 +19,7 @@ import numpy as np
 from flowborne import Array, Simulation, load_scene
 from flowborne.validation.case import Case, reference
 from flowborne.validation.findings import Finding, Grids, at_most, near
+from flowborne.validation.measurements import rows_of
 from flowborne.validation.worlds import frames_of
 
 RUNS = ("0.50", "1.00", "1.50", "2.00")
@@ -42,9 +41,8 @@ COLUMNS = (("speed", "speed_err"), ("sway_mm", "sway_err_mm"), ("yaw_deg", "yaw_
 
 def table(name: str) -> list[dict[str, str]]:
     """Rows of a table in the folder fishrobot."""
-    packed = files("flowborne.validation").joinpath("fishrobot", f"{name}.csv.gz").read_bytes()
-    header, *rows = gzip.decompress(packed).decode().split()
-    return [dict(zip(header.split(","), row.split(","), strict=True)) for row in rows]
+    header, *rows = rows_of("fishrobot", name)
+    return [dict(zip(header, row, strict=True)) for row in rows]
 
 
 def measured(run: str) -> dict[str, float]:

@@ -16,17 +16,12 @@ from flowborne import Grid, World
 from flowborne.validation.case import Case, Tier, confirmed, reference, table
 from flowborne.validation.findings import Curve, Finding, Grids, Plot, falling, near, within
 from flowborne.validation.shedding import (
-    AFTER,
-    BEFORE,
     CFL,
-    PERIODS,
     STREAM,
     UNBOUNDED,
-    Kicked,
-    amplitude,
     cylinder,
     judged,
-    watch,
+    shed,
 )
 from flowborne.validation.worlds import Vector, force_on, mjcf, refined, through_flow, whole_steps
 from flowborne.worlds import advance, make_world, velocity_at
@@ -99,17 +94,7 @@ def shed_in_the_open(
 
     strouhal  rough value of the expected frequency
     """
-    periods = PERIODS[quick]
-    field = Kicked(STREAM, UNBOUNDED, 0.0, 0.0)
-    rows, lines = [], []
-    for n, world, first in refined(grids, lambda n: open_water(n, 1.0 / reynolds), field):
-        before = 2.0 * BEFORE[quick] if first else AFTER
-        seen, drags, _ = watch(world, UNBOUNDED, before, strouhal, periods)
-        steps, period = seen.last(periods)
-        mean = float(drags[steps].mean())
-        rows.append((mean, amplitude(seen.signal[steps]), UNBOUNDED.time / period))
-        lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
-    return list(zip(*rows, strict=True)), lines
+    return shed(lambda n: open_water(n, 1.0 / reynolds), strouhal, grids, quick)
 
 
 def shedding_at_100(quick: bool) -> list[Finding]:

@@ -20,9 +20,7 @@ Lengths are cm and angles degrees, as published. A link's direction points to th
 
 from __future__ import annotations
 
-import gzip
 from dataclasses import replace
-from importlib.resources import files
 from time import perf_counter
 
 import numpy as np
@@ -32,6 +30,7 @@ from flowborne import Array, Simulation, load_scene
 from flowborne.bodies import kinematics
 from flowborne.validation.case import Case, reference
 from flowborne.validation.findings import Finding, Grids, at_most
+from flowborne.validation.measurements import rows_of
 from flowborne.validation.worlds import frames_of
 
 LINK_LENGTH = np.array([12.0, 9.8, 9.8, 9.8, 9.8, 9.8])
@@ -59,10 +58,8 @@ TANK_LENGTH = {20: 1.0, 40: 1.25}
 
 def table(name: str) -> dict[str, Array]:
     """Columns of a table of measurements in the folder rexeel."""
-    packed = files("flowborne.validation").joinpath("rexeel", f"{name}.csv.gz").read_bytes()
-    header, *rows = gzip.decompress(packed).decode().split()
-    columns = np.array([row.split(",") for row in rows], dtype=np.float64).T
-    return dict(zip(header.split(","), columns, strict=True))
+    header, *rows = rows_of("rexeel", name)
+    return dict(zip(header, np.array(rows, dtype=np.float64).T, strict=True))
 
 
 def resampled(values: Array, last: float) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from flowborne import Array, StepReport, World
 from flowborne.validation.case import confirmed, reference
 from flowborne.validation.findings import Finding, Grids, Plot, within
-from flowborne.validation.worlds import Uniform, force_on, mjcf, recorded
+from flowborne.validation.worlds import Uniform, force_on, mjcf, recorded, refined
 from flowborne.worlds import Field
 
 BEFORE = {True: 20.0, False: 40.0}
@@ -147,6 +147,27 @@ def watch(
         world, dt, round(duration / dt), lambda report: (*stream.coefficients(report), drop(world))
     ).T
     return Oscillation(dt, lifts), drags, drops
+
+
+def shed(
+    build: Callable[[int], World], strouhal: float, grids: Sequence[int], quick: bool
+) -> tuple[list[tuple[float, ...]], list[str]]:
+    """Mean drag, amplitude of the lift and frequency from grid to grid, and lines for people, of a
+    cylinder at the origin in UNBOUNDED.
+
+    build     a world, by the cells across D
+    strouhal  rough value of the expected frequency
+    """
+    periods, field = PERIODS[quick], Kicked(STREAM, UNBOUNDED, 0.0, 0.0)
+    rows, lines = [], []
+    for n, world, first in refined(grids, build, field):
+        before = 2.0 * BEFORE[quick] if first else AFTER
+        seen, drags, _ = watch(world, UNBOUNDED, before, strouhal, periods)
+        steps, period = seen.last(periods)
+        mean = float(drags[steps].mean())
+        rows.append((mean, amplitude(seen.signal[steps]), UNBOUNDED.time / period))
+        lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
+    return list(zip(*rows, strict=True)), lines
 
 
 def judged(
