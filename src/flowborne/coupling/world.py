@@ -20,7 +20,7 @@ from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
-from flowborne.fluid.window import Window
+from flowborne.fluid.window import Window, crosses
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 from flowborne.solids.wind import Wind
@@ -62,7 +62,7 @@ class Fluid:
     def __post_init__(self) -> None:
         for axis in () if self.window is None else self.window.axes:
             for side in self.boundaries.pair(axis):
-                if not (side.free or side.supplies):
+                if not crosses(side):
                     raise ValueError(
                         f"the grid cannot move along {'xyz'[axis]}, as a side there is {side.kind}"
                     )

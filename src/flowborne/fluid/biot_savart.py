@@ -59,7 +59,7 @@ def nodes_of(place: Place) -> Array:
     grid, along = place.grid, 1 - place.axis
     nodes = np.empty((grid.shape[along] + 1, 2))
     nodes[:, along] = grid.origin[along] + grid.spacing * np.arange(grid.shape[along] + 1)
-    nodes[:, place.axis] = (grid.upper if place.upper else grid.origin)[place.axis]
+    nodes[:, place.axis] = place.at
     return nodes
 
 

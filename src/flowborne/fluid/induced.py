@@ -120,7 +120,7 @@ def pooled(rate: Array, sea: Sea) -> tuple[Array, Array]:
     weighted = [np.bincount(block.ravel(), values * along) / rates for along in places.T]
     points = np.stack(weighted, axis=1)
     for place in sea.mirrors:
-        image, at = points.copy(), (grid.upper if place.upper else grid.origin)[place.axis]
-        image[:, place.axis] = 2.0 * at - image[:, place.axis]
+        image = points.copy()
+        image[:, place.axis] = 2.0 * place.at - image[:, place.axis]
         points, rates = np.concatenate([points, image]), np.concatenate([rates, rates])
     return points, rates

@@ -85,7 +85,7 @@ def edges_of(place: Place, axis: int) -> Array:
         grid.origin[a] + grid.spacing * (np.arange(grid.shape[a] + (a != axis)) + 0.5 * (a == axis))
         for a in range(3)
     ]
-    along[place.axis] = np.array([(grid.upper if place.upper else grid.origin)[place.axis]])
+    along[place.axis] = np.array([place.at])
     found = np.stack([c.ravel() for c in np.meshgrid(*along, indexing="ij")], axis=1)
     found.flags.writeable = False
     return found
@@ -109,10 +109,9 @@ def source_velocity(points: Array, rates: Array, place: Place) -> Array:
     grid, axis = place.grid, place.axis
     one, other = (a for a in range(3) if a != axis)
     nodes = [grid.origin[a] + grid.spacing * np.arange(grid.shape[a] + 1) for a in (one, other)]
-    end = (grid.upper if place.upper else grid.origin)[axis]
     flux = np.zeros((grid.shape[one], grid.shape[other]))
     for point, rate in zip(points, rates, strict=True):
-        x, y, z = nodes[0][:, None] - point[one], nodes[1] - point[other], end - point[axis]
+        x, y, z = nodes[0][:, None] - point[one], nodes[1] - point[other], place.at - point[axis]
         seen = np.arctan(x * y / (z * np.sqrt(x * x + y * y + z * z)))
         flux += rate * np.diff(np.diff(seen, axis=0), axis=1)
     return np.expand_dims(flux / (4.0 * np.pi * grid.spacing**2), axis)

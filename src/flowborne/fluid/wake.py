@@ -72,8 +72,9 @@ def wake_line(sea: Sea) -> WakeLine:
     middle = low + np.array(parts) * (high - low)
     along = np.array(sea.side.velocity)[axes]
     along /= np.linalg.norm(along)
-    end = high[axis] if sea.exit.upper else low[axis]
-    return WakeLine(middle + (end - middle[axis]) / along[axis] * along, along, BIN * grid.spacing)
+    return WakeLine(
+        middle + (sea.exit.at - middle[axis]) / along[axis] * along, along, BIN * grid.spacing
+    )
 
 
 def with_all_circulation_0(bins: Array, inside: Array) -> Array:
@@ -106,12 +107,10 @@ def followed(bins: Array, left: Array, before: WakeLine, after: WakeLine) -> Arr
     shift = moved_by - away * before.along
     arms = shift if count == 3 else shift @ np.array([[-before.along[1]], [before.along[0]]])
     found[:, count:] -= np.einsum("j,ki->kji", arms, bins[:, :count]).reshape(len(bins), -1)
-    next_ones = np.concatenate([found[1:], found[-1:]])
-    last_ones = np.concatenate([np.zeros((1, found.shape[1])), found[:-1]])
-    found += abs(away) / before.length * ((next_ones if away > 0.0 else last_ones) - found)
-    if away < 0.0:
-        found[0] += left
-    return found
+    part = away / before.length
+    if part < 0.0:
+        return moved(found, left, -part)
+    return np.asarray(found + part * (np.concatenate([found[1:], found[-1:]]) - found))
 
 
 def resampled(bins: Array, ratio: float) -> Array:

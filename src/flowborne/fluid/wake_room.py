@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.wake import BINS, WakeLine
@@ -112,6 +113,4 @@ def summed(layer: list[Array], place: Place, line: WakeLine) -> Array:
 
 
 def _layer(field: Array, axis: int, at: int) -> Array:
-    index = [slice(None)] * 3
-    index[axis] = slice(at, at + 1 or None)
-    return field[tuple(index)]
+    return field[edge(axis, slice(at, at + 1 or None))]

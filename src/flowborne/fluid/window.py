@@ -29,6 +29,11 @@ class Window:
     axes: tuple[int, ...]
 
 
+def crosses(side: Boundary | type[Boundary]) -> bool:
+    """Whether a grid may move across a side: whether there is fluid beyond."""
+    return side.free or side.supplies
+
+
 def moved_fluid(
     state: FluidState, grid: Grid, sides: Boundaries, axis: int, cells: int, time: float
 ) -> tuple[FluidState, Grid]:
@@ -41,19 +46,17 @@ def moved_fluid(
     """
     upper = cells > 0
     for _ in range(abs(cells)):
-        velocity = _with_layer(state, sides, Place(grid, axis, upper), time)
-        before, grid = grid, grid.moved(axis, 1 if upper else -1)
-        place = Place(grid, axis, upper)
-        side = sides.pair(axis)[upper]
+        beyond, grid = Place(grid, axis, upper), grid.moved(axis, 1 if upper else -1)
+        place, side = Place(grid, axis, upper), sides.pair(axis)[upper]
         state = replace(
             state,
-            velocity=velocity,
+            velocity=_with_layer(state, sides, beyond, place, time),
             velocity_change=faces_of([shifted(u, axis, upper) for u in state.velocity_change]),
             acceleration=faces_of([shifted(u, axis, upper) for u in state.acceleration]),
             pressure=shifted(state.pressure, axis, upper),
             previous_pressure=shifted(state.previous_pressure, axis, upper),
             cell_volume=shifted(state.cell_volume, axis, upper),
-            wake=wake_after_move(state, before, grid, sides),
+            wake=wake_after_move(state, beyond.grid, grid, sides),
             scalars={
                 name: shifted(dye, axis, upper, _entering(name, side, place, time))
                 for name, dye in state.scalars.items()
@@ -76,10 +79,11 @@ def _entering(name: str, side: Boundary, place: Place, time: float) -> Array | f
     return 0.0 if found is None else found
 
 
-def _with_layer(state: FluidState, sides: Boundaries, beyond: Place, time: float) -> Faces:
-    """Velocity on the faces of a grid that has moved by a cell beyond a side."""
-    grid, axis, upper = beyond.grid, beyond.axis, beyond.upper
-    side, new = sides.pair(axis)[upper], Place(grid.moved(axis, 1 if upper else -1), axis, upper)
+def _with_layer(
+    state: FluidState, sides: Boundaries, beyond: Place, new: Place, time: float
+) -> Faces:
+    """Velocity on the faces of a grid that has moved by a cell beyond a side, then at `new`."""
+    axis, upper, side = new.axis, new.upper, sides.pair(new.axis)[new.upper]
     # far sides that answer the vorticity inside hold what the next move starts from. Where they do
     # not, waves that grow outwards, by 1 + k h in a cell, would do so again with every move
     layers = (
@@ -87,7 +91,7 @@ def _with_layer(state: FluidState, sides: Boundaries, beyond: Place, time: float
         if state.wake.size > 0
         else [
             side.velocity_beyond(state.velocity[component][beyond.layer], beyond, component, time)
-            for component in grid.axes
+            for component in new.grid.axes
         ]
     )
     found = list(state.velocity)

@@ -9,6 +9,7 @@ import numpy as np
 from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.grid import Array
+from flowborne.fluid.window import crosses
 from flowborne.phrases import listed
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.dye import DyeBox
@@ -70,7 +71,7 @@ def check_window(draft: Draft) -> Iterator[str]:
         return
     for name, side in scene.boundaries:
         kind = side.boundary
-        if "xyz".index(name[0]) in axes and not (kind.free or kind.supplies):
+        if "xyz".index(name[0]) in axes and not crosses(kind):
             others = ", ".join(f'"{"xyz"[a]}"' for a in axes if "xyz"[a] != name[0])
             yield (
                 f"{draft.at('boundaries', name)}: the domain follows bodies along {name[0]}, and "

@@ -37,6 +37,11 @@ class Place:
         layers[self.axis] = slice(-1, None) if self.upper else slice(1)
         return tuple(layers)
 
+    @property
+    def at(self) -> float:
+        """Where it lies along its axis, m."""
+        return (self.grid.upper if self.upper else self.grid.origin)[self.axis]
+
     def face_coordinates(self, component: int) -> tuple[Array, Array, Array]:
         """x, y, z on the side at which a component of velocity lives, m; not to be written."""
         return _face_coordinates(self, component)
@@ -48,8 +53,8 @@ class Place:
     def _on_side(
         self, coordinates: tuple[Array, Array, Array], sparse: bool
     ) -> tuple[Array, Array, Array]:
-        along, end = list(coordinates), self.grid.upper if self.upper else self.grid.origin
-        along[self.axis] = np.array([end[self.axis]])
+        along = list(coordinates)
+        along[self.axis] = np.array([self.at])
         x, y, z = np.meshgrid(*along, indexing="ij", sparse=sparse)
         return x, y, z
 
