@@ -30,8 +30,8 @@ JOINTS = 10
 HEAD = 0.22
 """Share of the length before the first joint."""
 
-RANGES = (3.0, 25.0)
-"""Limits of the first and the last joint, degrees; those between are in proportion."""
+WAVE = 0.95
+"""Wavelength of a swimming fish over its length (Videler and Hess 1984)."""
 
 CORE = 0.55
 """Half axes of a bone over those of the section."""
@@ -75,6 +75,19 @@ def half_height(s: float) -> float:
         return LENGTH * float(np.interp(s, [peduncle, 0.97, TAIL], [0.0322, 0.11, 0.1162]))
     front, back = min(s / highest, 1.0), max(s - highest, 0.0) / (peduncle - highest)
     return LENGTH * 0.115 * (np.sqrt(front * (2.0 - front)) - 0.72 * back**2 * (3.0 - 2.0 * back))
+
+
+def sway(s: float) -> float:
+    """Amplitude of a swimming fish over its length at a share `s` of it (Videler and Hess 1984, as
+    Borazjani and Sotiropoulos 2008 have it)."""
+    return 0.02 - 0.0825 * s + 0.1625 * s**2
+
+
+def limit(number: int) -> float:
+    """Degrees that a joint may bend to each side: by which the wave of a fish that swims turns from
+    one bone to the next."""
+    bend = (2.0 * np.pi / WAVE) ** 2 * sway(joint_at(number))
+    return float(np.degrees(bend * (1.0 - HEAD) / JOINTS))
 
 
 def section() -> Section:
@@ -201,10 +214,8 @@ def model(hulls: dict[str, Array]) -> str:
                 f'{indent}  <joint name="heading"/>',
             ]
         else:
-            limit = RANGES[0] + (RANGES[1] - RANGES[0]) * (number - 1) / (JOINTS - 1)
-            lines.append(
-                f'{indent}  <joint name="joint_{number}" range="{-limit:.3g} {limit:.3g}"/>'
-            )
+            most = f"{limit(number - 1):.3g}"
+            lines.append(f'{indent}  <joint name="joint_{number}" range="-{most} {most}"/>')
         lines.append(f'{indent}  <geom name="{name}" mesh="{name}"/>')
         indent += "  "
     while len(indent) > 4:

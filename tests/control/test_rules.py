@@ -18,6 +18,7 @@ from flowborne.control.rules import (
     ResilientStep,
     Rule,
     descent,
+    inward,
 )
 
 
@@ -51,6 +52,19 @@ def test_longest_descent_that_strength_allows(gradient: list[float], data: st.Da
     assert np.max(np.abs(move) / limit) == pytest.approx(1.0)
     assert np.all(np.abs(move) <= limit)
     assert move @ g / (np.linalg.norm(move) * np.linalg.norm(g)) == pytest.approx(-1.0)
+
+
+def test_a_dof_at_the_end_of_its_range_does_not_slow_others() -> None:
+    """The first, with the largest slope, stands at its end; the second goes its full way."""
+
+    class Ended(Line):
+        def within_range(self, displacement: np.ndarray) -> np.ndarray:
+            return np.clip(displacement, [-1e-12, -1.0], [1.0, 1.0])
+
+    poses, limit = Ended(lambda d: 0.0, 2), np.array([0.1, 0.1])
+    outward, back = np.array([9.0, -3.0]), np.array([-9.0, -3.0])
+    np.testing.assert_array_equal(descent(inward(poses, outward, limit), limit), [0.0, 0.1])
+    np.testing.assert_array_equal(inward(poses, back, limit), back)
 
 
 @pytest.mark.parametrize("gradient", [1e-300, 1e-8, 3.0, 1e12])

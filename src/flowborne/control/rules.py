@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
+ENDED = 1e-6
+"""Part of its strength that a dof at an end of its range may still move by, from rounding."""
+
 
 class Rule(Protocol):
     """Turns a gradient into a displacement of the controlled dofs."""
@@ -43,6 +46,18 @@ RULES: Registry[Rule] = Registry(
     taken=("fixed", "resilient", "golden-section", "quasi-newton"),
 )
 """Rules that users have registered."""
+
+
+def inward(poses: Poses, gradient: Array, limit: Array) -> Array:
+    """(n,) the gradient, 0 for dofs that stand at an end of their range and would descend beyond it.
+
+    Others would move only in proportion to such a dof, which cannot move itself.
+
+    limit   (n,) what strength allows, rad or m
+    source  Bertsekas 1976 (projected gradient)
+    """
+    possible = np.abs(poses.within_range(-limit * np.sign(gradient)))
+    return np.where(possible > ENDED * limit, gradient, 0.0)
 
 
 def descent(gradient: Array, limit: Array) -> Array:
