@@ -49,7 +49,7 @@ RULES: Registry[Rule] = Registry(
 
 
 def inward(poses: Poses, gradient: Array, limit: Array) -> Array:
-    """(n,) the gradient, 0 for dofs that stand at an end of their range and would descend beyond it.
+    """(n,) the gradient, 0 for dofs that stand at the end of their range and would go beyond it.
 
     Others would move only in proportion to such a dof, which cannot move itself.
 
