@@ -14,11 +14,11 @@ from flowborne.control.gradients import GradientCentral, OffsetPoses
 from flowborne.control.rules import (
     FixedStep,
     GoldenSection,
+    ProjectedStep,
     QuasiNewton,
     ResilientStep,
     Rule,
     descent,
-    inward,
 )
 
 
@@ -61,10 +61,10 @@ def test_a_dof_at_the_end_of_its_range_does_not_slow_others() -> None:
         def within_range(self, displacement: np.ndarray) -> np.ndarray:
             return np.clip(displacement, [-1e-12, -1.0], [1.0, 1.0])
 
-    poses, limit = Ended(lambda d: 0.0, 2), np.array([0.1, 0.1])
+    poses, limit = Ended(lambda d: 0.0, 2), np.full(2, 0.1)
     outward, back = np.array([9.0, -3.0]), np.array([-9.0, -3.0])
-    np.testing.assert_array_equal(descent(inward(poses, outward, limit), limit), [0.0, 0.1])
-    np.testing.assert_array_equal(inward(poses, back, limit), back)
+    np.testing.assert_array_equal(ProjectedStep().step(poses, outward, limit), [0.0, 0.1])
+    np.testing.assert_array_equal(ProjectedStep().step(poses, back, limit), descent(back, limit))
 
 
 @pytest.mark.parametrize("gradient", [1e-300, 1e-8, 3.0, 1e12])
@@ -74,7 +74,7 @@ def test_step_of_one_dof_is_its_strength_however_small_the_gradient(gradient: fl
         assert step == [-sign * 0.03]
 
 
-@pytest.mark.parametrize("rule", [FixedStep(), GoldenSection(), QuasiNewton()])
+@pytest.mark.parametrize("rule", [FixedStep(), ProjectedStep(), GoldenSection(), QuasiNewton()])
 def test_no_gradient_no_step(rule: Rule) -> None:
     line = Line(lambda d: 0.0, 2)
     assert not rule.step(line, np.zeros(2), np.ones(2)).any()

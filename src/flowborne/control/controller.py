@@ -24,7 +24,7 @@ from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.control.phases import Phases
 from flowborne.control.plan import Horizon, PlanCourse
-from flowborne.control.rules import FixedStep, Rule, inward
+from flowborne.control.rules import FixedStep, Rule
 from flowborne.control.trial import Hypothesis, PoseCourse, without_scalars
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import BREAKDOWNS, StepReport
@@ -350,7 +350,7 @@ class Controller:
     def _step(self, trials: Trials, gradient: Array, limit: Array) -> Array:
         """(m,) the rule's displacement. Raises PartError if it is not finite or misshapen."""
         with _guarding("rule", self.rule):
-            given = self.rule.step(trials, inward(trials, gradient, limit), limit)
+            given = self.rule.step(trials, gradient, limit)
         expected = "a finite displacement in rad or m"
         return _checked("rule", self.rule, given, expected, gradient.shape)
 

@@ -43,21 +43,9 @@ class Rule(Protocol):
 RULES: Registry[Rule] = Registry(
     "rule",
     methods=("step_scale", "step"),
-    taken=("fixed", "resilient", "golden-section", "quasi-newton"),
+    taken=("fixed", "projected", "resilient", "golden-section", "quasi-newton"),
 )
 """Rules that users have registered."""
-
-
-def inward(poses: Poses, gradient: Array, limit: Array) -> Array:
-    """(n,) the gradient, 0 for dofs that stand at the end of their range and would go beyond it.
-
-    Others would move only in proportion to such a dof, which cannot move itself.
-
-    limit   (n,) what strength allows, rad or m
-    source  Bertsekas 1976 (projected gradient)
-    """
-    possible = np.abs(poses.within_range(-limit * np.sign(gradient)))
-    return np.where(possible > ENDED * limit, gradient, 0.0)
 
 
 def descent(gradient: Array, limit: Array) -> Array:
@@ -96,6 +84,21 @@ class FixedStep(FullStep):
 
     def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
         return descent(gradient, limit)
+
+
+@dataclass(frozen=True)
+class ProjectedStep(FixedStep):
+    """The step of `FixedStep` without dofs that stand at the end of their range and would go
+    beyond it.
+
+    With them, the other dofs would move only in proportion to what such a dof cannot do.
+
+    source  Bertsekas 1976
+    """
+
+    def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
+        possible = np.abs(poses.within_range(-limit * np.sign(gradient)))
+        return descent(np.where(possible > ENDED * limit, gradient, 0.0), limit)
 
 
 @dataclass(frozen=True)
@@ -265,6 +268,15 @@ class RuleFixed(RuleTable):
         return FixedStep()
 
 
+class RuleProjected(RuleTable):
+    """The same for the joints that are not at the end of their range already."""
+
+    kind: Literal["projected"]
+
+    def build(self, around: Surroundings) -> ProjectedStep:
+        return ProjectedStep()
+
+
 class RuleResilient(RuleTable):
     """Steps and probes that halve if the descent reverses, and grow again if it continues.
 
@@ -324,7 +336,7 @@ class RuleOwn(RuleTable, OwnTable):
 
 AnyRule = Annotated[
     Annotated[
-        RuleFixed | RuleResilient | RuleGoldenSection | RuleQuasiNewton,
+        RuleFixed | RuleProjected | RuleResilient | RuleGoldenSection | RuleQuasiNewton,
         Field(discriminator="kind"),
         Tag(BUILT_IN),
     ]
