@@ -13,6 +13,7 @@ from flowborne.scenes.notes import notes_of
     ("settings", "told"),
     [
         ({"controller.rule": "fixed"}, True),
+        ({"controller.rule": "projected"}, True),
         ({"controller.rule": "resilient"}, False),
         ({"controller.rule": "fixed", "control.0.probe": "0.8"}, False),
     ],
@@ -24,3 +25,14 @@ def test_probes_wider_than_fixed_steps_are_told(settings: dict[str, str], told: 
     assert len(notes) == told
     if told:
         assert "probes of 5 degrees are wider than steps of 0.833" in notes[0]
+
+
+def test_sides_that_whole_cells_make_longer_are_told() -> None:
+    for resolution, told in (
+        ("36", ""),
+        ("48", "y to 0.164 m for 0.16, z to 0.136 m for 0.128"),
+    ):
+        scene = load_scene("fish", {"domain.resolution": resolution})
+        notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
+        assert ("longer" in notes) == bool(told)
+        assert told in notes

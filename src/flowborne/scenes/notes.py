@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.control.rules import RuleFixed
+from flowborne.control.rules import RuleFixed, RuleProjected
 from flowborne.motion.bvh import MAX_BONE_STRETCH
 from flowborne.motion.clip_reading import (
     MIN_STANDING_COSINE,
@@ -46,7 +46,23 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     yield from clip_notes(scene)
     yield from _standing_still(scene)
     yield from _wide_probes(scene, model)
+    yield from _longer_sides(scene)
     yield from window_notes(scene)
+
+
+def _longer_sides(scene: Scene) -> Iterator[str]:
+    """Sides of the domain that whole cells make longer than the scene says."""
+    domain = scene.domain
+    if domain is None:
+        return
+    lengths = [count * domain.spacing() for count in domain.counts()]
+    longer = [
+        f"{axis} to {low + length:.6g} m for {high:.6g}"
+        for axis, low, high, length in zip("xyz", domain.lower, domain.upper, lengths, strict=False)
+        if length > (high - low) * (1.0 + 1e-9)
+    ]
+    if longer:
+        yield f"[domain]: whole cells make it longer: {listed(longer)}"
 
 
 def _moved_into_range(scene: Scene, model: SolidModel) -> Iterator[str]:
@@ -93,7 +109,7 @@ def _wide_probes(scene: Scene, model: SolidModel) -> Iterator[str]:
     A descent of fixed steps comes to rest where the objective is the same at both ends of a probe:
     half a probe off an optimum that is a kink, at most, and never nearer than its step.
     """
-    if not isinstance(scene.controller.rule, RuleFixed):
+    if not isinstance(scene.controller.rule, RuleFixed | RuleProjected):
         return
     time = scene.controller.every * scene.frame_time
     for number, table in enumerate(scene.control, start=1):
