@@ -8,7 +8,6 @@ import pytest
 from flowborne import Array, Grid, World, step
 from flowborne.coupling.cut import departure
 from flowborne.coupling.half_pressure import explicit_half_pressure, pressure_increment_ratio
-from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryOpen, make_world, set_velocity
 
@@ -51,25 +50,6 @@ def turned(world: World, steps: int) -> World:
     for _ in range(steps):
         assert step(world, DT).outcome.name == "DONE"
     return world
-
-
-def test_a_pocket_that_holds_nothing_yet_pushes_nothing() -> None:
-    """Bodies that part open cells without fluid: what such cells gave to them would be lost."""
-    world = make_world(BODY, SQUARE, solid_density=0.5)
-    set_velocity(world, swirl)
-    cut, state = departure(turned(world, 4)).cut, world.flow()[1]
-    touched = np.zeros(SQUARE.shape, bool)
-    touched.flat[cut.cells] = True
-    across = touched[:-1] & touched[1:] & (cut.open[0][1:-1] > 0.0)
-    x, y, _ = np.argwhere(across)[0]
-    state.cell_volume[x : x + 2, y] = 1e-13 * SQUARE.cell_volume
-    assert np.ptp(state.pressure[x : x + 2, y]) > 0.0
-    world.volumes = None
-    half = explicit_half_pressure(world, start := departure(world), DT)
-    mass = face_masses(start.volumes, 1.0)
-    gained = fluid_momentum(half.velocity, mass, SQUARE, Boundaries()) - half.start
-    given = half.sides - half.impulse[:12].reshape(-1, 6)[:, :3].sum(axis=0)
-    np.testing.assert_allclose(gained, given, atol=1e-15)
 
 
 def test_the_pressure_of_a_step_is_that_of_the_whole_step() -> None:

@@ -22,14 +22,9 @@ from flowborne.coupling.advection.scheme import Departure
 from flowborne.coupling.cut import moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.control_volumes import NOTHING
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.momentum import each_once, face_masses, fluid_momentum
 from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
-
-EMPTY = 2.0 * NOTHING
-"""Part of a cell below which fluid, as in a pocket that bodies have just opened, bears no pressure:
-faces between two such cells have no mass that could take up what it gives to the bodies."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +67,7 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
         return HalfPressure(state.velocity, *still, momentum)
     rate = accelerated(opened, mass, grid, sides)
     last, earlier = grid.zeros_faces(), grid.zeros_faces()
-    pressure = np.where(
-        start.volumes.cells > EMPTY * grid.cell_volume, dynamic_pressure(state.pressure, fluid), 0.0
-    )
+    pressure = dynamic_pressure(state.pressure, fluid)
     subtract_pressure_gradient(last, rate, pressure, grid, sides, dt)
     before = dynamic_pressure(state.previous_pressure, fluid)
     subtract_pressure_gradient(earlier, rate, before, grid, sides, dt)
