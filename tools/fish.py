@@ -31,7 +31,7 @@ HEAD = 0.22
 """Share of the length before the first joint."""
 
 WAVE = 0.95
-"""Wavelength of a swimming fish over its length (Videler and Hess 1984)."""
+"""Wavelength of a swimming fish over its length (Borazjani and Sotiropoulos 2008)."""
 
 CORE = 0.55
 """Half axes of a bone over those of the section."""

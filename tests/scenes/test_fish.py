@@ -61,4 +61,5 @@ def test_bent_the_other_way_it_decides_the_mirror_image() -> None:
     """The grid is its own mirror image, too."""
     left = first_gradient("{ joint_1 = 1.0, joint_10 = -2.0 }")
     right = first_gradient("{ joint_1 = -1.0, joint_10 = 2.0 }")
+    assert np.abs(left).max() > 1e-4
     np.testing.assert_allclose(right, -left, rtol=0.0, atol=0.02 * np.abs(left).max())

@@ -55,11 +55,11 @@ def _longer_sides(scene: Scene) -> Iterator[str]:
     domain = scene.domain
     if domain is None:
         return
-    lengths = [count * domain.spacing() for count in domain.counts()]
+    sides = zip("xyz", domain.lower, domain.upper, domain.grid().upper, strict=False)
     longer = [
-        f"{axis} to {low + length:.6g} m for {high:.6g}"
-        for axis, low, high, length in zip("xyz", domain.lower, domain.upper, lengths, strict=False)
-        if length > (high - low) * (1.0 + 1e-9)
+        f"{axis} to {end:.6g} m for {high:.6g}"
+        for axis, low, high, end in sides
+        if end - low > (high - low) * (1.0 + 1e-9)
     ]
     if longer:
         yield f"[domain]: whole cells make it longer: {listed(longer)}"

@@ -172,7 +172,7 @@ IMMERSED: Mapping[str, Mapping[str, str]] = {
     "with the tendons' arms in the water": {
         "solids.displace": '{ classes = ["hull", "drive", "arm"] }',
     },
-    "with all of it in the water, as its masses and volumes ask": {
+    "with all of it in the water": {
         "solids.displace": '{ classes = ["hull", "drive", "arm", "top"] }',
         "domain.upper": "[0.68, 0.24, 0.1425]",
     },
