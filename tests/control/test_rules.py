@@ -14,7 +14,6 @@ from flowborne.control.gradients import GradientCentral, OffsetPoses
 from flowborne.control.rules import (
     FixedStep,
     GoldenSection,
-    ProjectedStep,
     QuasiNewton,
     ResilientStep,
     Rule,
@@ -54,19 +53,6 @@ def test_longest_descent_that_strength_allows(gradient: list[float], data: st.Da
     assert move @ g / (np.linalg.norm(move) * np.linalg.norm(g)) == pytest.approx(-1.0)
 
 
-def test_a_dof_at_the_end_of_its_range_does_not_slow_others() -> None:
-    """The first, with the largest slope, stands at its end; the second goes its full way."""
-
-    class Ended(Line):
-        def within_range(self, displacement: np.ndarray) -> np.ndarray:
-            return np.clip(displacement, [-1e-12, -1.0], [1.0, 1.0])
-
-    poses, limit = Ended(lambda d: 0.0, 2), np.full(2, 0.1)
-    outward, back = np.array([9.0, -3.0]), np.array([-9.0, -3.0])
-    np.testing.assert_array_equal(ProjectedStep().step(poses, outward, limit), [0.0, 0.1])
-    np.testing.assert_array_equal(ProjectedStep().step(poses, back, limit), descent(back, limit))
-
-
 @pytest.mark.parametrize("gradient", [1e-300, 1e-8, 3.0, 1e12])
 def test_step_of_one_dof_is_its_strength_however_small_the_gradient(gradient: float) -> None:
     for sign in (-1.0, 1.0):
@@ -74,7 +60,7 @@ def test_step_of_one_dof_is_its_strength_however_small_the_gradient(gradient: fl
         assert step == [-sign * 0.03]
 
 
-@pytest.mark.parametrize("rule", [FixedStep(), ProjectedStep(), GoldenSection(), QuasiNewton()])
+@pytest.mark.parametrize("rule", [FixedStep(), GoldenSection(), QuasiNewton()])
 def test_no_gradient_no_step(rule: Rule) -> None:
     line = Line(lambda d: 0.0, 2)
     assert not rule.step(line, np.zeros(2), np.ones(2)).any()

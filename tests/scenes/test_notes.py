@@ -13,7 +13,6 @@ from flowborne.scenes.notes import notes_of
     ("settings", "told"),
     [
         ({"controller.rule": "fixed"}, True),
-        ({"controller.rule": "projected"}, True),
         ({"controller.rule": "resilient"}, False),
         ({"controller.rule": "fixed", "control.0.probe": "0.8"}, False),
     ],

@@ -19,9 +19,6 @@ Array = NDArray[np.float64]
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
-ENDED = 1e-6
-"""Part of its strength that a dof at an end of its range may still move by, from rounding."""
-
 
 class Rule(Protocol):
     """Turns a gradient into a displacement of the controlled dofs."""
@@ -43,7 +40,7 @@ class Rule(Protocol):
 RULES: Registry[Rule] = Registry(
     "rule",
     methods=("step_scale", "step"),
-    taken=("fixed", "projected", "resilient", "golden-section", "quasi-newton"),
+    taken=("fixed", "resilient", "golden-section", "quasi-newton"),
 )
 """Rules that users have registered."""
 
@@ -84,21 +81,6 @@ class FixedStep(FullStep):
 
     def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
         return descent(gradient, limit)
-
-
-@dataclass(frozen=True)
-class ProjectedStep(FixedStep):
-    """The step of `FixedStep` without dofs that stand at the end of their range and would go
-    beyond it.
-
-    With them, the other dofs would move only in proportion to what such a dof cannot do.
-
-    source  Bertsekas 1976
-    """
-
-    def step(self, poses: Poses, gradient: Array, limit: Array) -> Array:
-        possible = np.abs(poses.within_range(-limit * np.sign(gradient)))
-        return descent(np.where(possible > ENDED * limit, gradient, 0.0), limit)
 
 
 @dataclass(frozen=True)
@@ -268,15 +250,6 @@ class RuleFixed(RuleTable):
         return FixedStep()
 
 
-class RuleProjected(RuleTable):
-    """The same for the joints that are not at the end of their range already."""
-
-    kind: Literal["projected"]
-
-    def build(self, around: Surroundings) -> ProjectedStep:
-        return ProjectedStep()
-
-
 class RuleResilient(RuleTable):
     """Steps and probes that halve if the descent reverses, and grow again if it continues.
 
@@ -336,7 +309,7 @@ class RuleOwn(RuleTable, OwnTable):
 
 AnyRule = Annotated[
     Annotated[
-        RuleFixed | RuleProjected | RuleResilient | RuleGoldenSection | RuleQuasiNewton,
+        RuleFixed | RuleResilient | RuleGoldenSection | RuleQuasiNewton,
         Field(discriminator="kind"),
         Tag(BUILT_IN),
     ]

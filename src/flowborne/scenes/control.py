@@ -68,8 +68,8 @@ class ControllerTable(Table):
     hypothetical_steps  steps of a trial's displacement
     hypothetical_time   s of one such step, or of one of a plan; the time of a frame unless given
     settle_steps        further steps of a trial in the fixed pose
-    rule                "fixed", "projected", "resilient", "golden-section" or "quasi-newton" with
-                        their options, or a registered one
+    rule                "fixed", "resilient", "golden-section" or "quasi-newton" with their options,
+                        or a registered one
     every               frames between decisions
     iterations          descent steps per decision, in the flow as it is then
     servo               "exact", or "pd" with its frequency

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.control.rules import RuleFixed, RuleProjected
+from flowborne.control.rules import RuleFixed
 from flowborne.motion.bvh import MAX_BONE_STRETCH
 from flowborne.motion.clip_reading import (
     MIN_STANDING_COSINE,
@@ -109,7 +109,7 @@ def _wide_probes(scene: Scene, model: SolidModel) -> Iterator[str]:
     A descent of fixed steps comes to rest where the objective is the same at both ends of a probe:
     half a probe off an optimum that is a kink, at most, and never nearer than its step.
     """
-    if not isinstance(scene.controller.rule, RuleFixed | RuleProjected):
+    if not isinstance(scene.controller.rule, RuleFixed):
         return
     time = scene.controller.every * scene.frame_time
     for number, table in enumerate(scene.control, start=1):
