@@ -8,12 +8,22 @@ import pytest
 from flowborne import Array, Grid, World, step
 from flowborne.coupling.cut import departure
 from flowborne.coupling.half_pressure import explicit_half_pressure, pressure_increment_ratio
+from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryOpen, make_world, set_velocity
 
 DT = 1.0 / 64
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 BODY = mjcf('<body pos="0.4 0.45 0"><freejoint/><geom type="sphere" size="0.12"/></body>')
+
+FRAME = mjcf(
+    '<body pos="0.40625 0.4375 0"><freejoint/>'
+    '<geom type="box" size="0.016 0.05 0.1" pos="0.1035 0 0"/>'
+    '<geom type="box" size="0.016 0.05 0.1" pos="-0.1035 0 0"/>'
+    '<geom type="box" size="0.1 0.016 0.1" pos="0 0.041 0"/>'
+    '<geom type="box" size="0.1 0.016 0.1" pos="0 -0.041 0"/></body>'
+)
+"""Thin walls around a room of 5.6 x 1.6 cells of `SQUARE`, which is open in six by two."""
 
 
 def swirl(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
@@ -50,6 +60,24 @@ def turned(world: World, steps: int) -> World:
     for _ in range(steps):
         assert step(world, DT).outcome.name == "DONE"
     return world
+
+
+def test_a_pocket_without_fluid_pushes_nothing() -> None:
+    """Bodies that part leave one: what its last pressure gave to them, no fluid would give."""
+    world = make_world(FRAME, SQUARE, solid_density=100.0)
+    set_velocity(world, swirl)
+    cut, state = departure(turned(world, 4)).cut, world.flow()[1]
+    room = (slice(10, 16), slice(13, 15))
+    assert np.all(cut.open[0][11:16, 13:15] > 0.0)
+    assert np.ptp(state.pressure[room]) > 1e-4
+    state.cell_volume[room] = 1e-13 * SQUARE.cell_volume
+    world.volumes = None
+    half = explicit_half_pressure(world, start := departure(world), DT)
+    mass = face_masses(start.volumes, world.flow()[0].density)
+    gained = fluid_momentum(half.velocity, mass, SQUARE, Boundaries()) - half.start
+    given = half.sides - half.impulse[:12].reshape(-1, 6)[:, :3].sum(axis=0)
+    assert np.abs(given).max() > 1e-6
+    np.testing.assert_allclose(gained, given, atol=1e-15)
 
 
 def test_the_pressure_of_a_step_is_that_of_the_whole_step() -> None:

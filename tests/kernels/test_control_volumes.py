@@ -263,3 +263,14 @@ def test_sort_faces(shape: tuple, periodic: tuple, component: int, told: tuple) 
     for found, expected in zip(listed_kinds(kinds, counts), (part, shut, uneven), strict=True):
         np.testing.assert_array_equal(found, expected)
         assert 0 < found.size < case.volumes.size
+
+
+def test_a_closed_face_whose_cells_cancel_passes_on_what_it_gets() -> None:
+    """A body takes up both cells in a step, and rounding leaves them exactly opposite volumes."""
+    cells, opened = np.zeros((6, 1, 1)), np.zeros((7, 1, 1))
+    cells[2:4, 0, 0] = 1e-13, -1e-13
+    volumes, kinds = np.empty((7, 1, 1)), np.empty((7, 1, 1), np.uint8)
+    counts, limits = np.empty((7, 3), np.int64), (1.0, 0.2, 0.1, 1e-9)
+    sort_faces(volumes, kinds, counts, cells, opened, 0, np.zeros(2, np.uint8), False, limits)
+    assert volumes[3] == 0.0
+    np.testing.assert_array_equal(listed_kinds(kinds, counts)[1], (2, 3, 4))

@@ -24,7 +24,11 @@ from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.momentum import each_once, face_masses, fluid_momentum
-from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
+from flowborne.fluid.projection import (
+    accelerated,
+    accelerating_cells,
+    subtract_pressure_gradient,
+)
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,9 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     Behind a far side there is a sea, and what comes in has no more energy than that has; the
     pressure that changes the sea's velocity is not half of it given beforehand.
 
+    Nor does it act in cells that the solve leaves out too: a pocket that bodies have crushed and
+    open again is empty, and no fluid would give what its last pressure gave to them.
+
     The rest of the last pressure stays in the state, as the first guess of the solve.
     """
     fluid, state = world.flow()
@@ -68,6 +75,7 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     rate = accelerated(opened, mass, grid, sides)
     last, earlier = grid.zeros_faces(), grid.zeros_faces()
     pressure = dynamic_pressure(state.pressure, fluid)
+    pressure[~accelerating_cells(rate)] = 0.0
     subtract_pressure_gradient(last, rate, pressure, grid, sides, dt)
     before = dynamic_pressure(state.previous_pressure, fluid)
     subtract_pressure_gradient(earlier, rate, before, grid, sides, dt)
@@ -109,10 +117,10 @@ def pressure_increment_ratio(earlier: float) -> float:
 def dynamic_pressure(pressure: Array, fluid: Fluid) -> Array:
     """The pressure without the part that balances the body force and moves nothing, Pa."""
     grid, held = fluid.grid, pressure != 0.0
-    rest = pressure
+    rest = pressure.copy()
     for axis in grid.axes:
         slope = fluid.density * fluid.body_force[axis]
         if slope != 0.0 and not fluid.boundaries.periodic()[axis]:
             along = [-1 if a == axis else 1 for a in range(3)]
-            rest = rest - np.where(held, slope * grid.cell_coordinates()[axis].reshape(along), 0.0)
+            rest -= np.where(held, slope * grid.cell_coordinates()[axis].reshape(along), 0.0)
     return rest

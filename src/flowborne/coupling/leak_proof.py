@@ -42,6 +42,10 @@ MOST = 2.0
 """Factor on the volumes of a closed region beyond which it is a pocket that bodies crush, and is
 left to them. One that they open holds nothing until it is reached."""
 
+FILLED = 1e-300
+"""Part of a whole cell that is left where a body fills it and rounding leaves exactly nothing: one
+of volume 0 counts as never filled with fluid, and would not pass on what flows into it."""
+
 
 def leak_proof_flux(
     departure: Departure, after: Geometry, time: float, dt: float
@@ -72,6 +76,7 @@ def leak_proof_flux(
     net_out(net, *flux)
     later = start + dt * (departure.rate - net)
     swept.put_back(flux, later, dt)
+    later[(later == 0.0) & (cells != 0.0)] = FILLED * grid.cell_volume
     return flux, later
 
 

@@ -13,8 +13,10 @@ what its two cells push with.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.faces import accelerate, weigh
 from flowborne.kernels.pressure_gradient import subtract_gradient
@@ -32,6 +34,16 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
     for place, side in boundaries.around(grid):
         rates[place.axis][place.layer] *= side.pressure_weight(place)
     return rates
+
+
+def accelerating_cells(rate: Faces) -> NDArray[np.bool_]:
+    """Which cells (nx, ny, nz) have a face that their pressure accelerates, see `accelerated`."""
+    below, above = edge(0, slice(None, -1)), edge(0, slice(1, None))
+    found = (rate[0][below] > 0.0) | (rate[0][above] > 0.0)
+    for axis in (1, 2):
+        for part in (edge(axis, slice(None, -1)), edge(axis, slice(1, None))):
+            found |= rate[axis][part] > 0.0
+    return found
 
 
 def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:

@@ -359,6 +359,13 @@ def kind_of(
     return DRIVEN * pushed + PART * (volume < least) + SHUT * shut + UNEVEN * uneven
 
 
+@inlined
+def cancels(cells: Array, i: int, j: int, k: int, axis: int) -> bool:
+    """Whether both cells of a face across an axis hold something, and their mean is 0."""
+    at = i if axis == 0 else (j if axis == 1 else k)
+    return at < cells.shape[axis] and cells[i, j, k] != 0.0
+
+
 @kernel
 def sort_faces(
     volumes: Array,
@@ -406,6 +413,8 @@ def sort_faces(
             goal = cell * (0.5 if outer and not periodic else 1.0)
             for k in range(start, stop):
                 kind[k] = kind_of(volume[k], part[k], least * cell, goal, slack, nothing, own)
+                if own and volume[k] == 0.0 and cancels(cells, i, j, k, component):
+                    kind[k] |= SHUT
         parts, shut, uneven = 0, 0, 0
         for k in range(n2):
             parts += (kind[k] & PART) // PART
