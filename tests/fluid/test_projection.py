@@ -12,7 +12,7 @@ from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.projection import accelerated, face_weights, subtract_pressure_gradient
+from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.inflow import BoundaryInflow
 from flowborne.fluid.sides.no_slip import BoundaryNoSlip
@@ -71,16 +71,13 @@ def masses_of(opened: Faces, grid: Grid, sides: Boundaries) -> Faces:
 def project(velocity: Faces, opened: Faces, grid: Grid, sides: Boundaries, rate: Array) -> Array:
     """Make `velocity` free of divergence but for the sources, in place; gives p^."""
     mass = masses_of(opened, grid, sides)
-    system = PressureSystem(
-        face_weights(opened, accelerated(opened, mass, grid, sides), grid), sides.periodic()
-    )
+    gradient = pressure_gradient(opened, mass, DENSITY, grid, sides)
+    system = PressureSystem(face_weights(opened, gradient.rate, grid), sides.periodic())
     need = rate - net_outflow(velocity, opened, grid)
     solution = system.solve(need, tolerance=TOLERANCE)
     assert solution.converged
     assert solution.residual < TOLERANCE
-    subtract_pressure_gradient(
-        velocity, accelerated(opened, mass, grid, sides), solution.pressure, grid, sides, 1.0
-    )
+    gradient.subtract(velocity, solution.pressure, 1.0)
     return solution.pressure
 
 

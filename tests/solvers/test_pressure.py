@@ -123,6 +123,24 @@ def test_solution_equals_dense_least_norm_solution(shape, sides, blocked, bodies
     assert error <= 1e-10 * condition * np.linalg.norm(rhs)
 
 
+@pytest.mark.parametrize(("shape", "sides"), [CASES[2], CASES[3]])
+def test_a_dense_term_belongs_to_the_matrix(shape, sides):
+    """Between random cells; one of its vectors takes away as much as K leaves positive."""
+    weights, rng = random_weights(shape, sides, blocked=0.0), np.random.default_rng(3)
+    K, term = laplacian(weights, tuple(s == "periodic" for s in sides)), random_term(shape, 2)
+    cells = rng.choice(len(K), len(K) // 2)
+    vectors, U = rng.standard_normal((2, cells.size)), np.zeros((len(K), 2))
+    np.add.at(U, cells, vectors.T)
+    strengths = np.array([1.0, -0.5 / (U[:, 1] @ np.linalg.solve(K, U[:, 1]))])
+    J, rhs = row_matrix(term, len(K)), rng.standard_normal(shape)
+    A = K + U * strengths @ U.T + J @ term.mobility.times(J).T
+    beyond = cells, vectors, strengths
+    system = PressureSystem(weights, tuple(s == "periodic" for s in sides), beyond=beyond)
+    found = system.solve(rhs, None, term, tolerance=1e-12)
+    expected = np.linalg.solve(A, rhs.ravel()).reshape(shape)
+    np.testing.assert_allclose(found.pressure, expected, atol=1e-9 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("sides", [("closed", "closed", "closed"), ("periodic", "open", "closed")])
 @pytest.mark.parametrize(("strength", "rank"), [(1e4, None), (1e4, 3), (1e-4, None), (1.0, 1)])
 def test_light_heavy_and_jointed_bodies(sides, strength, rank):

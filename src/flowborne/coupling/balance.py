@@ -13,6 +13,7 @@ from flowborne.coupling.solve import Solved
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.momentum import fluid_momentum, momentum_change
+from flowborne.fluid.projection import pressure_gradient
 
 
 def momentum_balance(
@@ -34,7 +35,8 @@ def momentum_balance(
     taken, moved = momentum_change(before, projected.velocity, mass, grid, boundaries)
     after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     pushes = linear(projected.impulse, first)
-    sides = dt * side_push(projected.pressure, cut.open, grid, boundaries)
+    gradient = pressure_gradient(cut.open, mass, fluid.density, grid, boundaries)
+    sides = dt * side_push(projected.pressure, cut.open, gradient)
     exchanged = pushes.sum(axis=0)
     scale = float(np.abs(pushes).sum()) + moved
     missing = float(np.abs(exchanged + taken - sides).max())

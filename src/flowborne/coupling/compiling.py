@@ -38,13 +38,12 @@ def compile_iteration() -> None:
     from flowborne.kernels.conjugate_gradients import solve
     from flowborne.kernels.levels import even_at
     from flowborne.solvers.hierarchy import Buffers
-    from flowborne.solvers.pressure import NO_FIELDS, NO_TERM, NO_VECTORS
+    from flowborne.solvers.pressure import NO_DENSE_TERM, NO_FIELDS, NO_TERM, NO_VECTORS
 
     b, term = Buffers((1, SMALL, SMALL)), NO_TERM
-    rows = term.cells, term.row_start, term.columns, term.values
-    hierarchy, response = b.hierarchy(np.zeros(3, np.uint8)), term.mobility.arrays
+    hierarchy, low_rank = b.hierarchy(np.zeros(3, np.uint8)), (term.rows, term.mobility.arrays)
     finest = (*b.finest, even_at(b.even, b.table, 0), 0)
-    matrix = hierarchy, b.cycle, finest, b.vectors, rows, response
+    matrix = hierarchy, b.cycle, finest, b.vectors, *low_rank, NO_DENSE_TERM
     solve(*matrix, b.label, NO_VECTORS, NO_FIELDS, NO_VECTORS, 0.0, 0.0)
 
 

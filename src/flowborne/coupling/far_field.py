@@ -4,14 +4,10 @@ At the start of a step, from the state alone (after Weymouth and Lauber 2024, wi
 iteration): the leak-proof field, in which bodies move as they do, is the sea's stream, plus what
 its own circulation induces, that of the wake beyond the exit included (`fluid.wake`), plus what
 mouths, sources and flesh that swells bring. The sides have that normal velocity before the solve,
-which adds what happens in the step itself, with a column of fluid behind each face
-(`fluid.sides.far`):
-
-    u_n+ = u_n + dt p / (rho (h/2 + l))
-
-In a step after the bodies or the flow have been set by hand the sides keep their velocity, as the
-circulation is not yet that of a flow around the bodies. Where the sea's velocity U changes, p is
-the pressure without that which moves the sea, -rho x.dU/dt.
+which adds what happens in the step itself (`fluid.sides.far`, `fluid.dipoles`). In a step after the
+bodies or the flow have been set by hand the sides keep their velocity, as the circulation is not
+yet that of a flow around the bodies. Where the sea's velocity U changes, p is the pressure without
+that which moves the sea, -rho x.dU/dt.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.viscous_solve import ViscousSystem, Walls, walls_of
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import accelerated, subtract_pressure_gradient
+from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.solids.driven import Driven
 from flowborne.solids.dynamics import Kinematics
@@ -30,6 +30,7 @@ def diffuse(
     world: World,
     velocity: Faces,
     mass: Faces,
+    gradient: PressureGradient,
     cut: Geometry,
     jets: tuple[Jet, ...],
     pose: Kinematics,
@@ -50,8 +51,7 @@ def diffuse(
         return velocity, np.zeros(size), True
     grid, sides = fluid.grid, fluid.boundaries
     pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
-    rate = accelerated(cut.open, mass, grid, sides)
-    subtract_pressure_gradient(pushed, rate, state.pressure, grid, sides, dt)
+    gradient.subtract(pushed, state.pressure, dt)
     earlier = pressure_push(cut, dt * state.pressure, size)
     moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))
     parts = assemble_viscosity(
@@ -70,7 +70,7 @@ def diffuse(
     )
     slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
     smooth, impulse, converged = system.solve(pushed, moving, TOLERANCE, slip)
-    subtract_pressure_gradient(smooth, rate, state.pressure, grid, sides, -dt)
+    gradient.subtract(smooth, state.pressure, -dt)
     return smooth, impulse, converged
 
 

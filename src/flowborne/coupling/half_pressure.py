@@ -17,18 +17,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flowborne.coupling.advection.scheme import Departure
 from flowborne.coupling.cut import moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.control_volumes import NOTHING
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.momentum import each_once, face_masses, fluid_momentum
-from flowborne.fluid.projection import (
-    accelerated,
-    accelerating_cells,
-    subtract_pressure_gradient,
-)
+from flowborne.fluid.projection import pressure_gradient
+from flowborne.kernels.arrays import Integers
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,7 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     Behind a far side there is a sea, and what comes in has no more energy than that has; the
     pressure that changes the sea's velocity is not half of it given beforehand.
 
-    Nor does it act in cells that the solve leaves out too: a pocket that bodies have crushed and
-    open again is empty, and no fluid would give what its last pressure gave to them.
+    Nor does it act in `pockets`: no fluid would give what their last pressure gave to bodies.
 
     The rest of the last pressure stays in the state, as the first guess of the solve.
     """
@@ -72,13 +70,13 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     if plain or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)
         return HalfPressure(state.velocity, *still, momentum)
-    rate = accelerated(opened, mass, grid, sides)
+    gradient = pressure_gradient(opened, mass, fluid.density, grid, sides)
     last, earlier = grid.zeros_faces(), grid.zeros_faces()
     pressure = dynamic_pressure(state.pressure, fluid)
-    pressure[~accelerating_cells(rate)] = 0.0
-    subtract_pressure_gradient(last, rate, pressure, grid, sides, dt)
+    pressure[pockets(start, gradient.rate)] = 0.0
+    gradient.subtract(last, pressure, dt)
     before = dynamic_pressure(state.previous_pressure, fluid)
-    subtract_pressure_gradient(earlier, rate, before, grid, sides, dt)
+    gradient.subtract(earlier, before, dt)
     own = [each_once(axis, sides) for axis in range(3)]
     fields = list(zip(own, mass, last, earlier, strict=True))
     both = sum(float((m * k * b)[once].sum()) for once, m, k, b in fields)
@@ -88,9 +86,31 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     state.pressure -= half
     velocity = faces_of([u + part * k for u, k in zip(state.velocity, last, strict=True)])
     start.volumes.follow(velocity, grid)
-    pushed = dt * side_push(half, opened, grid, sides)
+    pushed = dt * side_push(half, opened, gradient)
     impulse = pressure_push(start.cut, dt * half, size)
     return HalfPressure(velocity, half, impulse, pushed, momentum)
+
+
+def pockets(start: Departure, rate: Faces) -> tuple[Integers, ...]:
+    """Index of the cells with open faces none of which holds fluid that their pressure could
+    accelerate: bodies have crushed them, and open them again.
+
+    rate  see `accelerated`
+    """
+    volumes, opened = start.volumes.cells, start.cut.open
+    small = np.nonzero(volumes <= 2.0 * NOTHING * start.grid.cell_volume)
+    found = beside(opened, small) & ~beside(rate, small)
+    return tuple(along[found] for along in small)
+
+
+def beside(faces: Faces, cells: tuple[Integers, ...]) -> NDArray[np.bool_]:
+    """Which cells at these indices have a face with a value above 0."""
+    found = np.zeros(cells[0].size, bool)
+    for axis, values in enumerate(faces):
+        for end in (0, 1):
+            at = [along + end * (n == axis) for n, along in enumerate(cells)]
+            found |= values[tuple(at)] > 0.0
+    return found
 
 
 def sea_changes(world: World, dt: float) -> bool:

@@ -21,11 +21,12 @@ import numpy as np
 
 from flowborne.coupling.advection.scheme import Departure
 from flowborne.coupling.fractions import Geometry
+from flowborne.coupling.operators import beyond_sides
 from flowborne.coupling.swept import swept_cells
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.projection import subtract_pressure_gradient
+from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.faces import mean_flux
 from flowborne.kernels.outflow import net_out
 from flowborne.solvers.pressure import PressureSystem
@@ -63,16 +64,21 @@ def leak_proof_flux(
         ends = before.open[axis], after.open[axis]
         moving = state.velocity[axis], state.velocity_change[axis]
         mean_flux(flux[axis], weights[axis], *moving, *ends, grid.face_area, stiffness(grid))
+    dipoles = sides.dipoles(grid)
+    if dipoles is not None:
+        dipoles = dipoles.on([weights[p.axis][p.layer] == stiffness(grid) for p in dipoles.places])
     drive_sides(flux, weights, grid, sides, time)
     swept = swept_cells(before, after, cells, grid, sides)
     start, end = swept.set_aside(flux, weights, cells, after.volume)
-    system = PressureSystem(weights, sides.periodic())
+    gradient = PressureGradient(weights, 2.0 * stiffness(grid), dipoles, grid, sides)
+    beyond = beyond_sides(dipoles, gradient.whole)
+    system = PressureSystem(weights, sides.periodic(), beyond=beyond)
     rhs, net = volume_rates(system, start, end, departure.rate, dt), np.empty(grid.shape)
     net_out(net, *flux)
     rhs += net
     left = LEFT * grid.cell_volume / dt
     solution = system.solve(-rhs, None, tolerance=TOLERANCE, absolute=left)
-    subtract_pressure_gradient(flux, weights, solution.pressure, grid, sides, 1.0)
+    gradient.subtract(flux, solution.pressure, 1.0)
     net_out(net, *flux)
     later = start + dt * (departure.rate - net)
     swept.put_back(flux, later, dt)

@@ -14,12 +14,16 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.sides.side import Place
+from flowborne.kernels.arrays import DenseTerm
 from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solvers.pressure import NO_DENSE_TERM
 
 
 def twists(kinematics: Kinematics, v: Array) -> Array:
@@ -90,14 +94,26 @@ def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: flo
     return np.concatenate([force, np.cross(centroid, force)], axis=1)
 
 
-def side_push(pressure: Array, opened: Faces, grid: Grid, boundaries: Boundaries) -> Array:
+def beyond_sides(dipoles: Dipoles | None, strength: float) -> DenseTerm:
+    """What the matrix of the pressure has besides its face weights.
+
+    strength  flux through an uncut face on a side with unit pressure in its cell and 0 on the side
+    """
+    if dipoles is None:
+        return NO_DENSE_TERM
+    return dipoles.cells, dipoles.vectors, strength * dipoles.signs
+
+
+def side_push(pressure: Array, opened: Faces, gradient: PressureGradient) -> Array:
     """(3,) force of the sides on the fluid for a pressure field, N.
 
     A cell that bodies and sides close in pushes nothing: the pressure it had before stays in it.
 
     opened  Faces, open part of each
     """
-    force = np.zeros(3)
+    grid, boundaries, force = gradient.grid, gradient.boundaries, np.zeros(3)
+    for place, answer in gradient.dipoles.answer(pressure) if gradient.dipoles else ():
+        force[place.axis] -= (1 - 2 * place.upper) * grid.face_area * float(answer.sum())
     for place, side in boundaries.around(grid):
         met = pressure[place.layer] * beside_open(place, opened, boundaries)
         met *= 1.0 - side.pressure_weight(place)

@@ -26,6 +26,7 @@ from flowborne.coupling.friction import diffuse
 from flowborne.coupling.mouths import Jet, add_rates
 from flowborne.coupling.operators import (
     add_flux,
+    beyond_sides,
     boundary_velocity,
     generalised,
     pressure_push,
@@ -34,7 +35,7 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.projection import accelerated, face_weights, subtract_pressure_gradient
+from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.faces import largest_open
 from flowborne.kernels.outflow import outflow
@@ -171,11 +172,12 @@ def solve_together(
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    moved_by = accelerated(cut.open, mass, fluid.grid, fluid.boundaries)
-    weights = face_weights(cut.open, moved_by, fluid.grid)
+    gradient = pressure_gradient(cut.open, mass, fluid.density, fluid.grid, fluid.boundaries)
+    weights = face_weights(cut.open, gradient.rate, fluid.grid)
+    beyond = beyond_sides(gradient.dipoles, fluid.grid.face_area * gradient.whole)
     mobility = driven.mobility(pose)
     yielding = give_way(cut, mobility, fluid.grid)
-    matrix = PressureSystem(weights, fluid.boundaries.periodic(), reaction=yielding)
+    matrix = PressureSystem(weights, fluid.boundaries.periodic(), yielding, beyond)
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
     if correct_under(pressure, cut, pose, driven, torque_limit) is not None:
@@ -183,7 +185,9 @@ def solve_together(
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
     timer.lap("projection")
-    smooth, viscous, smoothed = diffuse(world, velocity, mass, cut, jets, pose, driven, dt)
+    smooth, viscous, smoothed = diffuse(
+        world, velocity, mass, gradient, cut, jets, pose, driven, dt
+    )
     timer.lap("viscosity")
     term = LowRankTerm(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
@@ -207,7 +211,7 @@ def solve_together(
             if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
                 smooth, viscous, smoothed = diffuse(
-                    world, velocity, mass, cut, jets, pose, changed, dt
+                    world, velocity, mass, gradient, cut, jets, pose, changed, dt
                 )
                 timer.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
@@ -215,9 +219,7 @@ def solve_together(
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
     after = faces_of([u.copy() for u in smooth])
-    subtract_pressure_gradient(
-        after, moved_by, solution.pressure, fluid.grid, fluid.boundaries, 1.0
-    )
+    gradient.subtract(after, solution.pressure, 1.0)
     moved = start + term.mobility.times(on_solids)
     projected = Projected(
         after,
@@ -237,7 +239,9 @@ def solve_together(
     change = boundary_velocity(pose, v - driven.system.v)
     added = np.full(change.size, np.nan)
     if world.setup.splits:
-        plain = PressureSystem(weights, fluid.boundaries.periodic()) if yielding.size else matrix
+        plain = matrix
+        if yielding.size:
+            plain = PressureSystem(weights, fluid.boundaries.periodic(), beyond=beyond)
         added = added_mass_impulse(plain, cut, change)
     timer.lap("projection")
     return Solved(driven, v, actuator, viscous, added, smooth, projected, outcome, left)

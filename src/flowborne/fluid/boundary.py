@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from flowborne.fluid.dipoles import Dipoles, dipoles_of
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.sea import Sea, sea_of
 from flowborne.fluid.sides.closed import BoundaryClosed
@@ -20,8 +21,8 @@ from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 WALL = BoundaryClosed()
 
-SEAS = 16
-"""Grids for which the sea around is kept, at most: one that moves has another origin each time."""
+KEPT = 16
+"""Grids for which what is around is kept, at most: one that moves has another origin each time."""
 
 SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
@@ -111,16 +112,24 @@ class Boundaries:
 
     def sea(self, grid: Grid) -> Sea | None:
         """The sea around a grid; raises ValueError as `sea_of` does."""
-        found = self._seas.get(grid)
+        return self._beyond(grid)[0]
+
+    def dipoles(self, grid: Grid) -> Dipoles | None:
+        """What far sides of a grid answer to dipoles besides their columns; see `dipoles_of`."""
+        return self._beyond(grid)[1]
+
+    def _beyond(self, grid: Grid) -> tuple[Sea | None, Dipoles | None]:
+        found = self._known.get(grid)
         if found is None:
-            found = (sea_of(list(self.around(grid))),)
-            if len(self._seas) >= SEAS:
-                self._seas.clear()
-            self._seas[grid] = found
-        return found[0]
+            sides = list(self.around(grid))
+            found = sea_of(sides), dipoles_of(sides)
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            self._known[grid] = found
+        return found
 
     @cached_property
-    def _seas(self) -> dict[Grid, tuple[Sea | None]]:
+    def _known(self) -> dict[Grid, tuple[Sea | None, Dipoles | None]]:
         return {}
 
     def has_free_side(self, grid: Grid) -> bool:

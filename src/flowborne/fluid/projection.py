@@ -12,14 +12,18 @@ what its two cells push with.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import edge
+from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.faces import accelerate, weigh
 from flowborne.kernels.pressure_gradient import subtract_gradient
+
+EVEN = 1e-9
+"""Relative difference of masses of uncut faces: solves leave some 1e-12 in the volumes."""
 
 
 def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) -> Faces:
@@ -36,16 +40,6 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
     return rates
 
 
-def accelerating_cells(rate: Faces) -> NDArray[np.bool_]:
-    """Which cells (nx, ny, nz) have a face that their pressure accelerates, see `accelerated`."""
-    below, above = edge(0, slice(None, -1)), edge(0, slice(1, None))
-    found = (rate[0][below] > 0.0) | (rate[0][above] > 0.0)
-    for axis in (1, 2):
-        for part in (edge(axis, slice(None, -1)), edge(axis, slice(1, None))):
-            found |= rate[axis][part] > 0.0
-    return found
-
-
 def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
     weights = faces_of([np.empty(o.shape) for o in opened])
@@ -54,15 +48,39 @@ def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     return weights
 
 
-def subtract_pressure_gradient(
-    velocity: Faces,
-    rate: Faces,
-    pressure: Array,
-    grid: Grid,
-    boundaries: Boundaries,
-    scale: float,
-) -> None:
-    """Subtract scale rate (p_upper - p_lower) on every face, in place; see `subtract_gradient`."""
-    codes = boundaries.codes()
-    for axis in grid.axes:
-        subtract_gradient(velocity[axis], rate[axis], pressure, axis, scale, codes)
+@dataclass(frozen=True)
+class PressureGradient:
+    """What pressure does to the velocity of faces.
+
+    rate     Faces, see `accelerated`
+    whole    rate of an uncut face on a side with p = 0 on it
+    dipoles  what uncut faces of far sides answer besides; None without any
+    """
+
+    rate: Faces
+    whole: float
+    dipoles: Dipoles | None
+    grid: Grid
+    boundaries: Boundaries
+
+    def subtract(self, velocity: Faces, pressure: Array, scale: float) -> None:
+        """Subtract scale rate (p_upper - p_lower) on every face, in place; see
+        `subtract_gradient`."""
+        codes = self.boundaries.codes()
+        for axis in self.grid.axes:
+            subtract_gradient(velocity[axis], self.rate[axis], pressure, axis, scale, codes)
+        for place, answer in self.dipoles.answer(pressure) if self.dipoles else ():
+            change = scale * self.whole * answer
+            velocity[place.axis][place.layer] += change if place.upper else -change
+
+
+def pressure_gradient(
+    opened: Faces, mass: Faces, density: float, grid: Grid, boundaries: Boundaries
+) -> PressureGradient:
+    """What pressure does to faces of these open parts and masses (kg) of a fluid (kg/m^3)."""
+    rate, dipoles = accelerated(opened, mass, grid, boundaries), boundaries.dipoles(grid)
+    held = 0.5 * density * grid.cell_volume
+    if dipoles is not None:
+        sides = [(opened[p.axis][p.layer], mass[p.axis][p.layer]) for p in dipoles.places]
+        dipoles = dipoles.on([(o == 1.0) & (abs(m - held) < EVEN * held) for o, m in sides])
+    return PressureGradient(rate, grid.face_area / held, dipoles, grid, boundaries)

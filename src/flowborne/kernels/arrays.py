@@ -42,6 +42,9 @@ Vectors = tuple[Array, Array, Array, Array, Array]
 Rows = tuple[Integers, Integers, Integers, Array]
 """Sparse rows J: flat cell of each, where each begins, columns and values of the entries."""
 
+DenseTerm = tuple[Integers, Array, Array]
+"""U diag(s) U^T: flat cells (n,), U^T (m, n) and s (m,)."""
+
 Blocks = tuple[Integers, Integers, Indices, Integers, Indices]
 """Columns of a sparse L in blocks with the same rows: the first column of each (s+1,), where its
 rows below begin (s+1,), those rows, where its values begin (s+1,), and the block of each column."""

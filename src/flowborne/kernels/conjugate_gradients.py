@@ -9,6 +9,7 @@ import numpy as np
 
 from flowborne.kernels.arrays import (
     Array,
+    DenseTerm,
     Hierarchy,
     Labels,
     MobilityArrays,
@@ -19,6 +20,7 @@ from flowborne.kernels.arrays import (
     Vectors,
 )
 from flowborne.kernels.deflation import deflated, mode_strengths
+from flowborne.kernels.dense_term import add_term
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
 from flowborne.kernels.levels import at_level, wrap_ghosts
@@ -56,6 +58,7 @@ def solve(
     vectors: Vectors,
     rows: Rows,
     mobility: MobilityArrays,
+    beyond: DenseTerm,
     label: Labels,
     null: Array,
     fields: Real,
@@ -69,7 +72,8 @@ def solve(
     finest     K on the finest level, with its diagonal
     vectors    padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
                vectors, x as well at the end
-    rows       of J with padded flat cells; response: A^-1 (see `mobility`)
+    rows       of J with padded flat cells; mobility: A^-1 (see `mobility`)
+    beyond     what belongs to K besides: padded flat cells, vectors, strengths; see `dense_term`
     null       see `solvers.regions.null_basis`
     fields, amounts  of the modes in the preconditioner, at the scale of the hierarchy; see
                `solvers.deflation`
@@ -96,6 +100,7 @@ def solve(
             wrap_ghosts(x, periodic)
             apply_laplacian(q, x, finest)
             apply_low_rank(q, x, rows, mobility)
+            add_term(q, x, *beyond)
             true_residual(r, rhs, q)
             remove_null(r, label, null)
         else:
@@ -128,6 +133,7 @@ def solve(
                 else:
                     curvature = turn_and_apply(q, p, q, 1.0, beta, finest)
             curvature += apply_low_rank(q, p, rows, mobility)
+            curvature += add_term(q, p, *beyond)
             if not (curvature > 0.0 and product > 0.0):
                 break
             scale = 1.0 / np.sqrt(square)

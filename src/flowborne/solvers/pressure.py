@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Real, Rows
+from flowborne.kernels.arrays import Array, DenseTerm, Faces, Integers, Real, Rows
 from flowborne.kernels.conjugate_gradients import solve
 from flowborne.kernels.levels import at_level
 from flowborne.kernels.regions import region_loads
@@ -44,6 +44,10 @@ class LowRankTerm:
     values: Array
     mobility: Mobility
 
+    @property
+    def rows(self) -> Rows:
+        return self.cells, self.row_start, self.columns, self.values
+
 
 NO_TERM = LowRankTerm(
     np.zeros(0, np.int64),
@@ -53,6 +57,9 @@ NO_TERM = LowRankTerm(
     dense_mobility(np.zeros((0, 0))),
 )
 """K alone."""
+
+
+NO_DENSE_TERM: DenseTerm = np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -101,6 +108,8 @@ class PressureSystem:
               at the distance that the weight was made with; a periodic axis has the same weights on
               its first and last face. A cell is active when one of its weights is above 0.
     periodic  of each axis
+    beyond    a term that belongs to K, but not to its preconditioner; their sum is positive
+              definite
     reaction  (nx, ny, nz), at least 0: D with K + D closer than K to the matrix that is solved; for
               the preconditioner alone
     raises    ValueError for one cell along x or y in 3D, which the ghost layout has no room for
@@ -111,6 +120,7 @@ class PressureSystem:
         weights: Faces,
         periodic: tuple[bool, bool, bool] = (False, False, False),
         reaction: Array = NO_REACTION,
+        beyond: DenseTerm = NO_DENSE_TERM,
     ) -> None:
         nx, ny, nz = weights[1].shape[0], weights[0].shape[1], weights[0].shape[2]
         self.shape = (nx, ny, nz)
@@ -127,6 +137,7 @@ class PressureSystem:
         faces = (x, y, z)
         if self.slab:
             faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
+        self.beyond = padded_cells(beyond[0], inner), *beyond[1:]
         self._deflation: tuple[LowRankTerm, Deflation] | None = None
         self.buffers = borrow((inner, wraps), self)
         b = self.buffers
@@ -165,6 +176,7 @@ class PressureSystem:
             b.vectors,
             added.rows,
             term.mobility.arrays,
+            self.beyond,
             b.label,
             added.null,
             added.fields,
@@ -192,7 +204,7 @@ class PressureSystem:
     def _deflate(self, term: LowRankTerm) -> Deflation:
         b, mobility = self.buffers, term.mobility
         diagonal = b.finest[3]
-        rows = padded_rows((term.cells, term.row_start, term.columns, term.values), diagonal)
+        rows = padded_rows(term.rows, diagonal)
         null, amounts, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
         if self.regions:
             loads = region_loads(b.label, self.regions, mobility.size, rows)
@@ -204,3 +216,12 @@ class PressureSystem:
             fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
             amounts = mode_amounts(modes, gram)
         return Deflation(rows, null, fields, amounts)
+
+
+def padded_cells(cells: Integers, shape: tuple[int, int, int]) -> Integers:
+    """Flat indices of cells of a grid of this shape in padded arrays."""
+    i, j, k = np.unravel_index(cells, shape)
+    deep = int(shape[0] > 1)
+    return np.ravel_multi_index(
+        (i + deep, j + 1, k + 1), (shape[0] + 2 * deep, shape[1] + 2, shape[2] + 2)
+    )

@@ -6,8 +6,8 @@ column of fluid of the length r^2 / ((D - 1) n.r) behind each face with p = 0 at
 measured from the middle of the domain, so that the matrix stays the same while bodies move; where
 one end of an axis is a mirror, that is at the mirror.
 
-What the vorticity inside does is in `coupling.far_field`. The sea may flow: the side through which
-its stream leaves is open.
+For dipoles along the axes `fluid.dipoles` makes it exact. What the vorticity inside does is in
+`coupling.far_field`. The sea may flow: the side through which its stream leaves is open.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class BoundaryFar(BoundaryOpen):
     def pressure_weight(self, place: Place) -> Array | float:
         if self.is_exit(place):
             return 1.0
-        lengths = self._lengths(place.grid, place.cell_coordinates())
+        lengths = self.lengths(place.grid, place.cell_coordinates())
         distance2 = sum(length**2 for length in lengths.values())
         column = distance2 / ((len(lengths) - 1) * abs(lengths[place.axis]))
         half = 0.5 * place.grid.spacing
@@ -106,7 +106,7 @@ class BoundaryFar(BoundaryOpen):
     def velocity_beyond(self, velocity: Array, place: Place, component: int, time: float) -> Array:
         """That of the sea, and what differs from it falls as the velocity of a dipole, r^-D."""
         lengths, h = (
-            self._lengths(place.grid, place.face_coordinates(component)),
+            self.lengths(place.grid, place.face_coordinates(component)),
             place.grid.spacing,
         )
         distance2 = sum(length**2 for length in lengths.values())
@@ -114,7 +114,7 @@ class BoundaryFar(BoundaryOpen):
         sea = self.strength.at(time) * self.velocity[component]
         return sea + (velocity - sea) * (distance2 / farther2) ** (0.5 * len(lengths))
 
-    def _lengths(self, grid: Grid, at: tuple[Array, Array, Array]) -> dict[int, Array]:
+    def lengths(self, grid: Grid, at: tuple[Array, Array, Array]) -> dict[int, Array]:
         """Components of r at places, by axis, m."""
         return {
             axis: at[axis] - (1.0 - part) * grid.origin[axis] - part * grid.upper[axis]
