@@ -35,7 +35,6 @@ def diffuse(
     jets: tuple[Jet, ...],
     pose: Kinematics,
     driven: Driven,
-    dt: float,
 ) -> tuple[Faces, Array, bool]:
     """Implicit viscosity with the pressure of the last step, and its impulse on the bodies.
 
@@ -44,7 +43,7 @@ def diffuse(
 
     returns  Faces; (k,) impulse; whether the solve converged
     """
-    fluid, state = world.flow()
+    (fluid, state), dt = world.flow(), driven.system.dt
     bodies = pose.twist_jacobian.shape[0]
     size = 6 * bodies + pose.vertices.size
     if fluid.viscosity == 0.0:

@@ -185,9 +185,7 @@ def solve_together(
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
     timer.lap("projection")
-    smooth, viscous, smoothed = diffuse(
-        world, velocity, mass, gradient, cut, jets, pose, driven, dt
-    )
+    smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
     timer.lap("viscosity")
     term = LowRankTerm(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
@@ -211,7 +209,7 @@ def solve_together(
             if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
                 smooth, viscous, smoothed = diffuse(
-                    world, velocity, mass, gradient, cut, jets, pose, changed, dt
+                    world, velocity, mass, gradient, cut, jets, pose, changed
                 )
                 timer.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
