@@ -2,6 +2,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
+# Every process would compile the package anew, a fifth of what it takes to start.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: baselines closeness demo lint test browser dist docs gltf-validator imports failing gallery paper exporters fuzz messages size strangers validation-page clean
 
 demo: $(VENV)/installed
