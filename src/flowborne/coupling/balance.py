@@ -5,42 +5,36 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.coupling.advection.scheme import AdvectionResult
-from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.half_pressure import HalfPressure
-from flowborne.coupling.operators import side_push
 from flowborne.coupling.report import Momentum
 from flowborne.coupling.solve import Solved
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.momentum import fluid_momentum, momentum_change
-from flowborne.fluid.projection import pressure_gradient
 
 
 def momentum_balance(
     world: World,
-    cut: Geometry,
     mass: Faces,
     half: HalfPressure,
     advected: AdvectionResult,
     solved: Solved,
 ) -> Momentum:
-    """The fluid's budget of a step that ends with the masses `mass` of the faces, at `cut`."""
+    """The fluid's budget of a step that ends with the masses `mass` of the faces."""
     fluid, _ = world.flow()
     projected, before = solved.projected, solved.before_pressure
     assert projected is not None
     assert before is not None
-    dt, grid, boundaries = solved.driven.system.dt, fluid.grid, fluid.boundaries
+    grid, boundaries = fluid.grid, fluid.boundaries
     first = 6 * world.setup.solid.nbody
     pressed = fluid_momentum(before, mass, grid, boundaries)
     taken, moved = momentum_change(before, projected.velocity, mass, grid, boundaries)
     after = fluid_momentum(projected.velocity, mass, grid, boundaries)
     pushes = linear(projected.impulse, first)
-    gradient = pressure_gradient(cut.open, mass, fluid.density, grid, boundaries)
-    sides = dt * side_push(projected.pressure, cut.open, gradient)
     exchanged = pushes.sum(axis=0)
     scale = float(np.abs(pushes).sum()) + moved
-    missing = float(np.abs(exchanged + taken - sides).max())
-    sides += half.sides
+    missing = float(np.abs(exchanged + taken - projected.sides).max())
+    sides = projected.sides + half.sides
     exchanged += linear(half.impulse, first).sum(axis=0)
     forces = pressed - fluid_momentum(advected.velocity, mass, grid, boundaries)
     came = advected.crossed + advected.expelled + advected.lost

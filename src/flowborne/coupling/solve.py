@@ -30,6 +30,7 @@ from flowborne.coupling.operators import (
     boundary_velocity,
     generalised,
     pressure_push,
+    side_push,
 )
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.timer import Timer
@@ -71,6 +72,7 @@ class Projected:
     pressure    (nx, ny, nz) p, Pa
     impulse     (k,) J^T p^: wrenches about the world origin, then forces on vertices of flesh, N s
                 and N m s
+    sides       (3,) impulse of the sides on the fluid, N s
     iterations  of the solve, all turns of a step together in the end
     residual    true relative residual
     divergence  largest |net outflow of a cell| / volume, 1/s
@@ -80,6 +82,7 @@ class Projected:
     velocity: Faces
     pressure: Array
     impulse: Array
+    sides: Array
     iterations: int
     residual: float
     divergence: float
@@ -223,6 +226,7 @@ def solve_together(
         after,
         solution.pressure / dt,
         on_solids,
+        side_push(solution.pressure, cut.open, gradient),
         iterations,
         solution.residual,
         largest_divergence(after, cut, moved, rate, fluid),

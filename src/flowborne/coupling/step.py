@@ -128,7 +128,7 @@ def step_coupled(
     solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit, timer)  # 6
     store_state(world, half, advected, dyed, solved, cut, pose)  # 7
     far.store(world)
-    done.momentum = momentum_balance(world, cut, mass, half, driven_sides, solved)
+    done.momentum = momentum_balance(world, mass, half, driven_sides, solved)
     done.dye_error = dyed.error
     report_coupled(done, world, pose, half.impulse, solved)
     timer.lap("advection")
