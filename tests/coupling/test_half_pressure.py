@@ -8,7 +8,6 @@ import pytest
 from flowborne import Array, Grid, World, step
 from flowborne.coupling.cut import departure
 from flowborne.coupling.half_pressure import explicit_half_pressure, pressure_increment_ratio
-from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryOpen, make_world, set_velocity
 
@@ -62,7 +61,7 @@ def turned(world: World, steps: int) -> World:
     return world
 
 
-def test_a_pocket_without_fluid_pushes_nothing() -> None:
+def test_a_pocket_that_has_lost_its_fluid_pushes_nothing() -> None:
     """Bodies that part leave one: what its last pressure gave to them, no fluid would give."""
     world = make_world(FRAME, SQUARE, solid_density=100.0)
     set_velocity(world, swirl)
@@ -72,12 +71,10 @@ def test_a_pocket_without_fluid_pushes_nothing() -> None:
     assert np.ptp(state.pressure[room]) > 1e-4
     state.cell_volume[room] = 1e-13 * SQUARE.cell_volume
     world.volumes = None
-    half = explicit_half_pressure(world, start := departure(world), DT)
-    mass = face_masses(start.volumes, world.flow()[0].density)
-    gained = fluid_momentum(half.velocity, mass, SQUARE, Boundaries()) - half.start
-    given = half.sides - half.impulse[:12].reshape(-1, 6)[:, :3].sum(axis=0)
-    assert np.abs(given).max() > 1e-6
-    np.testing.assert_allclose(gained, given, atol=1e-15)
+    turned(world, 1)
+    assert np.abs(state.cell_volume[room]).max() < 1e-9 * SQUARE.cell_volume
+    assert not state.pressure[room].any()
+    assert step(world, DT).momentum.budget_error < 1e-13
 
 
 def test_the_pressure_of_a_step_is_that_of_the_whole_step() -> None:

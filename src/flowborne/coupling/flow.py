@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from flowborne.coupling.advection.scheme import AdvectionResult, Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.half_pressure import HalfPressure
@@ -79,7 +81,8 @@ def store_state(
     """The state at the end of the step, in place: what was solved for, and what the step changed.
 
     Faces without fluid have the velocity of the leak-proof field; `solved.projected.velocity` gets
-    it too, and becomes the state's own.
+    it too, and becomes the state's own. Cells that the solve leaves out have no pressure: no fluid
+    would give what half of their last one gave to bodies.
     """
     fluid, state = world.flow()
     grid, sides, volumes = fluid.grid, fluid.boundaries, advected.volumes
@@ -101,7 +104,8 @@ def store_state(
                 values[edge(axis, -1)] = values[edge(axis, 0)]
     state.velocity, state.velocity_change = velocity, state.velocity
     state.previous_pressure = state.pressure + half.pressure
-    state.pressure = half.pressure + projected.pressure
+    left_out = projected.pressure == 0.0
+    state.pressure = np.where(left_out, 0.0, half.pressure + projected.pressure)
     state.cell_volume, state.pose = volumes.cells, world.solid.q.copy()
     state.scalars = dyed.scalars
     world.advance_clock(dt)

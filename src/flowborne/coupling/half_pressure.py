@@ -17,17 +17,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.advection.scheme import Departure
 from flowborne.coupling.cut import moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.control_volumes import NOTHING
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.momentum import each_once, face_masses, fluid_momentum
 from flowborne.fluid.projection import pressure_gradient
-from flowborne.kernels.arrays import Integers
 
 
 @dataclass(frozen=True)
@@ -56,8 +53,6 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     Behind a far side there is a sea, and what comes in has no more energy than that has; the
     pressure that changes the sea's velocity is not half of it given beforehand.
 
-    Nor does it act in `pockets`: no fluid would give what their last pressure gave to bodies.
-
     The rest of the last pressure stays in the state, as the first guess of the solve.
     """
     fluid, state = world.flow()
@@ -73,7 +68,6 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     gradient = pressure_gradient(opened, mass, fluid.density, grid, sides)
     last, earlier = grid.zeros_faces(), grid.zeros_faces()
     pressure = dynamic_pressure(state.pressure, fluid)
-    pressure[pockets(start, gradient.rate)] = 0.0
     gradient.subtract(last, pressure, dt)
     before = dynamic_pressure(state.previous_pressure, fluid)
     gradient.subtract(earlier, before, dt)
@@ -89,28 +83,6 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     pushed = dt * side_push(half, opened, gradient)
     impulse = pressure_push(start.cut, dt * half, size)
     return HalfPressure(velocity, half, impulse, pushed, momentum)
-
-
-def pockets(start: Departure, rate: Faces) -> tuple[Integers, ...]:
-    """Index of the cells with open faces none of which holds fluid that their pressure could
-    accelerate: bodies have crushed them, and open them again.
-
-    rate  see `accelerated`
-    """
-    volumes, opened = start.volumes.cells, start.cut.open
-    small = np.nonzero(volumes <= 2.0 * NOTHING * start.grid.cell_volume)
-    found = beside(opened, small) & ~beside(rate, small)
-    return tuple(along[found] for along in small)
-
-
-def beside(faces: Faces, cells: tuple[Integers, ...]) -> NDArray[np.bool_]:
-    """Which cells at these indices have a face with a value above 0."""
-    found = np.zeros(cells[0].size, bool)
-    for axis, values in enumerate(faces):
-        for end in (0, 1):
-            at = [along + end * (n == axis) for n, along in enumerate(cells)]
-            found |= values[tuple(at)] > 0.0
-    return found
 
 
 def sea_changes(world: World, dt: float) -> bool:
@@ -137,10 +109,10 @@ def pressure_increment_ratio(earlier: float) -> float:
 def dynamic_pressure(pressure: Array, fluid: Fluid) -> Array:
     """The pressure without the part that balances the body force and moves nothing, Pa."""
     grid, held = fluid.grid, pressure != 0.0
-    rest = pressure.copy()
+    rest = pressure
     for axis in grid.axes:
         slope = fluid.density * fluid.body_force[axis]
         if slope != 0.0 and not fluid.boundaries.periodic()[axis]:
             along = [-1 if a == axis else 1 for a in range(3)]
-            rest -= np.where(held, slope * grid.cell_coordinates()[axis].reshape(along), 0.0)
+            rest = rest - np.where(held, slope * grid.cell_coordinates()[axis].reshape(along), 0.0)
     return rest

@@ -10,15 +10,11 @@ generalised velocities are related by the Jacobians of the kinematics, T.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dipoles import Dipoles
-from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.fluid.sides.side import Place
 from flowborne.kernels.arrays import DenseTerm
 from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
@@ -107,33 +103,15 @@ def beyond_sides(dipoles: Dipoles | None, strength: float) -> DenseTerm:
 def side_push(pressure: Array, opened: Faces, gradient: PressureGradient) -> Array:
     """(3,) force of the sides on the fluid for a pressure field, N.
 
-    A cell that bodies and sides close in pushes nothing: the pressure it had before stays in it.
-
-    opened  Faces, open part of each
+    pressure  (nx, ny, nz) Pa, 0 in cells that bodies and sides close in
+    opened    Faces, open part of each
     """
     grid, boundaries, force = gradient.grid, gradient.boundaries, np.zeros(3)
     for place, answer in gradient.dipoles.answer(pressure) if gradient.dipoles else ():
         force[place.axis] -= (1 - 2 * place.upper) * grid.face_area * float(answer.sum())
     for place, side in boundaries.around(grid):
-        met = pressure[place.layer] * beside_open(place, opened, boundaries)
-        met *= 1.0 - side.pressure_weight(place)
+        met = pressure[place.layer] * (1.0 - side.pressure_weight(place))
         if side.free:
             met *= opened[place.axis][place.layer]
         force[place.axis] += (1 - 2 * place.upper) * grid.face_area * float(met.sum())
     return force
-
-
-def beside_open(place: Place, opened: Faces, boundaries: Boundaries) -> NDArray[np.bool_]:
-    """Which cells next to a side have an open face that is on no side which prescribes the flux."""
-    found = np.zeros((), bool)
-    for axis in place.grid.axes:
-        low, high = boundaries.pair(axis)
-        solved = np.ones(place.grid.shape[axis] + 1, bool)
-        solved[0], solved[-1] = not low.prescribes, not high.prescribes
-        layer = list(place.layer)
-        if axis == place.axis:
-            layer[axis] = slice(-2, None) if place.upper else slice(2)
-        along = [-1 if a == axis else 1 for a in range(3)]
-        free = (opened[axis][tuple(layer)] > 0.0) & solved[layer[axis]].reshape(along)
-        found = found | free[edge(axis, slice(-1))] | free[edge(axis, slice(1, None))]
-    return found

@@ -33,7 +33,7 @@ def parts_of(world: World, velocity: Array, dt: float) -> int:
     pose, fastest = kinematics(model, world.solid.q), 0.0
     shapes = world.setup.shapes
     if shapes.body.size:
-        turned = np.einsum("gij,gkj->gki", pose.geom_rotation[shapes.source], shapes.tips())
+        turned = np.einsum("gij,gkj->gki", pose.geom_rotation[shapes.source], shapes.tips)
         at = turned + pose.geom_position[shapes.source][:, None]
         twist = twists(pose, velocity)[shapes.body][:, None]
         speed = twist[..., :3] + np.cross(twist[..., 3:], at)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,7 @@ class Shapes:
     skins: dict[int, Mesh]
     sheets: NDArray[np.bool_]
 
+    @cached_property
     def tips(self) -> Array:
         """(ng, 8, 3) corners of the bounding box of each in its own frame, m; of a sphere, which
         turns on the spot, its centre."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import prod
 
 import numpy as np
@@ -147,6 +147,7 @@ def beside_faces(cells: Array, axis: int, sides: Boundaries) -> Array:
     return found
 
 
+@lru_cache(maxsize=64)
 def neighbours(count: int, periodic: bool) -> tuple[Integers, Array]:
     """(2, n + 1, 2) which two cells' or faces' fluxes make those through the sides of the n control
     volumes of a component, and how much of each: across other axes, and across its own.

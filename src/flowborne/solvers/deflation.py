@@ -44,6 +44,8 @@ def compliant_modes(
               diagonal
     held      whether the term alone holds the level of some region, which no V-cycle knows
     """
+    if mobility.size == 0:
+        return np.zeros((0, 0))
     root = np.sqrt(scale) * mobility.compliant
     if mobility.is_dense:
         weight = root.T @ row_gram(rows, inverse, mobility.size) @ root

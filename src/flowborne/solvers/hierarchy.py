@@ -180,6 +180,8 @@ def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> Non
         if periodic[axis] or n < 1:
             continue
         for cell, outer, inner in ((1, 1, 2), (n, n + 1, n)):
+            if not faces[outer].any():
+                continue
             moved = np.where(faces[outer] < faces[inner], faces[outer], 0.0)
             cells[cell] += moved
             faces[outer] -= moved
