@@ -20,7 +20,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import block_diag, csr_array, diags_array
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
@@ -28,9 +28,10 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.viscosity import ViscousFaces
 from flowborne.kernels.arrays import Integers
+from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.viscosity import TIED
 from flowborne.kernels.viscous_operator import apply_component
-from flowborne.solvers.answers import Answering
+from flowborne.solvers.answers import Answering, Drag
 from flowborne.solvers.conjugate_gradients import conjugate_gradients, spread
 
 MOST = 20
@@ -79,6 +80,28 @@ class Walls:
             share, axes = np.linalg.eigh(0.5 * (couple + couple.T))
             couples[body] = (axes * np.maximum(share, 0.0)) @ axes.T
         return couples
+
+    def drag(self, couples: Array, size: int) -> Drag:
+        """(k, k) B^T W B + C; dense where there are bodies alone.
+
+        couples  (bodies, 3, 3) C;  size  k
+        """
+        bodies = len(couples)
+        blocks = np.zeros((bodies, 6, 6))
+        blocks[:, 3:, 3:] = couples
+        if size > 6 * bodies:
+            count, entries = self.arm.shape
+            row = np.repeat(np.arange(count), entries)
+            arms = csr_array((self.arm.ravel(), (row, self.columns.ravel())), shape=(count, size))
+            rest = csr_array((size - 6 * bodies, size - 6 * bodies))
+            couple = block_diag([*blocks, rest], format="csr")
+            return csr_array(arms.T @ (diags_array(self.weight) @ arms) + couple)
+        drag = np.zeros((bodies, 6, bodies, 6))
+        for body in range(bodies):
+            own = self.body == body
+            arm = self.arm[own]
+            drag[body, :, body] = blocks[body] + (self.weight[own, None] * arm).T @ arm
+        return drag.reshape(size, size)
 
 
 def walls_of(systems: list[ViscousFaces], cut: Geometry, grid: Grid) -> Walls:
@@ -144,49 +167,29 @@ class ViscousSystem:
         walls: Walls,
         size: int,
         bodies: int,
-        answering: Callable[[csr_array], Answering],
+        answering: Callable[[Drag], Answering],
         grid: Grid,
         boundaries: Boundaries,
         dt: float,
     ) -> None:
-        self.systems, self.walls, self.grid, self.dt = systems, walls, grid, dt
+        self.systems, self.walls, self.size, self.grid, self.dt = systems, walls, size, grid, dt
         periodic = boundaries.periodic()
         self.wraps = np.array([n if p else 0 for n, p in zip(grid.shape, periodic, strict=True)])
         self.diagonal = np.concatenate([system.diagonal.ravel() for system in systems])
         unknown = self.diagonal > 0.0
         self.scale = np.where(unknown, 1.0 / np.sqrt(np.where(unknown, self.diagonal, 1.0)), 0.0)
         self.most = MOST * max(MOST, *grid.shape)
-        self.faces, self.face = np.unique(walls.index, return_inverse=True)
+        self.couples = walls.couples(bodies)
+        self.answer = answering(dt * walls.drag(self.couples, size))
         count, entries = walls.arm.shape
-        row = np.repeat(np.arange(count), entries)
-        arms = csr_array((walls.arm.ravel(), (row, walls.columns.ravel())), shape=(count, size))
-        spin = (6 * np.arange(bodies)[:, None] + np.arange(3, 6))[:, None, :].repeat(3, axis=1)
-        twist = np.swapaxes(spin, 1, 2)
-        couples = walls.couples(bodies).ravel()
-        self.couple = csr_array((couples, (twist.ravel(), spin.ravel())), shape=(size, size))
-        drag = arms.T @ (diags_array(walls.weight) @ arms) + self.couple
-        self.answer = answering(csr_array(dt * drag))
-
-    def force(self, relative: Array, size: int) -> Array:
-        """(k,) push B^T W (u - B s) on every body, N and N m.
-
-        relative  (n,) u - B s at the walls, m/s;  size  k
-        """
-        walls = self.walls
-        wrench = ((walls.weight * relative)[:, None] * walls.arm).ravel()
-        return np.asarray(np.bincount(walls.columns.ravel(), wrench, minlength=size), float)
-
-    def on_faces(self, force: Array) -> Array:
-        """Sums over the walls of each of the `faces` of a force (n,) on them, N."""
-        return np.asarray(np.bincount(self.face, force, minlength=self.faces.size), float)
+        self.loose = np.where(walls.tied, 0.0, walls.weight)
+        pull = (self.scale[walls.index] * self.loose)[:, None] * walls.arm
+        starts = np.arange(0, count * entries + 1, entries)
+        self.rows = walls.index, starts, walls.columns.ravel(), pull.ravel()
 
     def at_walls(self, twist: Array) -> Array:
         """(n,) B s: velocity of the bodies at the wall faces, m/s."""
         return np.einsum("nm,nm->n", self.walls.arm, twist[self.walls.columns])
-
-    def drawn(self, twist: Array) -> Array:
-        """(n,) W B s: force of the bodies' motion on the wall faces, N; none on tied ones."""
-        return np.where(self.walls.tied, 0.0, self.walls.weight * self.at_walls(twist))
 
     def apply(self, x: Array) -> Array:
         """The matrix with the bodies eliminated, scaled to a diagonal of 1, times x (see
@@ -199,10 +202,8 @@ class ViscousSystem:
             apply_component(product[part], given[part], self.scale[part], system.links, self.wraps)
             first += system.kind.size
         if self.answer.yields:
-            walls = self.walls
-            moved = np.where(walls.tied, 0.0, self.scale[walls.index] * given[walls.index])
-            change = self.answer.change(self.dt * self.force(moved, self.couple.shape[0]))
-            product[self.faces] -= self.scale[self.faces] * self.on_faces(self.drawn(change))
+            push = sum_rows(x, self.rows, self.size)
+            add_rows(out, self.rows, -self.answer.change(self.dt * push))
         return out
 
     def solve(
@@ -225,8 +226,7 @@ class ViscousSystem:
         unknown = self.diagonal > 0.0
         rhs = np.where(unknown, mass * start + given, 0.0)
         known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist, blown))[0]
-        drawn = self.drawn(twist + known) + np.where(walls.tied, 0.0, walls.weight * blown)
-        rhs[self.faces] += self.on_faces(drawn)
+        np.add.at(rhs, walls.index, self.loose * (self.at_walls(twist + known) + blown))
         x, converged = self._conjugate_gradients(rhs, np.where(unknown, start, 0.0), tolerance)
         result = np.where(unknown, x, start)
         change, impulse = self.answer.to(self.push(result, twist, blown))
@@ -239,8 +239,13 @@ class ViscousSystem:
 
         velocity  over the concatenated faces, m/s;  twist  (k,) s;  slip  (n,) as in `solve`
         """
-        relative = velocity[self.walls.index] - self.at_walls(twist) - slip
-        return np.asarray(self.dt * (self.force(relative, twist.size) - self.couple @ twist))
+        walls, bodies = self.walls, len(self.couples)
+        force = walls.weight * (velocity[walls.index] - self.at_walls(twist) - slip)
+        each = (force[:, None] * walls.arm).ravel()
+        push = np.asarray(np.bincount(walls.columns.ravel(), each, twist.size), float)
+        spin = twist[: 6 * bodies].reshape(bodies, 6)[:, 3:]
+        push[: 6 * bodies].reshape(bodies, 6)[:, 3:] -= np.einsum("bij,bj->bi", self.couples, spin)
+        return np.asarray(self.dt * push)
 
     def _conjugate_gradients(self, rhs: Array, x: Array, tolerance: float) -> tuple[Array, bool]:
         """Solution from the guess x, and whether the residual is within the tolerance."""

@@ -37,7 +37,7 @@ from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import FleshSystem
 from flowborne.solids.model import SolidModel
 from flowborne.solids.prescribed import Driven, Mask
-from flowborne.solvers.answers import SparseAnswer
+from flowborne.solvers.answers import Drag, SparseAnswer
 from flowborne.solvers.cholesky import Cholesky, Ordering, cholesky, ordering_of
 from flowborne.solvers.mobility import Mobility, factored_mobility
 
@@ -130,11 +130,11 @@ class PrescribedFlesh(Driven):
             T, self.factor, self._constraints(), T @ self._soft(pose.twist_rows)
         )
 
-    def answering(self, pose: Kinematics, drag: csr_array) -> SparseAnswer:
+    def answering(self, pose: Kinematics, drag: Drag) -> SparseAnswer:
         J, D, _ = self.system.acting()
         held = csr_array(J[:, self.free])
         B = self.system.A[self.free][:, self.free] + held.T @ (D[:, None] * held)
-        return SparseAnswer(csr_array(B), csr_array(pose.jacobian[:, self.free]), drag)
+        return SparseAnswer(csr_array(B), csr_array(pose.jacobian[:, self.free]), csr_array(drag))
 
     def _constraints(self) -> Array:
         """(nf, k) Y' with B_FF^-1 = A_FF^-1 - Y' Y'^T."""

@@ -17,14 +17,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
-from scipy.sparse import csr_array
 
 from flowborne.errors import BreakdownError
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.dynamics import Kinematics, SolidSystem, System, assemble
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-from flowborne.solvers.answers import Answering, DenseAnswer
+from flowborne.solvers.answers import Answering, DenseAnswer, Drag
 from flowborne.solvers.mobility import Mobility, dense_mobility
 
 Mask = NDArray[np.bool_]
@@ -67,7 +66,7 @@ class Driven(ABC):
         """The motion caused by a unit impulse: M = T A^-1 T^T."""
 
     @abstractmethod
-    def answering(self, pose: Kinematics, drag: csr_array) -> Answering:
+    def answering(self, pose: Kinematics, drag: Drag) -> Answering:
         """The response of the bodies to a drag (k, k), kg."""
 
     @abstractmethod
@@ -120,8 +119,8 @@ class PrescribedSystem(Driven):
     def mobility(self, pose: Kinematics) -> Mobility:
         return dense_mobility(self._response(pose))
 
-    def answering(self, pose: Kinematics, drag: csr_array) -> DenseAnswer:
-        return DenseAnswer(self._response(pose), drag.toarray())
+    def answering(self, pose: Kinematics, drag: Drag) -> DenseAnswer:
+        return DenseAnswer(self._response(pose), np.asarray(drag))
 
     def _response(self, pose: Kinematics) -> Array:
         return np.asarray(pose.twist_rows @ self.inverse @ pose.twist_rows.T)

@@ -14,6 +14,10 @@ ROUNDING = 1e-15
 """Relative size of eigenvalues of M that are rounding errors."""
 
 
+Drag = Array | csr_array
+"""D, dense for few unknowns."""
+
+
 class Answering(Protocol):
     """The answer to a drag D (k, k), kg."""
 
