@@ -65,11 +65,14 @@ def leak_proof_flux(
         moving = state.velocity[axis], state.velocity_change[axis]
         mean_flux(flux[axis], weights[axis], *moving, *ends, grid.face_area, stiffness(grid))
     dipoles = sides.dipoles(grid)
-    if dipoles is not None:
-        dipoles = dipoles.on([weights[p.axis][p.layer] == stiffness(grid) for p in dipoles.places])
+    places = [] if dipoles is None else dipoles.places
+    uncut = [weights[p.axis][p.layer] == stiffness(grid) for p in places]
     drive_sides(flux, weights, grid, sides, time)
     swept = swept_cells(before, after, cells, grid, sides)
     start, end = swept.set_aside(flux, weights, cells, after.volume)
+    if dipoles is not None:
+        through = [weights[p.axis][p.layer] > 0.0 for p in places]  # not of cells set aside
+        dipoles = dipoles.on([a & b for a, b in zip(uncut, through, strict=True)])
     gradient = PressureGradient(weights, 2.0 * stiffness(grid), dipoles, grid, sides)
     beyond = beyond_sides(dipoles, gradient.whole)
     system = PressureSystem(weights, sides.periodic(), beyond=beyond)

@@ -108,8 +108,8 @@ class PressureSystem:
               at the distance that the weight was made with; a periodic axis has the same weights on
               its first and last face. A cell is active when one of its weights is above 0.
     periodic  of each axis
-    beyond    a term that belongs to K, but not to its preconditioner; their sum is positive
-              definite
+    beyond    a term between active cells that belongs to K, but not to its preconditioner; their
+              sum is positive definite
     reaction  (nx, ny, nz), at least 0: D with K + D closer than K to the matrix that is solved; for
               the preconditioner alone
     raises    ValueError for one cell along x or y in 3D, which the ghost layout has no room for
