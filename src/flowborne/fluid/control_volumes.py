@@ -15,13 +15,12 @@ out what they have beyond a h^3, by diffusion along one axis after the other.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge, kernel_axes, plane, planes
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.control_volumes import (
     Closed,
@@ -59,7 +58,6 @@ class ControlVolumes:
     cut        of each axis, (n,) flat indices of those that are not whole
     closed     of each axis
     transfers  of each axis, from V_f to M_f
-    periodic   which axes are
     """
 
     cells: Array
@@ -67,12 +65,6 @@ class ControlVolumes:
     cut: tuple[Integers, Integers, Integers]
     closed: tuple[Closed, Closed, Closed]
     transfers: tuple[Transfers, Transfers, Transfers]
-    periodic: tuple[bool, bool, bool]
-
-    @cached_property
-    def volume(self) -> Faces:
-        """Faces, V_f, m^3; along a periodic axis the last is the first one."""
-        return faces_of([means(self.cells, axis, self.periodic[axis]) for axis in range(3)])
 
     def follow(self, velocity: Faces, grid: Grid) -> None:
         """Give closed faces the velocity of their targets, in place."""
@@ -96,7 +88,7 @@ def control_volumes(
     if grid.is_slab:
         found.append((np.zeros(grid.face_shape(2)), NONE, NONE_CLOSED, NO_TRANSFERS))
     (u, v, w), cut, closed, transfers = zip(*found, strict=True)
-    return ControlVolumes(cells, (u, v, w), cut, closed, transfers, boundaries.periodic())
+    return ControlVolumes(cells, (u, v, w), cut, closed, transfers)
 
 
 def moving_volumes(

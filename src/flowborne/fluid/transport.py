@@ -10,7 +10,7 @@ Verstappen 2005). Values at the sides are of third order, held between their nei
 bodies they are the means of both, which neither gain nor lose energy. Two stages (Heun); what else
 the flow is given in a step goes along in the values, away from bodies, and not in the amounts, so
 that a steady flow stays as it is. A step of a Courant number above COURANT is done in substeps with
-one carrying field; control volumes too small for what flows through them there are `fleeting`.
+one carrying field.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NOTHING, ControlVolumes, means
-from flowborne.fluid.fleeting import CROSSED, NONE_FLEETING, find_fleeting
 from flowborne.fluid.ghosts import edge, kernel_axes, packed_sides, plane, planes
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
@@ -214,14 +213,8 @@ def carry_component(
             if ring:
                 along[edge(component, -1)] = along[edge(component, 0)]
             fields = *fields[:2], plane(along, grid)
-        fleeting = NONE_FLEETING
-        if transport.courant(grid) > CROSSED:
-            held = before.volume[component], after.volume[component]
-            steps = transport.dt / grid.cell_volume
-            fleeting = find_fleeting(held, flux, scratch.marks, volumes, steps)
         crossed, held_back, drained = carry(
-            *fields, along is not None, volumes, flux, table, inflows, fleeting, scratch, dt, count,
-            *MIXED,
+            *fields, along is not None, volumes, flux, table, inflows, scratch, dt, count, *MIXED,
         )  # fmt: skip
     return Carried(out, crossed, held_back, drained)
 

@@ -23,7 +23,6 @@ from flowborne.kernels.control_volumes import (
     share_velocity,
 )
 from flowborne.kernels.face_masses import add_transfers, give, place_of
-from flowborne.kernels.fleeting import choose, let_through, what_leaves
 from flowborne.kernels.flux import CLEAR, CUT, GHOSTS, UPSTREAM, pad_field, stage
 from flowborne.kernels.jit import kernel
 
@@ -96,20 +95,6 @@ class Inflows(NamedTuple):
     faces: Integers
     brought: Array
     loss: Array
-
-
-class Fleeting(NamedTuple):
-    """Control volumes that may let through more in a substep than they hold.
-
-    faces   (n,) flat, in ascending order
-    beside  (n, 6) control volume beyond each side; -1 at a side of the domain, and before an open
-            one, where what is upstream is carried
-    rate    (n, 6) volume per time that leaves through each side
-    """
-
-    faces: Integers
-    beside: Integers
-    rate: Array
 
 
 class Scratch(NamedTuple):
@@ -471,27 +456,6 @@ def exchange(
         give(after, gone, held, f, own[n] - inflows.brought[n], dt, nothing)
 
 
-@njit(nogil=True, cache=True)
-def inside(padded: Array, shape: Integers) -> Array:
-    """Copy of a field without its ghosts."""
-    d, out = (padded.shape[0] - shape[0]) // 2, np.empty((shape[0], shape[1], shape[2]))
-    for i in range(shape[0]):
-        for j in range(shape[1]):
-            for k in range(shape[2]):
-                out[i, j, k] = padded[i + d, j + GHOSTS, k + GHOSTS]
-    return out
-
-
-@njit(nogil=True, cache=True)
-def values_at(field: Array, places: Integers) -> Array:
-    """(n, 6) values of a field at flat places; those at -1 have no meaning."""
-    flat, found = field.reshape(-1), np.zeros(places.shape)
-    for n in range(places.shape[0]):
-        for way in range(6):
-            found[n, way] = flat[max(places[n, way], 0)]
-    return found
-
-
 @kernel
 def carry(
     out: Array,
@@ -502,7 +466,6 @@ def carry(
     flux: Fluxes,
     sides: Sides,
     inflows: Inflows,
-    fleeting: Fleeting,
     scratch: Scratch,
     dt: float,
     count: int,
@@ -522,7 +485,7 @@ def carry(
     start, later = (out, scratch.start) if count % 2 == 0 else (scratch.start, out)
     low = volumes.before
     inlets, drained = np.zeros(inflows.faces.size), np.zeros(inflows.faces.size)
-    arriving, leaving, crossed, held = np.zeros((0, 6)), np.zeros(0), 0.0, 0.0
+    crossed, held = 0.0, 0.0
     part_of_step(start, u, u, 0.0)
     fill_and_follow(start, low, volumes, volumes.was_shut)
     for s in range(count):
@@ -531,9 +494,6 @@ def carry(
             part_of_step(high, volumes.before, volumes.after, (s + 1) / count)
         else:
             high = volumes.after
-        own, to, through, row = choose(
-            fleeting.faces, fleeting.beside, fleeting.rate, low, high, dt
-        )
         for turn in range(2):
             weight = 1.0 - 0.5 * turn
             source, target = (start, middle) if turn == 0 else (middle, later)
@@ -550,15 +510,6 @@ def carry(
             part, given = weight * dt, volumes.given
             exchange(target, net, high, padded, inflows, inlets, shape, part, nothing)
             add_transfers(target, net, high, source, given, part, nothing)
-            if own.size:
-                field = inside(padded, shape)
-                if turn == 0:
-                    arriving = values_at(field, to)
-                    leaving = what_leaves(field, target, high, own, to, row, dt * through, nothing)
-                let_through(
-                    target, net, field, high, own, to, row, through, arriving, leaving, part,
-                    nothing,
-                )  # fmt: skip
             if turn == 1:
                 held += empty_at_walls(target, high, sides, shape, c, nothing)
             settle(target, high, volumes, dt, least, most, scratch.nought)
