@@ -33,16 +33,15 @@ from flowborne.kernels.control_volumes import (
 from flowborne.kernels.face_masses import ROUNDS, share_out, with_neighbours
 from flowborne.kernels.faces import face_means
 
-WHOLE = 0.99
-"""Control volumes of this part of a cell count as uncut."""
-
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
-
 
 SLACK = 1e-3
 """Part of a cell by which the volume of a face that is not cut may differ from a h^3: those of a
 closed region are scaled alike (see `leak_proof`)."""
+
+WHOLE = 1.0 - SLACK
+"""Part of a cell from which on control volumes count as uncut."""
 
 NONE = np.zeros(0, np.int64)
 NONE_CLOSED = Closed(NONE, np.zeros((0, 2), np.int64), np.zeros((0, 2)))

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers
+from flowborne.kernels.control_volumes import CLOSED_BELOW
 from flowborne.kernels.viscosity import (
     INACTIVE,
     UNKNOWN,
@@ -42,9 +43,6 @@ from flowborne.kernels.viscosity import (
     link_faces,
     meet_walls,
 )
-
-TOUCHING = 1e-3
-"""Faces of which no more than this part is open move with the body beside them."""
 
 NEAR = 2.0
 """Mean distance of a face's corners from bodies beyond which it is not beside one, cells."""
@@ -125,7 +123,7 @@ def assemble_viscosity(
         kind, away = np.empty(shape, np.uint8), np.empty(shape)
         face_distances(facets, axis, away)
         away -= NEAR * h
-        classify(kind, opened, axis, codes, TOUCHING)
+        classify(kind, opened, axis, codes, CLOSED_BELOW)
         near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
         centre = np.zeros((2, *shape))
         find_centres(facets, axis, near, centre)

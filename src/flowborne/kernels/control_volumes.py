@@ -23,7 +23,7 @@ less than 2.5 times."""
 AHEAD = 16
 """Places that a list is gone through before it is searched."""
 
-NONE = 1e-9
+CLOSED_BELOW = 1e-9
 """Open part of a face up to which it counts as closed."""
 
 DRIVEN, PART, SHUT, UNEVEN = 1, 2, 4, 8
@@ -353,7 +353,7 @@ def kind_of(
     goal   what it would move if it were open
     own    whether its velocity is not prescribed, and it is not another one
     """
-    pushed = own and opened > NONE and volume > nothing
+    pushed = own and opened > CLOSED_BELOW and volume > nothing
     shut = own and not pushed and volume != 0.0
     uneven = pushed and abs(volume - goal * opened) > slack
     return DRIVEN * pushed + PART * (volume < least) + SHUT * shut + UNEVEN * uneven

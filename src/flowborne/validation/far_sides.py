@@ -117,6 +117,10 @@ WHOLE = (-1.22, -1.42), (2.44, 2.24)
 """Corners of a domain of 3.66 x 3.66 m that holds the eel's whole way, m."""
 
 
+EEL_CELL = 0.01
+"""m"""
+
+
 def eel_way(
     lower: tuple[float, float],
     upper: tuple[float, float],
@@ -128,7 +132,7 @@ def eel_way(
     follow  what the domain follows
     """
     sides = {f"boundaries.{name}": "far" for name in ("x_min", "x_max", "y_min", "y_max")}
-    cells = round(100 * (upper[1] - lower[1]))
+    cells = round((upper[1] - lower[1]) / EEL_CELL)
     domain = {"lower": list(lower), "upper": list(upper), "resolution": cells, "follow": follow}
     changes = sides | {f"domain.{key}": str(value) for key, value in domain.items()}
     with Simulation(load_scene("eel", changes), workers=1) as simulation:

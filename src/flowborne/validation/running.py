@@ -186,6 +186,8 @@ def serve(pipe: Connection) -> None:
             return
         try:
             pipe.send((function(task), None))
+        except BrokenPipeError:  # the parent is gone
+            return
         except Exception as error:
             pipe.send((None, error))
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Marks
-from flowborne.kernels.control_volumes import NONE, TURNS
+from flowborne.kernels.control_volumes import CLOSED_BELOW, TURNS
 
 
 def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
@@ -188,7 +188,7 @@ def find_closed_reference(
     nothing: float,
 ) -> tuple[Integers, Array]:
     """`find_closed` in NumPy: closed faces, and on which ones pressure acts."""
-    driven = (volume > nothing) & (opened > NONE)
+    driven = (volume > nothing) & (opened > CLOSED_BELOW)
     counted = (volume != 0.0) & ~driven
     for end, told in zip((0, -1), prescribed, strict=True):
         for marks in (driven, counted):
