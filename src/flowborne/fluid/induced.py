@@ -114,7 +114,9 @@ def pooled(rate: Array, sea: Sea) -> tuple[Array, Array]:
     cells, coordinates = np.stack(np.nonzero(rate)), grid.cell_coordinates()
     places = np.stack([coordinates[axis][cells[axis]] for axis in grid.axes], axis=1)
     values = rate[tuple(cells)]
-    keys = np.stack([*(cells // POOL), values > 0.0])
+    away = 2 * cells + 1 - np.array(grid.shape)[:, None]  # from the middle, so that mirrors agree
+    blocks = np.sign(away) * (np.abs(away) // (2 * POOL) + 1)
+    keys = np.stack([*blocks, values > 0.0])
     _, block = np.unique(keys, axis=1, return_inverse=True)
     rates = np.asarray(np.bincount(block.ravel(), values), float)
     weighted = [np.bincount(block.ravel(), values * along) / rates for along in places.T]
