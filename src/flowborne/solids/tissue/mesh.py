@@ -16,7 +16,13 @@ from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.jit import numba_thread_count
 from flowborne.phrases import location, rounded_up
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.elements import connected, oriented, outer_surface, with_middles
+from flowborne.solids.elements import (
+    connected,
+    measures,
+    oriented,
+    outer_surface,
+    with_middles,
+)
 from flowborne.solids.tissue.bones import (
     MOST_SAMPLES,
     Bones,
@@ -190,9 +196,10 @@ def _meshed(
     """Points and right-handed tetrahedra between the surfaces, and the tolerance used.
 
     Where walls meet, the chamber is a wedge. The mesher may drop the part of its tip that is within
-    the tolerance of both walls, which leaves a pit as deep as the flesh. Then it is meshed again
-    with a smaller tolerance.
-    raises  ValueError when every try has a pit
+    the tolerance of both walls, which leaves a pit as deep as the flesh. Where its faces are off a
+    wall, the projection onto the wall may turn an element inside out. In both cases the flesh is
+    meshed again with a smaller tolerance.
+    raises  ValueError when every try has a pit or such an element
     """
     part = chamber.cut(hollow)
     for _ in range(MOST_TRIES):
@@ -202,7 +209,8 @@ def _meshed(
         used, renumbered = np.unique(elements, return_inverse=True)
         points, elements = points[used], renumbered.reshape(-1, 4)
         corners = points[np.unique(outer_surface(points, elements))]
-        if np.abs(signed_distance(corners, outside)).max() <= ASTRAY * tolerance:
+        follows = np.abs(signed_distance(corners, outside)).max() <= ASTRAY * tolerance
+        if follows and measures(points, elements).min() > 0.0:
             return points, elements, tolerance
         tolerance *= TOLERANCE_RATIO
     raise ValueError(
