@@ -65,6 +65,8 @@ class Swept:
     def put_back(self, flux: Faces, volumes: Array, dt: float) -> None:
         """Add what flows to and from these cells to the fluxes, m^3/s, and give them what they hold
         at last of the volumes that are reached; in place."""
+        if self.cells.size == 0:
+            return
         shape = np.array(volumes.shape)
         for volume, ways, sign in ((self.held, self.leaves, 1.0), (self.holds, self.enters, -1.0)):
             for cell, part, way in zip(self.cells, volume, ways, strict=True):
@@ -74,6 +76,10 @@ class Swept:
         volumes.reshape(-1)[self.cells] += self.holds
 
 
+NONE = np.zeros(0, np.int64)
+NOTHING_SWEPT = Swept(NONE, np.zeros(0), np.zeros(0), NONE, NONE, NONE, NONE)
+
+
 def swept_cells(
     before: Geometry, after: Geometry, cells: Array, grid: Grid, sides: Boundaries
 ) -> Swept:
@@ -81,12 +87,16 @@ def swept_cells(
 
     cells  (nx, ny, nz) volumes at the start, m^3
     """
+    if before is after:  # bodies that stand still
+        return NOTHING_SWEPT
     (keys, into), (later, into_later) = (ways_in(cut, grid, sides) for cut in (before, after))
     _, first, second = np.intersect1d(keys, later, assume_unique=True, return_indices=True)
     one, two = into[first], into_later[second]
     sizes = np.linalg.norm(one, axis=1), np.linalg.norm(two, axis=1)
     passed = (one * two).sum(axis=1) < TURNED * sizes[0] * sizes[1]
     passed &= np.minimum(*sizes) > LEAST
+    if not passed.any():
+        return NOTHING_SWEPT
     found, place = np.unique(keys[first][passed] % cells.size, return_index=True)
     leaves, ahead = way_out(found, one[passed][place], before.open, grid, sides)
     enters, behind = way_out(found, two[passed][place], after.open, grid, sides)

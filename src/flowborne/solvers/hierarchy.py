@@ -175,7 +175,7 @@ def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> Non
     weights, added  padded
     """
     for axis, across in enumerate(weights):
-        faces, cells = np.moveaxis(across, axis, 0), np.moveaxis(added, axis, 0)
+        faces, cells = across.swapaxes(0, axis), added.swapaxes(0, axis)
         n = added.shape[axis] - 2
         if periodic[axis] or n < 1:
             continue

@@ -158,6 +158,8 @@ class PressureSystem:
 
         rhs, guess  (nx, ny, nz); values in cells without an open face are ignored
         """
+        if term.mobility.largest() == 0.0:  # of bodies whose motion is given
+            term = NO_TERM
         b = self.buffers
         inner = b.label.shape
         cells = (inner[0] - 2 if inner[0] > 1 else 1, inner[1] - 2, inner[2] - 2)
