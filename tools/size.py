@@ -20,6 +20,9 @@ SOURCE = ROOT / "src" / PACKAGE
 SHORT = 60
 """Lines below which a module is short."""
 
+CORE = ("fluid", "coupling", "kernels", "solvers")
+"""Rooms whose constants are counted."""
+
 LEVELS = (15, 20)
 """Complexities above which functions are counted."""
 
@@ -46,6 +49,26 @@ def wide(path: Path) -> int:
     )
 
 
+def is_number(value: ast.expr | None) -> bool:
+    """Whether an expression is made of numbers alone."""
+    parts = () if value is None else tuple(ast.walk(value))
+    kinds = ast.Constant | ast.UnaryOp | ast.BinOp | ast.Tuple | ast.operator | ast.unaryop
+    numbers = [part for part in parts if isinstance(part, ast.Constant)]
+    made = all(isinstance(part, kinds | ast.expr_context) for part in parts)
+    return made and bool(numbers) and all(type(n.value) in (int, float) for n in numbers)
+
+
+def constants(path: Path) -> int:
+    """Names in capitals that a module binds to numbers; codes that stand in a row count as one."""
+    bound = (
+        node for node in ast.parse(path.read_text("utf-8")).body if isinstance(node, ast.Assign)
+    )
+    return sum(
+        is_number(node.value) and isinstance(node.targets[0], ast.Name | ast.Tuple)
+        for node in bound
+    )
+
+
 def complex_functions(above: int) -> list[str]:
     """Functions of greater complexity, with their place."""
     ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--exit-zero", "--select", "C901"]
@@ -66,6 +89,8 @@ def main() -> None:
     for room in sorted(modules):
         print(f"{room:18}{modules[room]:5} modules {total[room]:7} lines")
     print(f"{'all':18}{len(lines):5} modules {sum(lines.values()):7} lines")
+    core = [path for path in lines if room_of(path) in CORE]
+    print(f"constants of {', '.join(CORE)}: {sum(map(constants, core))}")
     print(f"below {SHORT} lines: {sum(count < SHORT for count in lines.values())} modules")
     print(f"more than {MOST_PARAMETERS} parameters: {sum(map(wide, lines))} functions")
     for above in LEVELS:

@@ -16,17 +16,13 @@ from flowborne.coupling.operators import twists
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
+from flowborne.fluid.transport import parts_for
 from flowborne.solids.dynamics import kinematics
-
-MOST = 1.0
-"""Cells that a point of a body may cross in a part."""
-
-SLACK = 1e-9
-"""Part of a cell by which it may cross more, of rounding."""
 
 
 def parts_of(world: World, velocity: Array, dt: float) -> int:
-    """Number of parts of a step in which the bodies move with `velocity` (nv,) for `dt` (s)."""
+    """Number of parts of a step in which the bodies move with `velocity` (nv,) for `dt` (s): no
+    point of them crosses more than a cell in a part."""
     fluid, model = world.setup.fluid, world.setup.solid
     if fluid is None or fluid.one_way or not velocity.any():
         return 1
@@ -41,9 +37,7 @@ def parts_of(world: World, velocity: Array, dt: float) -> int:
     if pose.vertices.size:
         skin = (pose.vertex_jacobian @ velocity).reshape(-1, 3)
         fastest = max(fastest, float(np.linalg.norm(skin, axis=1).max()))
-    if not np.isfinite(fastest):
-        return 1
-    return max(1, int(np.ceil(fastest * dt / (MOST * fluid.grid.spacing) - SLACK)))
+    return parts_for(fastest * dt / fluid.grid.spacing)
 
 
 def part_of(command: JointCommand, world: World, left: int) -> JointCommand:

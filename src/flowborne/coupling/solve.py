@@ -37,7 +37,7 @@ from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import ROUNDING, Integers
 from flowborne.kernels.faces import largest_open
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.driven import Driven, within_limits
@@ -59,9 +59,6 @@ SPLIT_TOLERANCE = 1e-5
 
 PROBES = 4
 """Fields of random signs by which the yielding of flesh is estimated."""
-
-ROUNDING = 1e-15
-"""Relative size of velocities that count as rounding errors in the divergence."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from flowborne.fluid.control_volumes import WHOLE as UNCUT
 from flowborne.fluid.ghosts import Scalar, edge
 from flowborne.fluid.grid import Array, Grid, faces_of, inner_product
 from flowborne.fluid.sides.side import Place
-from flowborne.fluid.transport import SUBSTEPS, Transport
+from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import mark_cut
 from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, pass_on, sort_cells
@@ -29,9 +29,6 @@ from flowborne.kernels.dye import sweep
 
 REACH = 2
 """Cells on both sides that the parabola in a cell is made from."""
-
-SLACK = 1e-9
-"""Part of a whole cell by which more than all of it may flow out in a substep."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,7 @@ class Passage:
         filled.reshape(-1)[brought.cells] += brought.gain
         sort_cells(kind, fullest, start, end, filled, *transport.flux, uncut)
         flowing = transport.dt * float(fullest.max())
-        self.count = int(min(max(1.0, np.ceil(flowing - SLACK)), SUBSTEPS))
+        self.count = parts_for(min(flowing, SUBSTEPS))
         self.dt = transport.dt / self.count
         others = np.flatnonzero(kind != WHOLE)
         shape, wraps = np.array(grid.shape), np.array(grid.shape) * np.array(sides.periodic())

@@ -46,6 +46,9 @@ order lets noise grow from 0.9 on."""
 SUBSTEPS = 300
 """Most substeps: a flow that asks for more has broken down, and its step will say so."""
 
+SLACK = 1e-9
+"""How much more than a whole number of parts is rounding, and needs no further part."""
+
 LASTING = (2.0, 4.0)
 """Cells that the flow crosses in a step, the axes added up, up to which what the last step gave it
 goes along, and from which on nothing does. Pressure and forces gave it at a place that a faster
@@ -55,6 +58,11 @@ MIXED = (2.0, 2.5)
 """Times what a control volume holds that leaves it in a substep, from which on it is mixed with
 the largest one beside it, and from which on wholly. Where c times it leaves, Heun's method keeps
 1 - c + c^2/2 of what it had, more than all from c = 2 on; mixing leaves (1 - 2 (c - 2)) of that."""
+
+
+def parts_for(amount: float) -> int:
+    """Fewest equal parts of which none is greater than 1; one of what is not a finite number."""
+    return max(1, int(np.ceil(amount - SLACK))) if np.isfinite(amount) else 1
 
 
 @dataclass(frozen=True)
@@ -104,10 +112,7 @@ class Transport:
 
     def substeps(self, grid: Grid) -> int:
         """In how many the step is done; in one where a flux is not a finite number."""
-        courant = self.courant(grid)
-        if not np.isfinite(courant):
-            return 1
-        return min(max(1, int(np.ceil(courant / COURANT))), SUBSTEPS)
+        return min(parts_for(self.courant(grid) / COURANT), SUBSTEPS)
 
     def lasting(self, grid: Grid) -> Array | None:
         """(nx, ny, nz) share of what the last step gave the flow that goes along with it, see

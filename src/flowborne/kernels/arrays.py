@@ -1,9 +1,12 @@
-"""Types of the arrays that kernels take."""
+"""Types of the arrays that kernels take, and their precision."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+ROUNDING = 1e-15
+"""Relative size of what is a rounding error of numbers in double precision."""
 
 Array = NDArray[np.float64]
 Faces = tuple[Array, Array, Array]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import (
+    ROUNDING,
     Array,
     DenseTerm,
     Hierarchy,
@@ -84,7 +85,7 @@ def solve(
     norm0 = np.sqrt(dot(rhs, rhs))
     remove_null(rhs, label, null)
     norm = np.sqrt(dot(rhs, rhs))
-    goal = max(tolerance * norm, absolute, 1e-15 * norm0)
+    goal = max(tolerance * norm, absolute, ROUNDING * norm0)
     residual, last = 0.0, np.inf
     z, b = at_level(cycle[0], table, 0), at_level(cycle[1], table, 0)
     ring = periodic.any()

@@ -7,12 +7,8 @@ from typing import Protocol
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import ROUNDING, Array
 from flowborne.solvers.cholesky import symmetric_factor
-
-ROUNDING = 1e-15
-"""Relative size of eigenvalues of M that are rounding errors."""
-
 
 Drag = Array | csr_array
 """D, dense for few unknowns."""

@@ -9,14 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import ROUNDING, Array
 from flowborne.kernels.vectors import descend, dot, turn
 
 WIDTH = 256
 """Entries in a row of the vectors."""
-
-ROUNDING = 1e-15
-"""Relative size of residuals, for a matrix with a diagonal of 1, that are rounding errors."""
 
 
 def spread(values: Array) -> Array:
