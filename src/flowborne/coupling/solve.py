@@ -54,8 +54,9 @@ FIRST_TOLERANCE = 1e-3
 TIGHTENING = 1e-3
 """Tolerance of a solve over that of the one before: what a correction changes shrinks as fast."""
 
-SPLIT_TOLERANCE = 1e-5
-"""Relative residual of the added-mass part of the pressure. Both parts add up whatever it is."""
+SPLIT_TOLERANCE = 1e-3
+"""Relative residual of the added-mass part of the pressure, whose forces are then off by 2e-4 at
+most (flyer-twist) and 1e-5 to 6e-5 in the mean. Both parts add up whatever it is."""
 
 PROBES = 4
 """Fields of random signs by which the yielding of flesh is estimated."""
