@@ -393,7 +393,19 @@ class _Run:
                 f"the run stopped in {error}; {kept}; try more steps per frame. If that does not "
                 "help, it is a fault of flowborne: flowborne --debug run shows where"
             )
-        return f"the simulation blew up in {error}; {kept}; try more steps per frame"
+        return f"the simulation blew up in {error}; {kept}; {self._remedy()}"
+
+    def _remedy(self) -> str:
+        """What may keep the run from blowing up."""
+        world, report = self.simulation.world, self.simulation.report
+        fluid = world.setup.fluid
+        if fluid is None or report is None or not any(step.contacts for step in report.steps):
+            return "try more steps per frame"
+        return (
+            "bodies touched in the fluid, which squeezes it out between them: give their geoms a "
+            f"contact margin of a cell, margin = {fluid.grid.spacing:.2g} m in the model, or try "
+            "more steps per frame"
+        )
 
     def _not_written(self, error: OSError) -> str:
         return (

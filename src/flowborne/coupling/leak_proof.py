@@ -84,7 +84,7 @@ def leak_proof_flux(
     gradient.subtract(flux, solution.pressure, 1.0)
     net_out(net, *flux)
     later = start + dt * (departure.rate - net)
-    swept.put_back(flux, later, dt)
+    swept.put_back(flux, later, end, dt)
     later[(later == 0.0) & (cells != 0.0)] = FILLED * grid.cell_volume
     return flux, later
 

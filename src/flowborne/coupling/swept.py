@@ -62,18 +62,23 @@ class Swept:
         start.reshape(-1)[self.cells] = end.reshape(-1)[self.cells] = 0.0
         return start, end
 
-    def put_back(self, flux: Faces, volumes: Array, dt: float) -> None:
-        """Add what flows to and from these cells to the fluxes, m^3/s, and give them what they hold
-        at last of the volumes that are reached; in place."""
+    def put_back(self, flux: Faces, volumes: Array, wanted: Array, dt: float) -> None:
+        """Add what flows to and from these cells to the fluxes, m^3/s, and give them their part of
+        the volumes that are reached, in place. A pocket beside them may not reach what it should.
+
+        wanted  volumes that `set_aside` gave for the end of the step
+        """
         if self.cells.size == 0:
             return
         shape = np.array(volumes.shape)
-        for volume, ways, sign in ((self.held, self.leaves, 1.0), (self.holds, self.enters, -1.0)):
+        reached, asked = (field.reshape(-1)[self.behind] for field in (volumes, wanted))
+        holds = self.holds * np.divide(reached, asked, out=np.zeros(asked.size), where=asked > 0.0)
+        for volume, ways, sign in ((self.held, self.leaves, 1.0), (holds, self.enters, -1.0)):
             for cell, part, way in zip(self.cells, volume, ways, strict=True):
                 face = face_of(shape, way // 2, cell, way % 2)
                 flux[way // 2].reshape(-1)[face] += sign * (2 * (way % 2) - 1) * part / dt
-        np.subtract.at(volumes.reshape(-1), self.behind, self.holds)
-        volumes.reshape(-1)[self.cells] += self.holds
+        np.subtract.at(volumes.reshape(-1), self.behind, holds)
+        volumes.reshape(-1)[self.cells] += holds
 
 
 NONE = np.zeros(0, np.int64)
