@@ -19,6 +19,7 @@ from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
+from flowborne.kernels.fresh import fill_fresh
 from flowborne.solids.driven import Driven
 from flowborne.solids.dynamics import Kinematics
 
@@ -39,7 +40,8 @@ def diffuse(
     """Implicit viscosity with the pressure of the last step, and its impulse on the bodies.
 
     The pressure is there so that the boundary layer is that of the flow at the end of the step;
-    it is taken off again before the new pressure is solved for.
+    it is taken off again before the new pressure is solved for. Cells that have opened since have
+    that around them.
 
     returns  Faces; (k,) impulse; whether the solve converged
     """
@@ -49,9 +51,11 @@ def diffuse(
     if fluid.viscosity == 0.0:
         return velocity, np.zeros(size), True
     grid, sides = fluid.grid, fluid.boundaries
+    last, wraps = state.pressure.copy(), np.array(grid.shape) * np.array(sides.periodic())
+    fill_fresh(last, cut.open, np.flatnonzero(last == 0.0), wraps)
     pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
-    gradient.subtract(pushed, state.pressure, dt)
-    earlier = pressure_push(cut, dt * state.pressure, size)
+    gradient.subtract(pushed, last, dt)
+    earlier = pressure_push(cut, dt * last, size)
     moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))
     parts = assemble_viscosity(
         OpenParts(cut.facets, cut.open, cut.volume),
@@ -69,7 +73,7 @@ def diffuse(
     )
     slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
     smooth, impulse, converged = system.solve(pushed, moving, TOLERANCE, slip)
-    gradient.subtract(smooth, state.pressure, -dt)
+    gradient.subtract(smooth, last, -dt)
     return smooth, impulse, converged
 
 

@@ -39,7 +39,6 @@ from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Integers
 from flowborne.kernels.faces import largest_open
-from flowborne.kernels.fresh import fill_fresh
 from flowborne.kernels.outflow import outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
@@ -174,8 +173,6 @@ def solve_together(
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    wraps = np.array(fluid.grid.shape) * np.array(fluid.boundaries.periodic())
-    fill_fresh(state.pressure, cut.open, np.flatnonzero(state.pressure == 0.0), wraps)
     gradient = pressure_gradient(cut.open, mass, fluid.density, fluid.grid, fluid.boundaries)
     weights = face_weights(cut.open, gradient.rate, fluid.grid)
     beyond = beyond_sides(gradient.dipoles, fluid.grid.face_area * gradient.whole)
