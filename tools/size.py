@@ -49,9 +49,9 @@ def wide(path: Path) -> int:
     )
 
 
-def is_number(value: ast.expr | None) -> bool:
+def is_number(value: ast.expr) -> bool:
     """Whether an expression is made of numbers alone."""
-    parts = () if value is None else tuple(ast.walk(value))
+    parts = tuple(ast.walk(value))
     kinds = ast.Constant | ast.UnaryOp | ast.BinOp | ast.Tuple | ast.operator | ast.unaryop
     numbers = [part for part in parts if isinstance(part, ast.Constant)]
     made = all(isinstance(part, kinds | ast.expr_context) for part in parts)
@@ -59,14 +59,9 @@ def is_number(value: ast.expr | None) -> bool:
 
 
 def constants(path: Path) -> int:
-    """Names in capitals that a module binds to numbers; codes that stand in a row count as one."""
-    bound = (
-        node for node in ast.parse(path.read_text("utf-8")).body if isinstance(node, ast.Assign)
-    )
-    return sum(
-        is_number(node.value) and isinstance(node.targets[0], ast.Name | ast.Tuple)
-        for node in bound
-    )
+    """Names that a module binds to numbers; those bound in one line count as one."""
+    lines = ast.parse(path.read_text("utf-8")).body
+    return sum(isinstance(line, ast.Assign) and is_number(line.value) for line in lines)
 
 
 def complex_functions(above: int) -> list[str]:

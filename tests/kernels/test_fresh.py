@@ -22,13 +22,8 @@ def test_a_fresh_cell_has_the_mean_of_those_beside_it_by_how_open_the_way_is() -
 
 
 def test_cells_behind_fresh_ones_follow_and_closed_ones_stay_without() -> None:
-    assert row([2.0, 0.0, 0.0, 0.0, 5.0], [0.0, 0.1, 0.3, 0.0, 0.0, 0.0]) == [
-        2.0,
-        2.0,
-        2.0,
-        0.0,
-        5.0,
-    ]
+    found = row([2.0, 0.0, 0.0, 0.0, 5.0], [0.0, 0.1, 0.3, 0.0, 0.0, 0.0])
+    assert found == [2.0, 2.0, 2.0, 0.0, 5.0]
 
 
 def test_across_a_periodic_side() -> None:

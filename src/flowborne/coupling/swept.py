@@ -13,6 +13,7 @@ import numpy as np
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.control_volumes import NONE
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.control_volumes import neighbour
@@ -81,7 +82,6 @@ class Swept:
         volumes.reshape(-1)[self.cells] += holds
 
 
-NONE = np.zeros(0, np.int64)
 NOTHING_SWEPT = Swept(NONE, np.zeros(0), np.zeros(0), NONE, NONE, NONE, NONE)
 
 

@@ -38,6 +38,11 @@ class Mobility:
     def is_dense(self) -> bool:
         return len(self.arrays[1]) == 1
 
+    @property
+    def yields(self) -> bool:
+        """Whether a load moves anything: not where the motion of all bodies is given."""
+        return not self.is_dense or bool(self.arrays[0].any())
+
     def times(self, load: Array) -> Array:
         """A^-1 applied to a load (k,), or to every row of (n, k)."""
         if self.is_dense:

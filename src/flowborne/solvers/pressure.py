@@ -158,7 +158,7 @@ class PressureSystem:
 
         rhs, guess  (nx, ny, nz); values in cells without an open face are ignored
         """
-        if term.mobility.largest() == 0.0:  # of bodies whose motion is given
+        if not term.mobility.yields:
             term = NO_TERM
         b = self.buffers
         inner = b.label.shape

@@ -235,7 +235,6 @@ def test_the_mesher_gets_no_longer_edges_than_the_flesh_has_room_for(
     assert asked == [pytest.approx(1.5 * np.sqrt(3.0), rel=0.02)]
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
 def test_a_mesh_with_an_element_inside_out_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """One meshing of two arms in some hundred had an element of -6e-9 m^3 at the mirror plane."""
     unfold, made = Chamber.unfold, []
@@ -253,6 +252,7 @@ def test_a_mesh_with_an_element_inside_out_is_made_again(monkeypatch: pytest.Mon
     assert measures(mesh.points, mesh.elements).min() > 0.0
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
 def test_a_mesher_ends_with_the_process_that_began_it() -> None:
     waiting = (
         "import signal, sys; from flowborne.solids.tissue.mesh_run import end_with_parent; "
