@@ -36,7 +36,7 @@ COPIES = {
     "box": ('type="box" size="0.8 0.5 1"', trimesh.creation.box((1.6, 1.0, 2.0))),
     "capsule": (
         'type="capsule" size="0.5 0.7"',
-        of_volume(trimesh.creation.capsule(1.4, 0.5, count=[32, 32]), CAPSULE),
+        of_volume(trimesh.creation.capsule(1.4, 0.5, count=[96, 96]), CAPSULE),
     ),
 }
 """A primitive, 2 m long, and the mesh that copies it."""

@@ -25,14 +25,22 @@ PISTON = (
     ],
     ids=["slab", "room"],
 )
-@pytest.mark.parametrize("left", [1e-3, 1e-5, 1e-7])
-def test_what_a_piston_pushes_out_is_no_faster_than_it(left: float, grid: fb.Grid) -> None:
-    """Its front closes cells but for the part `left`, in water, whose friction holds small cells.
+def test_what_a_piston_pushes_out_of_closing_cells_is_no_faster_than_what_passes_it(
+    grid: fb.Grid,
+) -> None:
+    """Its front closes cells but for a part, in water, whose friction holds small cells.
 
     What they had, over what is left of them, was 2100 m/s once.
     """
-    dt, world = 0.01, make_world(mjcf(PISTON), grid, viscosity=1e-4, solid_density=50.0)
-    speed = (0.31 - left) * H / dt
-    world.solid.q[0], world.solid.v[0] = -0.31 * H, speed
-    set_going(world)
-    assert advance(world, dt).fastest < 1.2 * speed
+
+    def fastest(left: float) -> float:
+        """Over the piston's speed, when it has come to leave this part of the cells before it."""
+        dt, world = 0.01, make_world(mjcf(PISTON), grid, viscosity=1e-4, solid_density=50.0)
+        speed = 0.3 * H / dt
+        world.solid.q[0], world.solid.v[0] = -(0.3 + left) * H, speed
+        set_going(world)
+        return advance(world, dt).fastest / speed
+
+    passing = max(fastest(left) for left in (0.3, 0.5, 0.7))
+    assert passing < 2.0
+    assert max(fastest(left) for left in (1e-3, 1e-5, 1e-7)) < min(passing, 1.25)

@@ -92,7 +92,7 @@ def case_of(
     still = grid.zeros_faces()
     masses = masses_of(cut.open, grid, boundaries)
     parts = assemble_viscosity(
-        OpenParts(cut.facets, cut.open, cut.volume),
+        OpenParts(cut.distance, cut.crossings, cut.open, cut.volume),
         still,
         masses,
         grid,

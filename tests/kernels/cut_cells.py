@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.kernels.edge_crossings import Crossings, new_crossings
+
 SHAPES = [(9, 8, 7), (10, 9, 1)]
 H, ORIGIN = 0.5, np.array([-2.1, -1.9, -1.6])
 
@@ -29,6 +31,16 @@ class Cut:
     @property
     def flat(self) -> bool:
         return self.shape[2] == 1
+
+    @property
+    def crossings(self) -> Crossings:
+        """None of them known: distances are linear along the edges."""
+        return new_crossings(self.distance, self.flat)
+
+    @property
+    def own_crossings(self) -> Crossings:
+        """The same with the first ball."""
+        return new_crossings(self.phi, self.flat)
 
 
 def nodes(shape: tuple[int, int, int]) -> np.ndarray:

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from flowborne.kernels.closed_fractions import (
     CREASE,
-    add_closed,
-    closed_fraction,
+    close_faces,
     count_beside,
     list_closed,
     share_closed,
@@ -19,33 +16,27 @@ from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.closed_fractions import (
-    add_closed_reference,
     count_beside_reference,
     face_closed_reference,
+    faces_in,
     list_closed_reference,
     share_closed_reference,
 )
 
 AXES = [(shape, axis) for shape in SHAPES for axis in range(3 if shape[2] > 1 else 2)]
-DISTANCE = st.one_of(st.just(0.0), st.floats(-2.0, 2.0, allow_subnormal=False))
-
-
-@given(st.tuples(DISTANCE, DISTANCE, DISTANCE, DISTANCE))
-@settings(deadline=None)
-def test_part_of_a_square(corners: tuple[float, float, float, float]) -> None:
-    a, b, c, d = corners
-    expected = face_closed_reference(np.array([[[a, d], [b, c]]]), 0)[0, 0, 0]
-    assert closed_fraction(a, b, c, d) == pytest.approx(expected, abs=1e-14)
 
 
 @pytest.mark.parametrize(("shape", "axis"), AXES)
-def test_add_closed(shape: tuple[int, int, int], axis: int) -> None:
+def test_close_faces(shape: tuple[int, int, int], axis: int) -> None:
     made = cut(shape)
-    total = np.random.default_rng(1).random(face_shape(shape, axis))
-    expected = add_closed_reference(total, made.phi, made.box, axis)
-    assert (expected - total).max() > 0.5
-    add_closed(total, made.phi, made.box, axis)
-    np.testing.assert_allclose(total, expected, atol=1e-14)
+    before = np.random.default_rng(1).random(face_shape(shape, axis))
+    expected, total = face_closed_reference(made.phi, axis), before.copy()
+    assert expected.max() > 0.5
+    own = np.empty(expected.shape)
+    close_faces(own, total, made.phi, made.own_crossings, made.box, axis, made.flat)
+    np.testing.assert_allclose(own, expected, atol=1e-14)
+    before[faces_in(made.box, axis)] += own
+    np.testing.assert_allclose(total, before, atol=1e-14)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -67,15 +58,17 @@ def test_shares_and_their_list(
     """Some faces in a crease and just below its limit."""
     made, codes, random = cut(shape), np.array(sides), np.random.default_rng(3)
     beside = random.integers(0, 3, shape)
-    total = add_closed_reference(np.zeros(face_shape(shape, axis)), made.phi, made.box, axis)
-    total *= random.uniform(1.0, 2.0, total.shape)
+    share = face_closed_reference(made.phi, axis)
+    total = np.zeros(face_shape(shape, axis))
+    total[faces_in(made.box, axis)] = share
+    total *= np.maximum(random.uniform(0.0, 2.0, total.shape), 1.0)
     opened = np.ones(total.shape)
     union = face_closed_reference(made.distance, axis)
     assert ((union > 1.0 - 10.0 * CREASE) & (union < 1.0)).any()
-    parts = opened, total, made.distance, beside, made.phi, made.box, axis, codes
-    expected, opening = share_closed_reference(*parts)
-    share = np.empty(expected.shape)
-    count = share_closed(share, *parts)
+    parts = share, opened, total, made.distance
+    rest = beside, made.box, axis, codes
+    expected, opening = share_closed_reference(*parts, *rest)
+    count = share_closed(*parts, made.crossings, *rest, made.flat)
     np.testing.assert_allclose(share, expected, atol=1e-14)
     np.testing.assert_allclose(opened, opening, atol=1e-14)
     assert count == (expected > 0.0).sum()

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from flowborne.kernels.edge_crossings import new_crossings
 from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 from flowborne.kernels.viscosity import (
     GIVEN,
@@ -71,7 +72,8 @@ def test_distances_and_kinds(shape: tuple, codes: np.ndarray, axis: int) -> None
 def test_centres(shape: tuple, codes: np.ndarray, axis: int) -> None:
     made = cut(shape)
     centre = np.zeros((2, *face_shape(shape, axis)))
-    find_centres(made.distance, axis, np.arange(centre[0].size), centre)
+    near = np.arange(centre[0].size)
+    find_centres(made.distance, made.crossings, axis, near, centre, made.flat)
     expected = find_centres_reference(made.distance, axis)
     assert expected.any()
     np.testing.assert_allclose(centre, expected, atol=1e-10)
@@ -84,9 +86,10 @@ def test_links(shape: tuple, codes: np.ndarray, axis: int) -> None:
     for d in range(2 if made.flat else 3):
         periodic = bool(codes[d, 0] == PERIODIC)
         grid = made.distance, made.opened[axis], centre, parts
+        edges = made.distance, made.crossings
         found = [np.zeros(kind.shape) for _ in range(3)]
         near = np.full(kind.shape, -1.0)
-        link_faces(axis, d, kind, near, *grid, velocity, 0.7, *found, periodic)
+        link_faces(axis, d, kind, near, *edges, *grid[1:], velocity, 0.7, *found, periodic)
         expected = link_faces_reference(axis, d, kind, *grid, velocity, 0.7, periodic)
         for one, other in zip(found, expected, strict=True):
             assert other.any()
@@ -96,10 +99,11 @@ def test_links(shape: tuple, codes: np.ndarray, axis: int) -> None:
 def test_links_of_uncut_faces_need_no_geometry() -> None:
     shape, nothing = (5, 4, 3), np.full((6, 5, 4), np.nan)
     kind, away = np.full((6, 4, 3), UNKNOWN, np.uint8), np.full((6, 4, 3), 0.1)
-    cuts = nothing, nothing, np.full((2, 6, 4, 3), np.nan), np.full(shape, np.nan)
+    edges = nothing, new_crossings(nothing, False)
+    cuts = nothing, np.full((2, 6, 4, 3), np.nan), np.full(shape, np.nan)
     for d in range(3):
         diagonal, link, given = (np.zeros(kind.shape) for _ in range(3))
-        link_faces(0, d, kind, away, *cuts, away, 0.7, diagonal, link, given, False)
+        link_faces(0, d, kind, away, *edges, *cuts, away, 0.7, diagonal, link, given, False)
         assert set(np.unique(link)) == {0.0, 0.7}
         np.testing.assert_array_equal(np.moveaxis(link, d, 0)[:-1], 0.7)
 
@@ -111,7 +115,8 @@ def test_walls(shape: tuple, codes: np.ndarray, axis: int) -> None:
     grid = made.distance, made.opened[axis], centre, parts
     wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
     gap, place = np.zeros((2, beside.size, 3, 3))
-    meet_walls(axis, kind, *grid, 0.7, codes, beside, wall, gap, place, node)
+    edges = made.distance, made.crossings
+    meet_walls(axis, kind, *edges, *grid[1:], 0.7, codes, beside, wall, gap, place, node)
     expected = meet_walls_reference(axis, kind, *grid, 0.7, codes, beside)
     assert (np.abs(wall) > 0.0).any(axis=0).all()
     np.testing.assert_allclose(wall, expected[0], rtol=1e-9, atol=1e-13)

@@ -1,4 +1,4 @@
-"""Open volume of cut cells: exact for planes, of second order for round bodies."""
+"""Open volume of cut cells: exact for planes and edges, right for what is round."""
 
 from __future__ import annotations
 
@@ -9,26 +9,32 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flowborne.fluid.grid import Array
+from flowborne.kernels.cut_faces import closed_face
+from flowborne.kernels.edge_crossings import Crossings, new_crossings
 from flowborne.kernels.node_distance import allow_for_curvature
-from flowborne.kernels.volumes import closed_tetrahedron, open_parts
+from flowborne.kernels.volumes import open_cells
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.node_distance import allow_for_curvature_reference
-from .references.volumes import closed_tetrahedron_reference, open_parts_reference
 
 PART = st.floats(-1.0, 1.0)
 
 
-def parts(distance: np.ndarray, flat: bool = False) -> np.ndarray:
-    """Open parts of cells with faces that are open."""
+def parts(distance: Array, found: Crossings, flat: bool = False) -> Array:
+    """Open parts of cells, and with them of their faces."""
     nx, ny, nz = (n - 1 for n in distance.shape)
     shape = (nx, ny, 1 if flat else nz)
+    faces = [np.ones(face_shape(shape, axis)) for axis in range(3)]
+    for axis in range(2 if flat else 3):
+        for at in np.ndindex(faces[axis].shape):
+            faces[axis][at] -= closed_face(distance, found, axis, *at, flat, False)[0]
     out = np.empty(shape)
-    open_parts(out, distance, *(np.ones(face_shape(shape, axis)) for axis in range(3)))
+    open_cells(out, distance, found, *faces, np.array([[0, n] for n in distance.shape]))
     return out
 
 
-def half_space(normal: np.ndarray, offset: float) -> float:
+def half_space(normal: Array, offset: float) -> float:
     """Part of the unit cube, or square, where normal . x > offset, by truncated powers."""
     n = len(normal)
     total = sum(
@@ -38,38 +44,6 @@ def half_space(normal: np.ndarray, offset: float) -> float:
     return float(total / (np.prod(normal) * (2 if n == 2 else 6)))
 
 
-@given(st.integers(0, 10_000))
-@settings(deadline=None, max_examples=200)
-def test_part_of_a_tetrahedron(seed: int) -> None:
-    corners = np.random.default_rng(seed).uniform(-1.0, 1.0, 4)
-    gaps = np.abs(np.subtract.outer(corners, corners)) + np.eye(4)
-    expected = float(closed_tetrahedron_reference(corners))
-    assert closed_tetrahedron(*corners) == pytest.approx(expected, abs=1e-14 / gaps.min() ** 2)
-
-
-@pytest.mark.parametrize("inside", range(5))
-def test_part_of_a_tetrahedron_with_equal_corners(inside: int) -> None:
-    corners = [-1.0] * inside + [1.0] * (4 - inside)
-    expected = [0.0, 1 / 8, 1 / 2, 7 / 8, 1.0][inside]
-    assert closed_tetrahedron(*corners) == pytest.approx(expected, abs=1e-15)
-    assert closed_tetrahedron(0.0, 0.0, 0.0, 0.0) == 0.0
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_open_parts(shape: tuple[int, int, int]) -> None:
-    """Of two balls, with random closed faces; those of some cells are all closed."""
-    made, random = cut(shape), np.random.default_rng(5)
-    distance = made.distance + 1e-3 * random.standard_normal(made.distance.shape)
-    if made.flat:
-        distance[:, :, 1] = distance[:, :, 0]
-    out = np.empty(shape)
-    open_parts(out, distance, *made.opened)
-    assert ((out > 0.0) & (out < 1.0)).any()
-    assert (out == 0.0).any()
-    expected = open_parts_reference(distance, *made.opened)
-    np.testing.assert_allclose(out, expected, atol=1e-9)
-
-
 @given(st.tuples(PART, PART, PART), st.floats(-1.5, 1.5), st.booleans())
 @settings(deadline=None, max_examples=200)
 def test_planes_are_exact(normal: tuple[float, float, float], offset: float, flat: bool) -> None:
@@ -77,41 +51,80 @@ def test_planes_are_exact(normal: tuple[float, float, float], offset: float, fla
     n = np.array(normal[: 2 if flat else 3])
     n[np.abs(n) < 0.05] = 0.05
     corner = np.moveaxis(np.indices((2, 2, 3)), 0, -1)[..., : len(n)]
-    found = parts(corner @ n - offset, flat)[0, 0, 0]
+    distance = corner @ n - offset
+    found = parts(distance, new_crossings(distance, flat), flat)[0, 0, 0]
     assert found == pytest.approx(half_space(n, offset), abs=1e-9)
+
+
+def wedge(point: Array, first: Array, second: Array) -> tuple[Array, Crossings]:
+    """Distances at the nodes of two cells to the body behind two planes through a point, and where
+    edges cross it."""
+    nodes = np.moveaxis(np.indices((2, 2, 3)), 0, -1)
+    away = np.stack([(nodes - point) @ n for n in (first, second)])
+    phi = away.max(axis=0)
+    found, used = new_crossings(phi, False), 0
+    for d in range(3):
+        for node in np.ndindex(2, 2, 3):
+            if node[d] + 1 == phi.shape[d]:
+                continue
+            ends = node, tuple(np.add(node, np.eye(3, dtype=int)[d]))
+            a, b = phi[ends[0]], phi[ends[1]]
+            if (a < 0.0) == (b < 0.0):
+                continue
+            outer, inner = ends if a >= 0.0 else ends[::-1]
+            each = [v[outer] / (v[outer] - v[inner]) if v[outer] >= 0.0 else -1.0 for v in away]
+            side = int(np.argmax(each))
+            found.at[(d, *node)] = used
+            found.part[used], found.piece[used] = each[side], side
+            found.normal[used] = (first, second)[side]
+            used += 1
+    return phi, found
+
+
+@given(st.integers(0, 10_000))
+@settings(deadline=None, max_examples=100)
+def test_an_edge_through_a_cell_is_exact(seed: int) -> None:
+    """A right angle along z, and turned a little, against cubes of a thirtieth of the cell."""
+    random = np.random.default_rng(seed)
+    turn, point = random.uniform(0.0, 2.0 * np.pi), random.uniform(0.1, 0.9, 3)
+    lean = random.uniform(-0.2, 0.2, 2)
+    first = np.array([np.cos(turn), np.sin(turn), lean[0]])
+    second = np.array([-np.sin(turn), np.cos(turn), lean[1]])
+    first, second = first / np.linalg.norm(first), second / np.linalg.norm(second)
+    phi, found = wedge(point, first, second)
+    kinks = [closed_face(phi, found, 2, 0, 0, side, False, False)[3] for side in (0, 1)]
+    if kinks != [1, 1] or any(
+        closed_face(phi, found, axis, *(side * np.eye(3, dtype=int)[axis]), False, False)[3]
+        for axis in (0, 1)
+        for side in (0, 1)
+    ):
+        return  # the edge leaves through another face
+    fine = (np.indices((30, 30, 30)).reshape(3, -1).T + 0.5) / 30.0
+    outside = np.maximum((fine - point) @ first, (fine - point) @ second) >= 0.0
+    assert parts(phi, found)[0, 0, 0] == pytest.approx(outside.mean(), abs=6e-3)
 
 
 @pytest.mark.parametrize("axis", range(3))
 def test_a_mirrored_body_leaves_mirrored_volumes(axis: int) -> None:
     """A body that is no plane in a cell too: flow about a wing is as that about its image."""
     distance = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 6, 6))
-    image = parts(np.ascontiguousarray(np.flip(distance, axis)))
-    np.testing.assert_allclose(np.flip(image, axis), parts(distance), atol=1e-12)
+    image = np.ascontiguousarray(np.flip(distance, axis))
+    mirrored = parts(image, new_crossings(image, False))
+    found = parts(distance, new_crossings(distance, False))
+    np.testing.assert_allclose(np.flip(mirrored, axis), found, atol=1e-12)
 
 
-def round_distance(cells: int, radius: float, flat: bool) -> np.ndarray:
-    """Distance to a ball, or disc, in the unit cube at the nodes."""
-    x = np.moveaxis(np.indices((cells + 1,) * 3), 0, -1) / cells - [0.513, 0.487, 0.496]
-    if flat:
-        x = x[:, :, :2] * [1.0, 1.0, 0.0]
-    return np.linalg.norm(x, axis=-1) - radius
-
-
-@pytest.mark.parametrize("flat", [True, False])
-def test_round_bodies_have_their_volume_at_second_order(flat: bool) -> None:
-    cells, radius = np.array([16, 24, 32, 48]), 0.31
-    exact = np.pi * radius**2 if flat else 4.0 / 3.0 * np.pi * radius**3
-    errors, curved = [], []
-    for n in cells:
-        distance = round_distance(n, radius, flat)
-        volume = 1.0 / n**2 if flat else 1.0 / n**3
-        errors.append(1.0 - volume * (1.0 - parts(distance, flat)).sum() / exact)
-        allowed = allow_for_curvature(distance, 1.0 / n)
-        curved.append(1.0 - volume * (1.0 - parts(allowed, flat)).sum() / exact)
-    slope = -np.polyfit(np.log(cells), np.log(errors), 1)[0]
-    assert abs(slope - 2.0) < 0.1, f"measured order {slope:.3f}"
-    assert errors[0] < (0.01 if flat else 0.025)
-    assert (np.abs(curved) < (1.01 if flat else 0.25) * np.array(errors)).all()
+def test_cells_without_an_open_face_hold_nothing() -> None:
+    shape = (2, 2, 2)
+    distance = np.ones((3, 3, 3))
+    faces = [np.ones(face_shape(shape, axis)) for axis in range(3)]
+    for axis in range(3):
+        faces[axis][(0, 0, 0)] = faces[axis][tuple(np.eye(3, dtype=int)[axis])] = 0.0
+    out = np.empty(shape)
+    box = np.array([[0, 3]] * 3)
+    open_cells(out, distance, new_crossings(distance, False), *faces, box)
+    assert out[0, 0, 0] == 0.0
+    assert out.sum() == 7.0
 
 
 @pytest.mark.parametrize("shape", SHAPES)

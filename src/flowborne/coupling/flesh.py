@@ -16,8 +16,9 @@ from flowborne.coupling.shapes import WATERTIGHT
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
+from flowborne.kernels.edge_crossings import Crossings, new_crossings
 from flowborne.kernels.node_distance import BAND
-from flowborne.kernels.skin import sample_skin, skin_box, skin_weights
+from flowborne.kernels.skin import cross_skin, sample_skin, skin_box, skin_weights
 from flowborne.solids.flesh import Flesh
 
 
@@ -30,6 +31,7 @@ class Skins:
     distance  signed distances to each at the nodes of its box, one image after the other, m;
               flesh too thin to be watertight (`shapes.WATERTIGHT`) is seen as thick as that
     start     (ni,) where those of each begin
+    crossings (ni,) where edges cross each; none of flesh that is seen thicker than it is
     middle    (nf, 3) of the box around each flesh, m
     vertices  (n, 3) m;  triangles  (k, 3)
     """
@@ -38,6 +40,7 @@ class Skins:
     box: Integers
     distance: Array
     start: Integers
+    crossings: tuple[Crossings, ...]
     middle: Array
     vertices: Array
     triangles: Integers
@@ -48,9 +51,9 @@ def skins_on(grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array
     if flesh is None:
         none, no_corners = np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
         no_boxes = np.zeros((0, 3, 2), np.int64)
-        return Skins(none, no_boxes, np.zeros(0), none, np.zeros((0, 3)), vertices, no_corners)
+        return Skins(none, no_boxes, np.zeros(0), none, (), np.zeros((0, 3)), vertices, no_corners)
     thinnest = 2.0 * WATERTIGHT[grid.is_slab] * grid.spacing
-    fleshes, boxes, starts, distances, middles, first = [], [], [], [], [], 0
+    fleshes, boxes, starts, distances, crossings, middles, first = [], [], [], [], [], [], 0
     for f in range(len(flesh.names)):
         own = np.flatnonzero(flesh.of_surface == f)
         triangles = flesh.surface[own]
@@ -68,13 +71,23 @@ def skins_on(grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array
             fleshes.append(f)
             boxes.append(box)
             starts.append(first)
-            distances.append(phi.ravel() - max(0.0, 0.5 * (thinnest - flesh.thickness[f])))
+            more = max(0.0, 0.5 * (thinnest - flesh.thickness[f]))
+            found = new_crossings(phi, grid.is_slab)
+            if more == 0.0:
+                skin = vertices, triangles, flesh.sheets[own], -1 - f
+                cross_skin(
+                    found, np.zeros(1, np.int64), phi, *skin, box, origin, grid.spacing,
+                    grid.is_slab,
+                )  # fmt: skip
+            crossings.append(found)
+            distances.append(phi.ravel() - more)
             first += phi.size
     return Skins(
         np.array(fleshes),
         np.array(boxes),
         np.concatenate(distances),
         np.array(starts),
+        tuple(crossings),
         np.array(middles),
         vertices,
         flesh.surface,

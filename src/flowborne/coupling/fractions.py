@@ -16,22 +16,20 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Rows
-from flowborne.kernels.closed_fractions import add_closed, count_beside, list_closed, share_closed
+from flowborne.kernels.closed_fractions import close_faces, count_beside, list_closed, share_closed
 from flowborne.kernels.coupling_rows import COVERED, NARROW, flesh_rows, kinds_of_cells, list_cells
-from flowborne.kernels.node_distance import (
-    BAND,
-    NEAR,
-    allow_for_curvature,
-    merge,
-    node_box,
-    sample_body,
+from flowborne.kernels.edge_crossings import (
+    Crossings,
+    Geometries,
+    cross_geometry,
+    merge_crossings,
+    new_crossings,
+    together,
 )
+from flowborne.kernels.node_distance import BAND, NEAR, merge, node_box, sample_body
 from flowborne.kernels.sides import CLOSED
-from flowborne.kernels.skin import sample_skin
-from flowborne.kernels.volumes import open_parts
-
-RIM = 2
-"""Nodes beyond a periodic side that the curvature of a body at the side is measured with."""
+from flowborne.kernels.skin import cross_skin, sample_skin
+from flowborne.kernels.volumes import open_cells
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
@@ -47,8 +45,8 @@ class Geometry:
     the twist of every body and then the velocity of every vertex of flesh.
 
     distance   (nx+1, ny+1, nz+1) to the nearest body at the nodes, m, at most BAND cells
-    facets     (nx+1, ny+1, nz+1) the same, such that facets leave curved bodies their size
     nearest    (nx+1, ny+1, nz+1) that body
+    crossings  of the edges with the nearest body
     open       open fraction of each face
     volume     (nx, ny, nz) open volume of each cell, m^3
     axis       (n,) closed parts of faces, one entry per face and body: axis of the face,
@@ -71,8 +69,8 @@ class Geometry:
     """
 
     distance: Array
-    facets: Array
     nearest: Integers
+    crossings: Crossings
     open: Faces
     volume: Array
     axis: Integers
@@ -108,6 +106,24 @@ def beside_sides(shape: Integers, walls: Integers) -> Integers:
     return beside
 
 
+@dataclass(frozen=True)
+class Piece:
+    """A body or flesh, or an image of it, on the grid.
+
+    body       its number
+    grid       displaced such that the body itself is there
+    box        (3, 2) ranges of nodes
+    distance   to it at these nodes, m
+    crossings  of edges between them
+    """
+
+    body: int
+    grid: Grid
+    box: Integers
+    distance: Array
+    crossings: Crossings
+
+
 def around_bodies(
     shapes: Shapes,
     position: Array,
@@ -116,36 +132,46 @@ def around_bodies(
     skins: Skins,
     grid: Grid,
     boundaries: Boundaries,
-) -> Iterator[tuple[int, Grid, Integers, Array]]:
-    """The distance to each body and flesh at the nodes around it and around its images.
+) -> Iterator[Piece]:
+    """All bodies and fleshes, and their images, that reach the grid.
 
-    boxes   see `body_boxes`
-    yields  its number; the grid displaced such that the body itself is there; (3, 2) ranges of
-            nodes, up to RIM beyond periodic sides of a room; the distances there, m
+    boxes  see `body_boxes`
     """
-    shape, h = np.array(grid.shape), grid.spacing
-    rim = RIM * np.array(boundaries.periodic()) * (not grid.is_slab)
+    placed, shape = shapes.placed(position, rotation), np.array(grid.shape)
     for body in np.unique(shapes.body):
         geoms = np.flatnonzero(shapes.body == body)
-        plain = np.array([g for g in geoms if g not in shapes.skins], np.int64)
         for image in displaced(grid, boundaries, *boxes[body]):
-            origin = np.array(image.origin) - h * rim
-            box = node_box(geoms, position, rotation, shapes.reach, origin, h, shape + 2 * rim)
-            box -= rim[:, None]
+            origin = np.array(image.origin)
+            box = node_box(geoms, position, rotation, shapes.reach, origin, grid.spacing, shape)
             if grid.is_slab:
                 box[2] = 0, 2
-            if np.any(box[:, 1] - box[:, 0] < 2):
-                continue
-            phi = sampled(shapes, plain, box, position, rotation, image)
-            for g in np.setdiff1d(geoms, plain):
-                own = skin_distance(shapes, g, box, position, rotation, image)
-                np.minimum(phi, own, out=phi)
-            yield int(body), image, box, phi
+            if np.all(box[:, 1] - box[:, 0] >= 2):
+                yield piece_of_body(int(body), shapes, placed, geoms, box, image)
     for n, start in enumerate(skins.start):
         box = np.ascontiguousarray(skins.box[n])
         counts = box[:, 1] - box[:, 0]
         phi = skins.distance[start : start + counts.prod()].reshape(counts)
-        yield len(boxes) + int(skins.flesh[n]), grid, box, phi
+        if phi.size:
+            yield Piece(len(boxes) + int(skins.flesh[n]), grid, box, phi, skins.crossings[n])
+
+
+def piece_of_body(
+    body: int, shapes: Shapes, placed: Geometries, geoms: Integers, box: Integers, grid: Grid
+) -> Piece:
+    """A body on a grid: the union of its geometries."""
+    skinned = [g for g in geoms if g in shapes.skins]
+    plain = np.array([g for g in geoms if g not in shapes.skins or shapes.sheets[g]], np.int64)
+    phi = sampled(placed, np.setdiff1d(geoms, skinned), box, grid)
+    for g in skinned:
+        np.minimum(phi, skin_distance(shapes, placed, g, box, grid), out=phi)
+    found = new_crossings(phi, grid.is_slab)
+    used, on = np.zeros(1, np.int64), (np.array(grid.origin), grid.spacing, grid.is_slab)
+    for g in plain:
+        cross_geometry(found, used, phi, box, placed, g, *on)
+    for g in skinned:
+        skin = at_place(shapes, placed, g), shapes.skins[g][1], shapes.pieces[g], int(g)
+        cross_skin(found, used, phi, *skin, box, *on)
+    return Piece(body, grid, box, phi, found)
 
 
 def body_boxes(shapes: Shapes, position: Array, rotation: Array, bodies: int) -> Array:
@@ -158,14 +184,6 @@ def body_boxes(shapes: Shapes, position: Array, rotation: Array, bodies: int) ->
     return boxes
 
 
-def within(box: Integers, phi: Array, grid: Grid) -> tuple[Integers, Array]:
-    """Ranges of nodes and the distances there, without those beyond the sides of the domain."""
-    inside = np.clip(box, 0, np.array(grid.shape)[:, None] + 1)
-    first, last = (inside - box[:, :1]).T
-    i, j, k = (slice(a, b) for a, b in zip(first, last, strict=True))
-    return inside, np.ascontiguousarray(phi[i, j, k])
-
-
 def join_faces(opened: list[Array], boundaries: Boundaries) -> None:
     """Make the open parts of the faces on both sides across a periodic axis alike, in place."""
     for d, faces in enumerate(opened):
@@ -174,45 +192,39 @@ def join_faces(opened: list[Array], boundaries: Boundaries) -> None:
             faces[first] = faces[last] = np.minimum(faces[first], faces[last])
 
 
-def joined_ends(distance: Array, boundaries: Boundaries) -> Array:
-    """Distance at the nodes with those on both sides across a periodic axis alike, and RIM more of
-    them beyond each."""
+def join_ends(distance: Array, boundaries: Boundaries) -> None:
+    """Make the distances at the nodes on both sides across a periodic axis alike, in place."""
     for axis in np.flatnonzero(boundaries.periodic()):
-        ends = np.minimum(distance.take([0], axis), distance.take([-1], axis))
-        inner = distance.take(range(1, distance.shape[axis] - 1), axis)
-        deep = [(RIM, RIM + 1) if a == axis else (0, 0) for a in range(3)]
-        distance = np.pad(np.concatenate([ends, inner], axis), deep, mode="wrap")
-    return distance
+        first, last = edge(int(axis), 0), edge(int(axis), -1)
+        distance[first] = distance[last] = np.minimum(distance[first], distance[last])
 
 
-def sampled(
-    shapes: Shapes, geoms: Integers, box: Integers, position: Array, rotation: Array, grid: Grid
-) -> Array:
+def sampled(placed: Geometries, geoms: Integers, box: Integers, grid: Grid) -> Array:
     """(box shape) distance to the nearest of some geometries at the nodes of a box, m."""
     phi = np.empty(box[:, 1] - box[:, 0])
-    sample_body(
-        phi, box, geoms, shapes.kind, shapes.size, position, rotation, shapes.tables,
-        shapes.table, shapes.corner, shapes.pitch, np.array(grid.origin), grid.spacing,
-        grid.is_slab,
-    )  # fmt: skip
+    sample_body(phi, box, geoms, placed, np.array(grid.origin), grid.spacing, grid.is_slab)
     return phi
 
 
+def at_place(shapes: Shapes, placed: Geometries, geom: int) -> Array:
+    """(n, 3) vertices of a geometry with a skin, m."""
+    return np.asarray(placed.position[geom] + shapes.skins[geom][0] @ placed.rotation[geom].T)
+
+
 def skin_distance(
-    shapes: Shapes, geom: int, box: Integers, position: Array, rotation: Array, grid: Grid
+    shapes: Shapes, placed: Geometries, geom: int, box: Integers, grid: Grid
 ) -> Array:
     """(box shape) distance to a geometry with a skin at the nodes of a box, m.
 
     In a slab that to the triangles themselves; in a room the same within NEAR cells, and farther
     away what its table has; the smaller of both where that is of sheets.
     """
-    vertices, faces = shapes.skins[geom]
-    placed = position[geom] + vertices @ rotation[geom].T
+    vertices, faces = at_place(shapes, placed, geom), shapes.skins[geom][1]
     band, h = BAND if grid.is_slab else NEAR, grid.spacing
-    near = sample_skin(placed, faces, box, np.array(grid.origin), h, grid.is_slab, band)
+    near = sample_skin(vertices, faces, box, np.array(grid.origin), h, grid.is_slab, band)
     if grid.is_slab:
         return near
-    far = sampled(shapes, np.array([geom]), box, position, rotation, grid)
+    far = sampled(placed, np.array([geom]), box, grid)
     beyond = np.copysign(np.maximum(np.abs(far), NEAR * h), near)
     found = np.where(np.abs(near) < NEAR * h, near, beyond)
     return np.minimum(found, far) if shapes.sheets[geom] else found
@@ -244,52 +256,50 @@ def geometry(
     total = grid.zeros_faces()
     pieces = []
     boxes = body_boxes(shapes, position, rotation, first_skin)
-    around = around_bodies(shapes, position, rotation, boxes, skins, grid, boundaries)
-    for body, image, wide, found in around:
-        box, phi = within(wide, found, grid)
-        merge(distance, nearest, phi, box, body)
-        count_beside(beside, phi, box, 1 if body < first_skin else ITS_FOLDS)
-        _, curved = within(wide, allow_for_curvature(found, h), grid)
+    pieces = list(around_bodies(shapes, position, rotation, boxes, skins, grid, boundaries))
+    crossings = together(distance.shape, [piece.crossings for piece in pieces])
+    first, shares = 0, []
+    for piece in pieces:
+        merge(distance, nearest, piece.distance, piece.box, piece.body)
+        merge_crossings(crossings.at, crossings.part, piece.crossings.at, piece.box, first)
+        first += piece.crossings.part.size
+        bodies = 1 if piece.body < first_skin else ITS_FOLDS
+        count_beside(beside, piece.distance, piece.box, bodies)
+        inside = piece.box[:, 1] - piece.box[:, 0] - 1
+        shares.append([np.zeros(inside + (np.arange(3) == d)) for d in range(3)])
         for d in grid.axes:
-            add_closed(total[d], curved, box, d)
-        pieces.append((body, image, box, curved))
-    parts, shares = 0, []
-    if any(boundaries.periodic()):
-        around_ring = joined_ends(distance, boundaries)
-        rim = np.outer(RIM * np.array(boundaries.periodic()), [-1, 1])
-        ends = rim + np.stack([np.zeros(3, np.int64), shape + 1], axis=1)
-        _, distance = within(ends, around_ring, grid)
-        _, of_all = within(ends, allow_for_curvature(around_ring, h), grid)
-    else:
-        of_all = allow_for_curvature(distance, h)
-    for body, image, box, curved in pieces:
-        inside = np.maximum(box[:, 1] - box[:, 0] - 1, 0)
-        share = [np.zeros(inside + (np.arange(3) == d)) for d in range(3)]
+            own = shares[-1][d], total[d], piece.distance, piece.crossings, piece.box
+            close_faces(*own, d, flat)
+    join_ends(distance, boundaries)
+    parts = 0
+    for piece, share in zip(pieces, shares, strict=True):
         for d in grid.axes:
             parts += share_closed(
-                share[d], opened[d], total[d], of_all, beside, curved, box, d, codes[d]
-            )
-        shares.append((body, image, box, share))
+                share[d], opened[d], total[d], distance, crossings, beside, piece.box, d, codes[d],
+                flat,
+            )  # fmt: skip
     join_faces(opened, boundaries)
     axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
-    closed, at = np.empty(parts), 0
-    for body, _, box, share in shares:
+    closed, last = np.empty(parts), 0
+    for piece, share in zip(pieces, shares, strict=True):
         for d in grid.axes:
             counts = np.array(grid.face_shape(d))
-            at = list_closed(share[d], box, d, body, counts, at, axis, face, part_body, closed)
+            listed = axis, face, part_body, closed
+            last = list_closed(share[d], piece.box, d, piece.body, counts, last, *listed)
     kind = kinds_of_cells(ox, oy, oz, walls)
-    open_cells = kind >= NARROW
-    bones = [share for share in shares if share[0] < first_skin]
+    with_rows = kind >= NARROW
+    bones = [each for each in zip(pieces, shares, strict=True) if each[0].body < first_skin]
     middle = np.concatenate([boxes.mean(axis=1), skins.middle])
     images = Images(periods(grid, boundaries), middle)
     centres, index = face_centres(axis, face, grid)
     place = images.at_bodies(centres, part_body)
-    rows = bone_rows(bones, open_cells, grid)
+    rows = bone_rows(bones, with_rows, grid)
     common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED, grid)
     if flat:
         oz[:] = 0.0
-    volume = np.empty(grid.shape)
-    open_parts(volume, of_all, ox, oy, oz)
+    volume = np.ones(grid.shape)
+    for piece in pieces:
+        open_cells(volume, distance, crossings, ox, oy, oz, piece.box)
     volume *= grid.cell_volume
     owner, force = rows[2][::6] // 6, rows[3].reshape(-1, 6)[:, :3]
     first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else axis.size
@@ -297,7 +307,7 @@ def geometry(
     if first < axis.size:
         corner, weight = skin_at(skins, place[first:], grid)
         skin = axis[first:], index[first:], closed[first:], corner, weight, 6 * first_skin, area
-        part, of_skin = flesh_rows(*skin, open_cells)
+        part, of_skin = flesh_rows(*skin, with_rows)
         across = (of_skin[2][::3] - 6 * first_skin) % 3
         push = of_skin[3].reshape(-1, 3).sum(axis=1)[:, None] * np.eye(3)[across]
         owner = np.append(owner, part_body[first:][part])
@@ -315,8 +325,8 @@ def geometry(
         rows = joined(rows, lent)
     return Geometry(
         distance,
-        of_all,
         nearest,
+        crossings,
         (ox, oy, oz),
         volume,
         axis,
@@ -336,18 +346,17 @@ def geometry(
 
 
 def bone_rows(
-    bones: list[tuple[int, Grid, Integers, list[Array]]], listed: NDArray[np.bool_], grid: Grid
+    bones: list[tuple[Piece, list[Array]]], listed: NDArray[np.bool_], grid: Grid
 ) -> Rows:
     """Rows of J of bones in listed cells.
 
-    bones   number of each, the grid displaced such that it is there itself, (3, 2) ranges of nodes
-            around it, and what it closes of the faces there
+    bones   and what each closes of the faces in its box
     listed  (nx, ny, nz)
     """
     none, counts, size = np.zeros(0, np.int64), [0], (grid.spacing, grid.face_area, grid.is_slab)
     given = [
-        (*share, listed, box, body, np.array(image.origin), *size)
-        for body, image, box, share in bones
+        (*share, listed, piece.box, piece.body, np.array(piece.grid.origin), *size)
+        for piece, share in bones
     ]
     for bone in given:
         counts.append(list_cells(*bone, counts[-1], none, none, np.zeros(0)))
@@ -384,8 +393,8 @@ def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
     far = np.full((nx + 1, ny + 1, nz + 1), BAND * grid.spacing)
     return Geometry(
         far,
-        far,
         np.zeros(far.shape, np.int64),
+        new_crossings(far, grid.is_slab),
         (opened[0], opened[1], opened[2]),
         np.full(grid.shape, grid.cell_volume),
         none,

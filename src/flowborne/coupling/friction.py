@@ -58,7 +58,7 @@ def diffuse(
     earlier = pressure_push(cut, dt * last, size)
     moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))
     parts = assemble_viscosity(
-        OpenParts(cut.facets, cut.open, cut.volume),
+        OpenParts(cut.distance, cut.crossings, cut.open, cut.volume),
         velocity,
         mass,
         grid,

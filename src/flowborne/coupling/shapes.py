@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.distance import SPHERE
-from flowborne.shapes.mesh import ShapeThickened
+from flowborne.kernels.edge_crossings import Geometries
+from flowborne.shapes.mesh import ShapeThickened, smooth_sheets
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.model import SolidModel
 
@@ -37,6 +38,7 @@ class Shapes:
     corner  (ng, 3) first sample's place in the geometry's frame, m
     pitch   (ng,) distance between samples, m
     skins   geometry -> vertices and faces to which distances near by are exact
+    pieces  geometry -> smooth sheet of each of these faces
     sheets  (ng,) whether the samples are of sheets within a skin
     """
 
@@ -50,7 +52,13 @@ class Shapes:
     corner: Array
     pitch: Array
     skins: dict[int, Mesh]
+    pieces: dict[int, NDArray[np.int64]]
     sheets: NDArray[np.bool_]
+
+    def placed(self, position: Array, rotation: Array) -> Geometries:
+        """The geometries at positions (ng, 3), m, and in rotations (ng, 3, 3), for kernels."""
+        samples = self.tables, self.table, self.corner, self.pitch
+        return Geometries(self.kind, self.size, position, rotation, *samples)
 
     @cached_property
     def tips(self) -> Array:
@@ -77,7 +85,7 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
             table[n] = first, *values.shape
             tables.append(values.ravel())
             first += values.size
-    skins = {n: shape.skin() for n, shape in enumerate(seen)}
+    skins = {n: skin for n, shape in enumerate(seen) if (skin := shape.skin()) is not None}
     return Shapes(
         np.array([shape.code for shape in seen], np.int64),
         np.array([shape.size for shape in seen]).reshape(-1, 3),
@@ -88,7 +96,8 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
         table,
         corner,
         pitch,
-        {n: skin for n, skin in skins.items() if skin is not None},
+        skins,
+        {n: smooth_sheets(*skin) for n, skin in skins.items()},
         np.array([isinstance(shape, ShapeThickened) for shape in seen], bool),
     )
 

@@ -34,6 +34,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.control_volumes import CLOSED_BELOW
+from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.viscosity import (
     INACTIVE,
     UNKNOWN,
@@ -86,12 +87,14 @@ class ViscousFaces:
 class OpenParts:
     """What bodies leave open of the grid.
 
-    facets  (nx+1, ny+1, nz+1) distance to the nearest body at the nodes, m, as faces are cut by it
-    faces   open part of each face
-    cells   (nx, ny, nz) open volume of each, m^3
+    distance   (nx+1, ny+1, nz+1) to the nearest body at the nodes, m
+    crossings  of the edges with bodies
+    faces      open part of each face
+    cells      (nx, ny, nz) open volume of each, m^3
     """
 
-    facets: Array
+    distance: Array
+    crossings: Crossings
     faces: Faces
     cells: Array
 
@@ -116,17 +119,17 @@ def assemble_viscosity(
     periodic = boundaries.periodic()
     h = grid.spacing
     stiffness = viscosity * grid.face_area / h
-    facets, parts = cut.facets, cut.cells / grid.cell_volume
+    edges, parts = (cut.distance, cut.crossings), cut.cells / grid.cell_volume
     systems = []
     for axis in grid.axes:
         shape, opened = grid.face_shape(axis), cut.faces[axis]
         kind, away = np.empty(shape, np.uint8), np.empty(shape)
-        face_distances(facets, axis, away)
+        face_distances(cut.distance, axis, away)
         away -= NEAR * h
         classify(kind, opened, axis, codes, CLOSED_BELOW)
         near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
         centre = np.zeros((2, *shape))
-        find_centres(facets, axis, near, centre)
+        find_centres(*edges, axis, near, centre, grid.is_slab)
         mass = masses[axis] / dt
         friction, given = stick_to_sides(kind, stiffness, grid, boundaries, axis, time)
         mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
@@ -138,7 +141,7 @@ def assemble_viscosity(
                 d,
                 kind,
                 away,
-                facets,
+                *edges,
                 opened,
                 centre,
                 parts,
@@ -153,7 +156,7 @@ def assemble_viscosity(
         wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
         gap, place = np.zeros((beside.size, 3, 3)), np.zeros((beside.size, 3, 3))
         meet_walls(
-            axis, kind, facets, opened, centre, parts, stiffness, codes, beside,
+            axis, kind, *edges, opened, centre, parts, stiffness, codes, beside,
             wall, gap, place, node,
         )  # fmt: skip
         diagonal.reshape(-1)[beside] += wall.sum(axis=1)

@@ -116,7 +116,11 @@ def list_cells(
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
             for k in range(box[2, 0], box[2, 1] - 1):
-                if not listed[i, j, k]:
+                a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
+                closed = sx[a, b, c] + sx[a + 1, b, c] + sy[a, b, c] + sy[a, b + 1, c]
+                if not flat:
+                    closed += sz[a, b, c] + sz[a, b, c + 1]
+                if closed == 0.0 or not listed[i, j, k]:
                     continue
                 cell_wrench(wrench, i, j, k, sx, sy, sz, box, origin, h, area, flat)
                 if wrench.any():

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.distance import signed_distance
+from flowborne.kernels.edge_crossings import Geometries, distance_to, placed
 from flowborne.kernels.jit import kernel
 
 BAND = 4.0
@@ -52,42 +52,24 @@ def sample_body(
     phi: Array,
     box: Integers,
     geoms: Integers,
-    kind: Integers,
-    size: Array,
-    position: Array,
-    rotation: Array,
-    tables: Array,
-    table: Integers,
-    corner: Array,
-    pitch: Array,
+    bodies: Geometries,
     origin: Array,
     h: float,
     flat: bool,
 ) -> None:
     """Distance to one body at the nodes of its box; a slab's nodes lie at z = 0."""
-    for i in range(box[0, 0], box[0, 1]):
-        for j in range(box[1, 0], box[1, 1]):
-            for k in range(box[2, 0], box[2, 1]):
-                if flat and k > box[2, 0]:
-                    phi[i - box[0, 0], j - box[1, 0], k - box[2, 0]] = phi[
-                        i - box[0, 0], j - box[1, 0], 0
-                    ]
-                    continue
-                x, y = origin[0] + h * i, origin[1] + h * j
-                z = 0.0 if flat else origin[2] + h * k
-                value = BAND * h
-                for g in geoms:
-                    dx, dy, dz = x - position[g, 0], y - position[g, 1], z - position[g, 2]
-                    lx = rotation[g, 0, 0] * dx + rotation[g, 1, 0] * dy + rotation[g, 2, 0] * dz
-                    ly = rotation[g, 0, 1] * dx + rotation[g, 1, 1] * dy + rotation[g, 2, 1] * dz
-                    lz = rotation[g, 0, 2] * dx + rotation[g, 1, 2] * dy + rotation[g, 2, 2] * dz
-                    value = min(
-                        value,
-                        signed_distance(
-                            kind[g], size[g], lx, ly, lz, tables, table[g], corner[g], pitch[g]
-                        ),
-                    )
-                phi[i - box[0, 0], j - box[1, 0], k - box[2, 0]] = value
+    phi[:] = BAND * h
+    for g in geoms:
+        body = placed(bodies, g)
+        for i in range(phi.shape[0]):
+            x = origin[0] + h * (box[0, 0] + i)
+            for j in range(phi.shape[1]):
+                y = origin[1] + h * (box[1, 0] + j)
+                for k in range(1 if flat else phi.shape[2]):
+                    z = 0.0 if flat else origin[2] + h * (box[2, 0] + k)
+                    phi[i, j, k] = min(phi[i, j, k], distance_to(body, x, y, z))
+    if flat:
+        phi[:, :, 1:] = phi[:, :, :1]
 
 
 @njit(nogil=True, cache=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Point
+from flowborne.kernels.edge_crossings import PIECES, Crossings, add_crossing
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.triangles import closest_on_triangle, squared_distance
 
@@ -165,6 +166,63 @@ def sample_skin(
     if flat:
         phi[:, :, 1:] = phi[:, :, :1]
     return phi
+
+
+@njit(nogil=True, cache=True)
+def cross_skin(
+    found: Crossings, used: Integers, phi: Array, vertices: Array, triangles: Integers,
+    sheet: Integers, number: int, box: Integers, origin: Array, h: float, flat: bool,
+) -> None:  # fmt: skip
+    """Note where edges cross a skin (see `edge_crossings`).
+
+    phi     distance to the body or flesh at the nodes of its box, m
+    sheet   (k,) smooth sheet of each triangle, of geometry `number`
+    """
+    places = (vertices - origin) / h - box[:, 0]
+    if flat:
+        places[:, 2] = vertices[:, 2] / h
+    normal, node = np.empty(3), np.empty(3, np.int64)
+    for t in range(triangles.shape[0]):
+        a, b, c = places[triangles[t, 0]], places[triangles[t, 1]], places[triangles[t, 2]]
+        for m in range(3):
+            e, g = (m + 1) % 3, (m + 2) % 3
+            normal[m] = (b[e] - a[e]) * (c[g] - a[g]) - (b[g] - a[g]) * (c[e] - a[e])
+        area = np.sqrt((normal**2).sum())
+        if area == 0.0:
+            continue
+        unit = normal / area
+        for d in range(2 if flat else 3):
+            e, g = (d + 1) % 3, (d + 2) % 3
+            if normal[d] == 0.0:
+                continue
+            counts_e = 1 if flat and e == 2 else phi.shape[e]
+            counts_g = 1 if flat and g == 2 else phi.shape[g]
+            low_e = first_node(min(a[e], b[e], c[e]) - ON_SKIN, counts_e)
+            high_e = first_node(max(a[e], b[e], c[e]) + ON_SKIN, counts_e)
+            low_g = first_node(min(a[g], b[g], c[g]) - ON_SKIN, counts_g)
+            high_g = first_node(max(a[g], b[g], c[g]) + ON_SKIN, counts_g)
+            for p in range(low_e, high_e):
+                for q in range(low_g, high_g):
+                    va = ((b[e] - p) * (c[g] - q) - (b[g] - q) * (c[e] - p)) / normal[d]
+                    vb = ((c[e] - p) * (a[g] - q) - (c[g] - q) * (a[e] - p)) / normal[d]
+                    vc = 1.0 - va - vb
+                    if min(va, vb, vc) < -ON_SKIN:
+                        continue
+                    x = va * a[d] + vb * b[d] + vc * c[d]
+                    if x < 0.0 or x >= phi.shape[d] - 1:
+                        continue
+                    node[d], node[e], node[g] = int(x), p, q
+                    lower = phi[node[0], node[1], node[2]] < 0.0
+                    node[d] += 1
+                    upper = phi[node[0], node[1], node[2]] < 0.0
+                    node[d] -= 1
+                    if lower == upper or lower != (normal[d] > 0.0):
+                        continue
+                    part = node[d] + 1.0 - x if lower else x - node[d]
+                    add_crossing(
+                        found, used, d, node[0], node[1], node[2], part, unit,
+                        number * PIECES + sheet[t],
+                    )  # fmt: skip
 
 
 @njit(nogil=True, cache=True)

@@ -11,11 +11,9 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
+from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.open_faces import (
-    open_edge,
-    open_polygon,
-)
 from flowborne.kernels.sides import CLOSED, PERIODIC
 
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
@@ -68,33 +66,25 @@ def classify(
                     kind[i, j, k] = TIED
 
 
-@njit(nogil=True, cache=True)
-def other_axes(axis: int) -> tuple[int, int]:
-    """The two others in their order, those of `centre`."""
-    return int(axis == 0), 2 - int(axis == 2)
-
-
 @kernel
-def find_centres(distance: Array, axis: int, near: Integers, centre: Array) -> None:
+def find_centres(
+    distance: Array, crossings: Crossings, axis: int, near: Integers, centre: Array, flat: bool
+) -> None:
     """Centres of the open parts of the faces `near` (flat indices), in place.
+
+    Walls are straight: between the arcs of a round body and the sides of a face there are crescents
+    whose centres are in the body.
 
     centre  (2, ...) from the centre of each face across `axis`, along the other axes, cells
     """
-    s, t = other_axes(axis)
-    si, sj, ti, tj, tk = int(s == 0), int(s == 1), int(t == 0), int(t == 1), int(t == 2)
     _, _, nj, nk = centre.shape
     for n in range(near.size):
         f = near[n]
         i, j, k = f // (nj * nk), (f // nk) % nj, f % nk
-        area, x, y = open_polygon(
-            distance[i, j, k],
-            distance[i + si, j + sj, k],
-            distance[i + si + ti, j + sj + tj, k + tk],
-            distance[i + ti, j + tj, k + tk],
-        )
-        if area > 0.0:
-            centre[0, i, j, k] = x
-            centre[1, i, j, k] = y
+        closed, x, y, _, _, _ = closed_face(distance, crossings, axis, i, j, k, flat, True)
+        if 0.0 < closed < 1.0:
+            centre[0, i, j, k] = min(max(-x / (1.0 - closed), -0.5), 0.5)
+            centre[1, i, j, k] = min(max(-y / (1.0 - closed), -0.5), 0.5)
 
 
 @njit(nogil=True, cache=True)
@@ -108,7 +98,7 @@ def along(one: float, other: float, part: float) -> float:
 
 @njit(nogil=True, cache=True)
 def across(
-    distance: Array, centre: Array, axis: int, d: int, i: int, j: int, k: int,
+    distance: Array, crossings: Crossings, centre: Array, axis: int, d: int, i: int, j: int, k: int,
     g: tuple[int, int, int],
 ) -> float:  # fmt: skip
     """Link between a face across `axis` and the next one along d, over that of open ones: the open
@@ -117,15 +107,18 @@ def across(
     g  the next face
     """
     n = int(d == other_axes(axis)[1])
-    part = edge_beside(distance, axis, d, i + int(d == 0), j + int(d == 1), k + int(d == 2))
+    part = edge_beside(
+        distance, crossings, axis, d, i + int(d == 0), j + int(d == 1), k + int(d == 2)
+    )
     return part / max(1.0 + centre[n, g[0], g[1], g[2]] - centre[n, i, j, k], LEAST)
 
 
 @njit(nogil=True, cache=True)
-def edge_beside(distance: Array, axis: int, d: int, i: int, j: int, k: int) -> float:
+def edge_beside(
+    distance: Array, crossings: Crossings, axis: int, d: int, i: int, j: int, k: int
+) -> float:
     """Open part of the edge at the lower side along d of face (i, j, k) across `axis`."""
-    e = 3 - axis - d
-    return open_edge(distance[i, j, k], distance[i + int(e == 0), j + int(e == 1), k + int(e == 2)])
+    return open_edge(distance, crossings, 3 - axis - d, i, j, k)
 
 
 @kernel
@@ -134,19 +127,6 @@ def following(at: int, count: int, periodic: bool) -> int:
     if at + 1 < count:
         return at + 1
     return 0 if periodic else -1
-
-
-@njit(nogil=True, cache=True)
-def opened_area(distance: Array, axis: int, i: int, j: int, k: int) -> float:
-    """Open part of face (i, j, k) across `axis` from the distances at its corners."""
-    s, t = other_axes(axis)
-    si, sj, ti, tj, tk = int(s == 0), int(s == 1), int(t == 0), int(t == 1), int(t == 2)
-    return open_polygon(
-        distance[i, j, k],
-        distance[i + si, j + sj, k],
-        distance[i + si + ti, j + sj + tj, k + tk],
-        distance[i + ti, j + tj, k + tk],
-    )[0]
 
 
 @njit(nogil=True, cache=True)
@@ -169,6 +149,7 @@ def link_faces(
     kind: NDArray[np.uint8],
     away: Array,
     distance: Array,
+    crossings: Crossings,
     opened: Array,
     centre: Array,
     parts: Array,
@@ -182,7 +163,7 @@ def link_faces(
     """Add the links along d to the system of the faces across `axis`.
 
     away       distance to bodies at each face; above 0 where it and its neighbours are uncut
-    distance   to the bodies at the nodes
+    distance   to the bodies at the nodes;  crossings  of edges with them
     opened     open part of each face
     parts      of each cell
     stiffness  mu A / h, kg/s
@@ -206,7 +187,9 @@ def link_faces(
                 elif d == axis:
                     coefficient = stiffness * along(opened[i, j, k], opened[g], parts[i, j, k])
                 else:
-                    coefficient = stiffness * across(distance, centre, axis, d, i, j, k, g)
+                    coefficient = stiffness * across(
+                        distance, crossings, centre, axis, d, i, j, k, g
+                    )
                 if here:
                     diagonal[i, j, k] += coefficient
                 if there:
@@ -224,6 +207,7 @@ def meet_walls(
     axis: int,
     kind: NDArray[np.uint8],
     distance: Array,
+    crossings: Crossings,
     opened: Array,
     centre: Array,
     parts: Array,
@@ -254,7 +238,8 @@ def meet_walls(
         i = f // (kind.shape[1] * kind.shape[2])
         j, k = (f // kind.shape[2]) % kind.shape[1], f % kind.shape[2]
         # in the plane: the wall that closes a part of the face, and closed faces beside it
-        area, moment, stuck = opened_area(distance, axis, i, j, k), 0.0, 0.0
+        straight = 1.0 - closed_face(distance, crossings, axis, i, j, k, flat, True)[0]
+        moment, stuck = 0.0, 0.0
         total[:], pull[:] = 0.0, 0.0
         for m in range(1 if flat else 2):
             d = others[m]
@@ -263,7 +248,7 @@ def meet_walls(
             for side in (-1, 1):
                 upper = int(side > 0)
                 part = edge_beside(
-                    distance, axis, d,
+                    distance, crossings, axis, d,
                     i + upper * int(d == 0), j + upper * int(d == 1), k + upper * int(d == 2),
                 )  # fmt: skip
                 away = max(0.5 - side * centre[m, i, j, k], LEAST)
@@ -281,10 +266,13 @@ def meet_walls(
         size = np.sqrt((total**2).sum())
         cut = 0.0
         if size > SAME:
-            reach = max(((1.0 if flat else 2.0) * area - moment) / size, LEAST)
+            # Gauss's theorem in the plane; an arc is at least half as far as its chord
+            reach = (1.0 if flat else 2.0) * straight - moment
+            bulge = 2.0 * (straight - opened[i, j, k])
+            reach = max(max(reach - bulge, 0.5 * reach) / size, LEAST)
             cut = size / reach
             pull -= total
-        elif area == 0.0:
+        elif straight == 0.0:
             cut = 1.0 / LEAST
         node[n, 0] = nearest_node(distance, i, j, k, 1 - step[0], 1 - step[1], 1 - step[2])
         if cut + stuck > 0.0:

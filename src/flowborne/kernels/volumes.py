@@ -1,103 +1,116 @@
-"""Open volume of the cells, from where the bodies cut their corners' distances."""
+"""Open volume of the cells: that of the polyhedron that the open parts of its faces bound."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.closed_fractions import closed_fraction
-
-Array = NDArray[np.float64]
-
-
-KUHN = np.array(
-    [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]]
-)
-"""Corners 4 x + 2 y + z of six tetrahedra that make up a cube, all with one main diagonal."""
-
-TETRAHEDRA = np.concatenate([KUHN ^ flip for flip in (0, 1, 2, 4)])
-"""The same with each of the four diagonals: the mean over them knows no left and right."""
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.cut_faces import closed_face, nodes_inside, open_edge
+from flowborne.kernels.edge_crossings import Crossings
 
 
 @njit(nogil=True, cache=True)
-def closed_tetrahedron(a: float, b: float, c: float, d: float) -> float:
-    """Part of a tetrahedron where the linear function with these corner values is negative."""
-    if a > b:
-        a, b = b, a
-    if c > d:
-        c, d = d, c
-    if a > c:
-        a, c = c, a
-    if b > d:
-        b, d = d, b
-    if b > c:
-        b, c = c, b
-    if a >= 0.0:
-        return 0.0
-    if d < 0.0:
-        return 1.0
-    if b >= 0.0:
-        return float(a / (a - b) * (a / (a - c)) * (a / (a - d)))
-    if c < 0.0:
-        return float(1.0 - d / (d - a) * (d / (d - b)) * (d / (d - c)))
-    p, q, r, s = a / (a - c), a / (a - d), b / (b - c), b / (b - d)
-    return float(p * q + (1.0 - p) * q * r + (1.0 - q) * r * s)
+def wall_point(
+    distance: Array, found: Crossings, i: int, j: int, k: int, point: Array, scratch: Array
+) -> None:
+    """A point of the wall in cell (i, j, k), which triangles join to where it meets the faces.
+
+    Where the wall has an edge, the middle of this. A smooth wall is a paraboloid, whose tangent
+    planes at the crossings pass its top twice as high as it is; a cone three quarters as high as
+    they do has its volume.
+
+    point    (3,) from the lower corner of the cell, cells, overwritten
+    scratch  (3, 3)
+    """
+    middle, mean, place = scratch
+    middle[:] = 0.0
+    corners = 0
+    for axis in range(3):
+        s, t = int(axis == 0), 2 - int(axis == 2)
+        for side in range(2):
+            a, b, c = (
+                i + side * int(axis == 0),
+                j + side * int(axis == 1),
+                k + side * int(axis == 2),
+            )
+            if not 0 < nodes_inside(distance, axis, a, b, c) < 4:
+                continue
+            _, _, _, count, x, y = closed_face(distance, found, axis, a, b, c, False, False)
+            corners += count
+            middle[axis] += side * count
+            middle[s] += x
+            middle[t] += y
+    if corners > 0:
+        point[:] = middle / corners
+        return
+    mean[:] = 0.0
+    count, rise = 0, 0.0
+    for d in range(3):
+        s, t = int(d == 0), 2 - int(d == 2)
+        for n in range(4):
+            a, b, c = i, j, k
+            first, second = n // 2, n % 2
+            a += first * int(s == 0)
+            b += first * int(s == 1) + second * int(t == 1)
+            c += second * int(t == 2)
+            lower = distance[a, b, c] < 0.0
+            upper = distance[a + int(d == 0), b + int(d == 1), c + int(d == 2)] < 0.0
+            if lower == upper:
+                continue
+            part = open_edge(distance, found, d, a, b, c)
+            place[s], place[t] = first, second
+            place[d] = 1.0 - part if lower else part
+            for m in range(3):
+                middle[m] += place[m]
+            count += 1
+            e = found.at[d, a, b, c]
+            if e >= 0:
+                for m in range(3):
+                    mean[m] += found.normal[e, m]
+                    rise += found.normal[e, m] * place[m]
+    middle /= count
+    rise -= (mean * middle).sum()
+    size = np.sqrt((mean**2).sum())
+    point[:] = middle
+    if size > 0.0:
+        point += 0.75 * rise / count / size * mean
 
 
 @njit(nogil=True, cache=True)
-def is_clear(distance: Array, ox: Array, oy: Array, oz: Array, i: int, j: int) -> bool:
-    """Whether no body touches a row of cells: outside of bodies at all corners, all faces open."""
-    touched = 0
-    for a in range(2):
-        for b in range(2):
-            row = distance[i + a, j + b]
-            for k in range(row.size):
-                touched += int(row[k] < 0.0)
-        one, other = ox[i + a, j], oy[i, j + a]
-        for k in range(one.size):
-            touched += int(one[k] == 0.0) | int(other[k] == 0.0)
-    if oz.shape[2] > 2:
-        row = oz[i, j]
-        for k in range(row.size):
-            touched += int(row[k] == 0.0)
-    return touched == 0
+def open_cells(
+    part: Array, distance: Array, found: Crossings, ox: Array, oy: Array, oz: Array, box: Integers
+) -> None:
+    """Open part of the cells in a box of nodes; 0 where all faces of a cell are closed.
 
+    In a slab that of its cross-section, the open part of its faces across z; else the sum of the
+    pyramids from a point of the wall over the open parts of the faces: its own triangles add none.
 
-@njit(nogil=True, cache=True)
-def open_parts(out: Array, distance: Array, ox: Array, oy: Array, oz: Array) -> None:
-    """Open part of every cell; 0 where all its faces are closed.
-
-    In a slab that of its cross-section; else the mean of four cubes of six tetrahedra, exact for a
-    plane and the same for mirrored bodies.
-
-    distance    to the bodies at the nodes
+    part        (nx, ny, nz), overwritten in the box
+    distance    to the bodies at the nodes;  found  where edges cross these
     ox, oy, oz  open parts of the faces
     """
-    flat = out.shape[2] == 1
-    phi = np.empty(8)
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            if is_clear(distance, ox, oy, oz, i, j):
-                out[i, j] = 1.0
-                continue
-            for k in range(out.shape[2]):
-                least = np.inf
-                for corner in range(8):
-                    phi[corner] = distance[i + corner // 4, j + (corner // 2) % 2, k + corner % 2]
-                    least = min(least, phi[corner])
+    flat = part.shape[2] == 1
+    point, scratch = np.empty(3), np.empty((3, 3))
+    for i in range(box[0, 0], box[0, 1] - 1):
+        for j in range(box[1, 0], box[1, 1] - 1):
+            for k in range(box[2, 0], box[2, 1] - 1):
                 faces = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
                 if not flat:
                     faces += oz[i, j, k] + oz[i, j, k + 1]
-                if faces == 0.0:
-                    out[i, j, k] = 0.0
-                elif least >= 0.0:
-                    out[i, j, k] = 1.0
+                inside = nodes_inside(distance, 0, i, j, k) + nodes_inside(distance, 0, i + 1, j, k)
+                if faces == 0.0 or inside == 8:
+                    part[i, j, k] = 0.0
+                elif inside == 0:
+                    part[i, j, k] = 1.0
                 elif flat:
-                    out[i, j, k] = 1.0 - closed_fraction(phi[0], phi[4], phi[6], phi[2])
+                    part[i, j, k] = 1.0 - closed_face(distance, found, 2, i, j, k, True, False)[0]
                 else:
-                    closed = 0.0
-                    for n in range(len(TETRAHEDRA)):
-                        t = TETRAHEDRA[n]
-                        closed += closed_tetrahedron(phi[t[0]], phi[t[1]], phi[t[2]], phi[t[3]])
-                    out[i, j, k] = 1.0 - closed / len(TETRAHEDRA)
+                    wall_point(distance, found, i, j, k, point, scratch)
+                    x, y, z = point
+                    volume = (
+                        x * ox[i, j, k] + (1.0 - x) * ox[i + 1, j, k]
+                        + y * oy[i, j, k] + (1.0 - y) * oy[i, j + 1, k]
+                        + z * oz[i, j, k] + (1.0 - z) * oz[i, j, k + 1]
+                    ) / 3.0  # fmt: skip
+                    part[i, j, k] = min(max(volume, 0.0), 1.0)

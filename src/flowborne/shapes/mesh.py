@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from flowborne.kernels.crossings import crossings
 from flowborne.kernels.distance import MESH
@@ -247,6 +249,16 @@ def neighbours(faces: Integers) -> Integers:
     one, other = order[same], order[same + 1]
     found[one], found[other] = other // 3, one // 3
     return found.reshape(-1, 3)
+
+
+def smooth_sheets(vertices: Array, faces: Integers) -> Integers:
+    """(m,) number of the smooth sheet of each triangle (m, 3) of vertices (k, 3): those whose
+    normals differ by less than SMOOTH_COSINE says belong together across their common edge."""
+    normals, adjacent = unit(outward(vertices[faces])), neighbours(faces)
+    smooth = np.einsum("tei,ti->te", normals[adjacent], normals) > SMOOTH_COSINE
+    one, edge = np.nonzero(smooth)
+    links = coo_array((np.ones(one.size), (one, adjacent[one, edge])), shape=(len(faces),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
 def welded(vertices: Array, faces: Integers) -> Mesh:

@@ -20,6 +20,7 @@ from scipy.sparse.linalg import spsolve
 
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.phrases import location
+from flowborne.shapes.mesh import smooth_sheets
 from flowborne.shapes.thickness import thinnest
 from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import measures, outer_surface, parts, prism, with_middles
@@ -142,6 +143,11 @@ class Flesh:
     def thickness(self) -> tuple[float, ...]:
         """Thickness of each flesh at rest, without its rims, m."""
         return tuple(thinnest(self.rest, skin, self.model.slab) for skin in self.skins)
+
+    @cached_property
+    def sheets(self) -> Integers:
+        """(k,) smooth sheet at rest of each triangle of the surface."""
+        return smooth_sheets(self.rest, self.surface)
 
     @property
     def skins(self) -> list[Integers]:

@@ -12,7 +12,7 @@ from flowborne.kernels.sides import CLOSED, PERIODIC
 
 
 def face_closed_reference(phi: Array, axis: int) -> Array:
-    """`face_closed` of all faces across `axis` in NumPy.
+    """`closed_face` of all faces across `axis` in NumPy, where no crossing is known.
 
     A corner alone on its side of the surface has a triangle of the square, two beside each other a
     trapezium. Two inside that face each other across a diagonal are joined.
@@ -39,13 +39,6 @@ def faces_in(box: Integers, axis: int) -> tuple[slice, slice, slice]:
     return x, y, z
 
 
-def add_closed_reference(total: Array, phi: Array, box: Integers, axis: int) -> Array:
-    """`add_closed` in NumPy: the total after it."""
-    out = total.copy()
-    out[faces_in(box, axis)] += face_closed_reference(phi, axis)
-    return out
-
-
 def count_beside_reference(beside: Integers, phi: Array, box: Integers, count: int) -> Integers:
     """`count_beside` in NumPy: the counts after it."""
     out = beside.copy()
@@ -56,18 +49,18 @@ def count_beside_reference(beside: Integers, phi: Array, box: Integers, count: i
 
 
 def share_closed_reference(
+    own: Array,
     opened: Array,
     total: Array,
     distance: Array,
     beside: Integers,
-    phi: Array,
     box: Integers,
     axis: int,
     codes: Integers,
 ) -> tuple[Array, Array]:
     """`share_closed` in NumPy: the shares in the box, and the open fractions after it."""
     at, n = faces_in(box, axis), np.arange(box[axis, 0], box[axis, 1])
-    union = face_closed_reference(distance, axis)[at]
+    union = np.where(own == total[at], own, face_closed_reference(distance, axis)[at])
     ends = [(int(d == axis),) * 2 for d in range(3)]
     most = np.pad(beside, ends, mode="wrap" if codes[0] == PERIODIC else "constant")
     crease = np.maximum(np.delete(most, 0, axis), np.delete(most, -1, axis))[at] > 1
@@ -78,8 +71,8 @@ def share_closed_reference(
         (n == opened.shape[axis] - 1) & (codes[1] == CLOSED)
     )
     counts = touched & ~np.expand_dims(solid, tuple(d for d in range(3) if d != axis))
-    own = union * face_closed_reference(phi, axis)
-    return np.divide(own, total[at], np.zeros_like(own), where=counts), out
+    part = union * own
+    return np.divide(part, total[at], np.zeros_like(own), where=counts), out
 
 
 def list_closed_reference(share: Array, box: Integers, counts: Integers) -> tuple[Integers, Array]:

@@ -16,7 +16,7 @@ from flowborne.kernels.viscosity import (
     UNKNOWN,
 )
 
-from .open_faces import open_edge_reference, open_polygon_reference
+from .cut_faces import closed_polygon_reference, open_edge_reference
 
 TINY = 1e-300
 """Above 0, where nothing is divided by nothing."""
@@ -54,7 +54,11 @@ def face_corners_reference(distance: Array, axis: int) -> Array:
 
 def find_centres_reference(distance: Array, axis: int) -> Array:
     """`find_centres` in NumPy, of all faces."""
-    return np.stack(open_polygon_reference(face_corners_reference(distance, axis))[1:])
+    closed, *moment = closed_polygon_reference(face_corners_reference(distance, axis))
+    cut = (closed > 0.0) & (closed < 1.0)
+    return np.where(
+        cut, np.clip(-np.stack(moment) / np.where(cut, 1.0 - closed, 1.0), -0.5, 0.5), 0.0
+    )
 
 
 def links_reference(
@@ -134,7 +138,7 @@ def meet_walls_reference(
     active = np.where((kind == UNKNOWN) | (kind == GIVEN), opened, 0.0)
     wall = np.zeros((3, *kind.shape))
     gap, place = np.zeros((3, 3, *kind.shape)), np.zeros((3, 3, *kind.shape))
-    area = open_polygon_reference(face_corners_reference(distance, axis))[0]
+    area = 1.0 - closed_polygon_reference(face_corners_reference(distance, axis))[0]
     moment, stuck = np.zeros(kind.shape), np.zeros(kind.shape)
     total, pull = np.zeros((2, 3, *kind.shape))
     for m, d in enumerate(others):
@@ -152,7 +156,8 @@ def meet_walls_reference(
             pull[d] -= shut * side * part
     size = np.sqrt((total**2).sum(axis=0))
     cut, one = size > SAME, np.where(size > SAME, size, 1.0)
-    reach = np.maximum((len(others) * area - moment) / one, LEAST)
+    reach, bulge = len(others) * area - moment, 2.0 * (area - opened)
+    reach = np.maximum(np.maximum(reach - bulge, 0.5 * reach) / one, LEAST)
     closed = np.where(cut, size / reach, np.where(area == 0.0, 1.0 / LEAST, 0.0))
     wall[0] = closed + stuck
     pull = pull - total * cut

@@ -1,4 +1,4 @@
-"""The kernels of `open_faces` in NumPy: slower, and nearer to what they mean."""
+"""The kernels of `cut_faces` in NumPy, where no crossing is known."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ def open_edge_reference(a: Array, b: Array) -> Array:
     return np.where(apart, part, a >= 0.0)
 
 
-def open_polygon_reference(corners: Array) -> tuple[Array, Array, Array]:
-    """`open_polygon` in NumPy, of corner distances (4, ...): the shoelace formula over all corners
-    and cuts, those that are not there left out."""
+def closed_polygon_reference(corners: Array) -> tuple[Array, Array, Array]:
+    """Closed part of unit squares with corner distances (4, ...), and its moments about their
+    centres: the shoelace formula over all corners and cuts, those that are not there left out."""
     place = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
     points, there = [], []
     for n in range(4):
@@ -28,7 +28,7 @@ def open_polygon_reference(corners: Array) -> tuple[Array, Array, Array]:
             place[n] + np.zeros((*apart.shape, 2)),
             place[n] + t[..., None] * (place[m] - place[n]),
         ]
-        there += [corners[n] >= 0.0, apart]
+        there += [corners[n] < 0.0, apart]
     area, first = np.zeros(corners[0].shape), np.zeros((*corners[0].shape, 2))
     for point, is_one in zip(points[::-1], there[::-1], strict=True):
         first = np.where(is_one[..., None], point, first)
@@ -39,5 +39,4 @@ def open_polygon_reference(corners: Array) -> tuple[Array, Array, Array]:
         area += 0.5 * cross
         moment += cross[..., None] * (last + point) / 6.0
         last = np.where(is_one[..., None], point, last)
-    centre = np.divide(moment, area[..., None], np.zeros_like(moment), where=area[..., None] > 1e-9)
-    return area, centre[..., 0], centre[..., 1]
+    return area, moment[..., 0], moment[..., 1]

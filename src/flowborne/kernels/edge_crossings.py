@@ -1,0 +1,254 @@
+"""Where the edges of the grid cross the surface of bodies.
+
+An edge from node (i, j, k) along an axis is cut where one of its nodes is inside a body and the
+other is not. The crossing is the root of the body's signed distance along the edge, not that of
+the line between the distances at the nodes: near an edge or corner of a body these measure to the
+nearest surface, which the edge need not meet. An edge that a thin body crosses twice is not cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.distance import BOX, CYLINDER, signed_distance
+from flowborne.kernels.jit import inlined
+
+PIECES = 1 << 20
+"""Numbers for the smooth pieces of the surface of one geometry."""
+
+ROOT = 1e-13
+"""Largest distance from the surface, in cells, of what counts as a crossing."""
+
+SHIFT = 1e-4
+"""Cells on either side of a crossing at which distances are taken for the normal."""
+
+
+class Crossings(NamedTuple):
+    """Crossings of edges in a box of nodes.
+
+    at      (3, ni, nj, nk) number of the crossing on the edge from each node along each axis, or
+            -1: there the distances at both nodes decide
+    part    (n,) part of the edge that is open, from its open node on
+    normal  (n, 3) of the surface there, outward
+    piece   (n,) smooth piece of the surface; between two pieces there is an edge or a corner
+    """
+
+    at: NDArray[np.int32]
+    part: Array
+    normal: Array
+    piece: Integers
+
+
+class Geometries(NamedTuple):
+    """Geometries with a signed distance, see `coupling.shapes`, and where they are.
+
+    kind, size        (ng,), (ng, 3)
+    position          (ng, 3) m;  rotation  (ng, 3, 3) of their frames to the world's
+    tables, table, corner, pitch  of the sampled ones
+    """
+
+    kind: Integers
+    size: Array
+    position: Array
+    rotation: Array
+    tables: Array
+    table: Integers
+    corner: Array
+    pitch: Array
+
+
+class Placed(NamedTuple):
+    """One of them."""
+
+    kind: int
+    size: Array
+    position: Array
+    rotation: Array
+    tables: Array
+    table: Integers
+    corner: Array
+    pitch: float
+
+
+@inlined
+def placed(bodies: Geometries, g: int) -> Placed:
+    """Geometry g."""
+    return Placed(
+        bodies.kind[g], bodies.size[g], bodies.position[g], bodies.rotation[g],
+        bodies.tables, bodies.table[g], bodies.corner[g], bodies.pitch[g],
+    )  # fmt: skip
+
+
+@inlined
+def distance_to(body: Placed, x: float, y: float, z: float) -> float:
+    """Signed distance of a place in the world to a geometry, m."""
+    rotation = body.rotation
+    dx, dy, dz = x - body.position[0], y - body.position[1], z - body.position[2]
+    lx = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
+    ly = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
+    lz = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
+    return signed_distance(
+        body.kind, body.size, lx, ly, lz, body.tables, body.table, body.corner, body.pitch
+    )
+
+
+@njit(nogil=True, cache=True)
+def cut_edges(phi: Array, flat: bool) -> int:
+    """Number of the edges between two nodes of which one is inside, distance below 0."""
+    count = 0
+    ni, nj, nk = phi.shape
+    for i in range(ni):
+        for j in range(nj):
+            for k in range(1 if flat else nk):
+                inside = phi[i, j, k] < 0.0
+                count += int(i + 1 < ni and (phi[min(i + 1, ni - 1), j, k] < 0.0) != inside)
+                count += int(j + 1 < nj and (phi[i, min(j + 1, nj - 1), k] < 0.0) != inside)
+                count += int(k + 1 < nk and (phi[i, j, min(k + 1, nk - 1)] < 0.0) != inside)
+    return count
+
+
+def new_crossings(phi: Array, flat: bool) -> Crossings:
+    """Room for where a body crosses edges in its box, from the distance to it at the nodes."""
+    count = cut_edges(phi, flat)
+    at = np.full((3, *phi.shape), -1, np.int32)
+    return Crossings(at, np.empty(count), np.empty((count, 3)), np.empty(count, np.int64))
+
+
+def together(shape: tuple[int, ...], each: Sequence[Crossings]) -> Crossings:
+    """The crossings with several bodies in one list, for nodes of this shape, as yet on no edge."""
+    own = [np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)]
+    lists = (np.concatenate(parts) for parts in zip(own, *(c[1:] for c in each), strict=True))
+    return Crossings(np.full((3, *shape), -1, np.int32), *lists)
+
+
+@njit(nogil=True, cache=True)
+def add_crossing(
+    found: Crossings, used: Integers, d: int, i: int, j: int, k: int,
+    part: float, normal: Array, piece: int,
+) -> None:  # fmt: skip
+    """Note a crossing, if none is nearer to the open node of its edge.
+
+    used  (1,) how many numbers are taken
+    """
+    n = found.at[d, i, j, k]
+    if n < 0:
+        n = used[0]
+        used[0] += 1
+        found.at[d, i, j, k] = n
+    elif part >= found.part[n]:
+        return
+    found.part[n], found.piece[n] = part, piece
+    found.normal[n] = normal
+
+
+@njit(nogil=True, cache=True)
+def cross_geometry(
+    found: Crossings, used: Integers, phi: Array, box: Integers, bodies: Geometries, g: int,
+    origin: Array, h: float, flat: bool,
+) -> None:  # fmt: skip
+    """Note where edges cross a geometry of a body.
+
+    phi  distance to the body at the nodes of its box, m;  box  (3, 2) node ranges
+    """
+    body, point, normal = placed(bodies, g), np.empty(3), np.empty(3)
+    ni, nj, nk = phi.shape
+    for i in range(ni):
+        for j in range(nj):
+            for k in range(1 if flat else nk):
+                inside = phi[i, j, k] < 0.0
+                for d in range(2 if flat else 3):
+                    a, b, c = i + int(d == 0), j + int(d == 1), k + int(d == 2)
+                    if a == ni or b == nj or c == nk or (phi[a, b, c] < 0.0) == inside:
+                        continue
+                    point[0] = origin[0] + h * (box[0, 0] + i)
+                    point[1] = origin[1] + h * (box[1, 0] + j)
+                    point[2] = 0.0 if flat else origin[2] + h * (box[2, 0] + k)
+                    step = h
+                    if inside:
+                        point[d] += h
+                        step = -h
+                    part = root(body, point, d, step, ROOT * h)
+                    if part >= 0.0:
+                        piece = int(g) * PIECES + surface_at(body, point, SHIFT * h, normal)
+                        add_crossing(found, used, d, i, j, k, part, normal, piece)
+
+
+@njit(nogil=True, cache=True)
+def merge_crossings(
+    at: NDArray[np.int32], part: Array, own: NDArray[np.int32], box: Integers, first: int
+) -> None:
+    """Let each edge in a body's box keep the crossing that leaves the least of it open.
+
+    at     (3, nx+1, ny+1, nz+1) numbers of the crossings with all bodies;  part  their open parts
+    own    the body's, see `Crossings`;  first  number of the body's first crossing
+    """
+    for d in range(3):
+        for i in range(own.shape[1]):
+            for j in range(own.shape[2]):
+                for k in range(own.shape[3]):
+                    if own[d, i, j, k] < 0:
+                        continue
+                    n = first + own[d, i, j, k]
+                    a, b, c = i + box[0, 0], j + box[1, 0], k + box[2, 0]
+                    if at[d, a, b, c] < 0 or part[n] < part[at[d, a, b, c]]:
+                        at[d, a, b, c] = n
+
+
+@njit(nogil=True, cache=True)
+def root(body: Placed, point: Array, d: int, step: float, tolerance: float) -> float:
+    """Part of the way from a point along axis d at which the distance is 0, by the Illinois method;
+    the point moves there. -1 when the way does not end inside.
+
+    step  length of the way, m, negative downward;  tolerance  m
+    """
+    start, a, b, last = point[d], 0.0, 1.0, 0
+    high = max(distance_to(body, point[0], point[1], point[2]), 0.0)
+    point[d] = start + step
+    low = distance_to(body, point[0], point[1], point[2])
+    if low >= 0.0:
+        return -1.0
+    for _ in range(100):
+        s = (high * b - low * a) / (high - low)
+        point[d] = start + s * step
+        value = distance_to(body, point[0], point[1], point[2])
+        if abs(value) <= tolerance:
+            break
+        if value >= 0.0:
+            a, high = s, value
+            if last > 0:
+                low *= 0.5
+            last = 1
+        else:
+            b, low = s, value
+            if last < 0:
+                high *= 0.5
+            last = -1
+    return float(s)
+
+
+@njit(nogil=True, cache=True)
+def surface_at(body: Placed, point: Array, shift: float, normal: Array) -> int:
+    """Number of the smooth piece of the surface at a point; its normal is written to `normal`."""
+    x, y, z = point
+    normal[0] = distance_to(body, x + shift, y, z) - distance_to(body, x - shift, y, z)
+    normal[1] = distance_to(body, x, y + shift, z) - distance_to(body, x, y - shift, z)
+    normal[2] = distance_to(body, x, y, z + shift) - distance_to(body, x, y, z - shift)
+    normal /= max(np.sqrt((normal**2).sum()), 1e-300)
+    return piece_of(body.kind, normal @ body.rotation)
+
+
+@njit(nogil=True, cache=True)
+def piece_of(kind: int, normal: Array) -> int:
+    """Number of the smooth piece that has a normal in the geometry's frame."""
+    if kind == BOX:
+        m = int(np.argmax(np.abs(normal)))
+        return 1 + 2 * m + int(normal[m] > 0.0)
+    if kind == CYLINDER and abs(normal[2]) > np.sqrt(0.5):
+        return 1 + int(normal[2] > 0.0)
+    return 0

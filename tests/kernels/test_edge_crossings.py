@@ -1,0 +1,138 @@
+"""Where edges of the grid cross bodies: against where lines cross the geometries."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from flowborne.fluid.grid import Array
+from flowborne.kernels.edge_crossings import (
+    PIECES,
+    Crossings,
+    Geometries,
+    cross_geometry,
+    cut_edges,
+    merge_crossings,
+    new_crossings,
+)
+from flowborne.kernels.node_distance import sample_body
+from flowborne.kernels.skin import cross_skin
+from flowborne.shapes.mesh import ShapeMesh, smooth_sheets
+from flowborne.shapes.primitives import PRIMITIVES
+from flowborne.shapes.shape import Primitive
+
+H, NODES = 0.1, 14
+BOX = np.array([[0, NODES], [0, NODES], [0, NODES]])
+SIZES = {
+    "sphere": (0.33, 0.0, 0.0),
+    "capsule": (0.18, 0.21, 0.0),
+    "cylinder": (0.27, 0.31, 0.0),
+    "box": (0.31, 0.22, 0.27),
+    "ellipsoid": (0.36, 0.21, 0.3),
+}
+PLACES = np.random.default_rng(5)
+
+
+def placed(shape: Primitive, middle: Array, turn: Array) -> Geometries:
+    one = np.zeros((1, 4), np.int64)
+    return Geometries(
+        np.array([shape.code]), shape.size[None], middle[None], turn[None], np.zeros(1), one,
+        np.zeros((1, 3)), np.ones(1),
+    )  # fmt: skip
+
+
+def crossed(bodies: Geometries, origin: Array) -> tuple[Array, Crossings]:
+    """Distances at the nodes, and where edges cross the first geometry."""
+    phi, geoms = np.empty((NODES,) * 3), np.array([0])
+    sample_body(phi, BOX, geoms, bodies, origin, H, False)
+    found = new_crossings(phi, False)
+    used = np.zeros(1, np.int64)
+    cross_geometry(found, used, phi, BOX, bodies, 0, origin, H, False)
+    assert used[0] == found.part.size == cut_edges(phi, False) > 100
+    return phi, found
+
+
+def ends(found: Crossings, phi: Array, d: int) -> tuple[Array, Array, Array]:
+    """(n, 3) open node of each crossed edge along d; (n,) way to the other, cells; (n,) number."""
+    lower = np.stack(np.nonzero(found.at[d] >= 0), axis=1)
+    number = found.at[d][tuple(lower.T)]
+    inside = phi[tuple(lower.T)] < 0.0
+    return lower + inside[:, None] * np.eye(3, dtype=int)[d], np.where(inside, -1.0, 1.0), number
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_crossings_of_geometries(kind: str) -> None:
+    """The first place beyond the open node where the grid's line crosses the geometry."""
+    for _ in range(4):
+        shape = PRIMITIVES[kind](np.array(SIZES[kind]))
+        turn = Rotation.random(random_state=PLACES).as_matrix()
+        origin = -H * (0.5 * NODES + PLACES.random(3))
+        phi, found = crossed(placed(shape, np.zeros(3), turn), origin)
+        for d in range(3):
+            node, way, number = ends(found, phi, d)
+            start = (origin + H * node) @ turn
+            direction = np.eye(3)[d] @ turn
+            enter, leave = shape.interval(start, direction)
+            place = np.where(way > 0.0, enter, -leave)
+            np.testing.assert_allclose(found.part[number], place / H, atol=1e-9)
+            at = start + (way * H * found.part[number])[:, None] * direction
+            shifts = 1e-6 * turn  # the world's axes in the geometry's frame
+            slope = [shape.distance(at + s) - shape.distance(at - s) for s in shifts]
+            normal = np.stack(slope, axis=1) / 2e-6
+            error = np.abs(found.normal[number] - normal).max(axis=1)
+            assert np.quantile(error, 0.98) < 1e-4, kind  # some are on an edge of the geometry
+
+
+def test_pieces() -> None:
+    """A box has six, a cylinder three, what is round one."""
+    count = {"sphere": 1, "capsule": 1, "cylinder": 3, "box": 6, "ellipsoid": 1}
+    for kind, pieces in count.items():
+        shape = PRIMITIVES[kind](np.array(SIZES[kind]))
+        _, found = crossed(placed(shape, np.zeros(3), np.eye(3)), np.full(3, -0.66))
+        assert np.unique(found.piece).size == pieces, kind
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_crossings_of_a_mesh_are_those_of_its_geometry(flat: bool) -> None:
+    shape = PRIMITIVES["box"](np.array([0.31, 0.22, 5.0 if flat else 0.27]))
+    mesh = ShapeMesh(*shape.triangles())
+    sheets = smooth_sheets(mesh.vertices, mesh.faces)
+    assert np.unique(sheets).size == 6
+    box = np.array([[0, NODES], [0, NODES], [0, 2 if flat else NODES]])
+    for _ in range(4):
+        turn = Rotation.from_euler("z", PLACES.uniform(0.0, 6.0)).as_matrix()
+        turn = turn if flat else Rotation.random(random_state=PLACES).as_matrix()
+        origin = -H * (0.5 * NODES + PLACES.random(3))
+        bodies, geoms = placed(shape, np.zeros(3), turn), np.array([0])
+        phi = np.empty(box[:, 1])
+        sample_body(phi, box, geoms, bodies, origin, H, flat)
+        one, other = new_crossings(phi, flat), new_crossings(phi, flat)
+        cross_geometry(one, np.zeros(1, np.int64), phi, box, bodies, 0, origin, H, flat)
+        skin = mesh.vertices @ turn.T, mesh.faces, sheets, 3
+        cross_skin(other, np.zeros(1, np.int64), phi, *skin, box, origin, H, flat)
+        np.testing.assert_array_equal(one.at >= 0, other.at >= 0)
+        a, b = (found.at[one.at >= 0] for found in (one, other))
+        np.testing.assert_allclose(one.part[a], other.part[b], atol=1e-9)
+        assert (np.linalg.norm(one.normal[a] - other.normal[b], axis=1) < 1e-6).mean() > 0.97
+        assert (other.piece[b] // PIECES == 3).all()
+
+
+def test_of_several_bodies_the_nearest_crossing_is_kept() -> None:
+    """Two balls, one a little larger than the other about the same middle."""
+    small, large = (
+        placed(PRIMITIVES["sphere"](np.array([r, 0.0, 0.0])), np.zeros(3), np.eye(3))
+        for r in (0.30, 0.31)
+    )
+    origin = np.array([-0.63, -0.64, -0.66])
+    each = [crossed(bodies, origin)[1] for bodies in (small, large)]
+    at, part = np.full_like(each[0].at, -1), np.concatenate([found.part for found in each])
+    first = 0
+    for found in each:
+        merge_crossings(at, part, found.at, BOX, first)
+        first += found.part.size
+    both = (each[0].at >= 0) & (each[1].at >= 0)
+    assert both.any()
+    np.testing.assert_array_equal(at[both], each[1].at[both] + each[0].part.size)
+    only = (each[0].at >= 0) & ~both
+    np.testing.assert_array_equal(at[only], each[0].at[only])
