@@ -18,6 +18,7 @@ from flowborne.kernels.distance import (
     distances,
     signed_distance,
 )
+from flowborne.kernels.edge_crossings import Geometries
 from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.kernels.node_distance import BAND, merge, node_box, sample_body
 from flowborne.kernels.triangles import closest_on_triangle, squared_distance
@@ -112,7 +113,7 @@ def test_a_body_of_several_geometries_at_the_nodes(shape: tuple[int, int, int]) 
         )
         expected = sample_body_reference(*given)
         phi = np.empty(expected.shape)
-        sample_body(phi, *given)
+        sample_body(phi, *given[:2], Geometries(*given[2:10]), *given[10:])
         np.testing.assert_allclose(phi, expected, atol=1e-13)
         assert expected.max() <= BAND * h
 

@@ -14,7 +14,7 @@ from flowborne.kernels.edge_crossings import Crossings
 def wall_point(
     distance: Array, found: Crossings, i: int, j: int, k: int, point: Array, scratch: Array
 ) -> None:
-    """A point of the wall in cell (i, j, k), which triangles join to where it meets the faces.
+    """A point of the wall within cell (i, j, k), which triangles join to where it meets the faces.
 
     Where the wall has an edge, the middle of this. A smooth wall is a paraboloid, whose tangent
     planes at the crossings pass its top twice as high as it is; a cone three quarters as high as
@@ -74,7 +74,8 @@ def wall_point(
     size = np.sqrt((mean**2).sum())
     point[:] = middle
     if size > 0.0:
-        point += 0.75 * rise / count / size * mean
+        for m in range(3):
+            point[m] = min(max(middle[m] + 0.75 * rise / count / size * mean[m], 0.0), 1.0)
 
 
 @njit(nogil=True, cache=True)
