@@ -35,12 +35,12 @@ class Cut:
     @property
     def crossings(self) -> Crossings:
         """None of them known: distances are linear along the edges."""
-        return new_crossings(self.distance, self.flat)
+        return new_crossings(self.distance, H, self.flat)
 
     @property
     def own_crossings(self) -> Crossings:
         """The same with the first ball."""
-        return new_crossings(self.phi, self.flat)
+        return new_crossings(self.phi, H, self.flat)
 
 
 def nodes(shape: tuple[int, int, int]) -> np.ndarray:

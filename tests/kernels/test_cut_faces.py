@@ -32,7 +32,7 @@ def on_edges(phi: Array, line: Array, normals: Array, pieces: list[int]) -> Cros
 
     line  (n,) c;  normals  (n, 2)
     """
-    found, used = new_crossings(phi, True), 0
+    found, used = new_crossings(phi, 1e-9, True), 0
     for d, side in product((0, 1), (0, 1)):
         node = (0, side) if d == 0 else (side, 0)
         ends = np.array([node, np.add(node, np.eye(2, dtype=int)[d])])
@@ -63,7 +63,7 @@ def on_edges(phi: Array, line: Array, normals: Array, pieces: list[int]) -> Cros
 def test_part_of_an_edge(a: float, b: float) -> None:
     phi = square((a, b, a, a))
     expected = open_edge_reference(np.array([a]), np.array([b]))[0]
-    assert open_edge(phi, new_crossings(phi, True), 0, 0, 0, 0) == pytest.approx(
+    assert open_edge(phi, new_crossings(phi, 1e-9, True), 0, 0, 0, 0) == pytest.approx(
         expected, abs=1e-14
     )
 
@@ -72,7 +72,9 @@ def test_part_of_an_edge(a: float, b: float) -> None:
 @settings(deadline=None)
 def test_part_of_a_square_without_crossings(corners: tuple[float, float, float, float]) -> None:
     phi = square(corners)
-    closed, x, y, kinks, _, _ = closed_face(phi, new_crossings(phi, True), 2, 0, 0, 0, True, False)
+    closed, x, y, kinks, _, _ = closed_face(
+        phi, new_crossings(phi, 1e-9, True), 2, 0, 0, 0, True, False
+    )
     assert kinks == 0
     assert closed == pytest.approx(face_closed_reference(phi, 2)[0, 0, 0], abs=1e-14)
     expected = closed_polygon_reference(np.array(corners))
@@ -95,7 +97,7 @@ def test_part_of_a_square_without_crossings(corners: tuple[float, float, float, 
 def test_part_of_a_square_that_lies_inside(corners: tuple[float, ...], part: float) -> None:
     """Corners inside across a diagonal are taken as joined: a thin body stays in one piece."""
     phi = square(corners)
-    found = closed_face(phi, new_crossings(phi, True), 2, 0, 0, 0, True, False)
+    found = closed_face(phi, new_crossings(phi, 1e-9, True), 2, 0, 0, 0, True, False)
     assert found[0] == pytest.approx(part, abs=1e-15)
 
 
@@ -150,7 +152,7 @@ def test_an_arc_has_its_segment(radius: float, place: float, turn: float) -> Non
     inside = (phi[:, :, 0] < 0.0).ravel()[[0, 2, 3, 1]]
     if (inside != np.roll(inside, -1)).sum() != 2:
         return
-    crossings, used = new_crossings(phi, True), 0
+    crossings, used = new_crossings(phi, 1e-9, True), 0
     for d, side in product((0, 1), (0, 1)):
         node = (0, side) if d == 0 else (side, 0)
         a, b = phi[(*node, 0)], phi[(*np.add(node, np.eye(2, dtype=int)[d]), 0)]

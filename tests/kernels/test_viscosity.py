@@ -99,7 +99,7 @@ def test_links(shape: tuple, codes: np.ndarray, axis: int) -> None:
 def test_links_of_uncut_faces_need_no_geometry() -> None:
     shape, nothing = (5, 4, 3), np.full((6, 5, 4), np.nan)
     kind, away = np.full((6, 4, 3), UNKNOWN, np.uint8), np.full((6, 4, 3), 0.1)
-    edges = nothing, new_crossings(nothing, False)
+    edges = nothing, new_crossings(nothing, 1e-9, False)
     cuts = nothing, np.full((2, 6, 4, 3), np.nan), np.full(shape, np.nan)
     for d in range(3):
         diagonal, link, given = (np.zeros(kind.shape) for _ in range(3))

@@ -52,7 +52,7 @@ def test_planes_are_exact(normal: tuple[float, float, float], offset: float, fla
     n[np.abs(n) < 0.05] = 0.05
     corner = np.moveaxis(np.indices((2, 2, 3)), 0, -1)[..., : len(n)]
     distance = corner @ n - offset
-    found = parts(distance, new_crossings(distance, flat), flat)[0, 0, 0]
+    found = parts(distance, new_crossings(distance, 1e-9, flat), flat)[0, 0, 0]
     assert found == pytest.approx(half_space(n, offset), abs=1e-9)
 
 
@@ -62,7 +62,7 @@ def wedge(point: Array, first: Array, second: Array) -> tuple[Array, Crossings]:
     nodes = np.moveaxis(np.indices((2, 2, 3)), 0, -1)
     away = np.stack([(nodes - point) @ n for n in (first, second)])
     phi = away.max(axis=0)
-    found, used = new_crossings(phi, False), 0
+    found, used = new_crossings(phi, 1e-9, False), 0
     for d in range(3):
         for node in np.ndindex(2, 2, 3):
             if node[d] + 1 == phi.shape[d]:
@@ -109,8 +109,8 @@ def test_a_mirrored_body_leaves_mirrored_volumes(axis: int) -> None:
     """A body that is no plane in a cell too: flow about a wing is as that about its image."""
     distance = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 6, 6))
     image = np.ascontiguousarray(np.flip(distance, axis))
-    mirrored = parts(image, new_crossings(image, False))
-    found = parts(distance, new_crossings(distance, False))
+    mirrored = parts(image, new_crossings(image, 1e-9, False))
+    found = parts(distance, new_crossings(distance, 1e-9, False))
     np.testing.assert_allclose(np.flip(mirrored, axis), found, atol=1e-12)
 
 
@@ -122,7 +122,7 @@ def test_cells_without_an_open_face_hold_nothing() -> None:
         faces[axis][(0, 0, 0)] = faces[axis][tuple(np.eye(3, dtype=int)[axis])] = 0.0
     out = np.empty(shape)
     box = np.array([[0, 3]] * 3)
-    open_cells(out, distance, new_crossings(distance, False), *faces, box)
+    open_cells(out, distance, new_crossings(distance, 1e-9, False), *faces, box)
     assert out[0, 0, 0] == 0.0
     assert out.sum() == 7.0
 

@@ -72,7 +72,7 @@ def skins_on(grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array
             boxes.append(box)
             starts.append(first)
             more = max(0.0, 0.5 * (thinnest - flesh.thickness[f]))
-            found = new_crossings(phi, grid.is_slab)
+            found = new_crossings(phi, grid.spacing, grid.is_slab)
             if more == 0.0:
                 skin = vertices, triangles, flesh.sheets[own], -1 - f
                 cross_skin(

@@ -164,7 +164,7 @@ def piece_of_body(
     phi = sampled(placed, np.setdiff1d(geoms, skinned), box, grid)
     for g in skinned:
         np.minimum(phi, skin_distance(shapes, placed, g, box, grid), out=phi)
-    found = new_crossings(phi, grid.is_slab)
+    found = new_crossings(phi, grid.spacing, grid.is_slab)
     used, on = np.zeros(1, np.int64), (np.array(grid.origin), grid.spacing, grid.is_slab)
     for g in plain:
         cross_geometry(found, used, phi, box, placed, g, *on)
@@ -258,19 +258,21 @@ def geometry(
     boxes = body_boxes(shapes, position, rotation, first_skin)
     pieces = list(around_bodies(shapes, position, rotation, boxes, skins, grid, boundaries))
     crossings = together(distance.shape, [piece.crossings for piece in pieces])
-    first, shares = 0, []
     for piece in pieces:
         merge(distance, nearest, piece.distance, piece.box, piece.body)
-        merge_crossings(crossings.at, crossings.part, piece.crossings.at, piece.box, first)
-        first += piece.crossings.part.size
         bodies = 1 if piece.body < first_skin else ITS_FOLDS
         count_beside(beside, piece.distance, piece.box, bodies)
+    join_ends(distance, boundaries)
+    first, shares = 0, []
+    for piece in pieces:
+        own = piece.crossings.at, piece.distance, piece.box
+        merge_crossings(crossings.at, crossings.part, distance, *own, first)
+        first += piece.crossings.part.size
         inside = piece.box[:, 1] - piece.box[:, 0] - 1
         shares.append([np.zeros(inside + (np.arange(3) == d)) for d in range(3)])
         for d in grid.axes:
-            own = shares[-1][d], total[d], piece.distance, piece.crossings, piece.box
-            close_faces(*own, d, flat)
-    join_ends(distance, boundaries)
+            alone = shares[-1][d], total[d], piece.distance, piece.crossings, piece.box
+            close_faces(*alone, d, flat)
     parts = 0
     for piece, share in zip(pieces, shares, strict=True):
         for d in grid.axes:
@@ -394,7 +396,7 @@ def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
     return Geometry(
         far,
         np.zeros(far.shape, np.int64),
-        new_crossings(far, grid.is_slab),
+        new_crossings(far, grid.spacing, grid.is_slab),
         (opened[0], opened[1], opened[2]),
         np.full(grid.shape, grid.cell_volume),
         none,

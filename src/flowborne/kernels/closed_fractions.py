@@ -8,7 +8,7 @@ from __future__ import annotations
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.cut_faces import closed_face, nodes_inside
+from flowborne.kernels.cut_faces import closed_face, is_cut
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.sides import CLOSED, PERIODIC
 
@@ -26,9 +26,8 @@ def close_faces(
     for i in range(own.shape[0]):
         for j in range(own.shape[1]):
             for k in range(own.shape[2]):
-                inside = nodes_inside(phi, axis, i, j, k)
-                closed = 0.25 * inside
-                if 0 < inside < 4:
+                closed = 1.0 if phi[i, j, k] < 0.0 else 0.0
+                if is_cut(phi, found, axis, i, j, k):
                     closed = closed_face(phi, found, axis, i, j, k, flat, False)[0]
                 own[i, j, k] = closed
                 total[i + box[0, 0], j + box[1, 0], k + box[2, 0]] += closed

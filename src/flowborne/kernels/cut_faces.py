@@ -34,12 +34,12 @@ def open_edge(phi: Array, found: Crossings, d: int, i: int, j: int, k: int) -> f
     phi  signed distance at the nodes; where no crossing is known, it is linear along the edge
     """
     a, b = phi[i, j, k], phi[i + int(d == 0), j + int(d == 1), k + int(d == 2)]
-    if (a < 0.0) == (b < 0.0):
-        return 0.0 if a < 0.0 else 1.0
     n = found.at[d, i, j, k]
-    if n < 0:
-        return max(a, b) / (max(a, b) - min(a, b))
-    return float(found.part[n])
+    if (a < 0.0) == (b < 0.0):
+        if a < 0.0:
+            return 0.0
+        return 1.0 if n < 0 else found.part[n] + found.part[n + 1]
+    return found.part[n] if n >= 0 else max(a, b) / (max(a, b) - min(a, b))
 
 
 @inlined
@@ -55,15 +55,38 @@ def nodes_inside(phi: Array, axis: int, i: int, j: int, k: int) -> int:
     )
 
 
-@njit(nogil=True, cache=True)
-def corner_of(n: int) -> tuple[int, int]:
-    """Corners 0 to 3 of a unit square in turn."""
-    return int(n == 1 or n == 2), int(n >= 2)
+@inlined
+def edges_of(axis: int, i: int, j: int, k: int, found: Crossings) -> tuple[int, int, int, int]:
+    """What is known of the four edges of face (i, j, k) across `axis` in turn, see `Crossings`."""
+    s, t = other_axes(axis)
+    at = found.at
+    return (
+        at[s, i, j, k],
+        at[t, i + int(s == 0), j + int(s == 1), k],
+        at[s, i + int(t == 0), j + int(t == 1), k + int(t == 2)],
+        at[t, i, j, k],
+    )
+
+
+@inlined
+def is_cut(phi: Array, found: Crossings, axis: int, i: int, j: int, k: int) -> bool:
+    """Whether a wall is on face (i, j, k) across `axis`."""
+    inside = nodes_inside(phi, axis, i, j, k)
+    if inside == 0:
+        return max(edges_of(axis, i, j, k, found)) >= 0
+    return inside < 4
+
+
+@inlined
+def corner_of(n: int) -> Place:
+    """Corners 0 to 3 of a unit square about the origin in turn."""
+    return int(n == 1 or n == 2) - 0.5, int(n >= 2) - 0.5
 
 
 @njit(nogil=True, cache=True)
 def wall_between(p: Place, q: Place, m: Place, n: Place, smooth: bool) -> tuple[float, float, bool]:
-    """The point in the unit square by way of which a wall goes from p to q; whether it is a corner.
+    """The point in the unit square about the origin by way of which a wall goes from p to q, with
+    the body on its left; whether it is a corner.
 
     m, n    normals at p and q
     smooth  whether both are on one smooth piece
@@ -71,7 +94,7 @@ def wall_between(p: Place, q: Place, m: Place, n: Place, smooth: bool) -> tuple[
     x, y = 0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])
     size = np.sqrt((m[0] ** 2 + m[1] ** 2) * (n[0] ** 2 + n[1] ** 2))
     sine, cosine = m[0] * n[1] - m[1] * n[0], m[0] * n[0] + m[1] * n[1]
-    right = q[1] - p[1], p[0] - q[0]  # outward, as the body is on the left
+    right = q[1] - p[1], p[0] - q[0]
     outward = min(m[0] * right[0] + m[1] * right[1], n[0] * right[0] + n[1] * right[1])
     if abs(sine) <= 1e-9 * size or outward <= 0.0:
         return x, y, False
@@ -85,10 +108,20 @@ def wall_between(p: Place, q: Place, m: Place, n: Place, smooth: bool) -> tuple[
         if turn > FLAT:
             part = 0.5 * (turn - np.sin(turn)) / (np.sin(half) ** 2 * np.tan(half))
     if dx != 0.0:
-        part = min(part, ((1.0 if dx > 0.0 else 0.0) - x) / dx)
+        part = min(part, (np.copysign(0.5, dx) - x) / dx)
     if dy != 0.0:
-        part = min(part, ((1.0 if dy > 0.0 else 0.0) - y) / dy)
+        part = min(part, (np.copysign(0.5, dy) - y) / dy)
     return x + part * dx, y + part * dy, not smooth
+
+
+@inlined
+def add_line(sums: Array, p: Place, q: Place) -> None:
+    """Add the triangle from the origin to p and q to six times an area's moments along both axes,
+    and twice the area."""
+    cross = p[0] * q[1] - q[0] * p[1]
+    sums[0] += cross * (p[0] + q[0])
+    sums[1] += cross * (p[1] + q[1])
+    sums[2] += cross
 
 
 @njit(nogil=True, cache=True)
@@ -98,14 +131,23 @@ def closed_face(
     """Closed part of face (i, j, k) across `axis`, and its moments about its centre along the
     two other axes, in cells; the number of corners of the wall on it, and the sum of their places.
 
-    Corners inside across a diagonal are joined: a thin body stays in one piece. In a slab, `flat`,
-    a face across x or y is an edge. A `straight` wall is the chord from crossing to crossing.
+    The sum over what bodies take of the edges and the walls from where the way around the face
+    leaves bodies to where it next enters one (Green's theorem). So corners inside across a diagonal
+    are joined: a thin body stays in one piece. A `straight` wall is the chord from crossing to
+    crossing. In a slab, `flat`, a face across x or y is an edge.
     """
-    if flat and axis < 2:
-        part = 1.0 - open_edge(phi, found, 1 - axis, i, j, k)
-        side = 0.5 * (1.0 - part) if phi[i, j, k] >= 0.0 else -0.5 * (1.0 - part)
-        return part, part * side, 0.0, 0, 0.0, 0.0
     s, t = other_axes(axis)
+    if flat and axis < 2:
+        d = 1 - axis
+        n = found.at[d, i, j, k]
+        part = 1.0 - open_edge(phi, found, d, i, j, k)
+        upper = phi[i + int(d == 0), j + int(d == 1), k] >= 0.0
+        low = 1.0 - part
+        if phi[i, j, k] < 0.0:
+            low = 0.0
+        elif upper and n >= 0:
+            low = found.part[n]
+        return part, part * (low + 0.5 * part - 0.5), 0.0, 0, 0.0, 0.0
     si, sj, ti, tj, tk = int(s == 0), int(s == 1), int(t == 0), int(t == 1), int(t == 2)
     values = (
         phi[i, j, k],
@@ -113,70 +155,46 @@ def closed_face(
         phi[i + si + ti, j + sj + tj, k + tk],
         phi[i + ti, j + tj, k + tk],
     )
-    begin, inside = -1, 0
-    for n in range(4):
-        if values[n] < 0.0:
-            inside += 1
-            begin = n
-    if inside == 0:
-        return 0.0, 0.0, 0.0, 0, 0.0, 0.0
-    if inside == 4:
-        return 1.0, 0.0, 0.0, 0, 0.0, 0.0
-    at = found.at
-    crossing = (
-        at[s, i, j, k],
-        at[t, i + si, j + sj, k],
-        at[s, i + ti, j + tj, k + tk],
-        at[t, i, j, k],
-    )
-    x0, y0 = corner_of(begin)
-    origin = x0 - 0.5, y0 - 0.5
-    last, p = (0.0, 0.0), (0.0, 0.0)
-    normal, piece = (0.0, 0.0), -1
-    area, sx, sy, corners, cx, cy = 0.0, 0.0, 0.0, 0, 0.0, 0.0
-    for turn in range(begin, begin + 4):
-        n, m = turn % 4, (turn + 1) % 4
-        for step in range(3):
-            if step == 0:  # the corner itself
-                if values[n] >= 0.0:
-                    continue
-                c = corner_of(n)
-                x, y = float(c[0]), float(c[1])
-            else:
-                if (values[n] < 0.0) == (values[m] < 0.0):
-                    continue
-                leaving = values[n] < 0.0
-                if step == 1 and (leaving or straight):
-                    continue
-                e = crossing[n]
-                inner, outer = (n, m) if leaving else (m, n)
-                if e >= 0:
-                    closed = 1.0 - found.part[e]
-                    here = found.normal[e, s], found.normal[e, t]
-                    own = found.piece[e]
-                else:
-                    closed = values[inner] / (values[inner] - values[outer])
-                    here, own = (0.0, 0.0), -1
-                c, o = corner_of(inner), corner_of(outer)
-                qx, qy = c[0] + closed * (o[0] - c[0]), c[1] + closed * (o[1] - c[1])
-                if step == 1:  # the wall on the way to where the polygon enters the body again
-                    x, y, kink = wall_between(p, (qx, qy), normal, here, own == piece)
-                    if kink:
-                        corners += 1
-                        cx += x
-                        cy += y
-                else:
-                    x, y = qx, qy
-                    if leaving:
-                        p, normal, piece = (qx, qy), here, own
-            x, y = x - x0, y - y0
-            cross = last[0] * y - x * last[1]
-            area += cross
-            sx += cross * (last[0] + x)
-            sy += cross * (last[1] + y)
-            last = (x, y)
-    area *= 0.5
+    crossing = edges_of(axis, i, j, k, found)
+    sums, corners, cx, cy = np.zeros(3), 0, 0.0, 0.0
+    p, normal, piece, waits = (0.0, 0.0), (0.0, 0.0), -1, False
+    for turn in range(8):
+        n, m, first = turn % 4, (turn + 1) % 4, turn < 4
+        if not first and not waits:
+            break
+        begins, ends, e = values[n] < 0.0, values[m] < 0.0, crossing[n]
+        c, o = corner_of(n), corner_of(m)
+        twice = not begins and not ends and e >= 0
+        if not begins and (ends or twice):  # the way enters a body
+            here, own = (0.0, 0.0), -1
+            f = e + int(twice and n >= 2)
+            part = values[n] / (values[n] - values[m]) if f < 0 else found.part[f]
+            if f >= 0:
+                here, own = (found.normal[f, s], found.normal[f, t]), found.piece[f]
+            c = c[0] + part * (o[0] - c[0]), c[1] + part * (o[1] - c[1])
+            if waits and straight:
+                add_line(sums, p, c)
+            elif waits:
+                x, y, kink = wall_between(p, c, normal, here, own == piece)
+                add_line(sums, p, (x, y))
+                add_line(sums, (x, y), c)
+                if kink:
+                    corners, cx, cy = corners + 1, cx + x + 0.5, cy + y + 0.5
+            waits = False
+        if not first:
+            continue
+        if not ends and (begins or twice):  # the way leaves it
+            normal, piece, waits = (0.0, 0.0), -1, True
+            f = e + int(twice and n < 2)
+            part = values[m] / (values[m] - values[n]) if f < 0 else found.part[f]
+            if f >= 0:
+                normal, piece = (found.normal[f, s], found.normal[f, t]), found.piece[f]
+            a = corner_of(n)
+            p = o[0] + part * (a[0] - o[0]), o[1] + part * (a[1] - o[1])
+            add_line(sums, c, p)
+        elif begins or ends:
+            add_line(sums, c, o)
+    area = 0.5 * sums[2]
     if area <= 0.0:
         return 0.0, 0.0, 0.0, corners, cx, cy
-    sx, sy = sx / 6.0 + area * origin[0], sy / 6.0 + area * origin[1]
-    return min(area, 1.0), sx, sy, corners, cx, cy
+    return min(area, 1.0), sums[0] / 6.0, sums[1] / 6.0, corners, cx, cy

@@ -3,7 +3,7 @@
 An edge from node (i, j, k) along an axis is cut where one of its nodes is inside a body and the
 other is not. The crossing is the root of the body's signed distance along the edge, not that of
 the line between the distances at the nodes: near an edge or corner of a body these measure to the
-nearest surface, which the edge need not meet. An edge that a thin body crosses twice is not cut.
+nearest surface, which the edge need not meet. An edge between two open nodes may be crossed twice.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ SHIFT = 1e-4
 class Crossings(NamedTuple):
     """Crossings of edges in a box of nodes.
 
-    at      (3, ni, nj, nk) number of the crossing on the edge from each node along each axis, or
-            -1: there the distances at both nodes decide
+    at      (3, ni, nj, nk) number of the crossing on the edge from each node along each axis, of
+            the lower one where it is crossed twice, which the upper one follows; or -1: there the
+            distances at both nodes decide
     part    (n,) part of the edge that is open, from its open node on
     normal  (n, 3) of the surface there, outward
     piece   (n,) smooth piece of the surface; between two pieces there is an edge or a corner
@@ -99,23 +100,26 @@ def distance_to(body: Placed, x: float, y: float, z: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def cut_edges(phi: Array, flat: bool) -> int:
-    """Number of the edges between two nodes of which one is inside, distance below 0."""
+def most_crossings(phi: Array, h: float, flat: bool) -> int:
+    """How often edges may be crossed: once between a node inside and one that is not, twice between
+    two open ones that are together nearer to the body than to each other."""
     count = 0
     ni, nj, nk = phi.shape
     for i in range(ni):
         for j in range(nj):
             for k in range(1 if flat else nk):
-                inside = phi[i, j, k] < 0.0
-                count += int(i + 1 < ni and (phi[min(i + 1, ni - 1), j, k] < 0.0) != inside)
-                count += int(j + 1 < nj and (phi[i, min(j + 1, nj - 1), k] < 0.0) != inside)
-                count += int(k + 1 < nk and (phi[i, j, min(k + 1, nk - 1)] < 0.0) != inside)
+                for d in range(2 if flat else 3):
+                    a, b, c = i + int(d == 0), j + int(d == 1), k + int(d == 2)
+                    if a < ni and b < nj and c < nk:
+                        low, high = phi[i, j, k], phi[a, b, c]
+                        count += int((low < 0.0) != (high < 0.0))
+                        count += 2 * int(min(low, high) >= 0.0 and low + high < h)
     return count
 
 
-def new_crossings(phi: Array, flat: bool) -> Crossings:
-    """Room for where a body crosses edges in its box, from the distance to it at the nodes."""
-    count = cut_edges(phi, flat)
+def new_crossings(phi: Array, h: float, flat: bool) -> Crossings:
+    """Room for where a body crosses edges in its box, from the distance to it at the nodes, m."""
+    count = most_crossings(phi, h, flat)
     at = np.full((3, *phi.shape), -1, np.int32)
     return Crossings(at, np.empty(count), np.empty((count, 3)), np.empty(count, np.int64))
 
@@ -129,22 +133,24 @@ def together(shape: tuple[int, ...], each: Sequence[Crossings]) -> Crossings:
 
 @njit(nogil=True, cache=True)
 def add_crossing(
-    found: Crossings, used: Integers, d: int, i: int, j: int, k: int,
+    found: Crossings, used: Integers, d: int, i: int, j: int, k: int, twice: bool, upper: bool,
     part: float, normal: Array, piece: int,
 ) -> None:  # fmt: skip
     """Note a crossing, if none is nearer to the open node of its edge.
 
-    used  (1,) how many numbers are taken
+    used   (1,) how many numbers are taken
+    twice  whether both nodes are open;  upper  whether this is the one next to the upper
     """
     n = found.at[d, i, j, k]
     if n < 0:
         n = used[0]
-        used[0] += 1
         found.at[d, i, j, k] = n
-    elif part >= found.part[n]:
-        return
-    found.part[n], found.piece[n] = part, piece
-    found.normal[n] = normal
+        used[0] += 1 + int(twice)
+        found.part[n : used[0]] = 1.0
+    n += int(upper)
+    if part < found.part[n]:
+        found.part[n], found.piece[n] = part, piece
+        found.normal[n] = normal
 
 
 @njit(nogil=True, cache=True)
@@ -161,43 +167,99 @@ def cross_geometry(
     for i in range(ni):
         for j in range(nj):
             for k in range(1 if flat else nk):
-                inside = phi[i, j, k] < 0.0
+                low = phi[i, j, k]
                 for d in range(2 if flat else 3):
                     a, b, c = i + int(d == 0), j + int(d == 1), k + int(d == 2)
-                    if a == ni or b == nj or c == nk or (phi[a, b, c] < 0.0) == inside:
+                    if a == ni or b == nj or c == nk:
+                        continue
+                    high = phi[a, b, c]
+                    twice = min(low, high) >= 0.0
+                    if low + high >= h if twice else max(low, high) < 0.0:
                         continue
                     point[0] = origin[0] + h * (box[0, 0] + i)
                     point[1] = origin[1] + h * (box[1, 0] + j)
                     point[2] = 0.0 if flat else origin[2] + h * (box[2, 0] + k)
-                    step = h
-                    if inside:
-                        point[d] += h
-                        step = -h
-                    part = root(body, point, d, step, ROOT * h)
-                    if part >= 0.0:
-                        piece = int(g) * PIECES + surface_at(body, point, SHIFT * h, normal)
-                        add_crossing(found, used, d, i, j, k, part, normal, piece)
+                    start = point[d]
+                    goal = start
+                    if twice:
+                        goal += dip(body, point, d, h)
+                        if goal <= start:
+                            continue
+                    elif low >= 0.0:
+                        goal += h
+                    for upper in range(2):
+                        if (low, high)[upper] < 0.0:
+                            continue
+                        point[d] = start + upper * h
+                        step = goal - point[d]
+                        part = abs(step) / h * root(body, point, d, step, ROOT * h)
+                        if part >= 0.0:
+                            piece = int(g) * PIECES + surface_at(body, point, SHIFT * h, normal)
+                            at_upper = twice and upper > 0
+                            add_crossing(
+                                found, used, d, i, j, k, twice, at_upper, part, normal, piece
+                            )
+
+
+@njit(nogil=True, cache=True)
+def dip(body: Placed, point: Array, d: int, h: float) -> float:
+    """How far along the edge of length h from a point there is a place inside, m; 0 for none.
+
+    It halves the edge where it may be inside: distances differ by no more than places do.
+    """
+    start, a, b = point[d], 0.0, h
+    fa = distance_to(body, point[0], point[1], point[2])
+    point[d] = start + h
+    fb = distance_to(body, point[0], point[1], point[2])
+    while fa + fb < b - a and b - a > SHIFT * h:
+        m = 0.5 * (a + b)
+        point[d] = start + m
+        fm = distance_to(body, point[0], point[1], point[2])
+        if fm < 0.0:
+            return m
+        if fa < fb:
+            b, fb = m, fm
+        else:
+            a, fa = m, fm
+    return 0.0
 
 
 @njit(nogil=True, cache=True)
 def merge_crossings(
-    at: NDArray[np.int32], part: Array, own: NDArray[np.int32], box: Integers, first: int
-) -> None:
-    """Let each edge in a body's box keep the crossing that leaves the least of it open.
+    at: NDArray[np.int32], part: Array, distance: Array, own: NDArray[np.int32], phi: Array,
+    box: Integers, first: int,
+) -> None:  # fmt: skip
+    """Let each edge in a body's box keep the crossings that leave the least of it open.
 
-    at     (3, nx+1, ny+1, nz+1) numbers of the crossings with all bodies;  part  their open parts
-    own    the body's, see `Crossings`;  first  number of the body's first crossing
+    at         (3, nx+1, ny+1, nz+1) numbers of the crossings with all bodies;  part  open parts
+    distance   to all bodies at the nodes, m;  phi  to this one in its box
+    own        the body's, see `Crossings`; those of edges that are not closed are taken away
+    first      number of the body's first crossing
     """
     for d in range(3):
-        for i in range(own.shape[1]):
-            for j in range(own.shape[2]):
-                for k in range(own.shape[3]):
+        for i in range(own.shape[1] - int(d == 0)):
+            for j in range(own.shape[2] - int(d == 1)):
+                for k in range(own.shape[3] - int(d == 2)):
                     if own[d, i, j, k] < 0:
                         continue
-                    n = first + own[d, i, j, k]
+                    p, q, r = i + int(d == 0), j + int(d == 1), k + int(d == 2)
                     a, b, c = i + box[0, 0], j + box[1, 0], k + box[2, 0]
-                    if at[d, a, b, c] < 0 or part[n] < part[at[d, a, b, c]]:
-                        at[d, a, b, c] = n
+                    n = first + own[d, i, j, k]
+                    twice = min(phi[i, j, k], phi[p, q, r]) >= 0.0
+                    if twice and part[n] + part[n + 1] >= 1.0:
+                        own[d, i, j, k] = -1
+                        continue
+                    low, high = distance[a, b, c], distance[a + p - i, b + q - j, c + r - k]
+                    if twice and min(low, high) < 0.0:
+                        continue
+                    m = at[d, a, b, c]
+                    if m >= 0:
+                        less = part[n] - part[m]
+                        if twice:
+                            less += part[n + 1] - part[m + 1]
+                        if less >= 0.0:
+                            continue
+                    at[d, a, b, c] = n
 
 
 @njit(nogil=True, cache=True)

@@ -216,12 +216,14 @@ def cross_skin(
                     node[d] += 1
                     upper = phi[node[0], node[1], node[2]] < 0.0
                     node[d] -= 1
-                    if lower == upper or lower != (normal[d] > 0.0):
+                    enters = normal[d] < 0.0
+                    if (lower and (upper or enters)) or (upper and not enters):
                         continue
-                    part = node[d] + 1.0 - x if lower else x - node[d]
+                    part = x - node[d] if enters else node[d] + 1.0 - x
+                    twice = not lower and not upper
                     add_crossing(
-                        found, used, d, node[0], node[1], node[2], part, unit,
-                        number * PIECES + sheet[t],
+                        found, used, d, node[0], node[1], node[2], twice, twice and not enters,
+                        part, unit, number * PIECES + sheet[t],
                     )  # fmt: skip
 
 

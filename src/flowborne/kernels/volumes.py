@@ -6,15 +6,16 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.cut_faces import closed_face, nodes_inside, open_edge
+from flowborne.kernels.cut_faces import closed_face, is_cut, nodes_inside, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 
 
 @njit(nogil=True, cache=True)
 def wall_point(
     distance: Array, found: Crossings, i: int, j: int, k: int, point: Array, scratch: Array
-) -> None:
-    """A point of the wall within cell (i, j, k), which triangles join to where it meets the faces.
+) -> bool:
+    """Find a point of the wall within cell (i, j, k), if there is one, which triangles join to where it
+    meets the faces.
 
     Where the wall has an edge, the middle of this. A smooth wall is a paraboloid, whose tangent
     planes at the crossings pass its top twice as high as it is; a cone three quarters as high as
@@ -24,58 +25,56 @@ def wall_point(
     scratch  (3, 3)
     """
     middle, mean, place = scratch
-    middle[:] = 0.0
+    middle[:], mean[:] = 0.0, 0.0
     corners = 0
     for axis in range(3):
-        s, t = int(axis == 0), 2 - int(axis == 2)
+        s, t = other_axes(axis)
         for side in range(2):
             a, b, c = (
                 i + side * int(axis == 0),
                 j + side * int(axis == 1),
                 k + side * int(axis == 2),
             )
-            if not 0 < nodes_inside(distance, axis, a, b, c) < 4:
-                continue
-            _, _, _, count, x, y = closed_face(distance, found, axis, a, b, c, False, False)
-            corners += count
-            middle[axis] += side * count
-            middle[s] += x
-            middle[t] += y
+            if is_cut(distance, found, axis, a, b, c):
+                _, _, _, count, x, y = closed_face(distance, found, axis, a, b, c, False, False)
+                corners += count
+                middle[axis] += side * count
+                middle[s] += x
+                middle[t] += y
     if corners > 0:
         point[:] = middle / corners
-        return
-    mean[:] = 0.0
+        return True
     count, rise = 0, 0.0
     for d in range(3):
-        s, t = int(d == 0), 2 - int(d == 2)
+        s, t = other_axes(d)
         for n in range(4):
-            a, b, c = i, j, k
-            first, second = n // 2, n % 2
-            a += first * int(s == 0)
-            b += first * int(s == 1) + second * int(t == 1)
-            c += second * int(t == 2)
-            lower = distance[a, b, c] < 0.0
-            upper = distance[a + int(d == 0), b + int(d == 1), c + int(d == 2)] < 0.0
-            if lower == upper:
+            place[s], place[t] = n // 2, n % 2
+            place[d] = 0.0
+            a, b, c = i + int(place[0]), j + int(place[1]), k + int(place[2])
+            low = distance[a, b, c]
+            high = distance[a + int(d == 0), b + int(d == 1), c + int(d == 2)]
+            first = found.at[d, a, b, c]
+            twice = min(low, high) >= 0.0
+            if first < 0 if twice else (low < 0.0) == (high < 0.0):
                 continue
-            part = open_edge(distance, found, d, a, b, c)
-            place[s], place[t] = first, second
-            place[d] = 1.0 - part if lower else part
-            for m in range(3):
-                middle[m] += place[m]
-            count += 1
-            e = found.at[d, a, b, c]
-            if e >= 0:
+            for e in range(first, first + 1 + int(twice)):
+                part = open_edge(distance, found, d, a, b, c)
+                if twice:
+                    part = found.part[e]
+                upward = e > first if twice else low < 0.0
+                place[d] = 1.0 - part if upward else part
+                count += 1
                 for m in range(3):
-                    mean[m] += found.normal[e, m]
-                    rise += found.normal[e, m] * place[m]
-    middle /= count
-    rise -= (mean * middle).sum()
-    size = np.sqrt((mean**2).sum())
-    point[:] = middle
-    if size > 0.0:
-        for m in range(3):
-            point[m] = min(max(middle[m] + 0.75 * rise / count / size * mean[m], 0.0), 1.0)
+                    middle[m] += place[m]
+                    if e >= 0:
+                        mean[m] += found.normal[e, m]
+                        rise += found.normal[e, m] * place[m]
+    if count == 0:
+        return False
+    rise = (rise - (mean * middle).sum() / count) / max(np.sqrt((mean**2).sum()), 1e-300) / count
+    for m in range(3):
+        point[m] = min(max(middle[m] / count + 0.75 * rise * mean[m], 0.0), 1.0)
+    return True
 
 
 @njit(nogil=True, cache=True)
@@ -96,18 +95,19 @@ def open_cells(
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
             for k in range(box[2, 0], box[2, 1] - 1):
-                faces = ox[i, j, k] + ox[i + 1, j, k] + oy[i, j, k] + oy[i, j + 1, k]
+                shut = 4.0 - ox[i, j, k] - ox[i + 1, j, k] - oy[i, j, k] - oy[i, j + 1, k]
                 if not flat:
-                    faces += oz[i, j, k] + oz[i, j, k + 1]
+                    shut += 2.0 - oz[i, j, k] - oz[i, j, k + 1]
                 inside = nodes_inside(distance, 0, i, j, k) + nodes_inside(distance, 0, i + 1, j, k)
-                if faces == 0.0 or inside == 8:
+                if shut == (4.0 if flat else 6.0) or inside == 8:
                     part[i, j, k] = 0.0
-                elif inside == 0:
+                elif inside == 0 and shut == 0.0:
                     part[i, j, k] = 1.0
                 elif flat:
                     part[i, j, k] = 1.0 - closed_face(distance, found, 2, i, j, k, True, False)[0]
+                elif not wall_point(distance, found, i, j, k, point, scratch):
+                    part[i, j, k] = 1.0
                 else:
-                    wall_point(distance, found, i, j, k, point, scratch)
                     x, y, z = point
                     volume = (
                         x * ox[i, j, k] + (1.0 - x) * ox[i + 1, j, k]
