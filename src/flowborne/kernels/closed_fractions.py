@@ -90,7 +90,7 @@ def share_closed(
             for c in range(share.shape[2]):
                 i, j, k = a + box[0, 0], b + box[1, 0], c + box[2, 0]
                 own, all_own = share[a, b, c], total[i, j, k]
-                if all_own == 0.0:
+                if own == 0.0:
                     continue
                 union = own
                 if own != all_own:
@@ -105,8 +105,7 @@ def share_closed(
                     share[a, b, c] = 0.0
                     continue
                 share[a, b, c] = union * own / all_own
-                if own > 0.0:
-                    count += 1
+                count += 1
     return count
 
 

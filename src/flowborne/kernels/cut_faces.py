@@ -124,6 +124,36 @@ def add_line(sums: Array, p: Place, q: Place) -> None:
     sums[2] += cross
 
 
+@inlined
+def between(p: Place, q: Place, part: float) -> Place:
+    """The place that is `part` of the way from p to q."""
+    return p[0] + part * (q[0] - p[0]), p[1] + part * (q[1] - p[1])
+
+
+@njit(nogil=True, cache=True)
+def add_wall(
+    sums: Array, p: Place, q: Place, e: int, f: int, found: Crossings, s: int, t: int,
+    straight: bool,
+) -> int:  # fmt: skip
+    """Add the wall from crossing e at p to crossing f at q, of which nothing is known below 0, to
+    the sums of `add_line`, and its corner's place to the last two; gives how many corners it has.
+
+    s, t  axes of the face
+    """
+    if straight or e < 0 or f < 0:
+        add_line(sums, p, q)
+        return 0
+    at_p = found.normal[e, s], found.normal[e, t]
+    at_q = found.normal[f, s], found.normal[f, t]
+    x, y, kink = wall_between(p, q, at_p, at_q, found.piece[e] == found.piece[f])
+    add_line(sums, p, (x, y))
+    add_line(sums, (x, y), q)
+    if kink:
+        sums[3] += x + 0.5
+        sums[4] += y + 0.5
+    return int(kink)
+
+
 @njit(nogil=True, cache=True)
 def closed_face(
     phi: Array, found: Crossings, axis: int, i: int, j: int, k: int, flat: bool, straight: bool
@@ -156,45 +186,36 @@ def closed_face(
         phi[i + ti, j + tj, k + tk],
     )
     crossing = edges_of(axis, i, j, k, found)
-    sums, corners, cx, cy = np.zeros(3), 0, 0.0, 0.0
-    p, normal, piece, waits = (0.0, 0.0), (0.0, 0.0), -1, False
+    sums, corners = np.zeros(5), 0
+    p, exit, waits = (0.0, 0.0), -1, False
     for turn in range(8):
         n, m, first = turn % 4, (turn + 1) % 4, turn < 4
         if not first and not waits:
             break
         begins, ends, e = values[n] < 0.0, values[m] < 0.0, crossing[n]
         c, o = corner_of(n), corner_of(m)
-        twice = not begins and not ends and e >= 0
-        if not begins and (ends or twice):  # the way enters a body
-            here, own = (0.0, 0.0), -1
-            f = e + int(twice and n >= 2)
-            part = values[n] / (values[n] - values[m]) if f < 0 else found.part[f]
-            if f >= 0:
-                here, own = (found.normal[f, s], found.normal[f, t]), found.piece[f]
-            c = c[0] + part * (o[0] - c[0]), c[1] + part * (o[1] - c[1])
-            if waits and straight:
-                add_line(sums, p, c)
-            elif waits:
-                x, y, kink = wall_between(p, c, normal, here, own == piece)
-                add_line(sums, p, (x, y))
-                add_line(sums, (x, y), c)
-                if kink:
-                    corners, cx, cy = corners + 1, cx + x + 0.5, cy + y + 0.5
-            waits = False
-        if not first:
+        if begins == ends:
+            if begins and first:
+                add_line(sums, c, o)
+            elif e >= 0 and first:  # a part in between
+                f, g = e + int(n >= 2), e + int(n < 2)
+                c, o = between(c, o, found.part[f]), between(o, c, found.part[g])
+                add_line(sums, c, o)
+                corners += add_wall(sums, o, c, g, f, found, s, t, straight)
             continue
-        if not ends and (begins or twice):  # the way leaves it
-            normal, piece, waits = (0.0, 0.0), -1, True
-            f = e + int(twice and n < 2)
-            part = values[m] / (values[m] - values[n]) if f < 0 else found.part[f]
-            if f >= 0:
-                normal, piece = (found.normal[f, s], found.normal[f, t]), found.piece[f]
-            a = corner_of(n)
-            p = o[0] + part * (a[0] - o[0]), o[1] + part * (a[1] - o[1])
-            add_line(sums, c, p)
-        elif begins or ends:
-            add_line(sums, c, o)
+        outer, inner = (m, n) if begins else (n, m)
+        part = found.part[e] if e >= 0 else values[outer] / (values[outer] - values[inner])
+        q = between(o, c, part) if begins else between(c, o, part)
+        if begins and first:
+            add_line(sums, c, q)
+            p, exit, waits = q, e, True
+        elif ends:
+            if waits:
+                corners += add_wall(sums, p, q, exit, e, found, s, t, straight)
+                waits = False
+            if first:
+                add_line(sums, q, o)
     area = 0.5 * sums[2]
     if area <= 0.0:
-        return 0.0, 0.0, 0.0, corners, cx, cy
-    return min(area, 1.0), sums[0] / 6.0, sums[1] / 6.0, corners, cx, cy
+        return 0.0, 0.0, 0.0, corners, sums[3], sums[4]
+    return min(area, 1.0), sums[0] / 6.0, sums[1] / 6.0, corners, sums[3], sums[4]

@@ -28,6 +28,11 @@ ROOT = 1e-13
 SHIFT = 1e-4
 """Cells on either side of a crossing at which distances are taken for the normal."""
 
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+LEAST_DIP = 1e-9
+"""Part of an edge within which the place is searched for where a body is nearest to it."""
+
 
 class Crossings(NamedTuple):
     """Crossings of edges in a box of nodes.
@@ -102,8 +107,8 @@ def distance_to(body: Placed, x: float, y: float, z: float) -> float:
 @njit(nogil=True, cache=True)
 def most_crossings(phi: Array, h: float, flat: bool) -> int:
     """How often edges may be crossed: once between a node inside and one that is not, twice between
-    two open ones that are together nearer to the body than to each other."""
-    count = 0
+    two open ones that are together nearer to the body than to each other, but for rounding."""
+    count, edge = 0, (1.0 + SHIFT) * h
     ni, nj, nk = phi.shape
     for i in range(ni):
         for j in range(nj):
@@ -113,7 +118,7 @@ def most_crossings(phi: Array, h: float, flat: bool) -> int:
                     if a < ni and b < nj and c < nk:
                         low, high = phi[i, j, k], phi[a, b, c]
                         count += int((low < 0.0) != (high < 0.0))
-                        count += 2 * int(min(low, high) >= 0.0 and low + high < h)
+                        count += 2 * int(min(low, high) >= 0.0 and low + high < edge)
     return count
 
 
@@ -144,6 +149,7 @@ def add_crossing(
     n = found.at[d, i, j, k]
     if n < 0:
         n = used[0]
+        assert n + int(twice) < found.part.size
         found.at[d, i, j, k] = n
         used[0] += 1 + int(twice)
         found.part[n : used[0]] = 1.0
@@ -205,22 +211,30 @@ def cross_geometry(
 def dip(body: Placed, point: Array, d: int, h: float) -> float:
     """How far along the edge of length h from a point there is a place inside, m; 0 for none.
 
-    It halves the edge where it may be inside: distances differ by no more than places do.
+    A search for the least distance by golden sections, until it cannot be below 0: distances differ
+    by no more than places do.
     """
     start, a, b = point[d], 0.0, h
-    fa = distance_to(body, point[0], point[1], point[2])
-    point[d] = start + h
-    fb = distance_to(body, point[0], point[1], point[2])
-    while fa + fb < b - a and b - a > SHIFT * h:
-        m = 0.5 * (a + b)
-        point[d] = start + m
-        fm = distance_to(body, point[0], point[1], point[2])
+    m, fm, n, fn = 0.0, np.inf, 0.0, np.inf
+    while min(fm, fn) < b - a or np.isinf(min(fm, fn)):
+        if np.isinf(fm):
+            m = b - GOLDEN * (b - a)
+            point[d] = start + m
+            fm = distance_to(body, point[0], point[1], point[2])
+        if np.isinf(fn):
+            n = a + GOLDEN * (b - a)
+            point[d] = start + n
+            fn = distance_to(body, point[0], point[1], point[2])
         if fm < 0.0:
             return m
-        if fa < fb:
-            b, fb = m, fm
+        if fn < 0.0:
+            return n
+        if b - a < LEAST_DIP * h:
+            break
+        if fm < fn:
+            b, n, fn, fm = n, m, fm, np.inf
         else:
-            a, fa = m, fm
+            a, m, fm, fn = m, n, fn, np.inf
     return 0.0
 
 

@@ -14,8 +14,8 @@ from flowborne.kernels.edge_crossings import Crossings
 def wall_point(
     distance: Array, found: Crossings, i: int, j: int, k: int, point: Array, scratch: Array
 ) -> bool:
-    """Find a point of the wall within cell (i, j, k), if there is one, which triangles join to where it
-    meets the faces.
+    """Find a point of the wall within cell (i, j, k), if it has one: triangles join it to where the
+    wall meets the faces.
 
     Where the wall has an edge, the middle of this. A smooth wall is a paraboloid, whose tangent
     planes at the crossings pass its top twice as high as it is; a cone three quarters as high as
