@@ -16,6 +16,10 @@ Verdict = Literal["pass", "coarse", "fail", "unconfirmed"]
 case is judged on its finest grids. A figure inside its tolerance passes on any grid."""
 
 
+Figures = Sequence[float] | Sequence[Sequence[float]] | Array
+"""A figure on each of several grids, or in several places of a body in the cell on each."""
+
+
 class Grids(NamedTuple):
     """Resolutions from coarse to fine, with their unit, such as "cells across D"."""
 
@@ -29,20 +33,27 @@ class GridSeries:
 
     values  the figure on each grid
     errors  its error on each, not negative
+    places  the figure in each place of a body in the cell, on each grid, if it has several places
     """
 
     label: str
     cells: Sequence[float]
     values: Sequence[float]
     errors: Sequence[float]
+    places: Sequence[Sequence[float]] = ()
 
     @classmethod
     def toward(
-        cls, grids: Grids, values: Sequence[float] | Array, exact: float, relative: bool = False
+        cls, grids: Grids, values: Figures, exact: float, relative: bool = False
     ) -> GridSeries:
-        """A series with the errors |value - exact|, or, if `relative`, |value / exact - 1|."""
-        errors = [abs(value / exact - 1.0 if relative else value - exact) for value in values]
-        return cls(*grids, list(values), errors)
+        """A series with the errors |value - exact|, or, if `relative`, |value / exact - 1|.
+
+        values  one on each grid, or several in different places of a body, whose mean counts
+        """
+        means = [float(np.mean(value)) for value in values]
+        errors = [abs(value / exact - 1.0 if relative else value - exact) for value in means]
+        places = [list(np.atleast_1d(value)) for value in values] if np.ndim(values[0]) else ()
+        return cls(*grids, means, errors, places)
 
     @property
     def order(self) -> float:
@@ -67,6 +78,8 @@ class GridSeries:
             f"{cells:>6g} {self.label}: {value:.6g}, error {error:.3g}"
             for cells, value, error in zip(self.cells, self.values, self.errors, strict=True)
         ]
+        for n, found in enumerate(self.places):
+            rows[n] += f", {spread_of(found)}, from {min(found):.6g} to {max(found):.6g}"
         if len(self.cells) > 1 and np.isfinite(self.order):
             rows.append(f"observed order {self.order:.2f}")
         elif len(self.cells) > 1:
@@ -76,13 +89,21 @@ class GridSeries:
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON; an order that does not exist is None."""
         order = self.order
-        return {
+        places = [[float(v) for v in found] for found in self.places]
+        return ({"places": places} if places else {}) | {
             "label": self.label,
             "cells": [float(c) for c in self.cells],
             "values": [float(v) for v in self.values],
             "errors": [float(e) for e in self.errors],
             "order": order if np.isfinite(order) else None,
         }
+
+
+def spread_of(places: Sequence[float]) -> str:
+    """The largest difference of a figure over the places of a body in the cell, in words."""
+    if len(places) == 1:
+        return "in one place"
+    return f"mean of {len(places)} places with a spread of {np.ptp(places):.2g}"
 
 
 @dataclass(frozen=True)
@@ -149,7 +170,7 @@ class Finding:
         return "coarse" if coarse and self.series is not None else "fail"
 
 
-Measured = float | Sequence[float] | Array | GridSeries
+Measured = float | Figures | GridSeries
 """A number; figures on several grids, of which the last counts; or a series of them."""
 
 
@@ -177,7 +198,7 @@ def near(
 
 def within(
     quantity: str,
-    values: Sequence[float] | Array,
+    values: Figures,
     reference: float,
     interval: tuple[float, float],
     on: Grids,

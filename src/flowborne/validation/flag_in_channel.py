@@ -22,8 +22,8 @@ LENGTH, HEIGHT = 2.5, 0.41
 """m, of the channel."""
 
 CYLINDER = '<geom type="cylinder" pos="0.2 0.2 0" size="0.05 0.5"/>'
-PLATE = '<geom type="box" pos="0.4 0.2 0" size="0.2 0.01 0.5"/>'
-"""The cylinder, and the rigid flag of D2 from the cylinder's middle to its end A."""
+RIGID = mjcf(CYLINDER, '<geom type="box" pos="0.4 0.2 0" size="0.2 0.01 0.5"/>')
+"""The cylinder, and with the rigid flag of D2 from the cylinder's middle to its end A."""
 
 END, SIZE = (0.6, 0.2), (0.35, 0.02)
 """A, the middle of the flag's end, and length from the cylinder on and thickness, m."""
@@ -108,10 +108,14 @@ FSI = (
 )
 
 
-def channel(cells: int, flow: Flow) -> World:
-    """The channel at rest, `cells` across it; the cylinder belongs to the world, body 0."""
+def channel(cells: int, flow: Flow, behind: float = BEHIND, rigid: str = RIGID) -> World:
+    """The channel at rest, `cells` across it; the cylinder belongs to the world, body 0.
+
+    behind  cells between A and the plane of the grid before it
+    rigid   MJCF of cylinder and flag, if the flag is rigid
+    """
     h = HEIGHT / cells
-    ahead = (BEHIND - END[0] / h) % 1.0
+    ahead = (behind - END[0] / h) % 1.0
     wall = BoundaryNoSlip()
     fluid = Fluid(
         Grid.slab(round(LENGTH / h + ahead), cells, h, (-ahead * h, 0.0)),
@@ -121,7 +125,7 @@ def channel(cells: int, flow: Flow) -> World:
         tolerance=1e-7,
     )
     if flow.tissue is None:
-        solid = SolidModel.from_string(mjcf(CYLINDER, PLATE), slab=True, gravity=NOWHERE)
+        solid = SolidModel.from_string(rigid, slab=True, gravity=NOWHERE)
     else:
         solid = flag_of(flow.tissue)
     return World.at_rest(Setup(solid, fluid))

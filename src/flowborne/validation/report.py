@@ -20,7 +20,7 @@ from flowborne import __version__
 from flowborne.parts import write_atomically
 from flowborne.validation import case as case_of
 from flowborne.validation.case import THE_RUN, Result, Tier
-from flowborne.validation.findings import Verdict
+from flowborne.validation.findings import Verdict, spread_of
 
 DATA = "report.json"
 TIERS = tuple(reversed(Tier))
@@ -106,6 +106,20 @@ def code() -> str:
     return digest.hexdigest()[:12]
 
 
+def of_other_code(data: Data) -> list[str]:
+    """Cases that were measured with other code than the present; with the tiers of which that is
+    true, if it is not true of all."""
+    stale = {
+        name: [tier for tier, case in tiers.items() if case.get("code") != code()]
+        for name, tiers in data.items()
+    }
+    return [
+        name if len(old) == len(data[name]) else f"{name} ({', '.join(old)})"
+        for name, old in stale.items()
+        if old
+    ]
+
+
 def already_there(folder: Path, tiers: Mapping[str, Tier]) -> dict[str, list[Result]]:
     """Results of the report by the same code in the same tier, without runs that broke down.
 
@@ -141,10 +155,13 @@ def is_finest(name: str, tier: str) -> bool:
 
 
 def grid_of(finding: dict[str, Any]) -> str:
-    """The grid on which a figure was measured, such as "10 cells across D"; empty without a grid
-    series."""
+    """The grid on which a figure was measured, such as "10 cells across D", and its spread over
+    places in the cell; empty without a grid series."""
     series = finding.get("series")
-    return "" if series is None else f"{series['cells'][-1]:g} {series['label']}"
+    if series is None:
+        return ""
+    grid = f"{series['cells'][-1]:g} {series['label']}"
+    return f"{grid}, {spread_of(series['places'][-1])}" if "places" in series else grid
 
 
 def verdict_of(case: dict[str, Case]) -> Verdict:

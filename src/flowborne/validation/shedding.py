@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from flowborne import Array, StepReport, World
 from flowborne.validation.case import confirmed, reference
-from flowborne.validation.findings import Finding, Grids, Plot, within
-from flowborne.validation.worlds import Uniform, force_on, mjcf, recorded, refined
-from flowborne.worlds import Field
+from flowborne.validation.findings import Figures, Finding, Grids, Plot, within
+from flowborne.validation.worlds import (
+    Place,
+    Uniform,
+    Vector,
+    force_on,
+    mjcf,
+    over_places,
+    recorded,
+)
+from flowborne.worlds import Field, velocity_at
 
 BEFORE = {True: 20.0, False: 40.0}
 AFTER = 15.0
-"""Times D/U before a flow that sheds vortices is evaluated: on the first grid, by quick, where
-shedding has to begin, and on a grid that starts from the flow of a coarser one."""
+"""Times D/U before a flow that sheds vortices is evaluated: in the first world, by quick, where
+shedding has to begin, and in one that starts from the flow of another."""
 
 PERIODS = {True: 2, False: 4}
 """Evaluated periods, by quick."""
@@ -111,6 +120,16 @@ class Oscillation:
         return f"lift's amplitude {one:.4f} in the first period, {other:.4f} in the last"
 
 
+def backflow(world: World, back: Vector, longest: float) -> float:
+    """Length of the backflow along x from a body's back, m, at most `longest`; 0 where there is
+    none one cell behind the back."""
+    h = world.flow()[0].grid.spacing
+    x = np.arange(h, longest, 0.05 * h)
+    u = velocity_at(world, np.array(back) + x[:, None] * np.array(STREAM.velocity))[:, 0]
+    i = int(np.argmax(u > 0.0))
+    return float(x[i] - 0.05 * h * u[i] / (u[i] - u[i - 1])) if i else 0.0
+
+
 def crest(values: Array) -> tuple[float, float]:
     """Largest value and its place in samples: vertex of the parabola through three samples."""
     at = int(np.argmax(values[1:-1])) + 1
@@ -150,31 +169,35 @@ def watch(
 
 
 def shed(
-    build: Callable[[int], World], strouhal: float, grids: Sequence[int], quick: bool
-) -> tuple[list[tuple[float, ...]], list[str]]:
-    """Mean drag, amplitude of the lift and frequency from grid to grid, and lines for people, of a
-    cylinder at the origin in UNBOUNDED.
+    build: Callable[[int, Place], World],
+    strouhal: float,
+    grids: Sequence[int],
+    quick: bool,
+    once: Sequence[int] = (),
+) -> tuple[list[Any], list[str]]:
+    """Mean drag, amplitude of the lift and frequency of a cylinder at the origin in UNBOUNDED, as
+    `over_places` has them, by the cells across D.
 
-    build     a world, by the cells across D
     strouhal  rough value of the expected frequency
     """
-    periods, field = PERIODS[quick], Kicked(STREAM, UNBOUNDED, 0.0, 0.0)
-    rows, lines = [], []
-    for n, world, first in refined(grids, build, field):
+    periods = PERIODS[quick]
+
+    def measure(cells: int, world: World, first: bool) -> tuple[Sequence[float], str]:
         before = 2.0 * BEFORE[quick] if first else AFTER
         seen, drags, _ = watch(world, UNBOUNDED, before, strouhal, periods)
         steps, period = seen.last(periods)
-        mean = float(drags[steps].mean())
-        rows.append((mean, amplitude(seen.signal[steps]), UNBOUNDED.time / period))
-        lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
-    return list(zip(*rows, strict=True)), lines
+        lift = amplitude(seen.signal[steps])
+        figures = float(drags[steps].mean()), lift, UNBOUNDED.time / period
+        return figures, seen.unsteadiness(periods)
+
+    return over_places(grids, build, Kicked(STREAM, UNBOUNDED, 0.0, 0.0), measure, once)
 
 
 def judged(
     name: str,
     quantity: str,
     grids: Sequence[int],
-    values: Sequence[float],
+    values: Figures,
     interval: tuple[float, float],
     *,
     lines: Sequence[str] = (),
