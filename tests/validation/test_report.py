@@ -146,14 +146,6 @@ def test_cases_of_other_code_are_named_with_the_tiers_of_which_that_is_true(
     assert of_other_code(read_report(tmp_path)) == ["B1 (minute)", "B2"]
 
 
-def test_a_report_from_before_there_were_tiers_is_read(tmp_path: Path) -> None:
-    add_to_report(tmp_path, [result("K11", "fail")], case_ids())
-    old = json.loads((tmp_path / DATA).read_text())
-    old["cases"]["K11"] = {"quick": old["cases"]["K11"]["minute"]}
-    (tmp_path / DATA).write_text(json.dumps(old))
-    assert list(read_report(tmp_path)["K11"]) == ["half-hour"]
-
-
 def test_a_folder_with_another_report_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / DATA).write_text(json.dumps([1, 2]))
     asked = CliRunner().invoke(app, ["validate", "--case", "K1", "--report", str(tmp_path)])

@@ -11,7 +11,7 @@ from flowborne.validation.case import reference
 def test_B8_falls_short_of_the_published_drag_by_less_than_a_tenth_on_8_cells() -> None:
     drag, lift, strouhal = case.cylinder_in_sea(True)
     assert float(drag.value) == pytest.approx(reference("B5", "Cd mean"), rel=0.08)
-    assert float(lift.value) == pytest.approx(0.227, abs=0.005)
+    assert float(lift.value) == pytest.approx(0.269, abs=0.005)
     assert strouhal.passed
 
 

@@ -42,9 +42,6 @@ VERDICTS: tuple[Verdict, ...] = ("fail", "coarse", "pass", "unconfirmed")
 def read_report(folder: Path) -> Data:
     """The cases of a report; none when there is no report yet.
 
-    Old reports have "quick" and "full" instead of tiers: such a case is in the present tier of that
-    run.
-
     raises  ValueError when the file is no report
     """
     path = folder / DATA
@@ -52,18 +49,9 @@ def read_report(folder: Path) -> Data:
         return {}
     try:
         data: Data = json.loads(path.read_text(encoding="utf-8"))["cases"]
-        return {
-            name: {_tier(name, filed): case for filed, case in tiers.items()}
-            for name, tiers in data.items()
-        }
+        return {name: dict(tiers) for name, tiers in data.items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path} is no report ({error}); name another folder") from error
-
-
-def _tier(name: str, filed: str) -> str:
-    if filed in ("quick", "full"):
-        return str(getattr(case_of(name), filed).value)
-    return Tier(filed).value
 
 
 def add_to_report(folder: Path, results: Sequence[Result], order: Iterable[str]) -> None:
