@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -123,8 +122,8 @@ def lid_driven(quick: bool) -> list[Finding]:
             rows.append((*deviations(world, reynolds), *primary_vortex(world)))
         u, v, x, y, psi = zip(*rows, strict=True)
         for name, values, plot in zip("uv", (u, v), plots(world, reynolds), strict=True):
-            finding = at_most(f"max|{name} - table|, Re {reynolds}", values, 0.01, grids)
-            findings.append(replace(finding, plot=plot))
+            title = f"max|{name} - table|, Re {reynolds}"
+            findings.append(at_most(title, values, 0.01, grids, plot=plot))
         exact = reference("F2", "primary vortex (x,y,psi)")[str(reynolds)]
         of = f"of the vortex, Re {reynolds}"
         findings += [

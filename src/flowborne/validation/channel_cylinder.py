@@ -126,7 +126,7 @@ def steady_cylinder(quick: bool) -> list[Finding]:
     grids, inflow = (10,) if quick else (20, 40, 80), Parabola(CREEPING.fastest)
     back = (CENTRE + 0.5 * DIAMETER, CENTRE, 0.0)
 
-    def measure(cells: int, world: World, first: bool) -> tuple[Sequence[float], str]:
+    def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
         drag, lift, change = steady_flow(world, 1e-2 if quick else 2e-5)
         figures = drag, lift, pressure_drop(world), backflow(world, back, 3.0 * DIAMETER)
         return figures, f"coefficients change by {change:.1g} in the last D/U"
@@ -148,8 +148,8 @@ def shedding_in_channel(quick: bool) -> list[Finding]:
     inflow = Parabola(SHEDDING.fastest)
     field = Kicked(inflow, SHEDDING, CENTRE, CENTRE)
 
-    def measure(cells: int, world: World, first: bool) -> tuple[Sequence[float], str]:
-        before = BEFORE[quick] if first else AFTER
+    def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
+        before = BEFORE if first else AFTER
         seen, drags, drops = watch(world, SHEDDING, before, 0.3, periods, pressure_drop)
         steps, period = seen.last(periods)
         lifts, later = seen.signal[steps], drops[steps]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
@@ -170,6 +170,16 @@ class Finding:
         return "coarse" if coarse and self.series is not None else "fail"
 
 
+class Details(TypedDict, total=False):
+    """Values of a `Finding` besides or in place of those that a function gives it."""
+
+    tolerance: Value
+    series: GridSeries | None
+    lines: Sequence[str]
+    plot: Plot | None
+    confirmed: bool
+
+
 Measured = float | Figures | GridSeries
 """A number; figures on several grids, of which the last counts; or a series of them."""
 
@@ -182,7 +192,7 @@ def near(
     *,
     relative: float | None = None,
     absolute: float | None = None,
-    lines: Sequence[str] = (),
+    **details: Unpack[Details],
 ) -> Finding:
     """A finding that passes within a relative or an absolute tolerance of its reference.
 
@@ -193,7 +203,7 @@ def near(
     assert bound is not None
     passed = bool(abs(figure - reference) <= bound)
     tolerance = f"{100.0 * relative:g} %" if relative is not None else f"{bound:g}"
-    return Finding(quantity, figure, reference, tolerance, passed, series, lines)
+    return replace(Finding(quantity, figure, reference, tolerance, passed, series), **details)
 
 
 def within(
@@ -202,14 +212,15 @@ def within(
     reference: float,
     interval: tuple[float, float],
     on: Grids,
-    *,
-    lines: Sequence[str] = (),
+    **details: Unpack[Details],
 ) -> Finding:
     """A finding on several grids whose last value has to lie in an interval."""
     value, series = _figure(values, reference, on)
     low, high = interval
-    passed = low <= value <= high
-    return Finding(quantity, value, reference, f"[{low:g}, {high:g}]", passed, series, lines)
+    found = Finding(
+        quantity, value, reference, f"[{low:g}, {high:g}]", low <= value <= high, series
+    )
+    return replace(found, **details)
 
 
 def falling(found: Finding) -> Finding:
@@ -224,16 +235,10 @@ def at_most(
     value: Measured,
     bound: float,
     on: Grids | None = None,
-    *,
-    lines: Sequence[str] = (),
+    **details: Unpack[Details],
 ) -> Finding:
-    """A finding whose reference is 0 and whose size may be at most `bound`.
-
-    on  the grids of several figures
-    """
-    figure, series = _figure(value, 0.0, on)
-    passed = bool(abs(figure) <= bound)
-    return Finding(quantity, figure, 0.0, f"{bound:g}", passed, series, lines)
+    """A finding whose reference is 0 and whose size may be at most `bound`."""
+    return near(quantity, value, 0.0, on, absolute=bound, **details)
 
 
 def above(

@@ -205,11 +205,10 @@ def compared(runs: Sequence[str], cells: Sequence[int], bar: Sequence[str] = ())
             )
     twin, slender = (reference("R2", name) for name in ("authors' twin", "elongated-body theory"))
     title = f"mean error of speed over {len(runs)} runs, m/s"
-    others = [
-        f"the authors' fitted twin {twin:g} and elongated-body theory {slender:g}, over 8 runs"
-    ]
-    found = at_most(title, np.mean(errors, axis=0), twin, grids, lines=others)
-    return [*findings, replace(found, reference=twin, tolerance="at most")]
+    others = f"the authors' fitted twin {twin:g} and elongated-body theory {slender:g}, over 8 runs"
+    mean = np.mean(errors, axis=0)
+    found = at_most(title, mean, twin, grids, tolerance="at most", lines=[others])
+    return [*findings, replace(found, reference=twin)]
 
 
 def per_beat(speed: float, real: Mapping[str, float]) -> str:

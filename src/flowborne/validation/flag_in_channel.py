@@ -196,8 +196,9 @@ def between(
     """A figure within the range of published ones."""
     exact, low, high = reference(flow.case, flow.name)[quantity]
     on = Grids("cells across the channel", grids)
-    found = within(f"{flow.name}, {quantity}", values, exact, (low, high), on, lines=lines)
-    return replace(found, tolerance=f"{low:g} to {high:g}")
+    accepted = f"{low:g} to {high:g}"
+    title = f"{flow.name}, {quantity}"
+    return within(title, values, exact, (low, high), on, lines=lines, tolerance=accepted)
 
 
 PERIODS = 4

@@ -103,10 +103,10 @@ def hovering(quick: bool) -> list[Finding]:
         ]
         if name == "lift":
             curves.append(Curve("measured by Wang", measured[:, 0], measured[:, 1], True))
-        found = at_most(f"{name}, mean distance from Eldredge's", away, bound, grids)
-        tolerance = "at most the experiment's in lift"
         plot = Plot("t/T", f"{name} over the largest quasi-steady one", curves)
-        findings.append(replace(found, reference=bound, tolerance=tolerance, plot=plot))
+        found = at_most(f"{name}, mean distance from Eldredge's", away, bound, grids, plot=plot)
+        tolerance = "at most the experiment's in lift"
+        findings.append(replace(found, reference=bound, tolerance=tolerance))
     return findings
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -337,7 +337,7 @@ def free_turn(quick: bool) -> list[Finding]:
     for n, part in zip(grids, lost, strict=True):
         title = f"part of the energy lost in half a turn, {n} cells"
         lines = [] if part >= 0.0 else ["the energy is larger than at the start"]
-        findings.append(replace(at_most(title, part, allowed[n], lines=lines), series=series))
+        findings.append(at_most(title, part, allowed[n], lines=lines, series=series))
     most = float(max(run.max() for run in runs))
     return [*findings, at_most("largest energy over that at the start", most, 1.0)]
 

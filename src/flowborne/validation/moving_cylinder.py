@@ -3,8 +3,6 @@ another cylinder (V8)."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from flowborne import Array, Grid, World
@@ -86,17 +84,16 @@ def swinging(quick: bool) -> list[Finding]:
     ]
     curves = (Curve("Duetsch et al.", phase, published, True), Curve("flowborne", *runs[-1]))
     plot = Plot("t/T", "in-line force coefficient", curves)
-    course = at_most("farthest from the measured curve", away, 0.15, grids)
-    findings = [
-        near("largest coefficient", peaks, largest, grids, relative=0.03),
-        replace(course, plot=plot),
-    ]
-    known = dict(part.split("=") for part in reference("V3", "Morison fit").split(", "))
+    known, sure = reference("V3", "Morison fit"), confirmed("V3", "Morison fit")
     coefficients = zip(*(morison(*run) for run in runs), strict=True)
-    for name, values in zip(("C_d", "C_i"), coefficients, strict=True):
-        fitted = near(f"Morison's {name}", values, float(known[name]), grids, relative=0.03)
-        findings.append(replace(fitted, confirmed=confirmed("V3", "Morison fit")))
-    return findings
+    return [
+        near("largest coefficient", peaks, largest, grids, relative=0.03),
+        at_most("farthest from the measured curve", away, 0.15, grids, plot=plot),
+        *(
+            near(f"Morison's {name}", values, exact, grids, relative=0.03, confirmed=sure)
+            for (name, exact), values in zip(known.items(), coefficients, strict=True)
+        ),
+    ]
 
 
 def sprung(cells: int, speed: float) -> World:
@@ -151,13 +148,13 @@ def vibrating(quick: bool) -> list[Finding]:
         lines=lines,
         confirmed=confirmed("V5", "(a) peak A/D"),
     )
-    drop = size / found[UNLOCKED][0]
-    locked = [
-        near(f"f/f_n {at}", frequency, 1.0, relative=0.1),
-        Finding(f"A/D {at} over that at {UNLOCKED:g}", drop, 5.0, "more than 5", drop > 5.0),
+    drop, sure = size / found[UNLOCKED][0], confirmed("V5", "lock-in")
+    title = f"A/D {at} over that at {UNLOCKED:g}"
+    return [
+        peak,
+        near(f"f/f_n {at}", frequency, 1.0, relative=0.1, confirmed=sure),
+        Finding(title, drop, 5.0, "more than 5", drop > 5.0, confirmed=sure),
     ]
-    sure = confirmed("V5", "lock-in")
-    return [peak, *(replace(finding, confirmed=sure) for finding in locked)]
 
 
 INNER, OUTER = 0.5, 1.0

@@ -6,16 +6,24 @@ the list names curves and has none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from flowborne import Grid, World
+from flowborne import Grid, StepReport, World
 from flowborne.validation.case import Case, Tier, confirmed, reference, table
-from flowborne.validation.findings import Curve, Finding, Grids, Plot, falling, near, within
+from flowborne.validation.findings import (
+    Curve,
+    Details,
+    Finding,
+    Grids,
+    Plot,
+    falling,
+    near,
+    within,
+)
 from flowborne.validation.shedding import (
     CFL,
     STREAM,
@@ -77,15 +85,12 @@ def open_water(cells: int, place: Place, viscosity: float) -> World:
 def steady_cylinder(quick: bool) -> list[Finding]:
     """B4: drag, length of the backflow and the angle at which the flow leaves the cylinder."""
     grids = (4, 8) if quick else (8, 16, 24, 32)
-    undisturbed = 30.0 if quick else 60.0
 
-    def measure(cells: int, world: World, first: bool) -> tuple[Sequence[float], str]:
-        dt = CFL / cells
-        steps = round((undisturbed if first else 15.0) / dt)
-        before, _ = UNBOUNDED.coefficients(advance(world, dt, steps - cells))
-        drag, _ = UNBOUNDED.coefficients(advance(world, dt, cells))
+    def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
+        drag, text = steady_drag(
+            world, 60.0 if first else 15.0, lambda report: UNBOUNDED.coefficients(report)[0]
+        )
         angle = 180.0 - separation(world, (0.0, 1.0, 0.0))
-        text = f"Cd changes by {drag - before:.2g} in the last D/U"
         return (drag, backflow(world, BACK, LONGEST), angle), text
 
     build = partial(open_water, viscosity=1.0 / 40.0)
@@ -136,31 +141,23 @@ def frequencies() -> list[Finding]:
         Curve("Gerris", list(known), list(known.values()), True),
         Curve("flowborne", list(known), [float(np.mean(st[-1])) for st in found.values()]),
     )
-    first, *others = (
-        near(f"St at Re {reynolds:g}", found[reynolds], exact, across(grids), relative=0.03)
-        for reynolds, exact in known.items()
-    )
-    return [replace(first, plot=Plot("Reynolds number", "Strouhal number", curves)), *others]
+    plots = {min(known): Plot("Reynolds number", "Strouhal number", curves)}
+    return [
+        near(f"St at Re {re:g}", st, known[re], across(grids), relative=0.03, plot=plots.get(re))
+        for re, st in found.items()
+    ]
 
 
 def held_at_185(quick: bool) -> list[Finding]:
     """V9: the figures of the cylinder while it is held."""
-    known = numbers_of(reference("V9", "fixed cylinder Re=185"))
-    grids = OPEN_GRIDS[quick]
+    held, grids = "fixed cylinder Re=185", OPEN_GRIDS[quick]
     (drag, lift, strouhal), lines = shed_in_the_open(185.0, 0.195, grids, quick)
     measured = drag, [np.sqrt(0.5) * np.array(values) for values in lift], strouhal
-    sure = confirmed("V9", "fixed cylinder Re=185")
-    first, *others = (
-        replace(near(f"{name}, held", values, exact, across(grids), relative=0.05), confirmed=sure)
-        for (name, exact), values in zip(known.items(), measured, strict=True)
-    )
-    return [replace(first, lines=lines), *others]
-
-
-def numbers_of(text: str) -> dict[str, float]:
-    """Names and numbers of "Cd 1.287, Cl_rms 0.443"."""
-    pairs: Sequence[Sequence[str]] = [part.split() for part in text.split(",")]
-    return {name: float(number) for name, number in pairs}
+    details = Details(confirmed=confirmed("V9", held), lines=lines)
+    return [
+        near(f"{name}, held", values, exact, across(grids), relative=0.05, **details)
+        for (name, exact), values in zip(reference("V9", held).items(), measured, strict=True)
+    ]
 
 
 def quarter(cells: int, place: Place, reynolds: float) -> World:
@@ -180,19 +177,19 @@ def quarter(cells: int, place: Place, reynolds: float) -> World:
     )
 
 
-def steady_drag(world: World, duration: float) -> tuple[float, float]:
-    """Drag coefficient of the sphere after some times D/U, and its change over the last one.
-
-    Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F.
-    """
-    fluid, _ = world.flow()
-    steps, dt = whole_steps(duration, CFL * fluid.grid.spacing)
+def steady_drag(
+    world: World, duration: float, coefficient: Callable[[StepReport], float]
+) -> tuple[float, str]:
+    """Drag coefficient after some times D/U, and its change over the last one in words."""
+    steps, dt = whole_steps(duration, CFL * world.flow()[0].grid.spacing)
     tail = round(1.0 / dt)
-    before, after = (
-        float(4.0 * force_on(advance(world, dt, count))[0] * 8.0 / np.pi)
-        for count in (steps - tail, tail)
-    )
-    return after, abs(after - before)
+    before, after = (coefficient(advance(world, dt, n)) for n in (steps - tail, tail))
+    return after, f"Cd changes by {after - before:.2g} in the last D/U"
+
+
+def of_sphere(report: StepReport) -> float:
+    """Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F."""
+    return float(4.0 * force_on(report)[0] * 8.0 / np.pi)
 
 
 def recirculation(world: World) -> float:
@@ -234,14 +231,12 @@ def sphere(quick: bool) -> list[Finding]:
     """B7: drag at Re 100 and 150, and the bubble behind the sphere at Re 100."""
     # on 12 cells a place takes a quarter of an hour
     grids, once = ((4,), ()) if quick else ((6, 8, 12), (12,))
-    undisturbed = 6.0 if quick else 16.0
     findings = []
     for reynolds in (100, 150):
 
-        def measure(cells: int, world: World, first: bool) -> tuple[Sequence[float], str]:
-            drag, change = steady_drag(world, undisturbed if first else 6.0)
-            figures = drag, recirculation(world), separation(world, BETWEEN)
-            return figures, f"Cd changes by {change:.2g} in the last D/U"
+        def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
+            drag, text = steady_drag(world, 16.0 if first else 6.0, of_sphere)
+            return (drag, recirculation(world), separation(world, BETWEEN)), text
 
         build = partial(quarter, reynolds=reynolds)
         (drags, lengths, angles), lines = over_places(grids, build, STREAM, measure, once)

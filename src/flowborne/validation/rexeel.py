@@ -184,8 +184,8 @@ def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
         scattered = f"mean of the {len(runs)} runs {least[n]:.3f}"
         lines = [*times, *delay, f"{others}, {scattered}"]
-        found = at_most(title, errors[:, n], aquarium, grids, lines=lines)
-        findings.append(replace(found, reference=aquarium, tolerance="at most"))
+        found = at_most(title, errors[:, n], aquarium, grids, tolerance="at most", lines=lines)
+        findings.append(replace(found, reference=aquarium))
     return findings
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -103,8 +102,8 @@ def in_stream(shape: str, stream: str, grids: Grids, arcs: Sequence[float]) -> F
         lines.append(f"{cells:>6g} {grids.label}: {', '.join(said)}")
         curves.append(Curve(f"{cells} {grids.label}", arc(arcs[0]), drags[0]))
     title = f"{shape}, {stream}: scatter of the settled objective over its mean"
-    found = at_most(title, values, PART, grids, lines=lines)
-    return replace(found, plot=Plot("angle (degrees)", "drag (N/m)", curves))
+    plot = Plot("angle (degrees)", "drag (N/m)", curves)
+    return at_most(title, values, PART, grids, lines=lines, plot=plot)
 
 
 def scatter_over_starts(quick: bool) -> list[Finding]:

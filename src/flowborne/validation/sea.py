@@ -66,20 +66,14 @@ def in_stream(cells: int, place: Place, length: int, width: int) -> World:
 
 def cylinder_in_sea(quick: bool) -> list[Finding]:
     """B8: B5's figures in small boxes; unless quick in the smaller one too."""
-    findings: list[Finding] = []
+    findings, on = list[Finding](), Grids("cells across D", GRIDS[quick])
     for (length, width), (_, wider) in list(BOXES.items())[: 1 if quick else None]:
         build = partial(in_stream, length=length, width=width)
         figures, lines = shed(build, 0.165, GRIDS[quick], quick)
         for (name, relative), values in zip(REQUIRED.items(), figures, strict=True):
-            found = near(
-                f"{name} in {length} x {width} D",
-                values,
-                float(reference("B5", name)),
-                Grids("cells across D", GRIDS[quick]),
-                relative=wider * relative,
-            )
-            findings.append(falling(replace(found, lines=lines)))
-            lines = []
+            title, exact = f"{name} in {length} x {width} D", float(reference("B5", name))
+            bound, shown = wider * relative, lines if name == "Cd mean" else ()
+            findings.append(falling(near(title, values, exact, on, relative=bound, lines=shown)))
     return findings
 
 
@@ -124,10 +118,10 @@ def eel() -> list[Finding]:
     found = []
     for low, high in windows:
         own = ways(low, high, "bodies")
-        finding = way_over(float(own.mean() / large.mean()), low, high, "a window of ")
         lines = [f"{name}: {way.mean():.4f} m, from {way.min():.4f} to {way.max():.4f} m"
                  for name, way in (("in the window", own), ("in the domain", large))]  # fmt: skip
-        found.append(replace(finding, lines=lines))
+        ratio = float(own.mean() / large.mean())
+        found.append(replace(way_over(ratio, low, high, "a window of "), lines=lines))
     return found
 
 

@@ -5,7 +5,7 @@ V1 is in centimetres, grams and seconds, V2 in SI units.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from flowborne.bodies import WindForce
 from flowborne.validation.case import Case, confirmed, reference
 from flowborne.validation.findings import (
     Curve,
+    Details,
     Finding,
     Grids,
     GridSeries,
@@ -99,8 +100,8 @@ def settling_cylinder(quick: bool) -> list[Finding]:
     for fall in FALLS:
         values = [fastest(fall, n)[0] for n in grids.cells]
         title, interval = f"{fall.name}, largest Re", (fall.low, fall.high)
-        found = within(title, values, fall.reynolds, interval, grids)
-        findings.append(replace(found, confirmed=confirmed("V1", f"{fall.name} max Re")))
+        sure = confirmed("V1", f"{fall.name} max Re")
+        findings.append(within(title, values, fall.reynolds, interval, grids, confirmed=sure))
     return findings
 
 
@@ -191,14 +192,14 @@ def settling(quick: bool) -> list[Finding]:
         findings.append(falling(near(title, series, oil.peak, relative=0.03)))
         found = [apart(one, times, measured, oil.peak) for one in falls]
         title = f"{oil.name}, farthest from the measured curve over its largest velocity"
-        course = at_most(title, [away for away, _ in found], 0.05, grids, lines=found[-1][1])
         moments, velocity, _ = falls[-1]
         thin = slice(None, None, max(1, len(moments) // 200))
         curves = (
             Curve("measured", times, measured, True),
             Curve("flowborne", moments[thin], velocity[thin]),
         )
-        findings.append(replace(course, plot=Plot("t (s)", "downward velocity (m/s)", curves)))
+        details = Details(lines=found[-1][1], plot=Plot("t (s)", "downward velocity (m/s)", curves))
+        findings.append(at_most(title, [away for away, _ in found], 0.05, grids, **details))
     return findings
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Unpack
 
 import numpy as np
 
 from flowborne import Array, StepReport, World
 from flowborne.validation.case import confirmed, reference
-from flowborne.validation.findings import Figures, Finding, Grids, Plot, within
+from flowborne.validation.findings import Details, Figures, Finding, Grids, within
 from flowborne.validation.worlds import (
     Place,
     Uniform,
@@ -22,10 +22,9 @@ from flowborne.validation.worlds import (
 )
 from flowborne.worlds import Field, velocity_at
 
-BEFORE = {True: 20.0, False: 40.0}
-AFTER = 15.0
-"""Times D/U before a flow that sheds vortices is evaluated: in the first world, by quick, where
-shedding has to begin, and in one that starts from the flow of another."""
+BEFORE, AFTER = 40.0, 15.0
+"""Times D/U before a flow that sheds vortices is evaluated: in the first world, where shedding has
+to begin and in open water takes twice as long, and in one that starts from the flow of another."""
 
 PERIODS = {True: 2, False: 4}
 """Evaluated periods, by quick."""
@@ -182,8 +181,8 @@ def shed(
     """
     periods = PERIODS[quick]
 
-    def measure(cells: int, world: World, first: bool) -> tuple[Sequence[float], str]:
-        before = 2.0 * BEFORE[quick] if first else AFTER
+    def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
+        before = 2.0 * BEFORE if first else AFTER
         seen, drags, _ = watch(world, UNBOUNDED, before, strouhal, periods)
         steps, period = seen.last(periods)
         lift = amplitude(seen.signal[steps])
@@ -199,11 +198,9 @@ def judged(
     grids: Sequence[int],
     values: Figures,
     interval: tuple[float, float],
-    *,
-    lines: Sequence[str] = (),
-    plot: Plot | None = None,
+    **details: Unpack[Details],
 ) -> Finding:
     """A quantity of the case `name` on some grids, inside an interval of the list."""
     exact, on = reference(name, quantity), Grids("cells across D", grids)
-    found = within(quantity, values, exact, interval, on, lines=lines)
-    return replace(found, plot=plot, confirmed=confirmed(name, quantity))
+    details["confirmed"] = confirmed(name, quantity)
+    return within(quantity, values, exact, interval, on, **details)

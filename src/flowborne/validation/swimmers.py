@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flowborne import Array, Grid, World
 from flowborne.bodies import Trajectory, TrajectorySinusoid, halfway_momentum, kinematics
 from flowborne.validation.case import Case, Tier, confirmed, reference
-from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, near
+from flowborne.validation.findings import Curve, Details, Finding, Grids, Plot, at_most, near
 from flowborne.validation.worlds import RING, at_start, chain, history, square, whole_steps
 from flowborne.worlds import Boundaries, advance, make_world
 
@@ -139,8 +139,8 @@ def swimming(quick: bool) -> list[Finding]:
         Curve("flowborne, mean of a period", times[::8], mean[::8]),
     )
     plot = Plot("t/T", "forward speed (L/T)", curves)
-    found = near("mean forward speed, L/T", speeds, exact, grids, relative=0.1)
-    return [replace(found, plot=plot, confirmed=confirmed("S1", SPEED))]
+    details = Details(plot=plot, confirmed=confirmed("S1", SPEED))
+    return [near("mean forward speed, L/T", speeds, exact, grids, relative=0.1, **details)]
 
 
 def capsules(links: int) -> str:

@@ -207,7 +207,7 @@ def over_places(
     grids: Sequence[int],
     build: Callable[[int, Place], World],
     field: Field,
-    measure: Callable[[int, World, bool], tuple[Sequence[float], str]],
+    measure: Callable[[World, bool], tuple[Sequence[float], str]],
     once: Sequence[int] = (),
 ) -> tuple[list[Any], list[str]]:
     """Figures of a held body at PLACES in a cell of each grid.
@@ -215,7 +215,7 @@ def over_places(
     Each world starts from the last flow of the one before, as in `refined`.
 
     build    a world, from the cells and the place of the body
-    measure  figures, and a line for people, from the cells, the world, and whether it is the first
+    measure  figures, and a line for people, from the world, and whether it is the first
     once     grids with the first place only, as a run takes half an hour
     returns  each figure by grid and place; lines
     """
@@ -223,7 +223,7 @@ def over_places(
     lines = []
     every = [(n, place) for n in grids for place in PLACES[: 1 if n in once else None]]
     for (n, place), world, first in refined(every, lambda at: build(*at), field):
-        figures, text = measure(n, world, first)
+        figures, text = measure(world, first)
         rows[n].append(figures)
         lines.append(f"{n:>6g} cells, {place[0]:.2f} and {place[1]:.2f} of a cell: {text}")
     by_grid = [list(zip(*found, strict=True)) for found in rows.values()]
