@@ -41,20 +41,15 @@ from flowborne.worlds import (
     make_world,
 )
 
-DIAMETER, CENTRE = 0.1, 0.2
-"""m: of the cylinder, and both coordinates of its centre."""
-
-LENGTH, HEIGHT = 2.2, 0.41
-"""m, of the channel."""
+DIAMETER, CENTRE, LENGTH, HEIGHT = 0.1, 0.2, 2.2, 0.41
+"""m: of the cylinder, both coordinates of its centre; of the channel."""
 
 VISCOSITY = 1e-3
 """Pa s; the fluid's density is 1 kg/m^3."""
 
-GRIDS = {True: (10,), False: (10, 20, 40)}
-"""Cells across D of B2 and B3, by quick; multiples of 10 fit the channel."""
-
-ONCE = (40,)
-"""Grid of B3 with one place: it starts at rest in each, and takes an hour."""
+GRIDS, ONCE = {True: (10,), False: (10, 20, 40)}, (40,)
+"""Cells across D of B2 and B3, by quick: multiples of 10 fit the channel. The grid of B3 with one
+place, as it starts at rest in each and takes an hour."""
 
 CREEPING = Stream(DIAMETER, 0.2, 0.3)
 SHEDDING = Stream(DIAMETER, 1.0, 1.5)
@@ -70,12 +65,10 @@ def pulsed_inflow(x: Array, y: Array, z: Array, time: float) -> tuple[Array, Arr
 
 
 def channel(cells: int, place: Place, inflow: Profile) -> World:
-    """The channel at rest with the cylinder in it, `cells` across its diameter.
-
-    Along the channel the cylinder's centre is at its place in a cell. Across it is on a plane of
-    nodes; where the place is nearer to the next one, one cell more across the channel puts it 0.49
-    of a cell above a plane. The walls allow no others.
-    """
+    """The channel at rest with the cylinder in it, `cells` across its diameter. Along the channel
+    the cylinder's centre is at its place in a cell. Across it is on a plane of nodes; where the
+    place is nearer to the next one, one cell more across the channel puts it 0.49 of a cell above a
+    plane. The walls allow no others."""
     across = round(HEIGHT * cells / DIAMETER) + round(place[1])
     h = HEIGHT / across
     ahead = (place[0] - CENTRE / h) % 1.0
@@ -91,10 +84,8 @@ def channel(cells: int, place: Place, inflow: Profile) -> World:
 
 
 def pressure_drop(world: World) -> float:
-    """p at the front of the cylinder less p at its back, Pa.
-
-    Extrapolated to them along its axis, from two cells whose centres are half a cell or more away.
-    """
+    """p at the front of the cylinder less p at its back, Pa. Extrapolated to them along its axis,
+    from two cells whose centres are half a cell or more away."""
     fluid, state = world.flow()
     (x, y, _), h = fluid.grid.cell_coordinates(), fluid.grid.spacing
     j = int(np.searchsorted(y, CENTRE))

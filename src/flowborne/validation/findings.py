@@ -160,9 +160,7 @@ class Finding:
 
     def verdict(self, coarse: bool = False) -> Verdict:
         """The verdict in a run; `coarse` says that the run's grids are too coarse for the case.
-
-        Only a figure with a grid series can be coarse; all others hold on any grid.
-        """
+        Only a figure with a grid series can be coarse; all others hold on any grid."""
         if not self.confirmed:
             return "unconfirmed"
         if self.passed:

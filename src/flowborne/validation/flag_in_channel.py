@@ -31,25 +31,16 @@ END, SIZE = (0.6, 0.2), (0.35, 0.02)
 DENSITY, VISCOSITY = 1000.0, 1.0
 """Of the fluid, kg/m^3 and Pa s."""
 
-CELLS = (35, 2)
-"""Cells of flesh along and across the flag; with them D1 is 0.5 % off."""
-
-CFL = 1.0
-"""Cells that the fastest inflow crosses in a step."""
+CELLS, CFL = (35, 2), 1.0
+"""Cells of flesh along and across the flag, with which D1 is 0.5 % off; cells that the fastest
+inflow crosses in a step."""
 
 GRIDS = {True: (44,), False: (44, 85, 126)}
 FLUTTERING = (44, 85)
-"""Cells across the channel, by quick; and for FSI2 and FSI3.
-
-With 44 cells and steps of 41 the sides of the flag at rest lie 0.39 and 0.54 of a cell above planes
-of the grid. If they cross such planes the lift jumps, as the corner cells of the flag's end change:
-with CFD1's flow by 0.48 N/m on 41 cells and by 0.28 N/m on 82. Half-way between it is correct.
-FSI1's flag rises by 0.2 cells on 85, which makes its lift too large.
-"""
-
 BEHIND = 0.1
-"""Cells between A and the plane of the grid before it. The jump grows with this distance; on the
-plane the flag's end is not closed."""
+"""Cells across the channel, by quick, and for FSI2 and FSI3; cells between A and the plane of the
+grid before it. With 44 cells and steps of 41 the sides of the flag at rest lie 0.39 and 0.54 of a
+cell above planes. On others, and with its end in other places, it has another lift: D6."""
 
 
 @dataclass(frozen=True)
@@ -157,11 +148,9 @@ def march(world: World, flow: Flow, seconds: float) -> Array:
     return recorded(world, dt, round(seconds / dt), figures)
 
 
-SHORTER = 0.5
-"""Part of a flow's longest time on finer grids, and when quick."""
-
-LAST = 0.1
-"""Last part of that time, for the means and the remaining changes."""
+SHORTER, LAST = 0.5, 0.1
+"""Parts of a flow's longest time: on finer grids and when quick; the last of that time, for the
+means and the remaining changes."""
 
 
 def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[str]]:
@@ -222,10 +211,8 @@ class Flutter:
 
 
 def flutter(rows: Array, dt: float) -> Flutter:
-    """Figures of the last PERIODS periods of drag, lift and displacement of A (steps, 4).
-
-    With fewer periods, of the LAST part of the rows.
-    """
+    """Figures of the last PERIODS periods of drag, lift and displacement of A (steps, 4). With
+    fewer periods, of the LAST part of the rows."""
     _, lift, _, up = rows.T
     clock = up if up.any() else lift
     seen = Oscillation(dt, clock)

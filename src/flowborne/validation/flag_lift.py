@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import product
-
-import numpy as np
 
 from flowborne import World
 from flowborne.validation.case import Case, Tier, reference
-from flowborne.validation.findings import Curve, Finding, Plot, near
+from flowborne.validation.findings import Curve, Details, Finding, Plot, near
 from flowborne.validation.flag_in_channel import CFD, END, LAST, SHORTER, channel, march
 from flowborne.validation.worlds import Parabola, mjcf, refined
 
@@ -22,10 +19,8 @@ PLACES = (0.01, 0.1, 0.3, 0.5, 0.7, 0.9)
 
 ACCEPTED = {41: 0.05, 82: 0.03}
 """Cells across the channel -> accepted error of the lift in every place, over the published lift.
-
 On 41 cells the flag's sides lie on planes of nodes with the axis at 0.2 m, and 0.1 and 0.3 of a
-cell above them with the axis at 0.201 m and 0.203 m.
-"""
+cell above them with the axis at 0.201 m and 0.203 m."""
 
 FLAGS = {
     "square": '<geom type="box" pos="0.4 {y} 0" size="0.2 0.01 0.5"/>',
@@ -68,20 +63,18 @@ def lift_over_places(quick: bool) -> list[Finding]:
         rows = lifts(end, y, list(ACCEPTED)[: 1 if quick else None])
         curves = [Curve("right", PLACES, [exact] * len(PLACES), True)]
         curves += [Curve(f"{cells} cells across", PLACES, row) for cells, row in rows.items()]
+        plot = Plot("cells between end and plane", f"lift with the axis at {y:g} m (N/m)", curves)
         for cells, row in rows.items():
-            worst = row[int(np.argmax(np.abs(np.array(row) - exact)))]
+            worst = max(row, key=lambda lift: abs(lift - exact))
             title = f"worst lift in six places on {cells} cells, {end} end, axis at {y:g} m"
-            found_at = ", ".join(
-                f"{lift:.3f} at {at:g}" for at, lift in zip(PLACES, row, strict=True)
+            listed = ", ".join(f"{at:g}: {lift:.3f}" for at, lift in zip(PLACES, row, strict=True))
+            details = Details(
+                tolerance=f"{100.0 * ACCEPTED[cells]:g} % of {full:g}",
+                lines=[f"cells between end and plane, and lift in N/m: {listed}"],
+                plot=plot if cells == max(rows) else None,
             )
-            lines = [f"lift in N/m at cells behind a plane of nodes: {found_at}"]
-            found = near(title, worst, exact, absolute=ACCEPTED[cells] * full, lines=lines)
-            tolerance = f"{100.0 * ACCEPTED[cells]:g} % of {full:g}"
-            findings.append(replace(found, tolerance=tolerance))
-        plot = Plot(
-            "cells between the flag's end and a plane", f"lift at y = {y:g} m (N/m)", curves
-        )
-        findings[-1] = replace(findings[-1], plot=plot)
+            bound = ACCEPTED[cells] * full
+            findings.append(near(title, worst, exact, absolute=bound, **details))
     return findings
 
 

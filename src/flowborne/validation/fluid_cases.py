@@ -120,11 +120,8 @@ def decay(cells: int, duration: float) -> tuple[Array, Array, Array]:
 
 
 def vortices_break_up(quick: bool) -> list[Finding]:
-    """F3: the first steps, the peak of the dissipation and its whole course.
-
-    The list has the course to within 5 % on 256 cells a side; coarser grids fail by their distance
-    from it.
-    """
+    """F3: the first steps, the peak of the dissipation and its whole course. The list has the
+    course to within 5 % on 256 cells a side; coarser grids fail by their distance from it."""
     grids = Grids("cells a side", (32, 64) if quick else (32, 64, 128))
     runs = [decay(n, 20.0) for n in grids.cells]
     peaks = [rates.max() for _, _, rates in runs]

@@ -190,11 +190,8 @@ class PendulumBox:
         return float(table("I2", "cylinder in closed square, Ca vs D/L")[2.0 * RADIUS / self.side])
 
 
-NARROW = PendulumBox(2.0, ROD, (64, 128, 256, 384))
-"""The bob rests in the middle."""
-
-WIDE = PendulumBox(4.0, 0.0, (128, 256, 512))
-"""For swings of more than 90 degrees, which would leave the other box."""
+NARROW, WIDE = PendulumBox(2.0, ROD, (64, 128, 256, 384)), PendulumBox(4.0, 0.0, (128, 256, 512))
+"""With the bob at rest in the middle; for swings by more than 90 degrees, which leave it."""
 
 
 def small_period(ratio: float, added: float) -> float:

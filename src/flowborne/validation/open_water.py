@@ -67,10 +67,8 @@ def across(cells: Sequence[int]) -> Grids:
 
 def open_water(cells: int, place: Place, viscosity: float) -> World:
     """The cylinder at the origin, in a place of its cell, and the stream that enters the domain.
-
-    The domain reaches 20 D upstream and 30 D downstream and to each side, which slips; half as
-    wide it would raise the drag at Re 100 by 0.8 %.
-    """
+    The domain reaches 20 D upstream and 30 D downstream and to each side, which slips; half as wide
+    it would raise the drag at Re 100 by 0.8 %."""
     lower = -20.0 - place[0] / cells, -30.0 - place[1] / cells
     grid = Grid.slab(50 * cells, 60 * cells, 1.0 / cells, lower)
     return make_world(
@@ -161,10 +159,8 @@ def held_at_185(quick: bool) -> list[Finding]:
 
 
 def quarter(cells: int, place: Place, reynolds: float) -> World:
-    """A quarter of the sphere's box, between two planes about which the flow is symmetric.
-
-    The sphere has its place in a cell along the stream; across it is on planes of nodes.
-    """
+    """A quarter of the sphere's box, between two planes about which the flow is symmetric. The
+    sphere has its place in a cell along the stream; across it is on planes of nodes."""
     counts = (UPSTREAM + DOWNSTREAM) * cells, ASIDE * cells, ASIDE * cells
     grid = Grid(counts, 1.0 / cells, (-UPSTREAM - place[0] / cells, 0.0, 0.0))
     sphere = '<body name="sphere"><geom type="sphere" size="0.5"/></body>'

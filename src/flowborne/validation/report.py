@@ -40,10 +40,8 @@ VERDICTS: tuple[Verdict, ...] = ("fail", "coarse", "pass", "unconfirmed")
 
 
 def read_report(folder: Path) -> Data:
-    """The cases of a report; none when there is no report yet.
-
-    raises  ValueError when the file is no report
-    """
+    """The cases of a report; none when there is no report yet. Raises ValueError when the file is
+    no report."""
     path = folder / DATA
     if not path.exists():
         return {}
@@ -81,10 +79,8 @@ def add_to_report(folder: Path, results: Sequence[Result], order: Iterable[str])
 
 @cache
 def code() -> str:
-    """Digest of every file of the package: solver, cases, references, scenes.
-
-    Two runs with the same digest were made by the same code.
-    """
+    """Digest of every file of the package: solver, cases, references, scenes. Two runs with the
+    same digest were made by the same code."""
     root = Path(flowborne.__file__).parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):

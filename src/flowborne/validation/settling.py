@@ -106,10 +106,9 @@ def settling_cylinder(quick: bool) -> list[Finding]:
 
 
 DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
-"""m and kg/m^3 of V2's sphere, m/s^2."""
-
 HALF, HEIGHT, START = 0.05, 0.16, 0.1275
-"""m: half the box's width, its height, and the height from which the sphere's centre falls."""
+"""m and kg/m^3 of V2's sphere, m/s^2; half the width of its box, the height of that, and the height
+from which its centre falls, m."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +140,8 @@ OILS = (Oil("E1", 970.0, 0.373), Oil("E3", 962.0, 0.113))
 
 def quarter(oil: Oil, cells: int) -> World:
     """A quarter of the box, `cells` in 10 mm, between two planes about which the flow is symmetric.
-
     A quarter of the sphere's weight less its buoyancy pulls at a quarter of its mass. The whole box
-    gives the same velocities to 5e-7 m/s with 4 cells in 10 mm.
-    """
+    gives the same velocities to 5e-7 m/s with 4 cells in 10 mm."""
     h = 0.01 / cells
     counts = [round(side / h) for side in (HALF, HALF, HEIGHT)]
     grid = Grid((counts[0], counts[1], counts[2]), h, (0.0, 0.0, 0.0))

@@ -99,10 +99,8 @@ class Oscillation:
         return self.dt * (at + away[at] / (away[at] - away[at + 1]))
 
     def last(self, periods: int) -> tuple[slice, float]:
-        """The samples of the last whole periods, and the length of one in s.
-
-        Raises ArithmeticError when there are not so many.
-        """
+        """The samples of the last whole periods, and the length of one in s. Raises ArithmeticError
+        when there are not so many."""
         rises = self.rises()
         if rises.size <= periods:
             raise ArithmeticError(f"the lift rises {rises.size} times, {periods + 1} are needed")

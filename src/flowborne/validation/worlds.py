@@ -97,10 +97,8 @@ def history(world: World, dt: float, steps: int, figures: Callable[[], Any]) -> 
 
 
 def frames_of(simulation: Simulation, frames: int, figures: Callable[[FrameReport], Any]) -> Array:
-    """(frames, ...) figures after each of some frames, from the frame's report.
-
-    raises  ArithmeticError when the run blows up
-    """
+    """(frames, ...) figures after each of some frames, from the frame's report. Raises
+    ArithmeticError when the run blows up."""
     try:
         return np.array([figures(simulation.advance_frame()) for _ in range(frames)])
     except BlowUpError as error:
@@ -113,10 +111,8 @@ def force_on(report: StepReport, body: int = 1) -> Array:
 
 
 def start_at_once(world: World, dt: float) -> StepReport:
-    """The first step from a flow that is not yet adapted to its bodies: the impulsive start.
-
-    The pressure of this step is an impulse and no estimate of the next one, so it is cleared.
-    """
+    """The first step from a flow that is not yet adapted to its bodies: the impulsive start. The
+    pressure of this step is an impulse and no estimate of the next one, so it is cleared."""
     report = advance(world, dt)
     _, state = world.flow()
     for values in (*state.acceleration, state.pressure, state.previous_pressure):
@@ -192,12 +188,10 @@ def refined(
 
 
 PLACES = tuple(((k + 0.25) / 5.0 % 1.0, (2.0 * k + 0.25) / 5.0 % 1.0) for k in range(1, 6))
-"""Places (x, y) of a held body in a cell of its grid, in cells from the cell's lower corner.
-
-They are a lattice of five points, (k, 2 k) / 5, a quarter of its step away from the corner. Along
-each axis they are 1/5 of a cell apart and, with their mirror images, 1/10; none lies on a plane of
-nodes or half-way between two, where a grid cuts a round body into equal halves.
-"""
+"""Places (x, y) of a held body in a cell of its grid, in cells from the cell's lower corner. They
+are a lattice of five points, (k, 2 k) / 5, a quarter of its step away from the corner. Along each
+axis they are 1/5 of a cell apart and, with their mirror images, 1/10; none lies on a plane of nodes
+or half-way between two, where a grid cuts a round body into equal halves."""
 
 Place = tuple[float, float]
 ORIGIN: Place = (0.0, 0.0)
