@@ -118,7 +118,7 @@ def steady_cylinder(quick: bool) -> list[Finding]:
     back = (CENTRE + 0.5 * DIAMETER, CENTRE, 0.0)
 
     def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
-        drag, lift, change = steady_flow(world, 1e-2 if quick else 2e-5)
+        drag, lift, change = steady_flow(world, 2e-5)
         figures = drag, lift, pressure_drop(world), backflow(world, back, 3.0 * DIAMETER)
         return figures, f"coefficients change by {change:.1g} in the last D/U"
 

@@ -151,11 +151,12 @@ def held_at_185(quick: bool) -> list[Finding]:
     held, grids = "fixed cylinder Re=185", OPEN_GRIDS[quick]
     (drag, lift, strouhal), lines = shed_in_the_open(185.0, 0.195, grids, quick)
     measured = drag, [np.sqrt(0.5) * np.array(values) for values in lift], strouhal
-    details = Details(confirmed=confirmed("V9", held), lines=lines)
-    return [
-        near(f"{name}, held", values, exact, across(grids), relative=0.05, **details)
-        for (name, exact), values in zip(reference("V9", held).items(), measured, strict=True)
-    ]
+    findings: list[Finding] = []
+    for (name, exact), values in zip(reference("V9", held).items(), measured, strict=True):
+        details = Details(confirmed=confirmed("V9", held), lines=[] if findings else lines)
+        title, on = f"{name}, held", across(grids)
+        findings.append(near(title, values, exact, on, relative=0.05, **details))
+    return findings
 
 
 def quarter(cells: int, place: Place, reynolds: float) -> World:

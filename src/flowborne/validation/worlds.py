@@ -187,11 +187,12 @@ def refined(
         before = world
 
 
-PLACES = tuple(((k + 0.25) / 5.0 % 1.0, (2.0 * k + 0.25) / 5.0 % 1.0) for k in range(1, 6))
+PLACES = tuple(((k + 0.25) / 5.0 % 1.0, (2.0 * k + 0.25) / 5.0 % 1.0) for k in range(3, 8))
 """Places (x, y) of a held body in a cell of its grid, in cells from the cell's lower corner. They
 are a lattice of five points, (k, 2 k) / 5, a quarter of its step away from the corner. Along each
 axis they are 1/5 of a cell apart and, with their mirror images, 1/10; none lies on a plane of nodes
-or half-way between two, where a grid cuts a round body into equal halves."""
+or half-way between two, where a grid cuts a round body into equal halves. In the first, which
+stands alone on the finest grids, B8's figures on 8 cells are within 1 % of their means."""
 
 Place = tuple[float, float]
 ORIGIN: Place = (0.0, 0.0)
