@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines closeness demo lint test browser dist docs gltf-validator imports failing gallery paper exporters fuzz messages size strangers validation-page clean
+.PHONY: baselines closeness demo lint test browser dist docs gltf-validator imports failing same-figures gallery paper exporters fuzz messages size strangers validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -48,6 +48,11 @@ paper: $(VENV)/installed-test
 
 validation-page: $(VENV)/installed-test
 	$(BIN)/python tools/validation_page.py
+
+same-figures: $(VENV)/installed-test
+	rm -rf build/minute
+	-$(BIN)/flowborne validate --report build/minute
+	$(BIN)/python tools/same_figures.py build/minute
 
 exporters: $(VENV)/installed-test
 	$(BIN)/python tools/exporters.py

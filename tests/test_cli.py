@@ -346,6 +346,12 @@ def test_an_interrupted_validation_says_how_it_goes_on(command, cases, monkeypat
     assert err == "flowborne: interrupted; kept has the finished cases; run again to continue\n"
 
 
+def test_a_validation_says_which_cases_of_its_report_are_of_other_code(command, cases, monkeypatch):
+    monkeypatch.setattr("flowborne.validation.report.of_other_code", lambda _: ["B1 (all)", "B2"])
+    code, _, err = command("validate", "--case", "K1", "--report", "kept")
+    assert (code, err) == (0, "kept: measured with other code: B1 (all), B2\n")
+
+
 @pytest.mark.parametrize("arguments", [["validate", "--case", "K2"], ["bench", "K2"]])
 def test_json_is_all_that_is_printed(command, cases, arguments):
     code, out, _ = command(*arguments, "--json")

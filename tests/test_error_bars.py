@@ -99,7 +99,8 @@ def test_what_no_bar_can_be_put_on_is_refused(
 
 @dataclass
 class Runs:
-    """Stands in for runs, whose number would be 3 - 50 / cells^2 - 4 / steps^2."""
+    """Stands in for runs, whose number would be 3 - 50 / cells^2 - 4 / steps^2, and 0.01 more with
+    the eel's domain half a cell aside."""
 
     outcome: RunOutcome = RunOutcome.DONE
     scenes: list[fb.Scene] = field(default_factory=list)
@@ -112,7 +113,10 @@ class Runs:
         domain, time = self.scenes[-1].domain, self.scenes[-1].time
         assert domain is not None
         assert domain.resolution is not None
-        return 3.0 - 50.0 / domain.resolution**2 - 4.0 / time.steps_per_frame**2
+        aside = domain.lower[0] / domain.spacing()
+        assert domain.lower == pytest.approx((aside * domain.spacing(),) * 2)
+        assert np.subtract(domain.upper, domain.lower) == pytest.approx((1.22, 1.22))
+        return 3.0 + 0.02 * aside - 50.0 / domain.resolution**2 - 4.0 / time.steps_per_frame**2
 
 
 @pytest.fixture
@@ -123,16 +127,17 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> Runs:
     return made
 
 
-def test_bars_of_grid_and_step_are_added_and_no_run_is_made_twice(runs: Runs) -> None:
+def test_bars_of_grid_step_and_place_are_added_and_no_run_is_made_twice(runs: Runs) -> None:
     found = fb.error_bar("eel", runs.number, (20, 40, 80), (1, 2, 4))
-    assert len(runs.scenes) == 5
+    assert len(runs.scenes) == 6
     assert found.grids is not None
     assert found.steps is not None
     assert (found.grids.order, found.steps.order) == pytest.approx((2.0, 2.0))
     assert found.value == pytest.approx(3.0 - 50.0 / 6400.0 - 0.25)
-    assert found.uncertainty == pytest.approx(1.25 * (50.0 / 6400.0 + 0.25))
-    assert found.spread == pytest.approx(4.0 - 0.25)
-    assert str(found) == "2.742 ± 0.32 (grid 0.0098, step 0.31)"
+    assert found.shifted == pytest.approx(found.value + 0.01)
+    assert found.uncertainty == pytest.approx(1.25 * (50.0 / 6400.0 + 0.25) + 0.01)
+    assert found.spread == pytest.approx(4.0 - 0.25 + 0.01)
+    assert str(found) == "2.742 ± 0.33 (grid 0.0098, step 0.31, place 0.01)"
     assert str(found.grids) == "2.742 ± 0.0098 (order 2)"
 
 
@@ -175,7 +180,7 @@ def test_steps_of_a_scene_show_the_order_of_its_scheme(tmp_path: Path) -> None:
         return float(run.history["position_along_m"][-1])
 
     found = fb.error_bar(tmp_path / "spring.toml", final, steps=(8, 16, 32))
-    assert found.grids is None
+    assert (found.grids, found.shifted) == (None, None)
     assert found.steps is not None
     exact = math.cos(2.0 * 0.5)
     assert abs(found.value - exact) < found.uncertainty < 0.05

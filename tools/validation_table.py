@@ -15,6 +15,7 @@ from flowborne.validation.report import (
     failures,
     grid_of,
     is_finest,
+    of_other_code,
     read_report,
     tier_of,
     verdict_of,
@@ -55,6 +56,7 @@ def made_from() -> str:
     cases = [tiers[tier_of(tiers)] for tiers in read_report(REPORT).values()]
     measured = Counter((case["version"], case.get("code", "")) for case in cases)
     now = sum(count for (_, digest), count in measured.items() if digest == code())
+    stale = ", ".join(of_other_code(read_report(REPORT)))
     runs = "\n".join(
         f"* {count} cases: version `{version}`" + (f", code `{digest}`" if digest else "")
         for (version, digest), count in measured.most_common()
@@ -64,6 +66,7 @@ def made_from() -> str:
         "exactly this code and the others with earlier code, which each case names. A version that "
         "ends in `.d` and a date had changes that were not committed; the code is a digest of all "
         f"files of the package.\n\n{runs}"
+        + (f"\n\nMeasured with other code: {stale}." if stale else "")
     )
 
 

@@ -489,6 +489,7 @@ def validate(
 ) -> None:
     """Compare with analytic and published cases."""
     from flowborne.validation import Tier, case_ids
+    from flowborne.validation.report import of_other_code, read_report
     from flowborne.validation.running import run_cases
 
     ids = _known(case or [], case_ids(), "case", "--case")
@@ -502,6 +503,8 @@ def validate(
     except KeyboardInterrupt as stop:
         kept = "" if report is None else f"; {report} has the finished cases; run again to continue"
         raise StoppedError(f"interrupted{kept}") from stop
+    if report is not None and (stale := of_other_code(read_report(report))):
+        print(f"{report}: measured with other code: {', '.join(stale)}", file=sys.stderr)
     _report(results, as_json)
 
 

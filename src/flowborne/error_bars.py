@@ -17,6 +17,7 @@ from flowborne.errors import SceneError
 from flowborne.running import RunOutcome, run
 from flowborne.runs.open_run import OpenRun
 from flowborne.scenes.load import load_scene
+from flowborne.scenes.schema import Scene
 
 Array = NDArray[np.float64]
 
@@ -121,10 +122,13 @@ class ErrorBar:
     """A number of a scene with its numerical uncertainty.
 
     value        on the finest grid with the shortest step
-    uncertainty  half width of its bar: the sum of those of grids and steps
+    uncertainty  half width of its bar: the sum of those of grids, steps and place
     spread       largest value minus the smallest, of all runs
     grids        its values on all grids, with the shortest step; None for one grid
     steps        its values with all steps, on the finest grid; None for one step
+    shifted      value on the finest grid half a cell aside; None for one grid. Its distance from
+                 `value` is the half width of the place: if a number varies over a cell, the places
+                 half a cell apart are on either side of its mean
     """
 
     value: float
@@ -132,10 +136,13 @@ class ErrorBar:
     spread: float
     grids: Refinement | None
     steps: Refinement | None
+    shifted: float | None
 
     def __str__(self) -> str:
         found = {"grid": self.grids, "step": self.steps}
         parts = [f"{name} {one.uncertainty:.2g}" for name, one in found.items() if one is not None]
+        if self.shifted is not None:
+            parts.append(f"place {abs(self.shifted - self.value):.2g}")
         return f"{self.value:.4g} ± {self.uncertainty:.2g} ({', '.join(parts)})"
 
 
@@ -151,8 +158,9 @@ def error_bar(
 ) -> ErrorBar:
     """Error bar of a number, from runs of a scene on several grids and with several steps.
 
-    The grids are run with the last number of steps, the steps on the last grid. The bar contains
-    the errors of grid and step only, not those of the model.
+    The grids are run with the last number of steps, the steps on the last grid. With several grids
+    the last one is run again half a cell aside along every axis, and the sides of the domain with
+    it. The bar contains the errors of grid and step only, not those of the model.
 
     scene        name of a built-in scene, or path of a scene file
     measure      a column of the history, for its mean over all frames, or a function of a run
@@ -177,23 +185,41 @@ def error_bar(
     counts: list[int | None] = [*steps] or [None]
     grids = [(cells, counts[-1]) for cells in cells_of]
     times = [(cells_of[-1], count) for count in counts]
-    values: dict[tuple[int | None, int | None], float] = {}
-    for cells, count in dict.fromkeys([*grids, *times]):
+    runs = [(*pair, False) for pair in dict.fromkeys([*grids, *times])]
+    aside = (*times[-1], True)
+    values: dict[tuple[int | None, int | None, bool], float] = {}
+    for cells, count, moved in [*runs, aside] if len(grids) > 1 else runs:
         keys = {"domain.resolution": cells, "time.steps_per_frame": count}
         chosen = {key: str(number) for key, number in keys.items() if number is not None}
         name = ", ".join(f"{key}={number}" for key, number in chosen.items())
+        name += ", half a cell aside" if moved else ""
         loaded = load_scene(scene, {**(settings or {}), **chosen})
+        loaded = _shifted(loaded) if moved else loaded
         with TemporaryDirectory() as thrown_away:
             folder = Path(thrown_away if out is None else out) / name.replace(", ", " ")
             result = run(loaded, folder, frames=frames, film=False)
             if result.outcome is not RunOutcome.DONE:
                 raise SceneError(f"no error bar of {scene} with {name}: {result.message}.")
-            values[cells, count] = _measured(OpenRun(folder), measure)
-    grid = Refinement.of(resolutions, [values[key] for key in grids]) if len(grids) > 1 else None
-    step = Refinement.of(steps, [values[key] for key in times]) if len(times) > 1 else None
+            values[cells, count, moved] = _measured(OpenRun(folder), measure)
+    ways = (resolutions, grids), (steps, times)
+    grid, step = (
+        Refinement.of(numbers, [values[*key, False] for key in keys]) if len(keys) > 1 else None
+        for numbers, keys in ways
+    )
+    value, shifted = values[*times[-1], False], values.get(aside)
     uncertainty = sum(found.uncertainty for found in (grid, step) if found is not None)
-    spread = float(np.ptp(list(values.values())))
-    return ErrorBar(values[times[-1]], uncertainty, spread, grid, step)
+    uncertainty += 0.0 if shifted is None else abs(shifted - value)
+    return ErrorBar(value, uncertainty, float(np.ptp(list(values.values()))), grid, step, shifted)
+
+
+def _shifted(scene: Scene) -> Scene:
+    """The scene with its domain half a cell further along every axis."""
+    domain = scene.domain
+    assert domain is not None
+    half = 0.5 * domain.spacing()
+    corners = {"lower": domain.lower, "upper": domain.upper}
+    moved = {name: tuple(x + half for x in corner) for name, corner in corners.items()}
+    return scene.model_copy(update={"domain": domain.model_copy(update=moved)})
 
 
 def order_of(spacings: Array, values: Array) -> float:

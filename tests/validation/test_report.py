@@ -19,6 +19,7 @@ from flowborne.validation.report import (
     add_to_report,
     already_there,
     failures,
+    of_other_code,
     read_report,
     verdict_of,
     verdicts,
@@ -26,8 +27,9 @@ from flowborne.validation.report import (
 
 MINUTE, HALF_HOUR, ALL = Tier
 
-SERIES = GridSeries("cells across D", (8, 16, 32), (1.2, 1.05, 1.01), (0.2, 0.05, 0.01))
-
+SERIES = GridSeries(
+    "cells across D", (8, 16, 32), (1.2, 1.05, 1.01), (0.2, 0.05, 0.01), ((1.1, 1.3),) * 3
+)
 
 PLOT = Plot(
     "t (s)",
@@ -92,7 +94,7 @@ def test_the_page_is_sound_and_says_everything(tmp_path: Path) -> None:
     write_page(tmp_path)
     text = (tmp_path / PAGE).read_text()
     assert "2 cases with 2 figures: 1 pass, 1 fail, 0 are outside" in text
-    assert "<td>32 cells across D</td>" in text
+    assert "<td>32 cells across D, mean of 2 places with a spread of 0.2</td>" in text
     assert "Tier all, its finest grids" in text
     assert "Tier minute, not its finest grids" in text
     assert "drag &amp; lift" in text
@@ -133,12 +135,15 @@ def test_only_a_run_of_the_same_code_in_the_same_tier_is_there_already(
     assert not already_there(tmp_path, {"B1": MINUTE})
 
 
-def test_a_report_from_before_there_were_tiers_is_read(tmp_path: Path) -> None:
-    add_to_report(tmp_path, [result("K11", "fail")], case_ids())
-    old = json.loads((tmp_path / DATA).read_text())
-    old["cases"]["K11"] = {"quick": old["cases"]["K11"]["minute"]}
-    (tmp_path / DATA).write_text(json.dumps(old))
-    assert list(read_report(tmp_path)["K11"]) == ["half-hour"]
+def test_cases_of_other_code_are_named_with_the_tiers_of_which_that_is_true(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_to_report(tmp_path, [result("B1", "pass")], case_ids())
+    add_to_report(tmp_path, [result("B2", "pass", tier=ALL)], case_ids())
+    assert not of_other_code(read_report(tmp_path))
+    monkeypatch.setattr(report, "code", lambda: "another")
+    add_to_report(tmp_path, [result("B1", "pass", tier=ALL)], case_ids())
+    assert of_other_code(read_report(tmp_path)) == ["B1 (minute)", "B2"]
 
 
 def test_a_folder_with_another_report_is_left_alone(tmp_path: Path) -> None:

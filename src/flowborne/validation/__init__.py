@@ -20,6 +20,7 @@ MODULES = {
     "creatures": ("K11",),
     "fishrobot": ("R2",),
     "flag_in_channel": ("D2", "D3"),
+    "flag_lift": ("D6",),
     "flapping_ellipse": ("S3",),
     "flesh": ("D1", "D4", "D5"),
     "far_sides": ("I10",),

@@ -240,11 +240,9 @@ SOLID_IMAGES = 4.84372 / (2.0 * np.pi)
 
 
 def unbounded(added: float, displaced: float, solid: bool = False) -> float:
-    """Added mass over the fluid's density without the box of 1 m, from that in its middle.
-
-    The body's dipole S is the sum of displaced and added volume; in the box it is
-    S / (1 - images S).
-    """
+    """Added mass over the fluid's density without the box of 1 m, from that in its middle. The
+    body's dipole S is the sum of displaced and added volume; in the box it is S / (1 - images
+    S)."""
     dipole = added + displaced
     return dipole / (1.0 + (SOLID_IMAGES if solid else FLAT_IMAGES) * dipole) - displaced
 
@@ -300,11 +298,9 @@ def turning(a: float, b: float) -> float:
 
 
 def free_turning(boxed: float, a: float, b: float) -> float:
-    """Added moment of inertia without the box of 1 m, from that in its middle.
-
-    The images of the body's quadrupole, (a^2 - b^2)(a + b)^2/16, add its square times a number
-    that follows from I2's ellipse.
-    """
+    """Added moment of inertia without the box of 1 m, from that in its middle. The images of the
+    body's quadrupole, (a^2 - b^2)(a + b)^2/16, add its square times a number that follows from I2's
+    ellipse."""
 
     def square(a: float, b: float) -> float:
         return ((a**2 - b**2) * (a + b) ** 2 / 16.0) ** 2
@@ -359,21 +355,15 @@ def quarter(cells: int) -> Grid:
 
 
 def without_thickness(cells: Cells, values: Sequence[float]) -> float:
-    """Limit of values on three grids for no thickness in the fluid, which is proportional to
-    e = 1/cells.
-
-    The flow round a thin rim of any shape adds terms in e ln e and e.
-    """
+    """Limit of values on three grids for no thickness in the fluid, which is proportional to e =
+    1/cells. The flow round a thin rim of any shape adds terms in e ln e and e."""
     e = 1.0 / np.array(cells)
     return float(np.linalg.solve(np.column_stack([e**0, e * np.log(e), e]), values)[0])
 
 
 def disc(quick: bool) -> list[Finding]:
-    """A disc broadside, and its limit for no thickness, as in the list.
-
-    In the fluid it is 1.75 cells thick, and a disc of this thickness has the added mass of the
-    series.
-    """
+    """A disc broadside, and its limit for no thickness, as in the list. In the fluid it is 1.75
+    cells thick, and a disc of this thickness has the added mass of the series."""
     half = 0.2
     cells = (16, 32, 64) if quick else (32, 64, 128)
     geom = f'<geom type="cylinder" size="{half} {THIN}" zaxis="0 1 0"/>'

@@ -123,9 +123,7 @@ def energy(world: World, dt: float) -> float:
 
 def swings(steps: int, periods: float) -> tuple[float, float]:
     """Drift of the energy and largest error of a joint's position, m, `steps` in a period of 2 s.
-
-    The drift is that of the mean over a tenth of the run, from the first tenth to the last.
-    """
+    The drift is that of the mean over a tenth of the run, from the first tenth to the last."""
     dt = 2.0 / steps
     world = double_pendulum(0.5, 0.4)
     start(world, dt)
@@ -282,10 +280,8 @@ def floating(flat: bool) -> str:
 
 
 def kept(flat: bool, dt: float, seconds: float) -> tuple[float, float]:
-    """Largest change of linear and of angular momentum over their first values.
-
-    The chain flies and tumbles while its motors swing its joints.
-    """
+    """Largest change of linear and of angular momentum over their first values. The chain flies and
+    tumbles while its motors swing its joints."""
     motions = tuple(
         TrajectorySinusoid(np.array([6 + k]), 0.6 + 0.1 * k, 1.0 + 0.1 * k, 0.2 * k, 0.4 * k)
         for k in range(LINKS - 1)

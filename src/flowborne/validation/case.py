@@ -120,8 +120,8 @@ class Result:
         """The result that `as_dict` gave."""
         found = {name: value for name, value in row.items() if name != "grid"}
         if "series" in row:
-            names = ("label", "cells", "values", "errors")
-            found["series"] = GridSeries(*(row["series"][name] for name in names))
+            given = {name: value for name, value in row["series"].items() if name != "order"}
+            found["series"] = GridSeries(**given)
         if "plot" in row:
             plot = row["plot"]
             found["plot"] = Plot(plot["x"], plot["y"], [Curve(**curve) for curve in plot["curves"]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,11 +13,9 @@ from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, 
 from flowborne.validation.worlds import NOWHERE, Uniform, refined
 from flowborne.worlds import Boundaries, BoundaryNoSlip, advance, make_world
 
-LONGEST = 400.0
-"""s within which a flow has to become steady."""
-
-MISPRINT = (400, 0.9063)
-"""Reynolds number and x of a wrong value in the printed table."""
+LONGEST, MISPRINT = 400.0, (400, 0.9063)
+"""s within which a flow has to become steady; Reynolds number and x of a value misprinted in the
+table."""
 
 
 def cavity(cells: int, reynolds: int) -> World:
@@ -33,10 +30,8 @@ def cavity(cells: int, reynolds: int) -> World:
 
 
 def settle(world: World, rate: float) -> float:
-    """Time in s at which max|du/dt| falls below `rate` (m/s^2).
-
-    Raises ArithmeticError when the flow does not become steady.
-    """
+    """Time in s at which max|du/dt| falls below `rate` (m/s^2). Raises ArithmeticError when the
+    flow does not become steady."""
     fluid, state = world.flow()
     dt = fluid.grid.spacing  # the lid crosses a cell in a step
     while world.time < LONGEST:
@@ -106,10 +101,8 @@ def primary_vortex(world: World) -> tuple[float, float, float]:
 
 
 def lid_driven(quick: bool) -> list[Finding]:
-    """F2: velocity profiles, and position and strength of the primary vortex.
-
-    The tables are accurate to some thousandths, so that the deviation from them levels off.
-    """
+    """F2: velocity profiles, and position and strength of the primary vortex. The tables are
+    accurate to some thousandths, so that the deviation from them levels off."""
     # even, so that faces lie on the centre lines; at Re 1000 32 cells are too coarse for the layer
     # under the lid: the flow does not become steady
     grids = Grids("cells a side", (16, 32) if quick else (64, 128, 160))
@@ -123,8 +116,8 @@ def lid_driven(quick: bool) -> list[Finding]:
             rows.append((*deviations(world, reynolds), *primary_vortex(world)))
         u, v, x, y, psi = zip(*rows, strict=True)
         for name, values, plot in zip("uv", (u, v), plots(world, reynolds), strict=True):
-            finding = at_most(f"max|{name} - table|, Re {reynolds}", values, 0.01, grids)
-            findings.append(replace(finding, plot=plot))
+            title = f"max|{name} - table|, Re {reynolds}"
+            findings.append(at_most(title, values, 0.01, grids, plot=plot))
         exact = reference("F2", "primary vortex (x,y,psi)")[str(reynolds)]
         of = f"of the vortex, Re {reynolds}"
         findings += [

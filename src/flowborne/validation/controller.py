@@ -158,11 +158,9 @@ def drag_law(incidence: Array) -> Array:
 
 
 def drag_at_rest(quick: bool) -> list[Finding]:
-    """K3: most and least drag without the relative velocity, for winds from several sides.
-
-    The least drag is at tan phi = w/L, where d/dphi (L sin^3 + w cos^3) = 0: a corner of a thick
-    block points into the wind.
-    """
+    """K3: most and least drag without the relative velocity, for winds from several sides. The
+    least drag is at tan phi = w/L, where d/dphi (L sin^3 + w cos^3) = 0: a corner of a thick block
+    points into the wind."""
     pace = 0.5
     scale = 2.0 * AIR * SPEED**2 * LENGTH
     corner = float(np.degrees(np.arctan(WIDTH / LENGTH)))
@@ -190,11 +188,9 @@ def drag_at_rest(quick: bool) -> list[Finding]:
 
 
 def drag_of_slender_blocks(quick: bool) -> list[Finding]:
-    """K3 for blocks of several shapes, with the settings of the scene of least drag.
-
-    The least drag is at a kink with different slopes on its sides: a probe of constant width would
-    find a minimum away from it.
-    """
+    """K3 for blocks of several shapes, with the settings of the scene of least drag. The least drag
+    is at a kink with different slopes on its sides: a probe of constant width would find a minimum
+    away from it."""
     model = resources.files("flowborne.scenes.library").joinpath("block.xml").read_text()
     findings = []
     for aspect in (5.0,) if quick else (4.0, 5.0, 10.0):
@@ -216,10 +212,8 @@ def drag_of_slender_blocks(quick: bool) -> list[Finding]:
 
 
 def hinge_angles(simulation: Simulation, frames: int) -> Array:
-    """(frames + 1,) degrees of a scene's only joint, at the start and after each frame.
-
-    raises  ArithmeticError when the run blows up
-    """
+    """(frames + 1,) degrees of a scene's only joint, at the start and after each frame. Raises
+    ArithmeticError when the run blows up."""
 
     def angle(_: object = None) -> float:
         return float(simulation.world.solid.q[0])

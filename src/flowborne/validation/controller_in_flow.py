@@ -53,23 +53,22 @@ def course(
     rule: str | None = None,
     start: float | None = None,
 ) -> AngleHistory:
-    """Run a built-in block scene with one worker.
+    """Run a built-in block scene with one worker; what is None is that of the scene.
 
-    frames      number of frames; that of the scene when None
     strength    degrees/s
-    resolution  of the domain; that of the scene when None
-    rule        of the controller; that of the scene when None
-    start       angle in degrees; that of the scene when None
+    resolution  of the domain
+    rule        of the controller
+    start       angle in degrees
     raises      ArithmeticError when the run blows up
     """
-    settings = {"control.0.strength": str(strength)}
-    if resolution is not None:
-        settings["domain.resolution"] = str(resolution)
-    if rule is not None:
-        settings["controller.rule.kind"] = rule
-    if start is not None:
-        settings["initial.positions.hinge"] = str(start)
-    with Simulation(load_scene(scene, settings), workers=1) as simulation:
+    settings = {
+        "control.0.strength": strength,
+        "domain.resolution": resolution,
+        "controller.rule.kind": rule,
+        "initial.positions.hinge": start,
+    }
+    given = {key: str(value) for key, value in settings.items() if value is not None}
+    with Simulation(load_scene(scene, given), workers=1) as simulation:
         angles = hinge_angles(simulation, simulation.frames if frames is None else frames)
     return judged(angles, strength / FRAMES_PER_SECOND)
 
@@ -88,10 +87,8 @@ def judged(angles: Array, step: float) -> AngleHistory:
 
 
 def held_drag(degrees: float, resolution: int, seconds: float) -> float:
-    """Mean pressure drag of the block held at an angle, N, over the last half of `seconds`.
-
-    In a step the stream of 1 m/s moves by a quarter of a cell.
-    """
+    """Mean pressure drag of the block held at an angle, N, over the last half of `seconds`. In a
+    step the stream of 1 m/s moves by a quarter of a cell."""
     settings = {"domain.resolution": str(resolution), "initial.positions.hinge": str(degrees)}
     world = Simulation(load_scene("ns-block-drag-max", settings)).world
     command = hold_all(1)

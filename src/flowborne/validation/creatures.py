@@ -26,15 +26,10 @@ thicker."""
 COARSE_SWIMMER = {"domain.resolution": "72"}
 """Settings of the swimmer's quick runs: legs of 1.4 cells."""
 
-CYCLE = 1.75
-"""s, of the swimmer."""
+CYCLE, LEAST_GAIN = 1.75, 1.2
+"""s of the swimmer, and its least gain by the legs that the paper claims."""
 
-LEAST_GAIN = 1.2
-"""Least gain by the legs that the paper claims for its swimmer."""
-
-SWIMMERS = ("swimmer", "swimmer-jet-only", "swimmer-no-control")
-
-STROKE = "swimmer-stroke"
+SWIMMERS, STROKE = ("swimmer", "swimmer-jet-only", "swimmer-no-control"), "swimmer-stroke"
 
 
 @dataclass(frozen=True)

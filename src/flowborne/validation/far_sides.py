@@ -24,11 +24,8 @@ from flowborne.validation.findings import Finding, Grids, near
 from flowborne.validation.worlds import Vector
 from flowborne.worlds import Boundaries, BoundaryClosed, BoundaryFar
 
-ASIDE = 0.3
-"""Radii by which a box lies beside the body, along every axis."""
-
-FLAT = 0.1
-"""Width of the ellipse over its length."""
+ASIDE, FLAT = 0.3, 0.1
+"""Radii by which a box lies beside the body, along every axis; width of the ellipse over length."""
 
 FAR, CLOSED = BoundaryFar(), BoundaryClosed()
 AROUND = Boundaries(FAR, FAR, FAR, FAR)
@@ -113,12 +110,8 @@ def disc(quick: bool) -> Finding:
     return near(title, without_thickness(cells, values), 1.0, relative=0.02)
 
 
-WHOLE = (-1.22, -1.42), (2.44, 2.24)
-"""Corners of a domain of 3.66 x 3.66 m that holds the eel's whole way, m."""
-
-
-EEL_CELL = 0.01
-"""m"""
+WHOLE, EEL_CELL = ((-1.22, -1.42), (2.44, 2.24)), 0.01
+"""Corners of a domain of 3.66 x 3.66 m that holds the eel's whole way, and its cells, m."""
 
 
 def eel_way(

@@ -196,10 +196,8 @@ def posture(model: SolidModel, q: Array) -> tuple[Array, Array, float]:
 
 
 def draw_frame(frame: int, path: Path) -> None:
-    """Picture of the scene after `frame` frames.
-
-    raises  ValueError when this machine cannot draw in three dimensions
-    """
+    """Picture of the scene after `frame` frames. Raises ValueError when this machine cannot draw in
+    three dimensions."""
     import imageio.v3 as imageio
 
     from flowborne.pictures import Picture, Run

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
@@ -14,6 +14,10 @@ Value = float | str
 Verdict = Literal["pass", "coarse", "fail", "unconfirmed"]
 """`coarse` is a figure outside its tolerance on a grid too coarse for it. This is no failure, as a
 case is judged on its finest grids. A figure inside its tolerance passes on any grid."""
+
+
+Figures = Sequence[float] | Sequence[Sequence[float]] | Array
+"""A figure on each of several grids, or in several places of a body in the cell on each."""
 
 
 class Grids(NamedTuple):
@@ -29,20 +33,27 @@ class GridSeries:
 
     values  the figure on each grid
     errors  its error on each, not negative
+    places  the figure in each place of a body in the cell, on each grid, if it has several places
     """
 
     label: str
     cells: Sequence[float]
     values: Sequence[float]
     errors: Sequence[float]
+    places: Sequence[Sequence[float]] = ()
 
     @classmethod
     def toward(
-        cls, grids: Grids, values: Sequence[float] | Array, exact: float, relative: bool = False
+        cls, grids: Grids, values: Figures, exact: float, relative: bool = False
     ) -> GridSeries:
-        """A series with the errors |value - exact|, or, if `relative`, |value / exact - 1|."""
-        errors = [abs(value / exact - 1.0 if relative else value - exact) for value in values]
-        return cls(*grids, list(values), errors)
+        """A series with the errors |value - exact|, or, if `relative`, |value / exact - 1|.
+
+        values  one on each grid, or several in different places of a body, whose mean counts
+        """
+        means = [float(np.mean(value)) for value in values]
+        errors = [abs(value / exact - 1.0 if relative else value - exact) for value in means]
+        places = [list(np.atleast_1d(value)) for value in values] if np.ndim(values[0]) else ()
+        return cls(*grids, means, errors, places)
 
     @property
     def order(self) -> float:
@@ -67,6 +78,8 @@ class GridSeries:
             f"{cells:>6g} {self.label}: {value:.6g}, error {error:.3g}"
             for cells, value, error in zip(self.cells, self.values, self.errors, strict=True)
         ]
+        for n, found in enumerate(self.places):
+            rows[n] += f", {spread_of(found)}, from {min(found):.6g} to {max(found):.6g}"
         if len(self.cells) > 1 and np.isfinite(self.order):
             rows.append(f"observed order {self.order:.2f}")
         elif len(self.cells) > 1:
@@ -76,13 +89,21 @@ class GridSeries:
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON; an order that does not exist is None."""
         order = self.order
-        return {
+        places = [[float(v) for v in found] for found in self.places]
+        return ({"places": places} if places else {}) | {
             "label": self.label,
             "cells": [float(c) for c in self.cells],
             "values": [float(v) for v in self.values],
             "errors": [float(e) for e in self.errors],
             "order": order if np.isfinite(order) else None,
         }
+
+
+def spread_of(places: Sequence[float]) -> str:
+    """The largest difference of a figure over the places of a body in the cell, in words."""
+    if len(places) == 1:
+        return "in one place"
+    return f"mean of {len(places)} places with a spread of {np.ptp(places):.2g}"
 
 
 @dataclass(frozen=True)
@@ -139,9 +160,7 @@ class Finding:
 
     def verdict(self, coarse: bool = False) -> Verdict:
         """The verdict in a run; `coarse` says that the run's grids are too coarse for the case.
-
-        Only a figure with a grid series can be coarse; all others hold on any grid.
-        """
+        Only a figure with a grid series can be coarse; all others hold on any grid."""
         if not self.confirmed:
             return "unconfirmed"
         if self.passed:
@@ -149,7 +168,17 @@ class Finding:
         return "coarse" if coarse and self.series is not None else "fail"
 
 
-Measured = float | Sequence[float] | Array | GridSeries
+class Details(TypedDict, total=False):
+    """Values of a `Finding` besides or in place of those that a function gives it."""
+
+    tolerance: Value
+    series: GridSeries | None
+    lines: Sequence[str]
+    plot: Plot | None
+    confirmed: bool
+
+
+Measured = float | Figures | GridSeries
 """A number; figures on several grids, of which the last counts; or a series of them."""
 
 
@@ -161,7 +190,7 @@ def near(
     *,
     relative: float | None = None,
     absolute: float | None = None,
-    lines: Sequence[str] = (),
+    **details: Unpack[Details],
 ) -> Finding:
     """A finding that passes within a relative or an absolute tolerance of its reference.
 
@@ -172,23 +201,24 @@ def near(
     assert bound is not None
     passed = bool(abs(figure - reference) <= bound)
     tolerance = f"{100.0 * relative:g} %" if relative is not None else f"{bound:g}"
-    return Finding(quantity, figure, reference, tolerance, passed, series, lines)
+    return replace(Finding(quantity, figure, reference, tolerance, passed, series), **details)
 
 
 def within(
     quantity: str,
-    values: Sequence[float] | Array,
+    values: Figures,
     reference: float,
     interval: tuple[float, float],
     on: Grids,
-    *,
-    lines: Sequence[str] = (),
+    **details: Unpack[Details],
 ) -> Finding:
     """A finding on several grids whose last value has to lie in an interval."""
     value, series = _figure(values, reference, on)
     low, high = interval
-    passed = low <= value <= high
-    return Finding(quantity, value, reference, f"[{low:g}, {high:g}]", passed, series, lines)
+    found = Finding(
+        quantity, value, reference, f"[{low:g}, {high:g}]", low <= value <= high, series
+    )
+    return replace(found, **details)
 
 
 def falling(found: Finding) -> Finding:
@@ -203,16 +233,10 @@ def at_most(
     value: Measured,
     bound: float,
     on: Grids | None = None,
-    *,
-    lines: Sequence[str] = (),
+    **details: Unpack[Details],
 ) -> Finding:
-    """A finding whose reference is 0 and whose size may be at most `bound`.
-
-    on  the grids of several figures
-    """
-    figure, series = _figure(value, 0.0, on)
-    passed = bool(abs(figure) <= bound)
-    return Finding(quantity, figure, 0.0, f"{bound:g}", passed, series, lines)
+    """A finding whose reference is 0 and whose size may be at most `bound`."""
+    return near(quantity, value, 0.0, on, absolute=bound, **details)
 
 
 def above(

@@ -25,11 +25,8 @@ from flowborne.validation.worlds import frames_of
 RUNS = ("0.50", "1.00", "1.50", "2.00")
 """Names of the runs: Hz of the motor as it was set."""
 
-FRAMES = 40
-"""Frames per beat."""
-
-SKIPPED, COUNTED = 6, 3
-"""Beats from the start that are left out, and those that are measured after them."""
+FRAMES, SKIPPED, COUNTED = 40, 6, 3
+"""Frames per beat, beats from the start that are left out, and those that are measured after."""
 
 HEAD = -0.006
 """x of the middle of the head's two markers in the frame of the head, m."""
@@ -110,10 +107,8 @@ def first_harmonics(
     time: Array, place: Array, heading: Array, beat: float
 ) -> tuple[tuple[float, float], Array]:
     """Amplitudes of the beat: of the place across the mean course, m, and of the heading, rad; and
-    the course (2,), a unit vector.
-
-    They are least-squares fits of two harmonics and a cubic trend, which turns and drifts.
-    """
+    the course (2,), a unit vector. They are least-squares fits of two harmonics and a cubic trend,
+    which turns and drifts."""
     trend = np.polynomial.polynomial.polyvander(2.0 * time / time[-1] - 1.0, 3)
     waves = [f(2.0 * np.pi * n * beat * time) for n in (1, 2) for f in (np.sin, np.cos)]
     columns = np.column_stack([trend, *waves])
@@ -205,11 +200,10 @@ def compared(runs: Sequence[str], cells: Sequence[int], bar: Sequence[str] = ())
             )
     twin, slender = (reference("R2", name) for name in ("authors' twin", "elongated-body theory"))
     title = f"mean error of speed over {len(runs)} runs, m/s"
-    others = [
-        f"the authors' fitted twin {twin:g} and elongated-body theory {slender:g}, over 8 runs"
-    ]
-    found = at_most(title, np.mean(errors, axis=0), twin, grids, lines=others)
-    return [*findings, replace(found, reference=twin, tolerance="at most")]
+    others = f"the authors' fitted twin {twin:g} and elongated-body theory {slender:g}, over 8 runs"
+    mean = np.mean(errors, axis=0)
+    found = at_most(title, mean, twin, grids, tolerance="at most", lines=[others])
+    return [*findings, replace(found, reference=twin)]
 
 
 def per_beat(speed: float, real: Mapping[str, float]) -> str:

@@ -22,8 +22,8 @@ LENGTH, HEIGHT = 2.5, 0.41
 """m, of the channel."""
 
 CYLINDER = '<geom type="cylinder" pos="0.2 0.2 0" size="0.05 0.5"/>'
-PLATE = '<geom type="box" pos="0.4 0.2 0" size="0.2 0.01 0.5"/>'
-"""The cylinder, and the rigid flag of D2 from the cylinder's middle to its end A."""
+RIGID = mjcf(CYLINDER, '<geom type="box" pos="0.4 0.2 0" size="0.2 0.01 0.5"/>')
+"""The cylinder, and with the rigid flag of D2 from the cylinder's middle to its end A."""
 
 END, SIZE = (0.6, 0.2), (0.35, 0.02)
 """A, the middle of the flag's end, and length from the cylinder on and thickness, m."""
@@ -31,25 +31,16 @@ END, SIZE = (0.6, 0.2), (0.35, 0.02)
 DENSITY, VISCOSITY = 1000.0, 1.0
 """Of the fluid, kg/m^3 and Pa s."""
 
-CELLS = (35, 2)
-"""Cells of flesh along and across the flag; with them D1 is 0.5 % off."""
-
-CFL = 1.0
-"""Cells that the fastest inflow crosses in a step."""
+CELLS, CFL = (35, 2), 1.0
+"""Cells of flesh along and across the flag, with which D1 is 0.5 % off; cells that the fastest
+inflow crosses in a step."""
 
 GRIDS = {True: (44,), False: (44, 85, 126)}
 FLUTTERING = (44, 85)
-"""Cells across the channel, by quick; and for FSI2 and FSI3.
-
-With 44 cells and steps of 41 the sides of the flag at rest lie 0.39 and 0.54 of a cell above planes
-of the grid. If they cross such planes the lift jumps, as the corner cells of the flag's end change:
-with CFD1's flow by 0.48 N/m on 41 cells and by 0.28 N/m on 82. Half-way between it is correct.
-FSI1's flag rises by 0.2 cells on 85, which makes its lift too large.
-"""
-
 BEHIND = 0.1
-"""Cells between A and the plane of the grid before it. The jump grows with this distance; on the
-plane the flag's end is not closed."""
+"""Cells across the channel, by quick, and for FSI2 and FSI3; cells between A and the plane of the
+grid before it. With 44 cells and steps of 41 the sides of the flag at rest lie 0.39 and 0.54 of a
+cell above planes. On others, and with its end in other places, it has another lift: D6."""
 
 
 @dataclass(frozen=True)
@@ -108,10 +99,14 @@ FSI = (
 )
 
 
-def channel(cells: int, flow: Flow) -> World:
-    """The channel at rest, `cells` across it; the cylinder belongs to the world, body 0."""
+def channel(cells: int, flow: Flow, behind: float = BEHIND, rigid: str = RIGID) -> World:
+    """The channel at rest, `cells` across it; the cylinder belongs to the world, body 0.
+
+    behind  cells between A and the plane of the grid before it
+    rigid   MJCF of cylinder and flag, if the flag is rigid
+    """
     h = HEIGHT / cells
-    ahead = (BEHIND - END[0] / h) % 1.0
+    ahead = (behind - END[0] / h) % 1.0
     wall = BoundaryNoSlip()
     fluid = Fluid(
         Grid.slab(round(LENGTH / h + ahead), cells, h, (-ahead * h, 0.0)),
@@ -121,7 +116,7 @@ def channel(cells: int, flow: Flow) -> World:
         tolerance=1e-7,
     )
     if flow.tissue is None:
-        solid = SolidModel.from_string(mjcf(CYLINDER, PLATE), slab=True, gravity=NOWHERE)
+        solid = SolidModel.from_string(rigid, slab=True, gravity=NOWHERE)
     else:
         solid = flag_of(flow.tissue)
     return World.at_rest(Setup(solid, fluid))
@@ -153,11 +148,9 @@ def march(world: World, flow: Flow, seconds: float) -> Array:
     return recorded(world, dt, round(seconds / dt), figures)
 
 
-SHORTER = 0.5
-"""Part of a flow's longest time on finer grids, and when quick."""
-
-LAST = 0.1
-"""Last part of that time, for the means and the remaining changes."""
+SHORTER, LAST = 0.5, 0.1
+"""Parts of a flow's longest time: on finer grids and when quick; the last of that time, for the
+means and the remaining changes."""
 
 
 def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[str]]:
@@ -192,8 +185,9 @@ def between(
     """A figure within the range of published ones."""
     exact, low, high = reference(flow.case, flow.name)[quantity]
     on = Grids("cells across the channel", grids)
-    found = within(f"{flow.name}, {quantity}", values, exact, (low, high), on, lines=lines)
-    return replace(found, tolerance=f"{low:g} to {high:g}")
+    accepted = f"{low:g} to {high:g}"
+    title = f"{flow.name}, {quantity}"
+    return within(title, values, exact, (low, high), on, lines=lines, tolerance=accepted)
 
 
 PERIODS = 4
@@ -217,10 +211,8 @@ class Flutter:
 
 
 def flutter(rows: Array, dt: float) -> Flutter:
-    """Figures of the last PERIODS periods of drag, lift and displacement of A (steps, 4).
-
-    With fewer periods, of the LAST part of the rows.
-    """
+    """Figures of the last PERIODS periods of drag, lift and displacement of A (steps, 4). With
+    fewer periods, of the LAST part of the rows."""
     _, lift, _, up = rows.T
     clock = up if up.any() else lift
     seen = Oscillation(dt, clock)

@@ -78,11 +78,9 @@ def apart(times: Array, values: Array, published: Array) -> float:
 
 
 def hovering(quick: bool) -> list[Finding]:
-    """S3: lift and drag from rest, against another solver and the experiment.
-
-    The list has no tolerance. The distance of the measured lift from that solver's is the tolerance
-    of ours, and of the drag, which was not measured.
-    """
+    """S3: lift and drag from rest, against another solver and the experiment. The list has no
+    tolerance. The distance of the measured lift from that solver's is the tolerance of ours, and of
+    the drag, which was not measured."""
     cells, side, strokes = ((10, 20), 10, 1.0) if quick else ((20, 40), 30, 4.0)
     grids = Grids("cells across the chord", cells)
     runs = [flap(n, side, strokes) for n in cells]
@@ -103,10 +101,10 @@ def hovering(quick: bool) -> list[Finding]:
         ]
         if name == "lift":
             curves.append(Curve("measured by Wang", measured[:, 0], measured[:, 1], True))
-        found = at_most(f"{name}, mean distance from Eldredge's", away, bound, grids)
-        tolerance = "at most the experiment's in lift"
         plot = Plot("t/T", f"{name} over the largest quasi-steady one", curves)
-        findings.append(replace(found, reference=bound, tolerance=tolerance, plot=plot))
+        found = at_most(f"{name}, mean distance from Eldredge's", away, bound, grids, plot=plot)
+        tolerance = "at most the experiment's in lift"
+        findings.append(replace(found, reference=bound, tolerance=tolerance))
     return findings
 
 

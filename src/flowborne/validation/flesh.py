@@ -180,11 +180,9 @@ def in_time(steps: Sequence[int], periods: int) -> list[Finding]:
 
 
 def flag_in_time(quick: bool) -> list[Finding]:
-    """CSM3: the bar of CSM1 released at rest, by its small vibrations and by its large ones.
-
-    It is not damped. At 50 steps a second its fast modes grow in the large swings and dominate
-    after some seconds; at 100 they do not in 10 s.
-    """
+    """CSM3: the bar of CSM1 released at rest, by its small vibrations and by its large ones. It is
+    not damped. At 50 steps a second its fast modes grow in the large swings and dominate after some
+    seconds; at 100 they do not in 10 s."""
     known = reference("D5", "CSM3 cross-check, Hz")
     small, large = known["f1 of Euler-Bernoulli with E/(1-nu^2)"], known["large amplitude"]
     grids = FLAG_CELLS[:2] if quick else FLAG_CELLS[:3]

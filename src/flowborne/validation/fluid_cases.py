@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from flowborne import Array, Grid, World
@@ -122,11 +120,8 @@ def decay(cells: int, duration: float) -> tuple[Array, Array, Array]:
 
 
 def vortices_break_up(quick: bool) -> list[Finding]:
-    """F3: the first steps, the peak of the dissipation and its whole course.
-
-    The list has the course to within 5 % on 256 cells a side; coarser grids fail by their distance
-    from it.
-    """
+    """F3: the first steps, the peak of the dissipation and its whole course. The list has the
+    course to within 5 % on 256 cells a side; coarser grids fail by their distance from it."""
     grids = Grids("cells a side", (32, 64) if quick else (32, 64, 128))
     runs = [decay(n, 20.0) for n in grids.cells]
     peaks = [rates.max() for _, _, rates in runs]
@@ -145,8 +140,8 @@ def vortices_break_up(quick: bool) -> list[Finding]:
     name, when = "-dE_k/dt peak value", "time of peak"
     peak, time = float(reference("F3", name)), float(reference("F3", when))
     begun = "-dE/dt in the second step, m^2/s^3"
-    course = at_most("farthest from the published course, relative", away, 0.05, grids)
-    course = replace(course, tolerance="5 %")
+    title = "farthest from the published course, relative"
+    course = at_most(title, away, 0.05, grids, tolerance="5 %")
     lines = [
         f"{n:>6g} cells a side: the first step loses {1.0 - energies[1] / energies[0]:.2g} of E"
         for n, (energies, _, _) in zip(grids.cells, runs, strict=True)
@@ -154,7 +149,7 @@ def vortices_break_up(quick: bool) -> list[Finding]:
     return [
         near("E(0), m^2/s^2", runs[-1][0][0], ENERGY, relative=0.01),
         near(begun, early, DISSIPATION, grids, relative=0.01, lines=lines),
-        replace(within(name, peaks, peak, (0.0125, 0.0130), grids), plot=plot),
+        within(name, peaks, peak, (0.0125, 0.0130), grids, plot=plot),
         within(when, moments, time, (8.8, 9.1), grids),
         falling(course),
     ]

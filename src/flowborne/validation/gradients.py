@@ -145,10 +145,8 @@ CHAINS = (1, 2, 3, 4)
 def decision_seconds(
     count: int, resolution: int, workers: int, clock: Callable[[], float]
 ) -> list[float]:
-    """Median time of a decision of each chain over the first `count` frames by `clock`, s.
-
-    The chains take turns, so that other load of the machine affects all of them alike.
-    """
+    """Median time of a decision of each chain over the first `count` frames by `clock`, s. The
+    chains take turns, so that other load of the machine affects all of them alike."""
     spent: list[list[float]] = [[] for _ in CHAINS]
     settings = {"domain.resolution": str(resolution)}
     with kernel_threads(1), ExitStack() as stack:
@@ -168,10 +166,8 @@ def decision_seconds(
 
 
 def chain_cost(quick: bool) -> list[Finding]:
-    """Time of a decision against the number of joints.
-
-    The serial time is CPU time, so that it does not depend on other load of the machine.
-    """
+    """Time of a decision against the number of joints. The serial time is CPU time, so that it does
+    not depend on other load of the machine."""
     count, resolution = (3, 48) if quick else (15, 128)
     serial = decision_seconds(count, resolution, 1, process_time)
     side = decision_seconds(count, resolution, cores(), perf_counter)

@@ -16,13 +16,8 @@ from flowborne.bodies import human_mjcf, standard_skeleton
 from flowborne.validation.case import Case, Tier
 from flowborne.validation.findings import Finding, above, at_most, near
 
-G = 9.81
-
-MASS = 73.0
-"""kg, of the standard body."""
-
-FRAMES = 48
-"""Frames after which no joint of these scenes moves any more."""
+G, MASS, FRAMES = 9.81, 73.0, 48
+"""m/s^2; kg of the standard body; frames after which no joint of these scenes moves any more."""
 
 BACK, SHOULDERS = "lower_back", ("left_shoulder", "right_shoulder")
 """Names of joints; the body on the back's joint has the same name."""
@@ -37,11 +32,8 @@ SPREAD: Pose = {"left_shoulder": (25.0, 0.0, 0.0), "right_shoulder": (-25.0, 0.0
 PICTURE = {"domain", "fluid", "boundaries", "dye", "film"}
 """Tables that only draw the wind of a scene by dye in a fluid; the bodies have the given wind."""
 
-LEANS = ((12.0, 15.0, 10.0), (-20.0, 5.0, 0.0), (0.0, -25.0, -15.0))
-"""Of the back, degrees, as in `Pose`."""
-
-SHARE = 0.15
-"""Force of the wind at the centre of mass, part of the weight."""
+LEANS, SHARE = ((12.0, 15.0, 10.0), (-20.0, 5.0, 0.0), (0.0, -25.0, -15.0)), 0.15
+"""Of the back, degrees, as in `Pose`; force of the wind at the centre of mass over the weight."""
 
 
 def standing(scene: str, pose: Pose, **tables: Any) -> Simulation:
@@ -75,10 +67,8 @@ def still_clip(pose: Pose) -> str:
 
 
 def skeleton_below(model: SolidModel, body: int) -> Iterator[str]:
-    """Lines of a BVH file, y up and facing z, for a body's joint and all below it.
-
-    Without end sites the last bones have their standard lengths.
-    """
+    """Lines of a BVH file, y up and facing z, for a body's joint and all below it. Without end
+    sites the last bones have their standard lengths."""
     forward, left, up = model.mj.body_pos[body]
     yield f"{'ROOT' if body == 1 else 'JOINT'} {model.joint_names[body - 1]}"
     yield "{"
@@ -142,20 +132,15 @@ class Load:
 
     @property
     def lean(self) -> float:
-        """Angle of the line from joint to centre from the vertical.
-
-        Degrees; positive for a standing trunk that leans forward and a hanging arm that is blown
-        back.
-        """
+        """Angle of the line from joint to centre from the vertical. Degrees; positive for a
+        standing trunk that leans forward and a hanging arm that is blown back."""
         away = self.reach if self.reach[2] > 0.0 else -self.reach
         return float(np.degrees(np.arctan2(away[0], away[2])))
 
     @property
     def off_line(self) -> float:
-        """Angle between weight and wind together and the line from joint to centre.
-
-        Degrees; from the moment about the joint, which depends on where the wind acts.
-        """
+        """Angle between weight and wind together and the line from joint to centre. Degrees; from
+        the moment about the joint, which depends on where the wind acts."""
         forces = self.mass[:, None] * np.array([0.0, 0.0, -G]) + self.force
         moment = (np.cross(self.centre - self.joint, forces) + self.torque).sum(axis=0)
         net = np.linalg.norm(forces.sum(axis=0))
@@ -191,10 +176,8 @@ def torque_off_moment(lean: tuple[float, float, float]) -> float:
 
 
 def arms_hang(quick: bool) -> list[Finding]:
-    """K9: arms hang below the shoulders and the rest balances, also with a leg in the way.
-
-    Free arms are those of the standard body: in the scene's body the thighs reach the hands.
-    """
+    """K9: arms hang below the shoulders and the rest balances, also with a leg in the way. Free
+    arms are those of the standard body: in the scene's body the thighs reach the hands."""
     start: Pose = {
         BACK: (12.0, 15.0, 10.0),
         "left_shoulder": (10.0, -40.0, 0.0),

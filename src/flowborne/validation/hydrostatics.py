@@ -14,14 +14,9 @@ GRAVITY: Vector = (751.0, 83.6, 0.0)
 TILTED: Vector = (751.0, 83.6, -212.0)
 """m/s^2, at a generic angle to a slab and to a three-dimensional grid."""
 
-DENSITY = 1.3
-"""kg/m^3, of fluid and neutral bodies."""
-
-DT = 1e-3
-"""s"""
-
-SOLVE = 1e-13
-"""Relative residual of the pressure solve, below the tolerance of the velocity."""
+DENSITY, DT, SOLVE = 1.3, 1e-3, 1e-13
+"""kg/m^3 of fluid and neutral bodies; s; relative residual of the pressure solve, below the
+tolerance of the velocity."""
 
 SLAB = square(48)
 BOX = Grid((20, 20, 20), 1.0 / 20.0, (-0.5, -0.5, -0.5))
@@ -138,12 +133,10 @@ def fastest(world: World) -> float:
 
 
 def hydrostatic_balance(quick: bool) -> list[Finding]:
-    """F5: fluid at rest under its own weight around fixed bodies, and around neutral free ones.
-
-    The solver omits the hydrostatic pressure and applies Archimedes' force to bodies in closed
-    form. To test the pressure of the cut cells, gravity is a force on the fluid around the fixed
-    bodies; the free bodies have the solver's own gravity.
-    """
+    """F5: fluid at rest under its own weight around fixed bodies, and around neutral free ones. The
+    solver omits the hydrostatic pressure and applies Archimedes' force to bodies in closed form. To
+    test the pressure of the cut cells, gravity is a force on the fluid around the fixed bodies; the
+    free bodies have the solver's own gravity."""
     findings = []
     for name, grid, gravity, steps in (
         ("slab", SLAB, GRAVITY, 100 if quick else 1000),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -190,11 +190,8 @@ class PendulumBox:
         return float(table("I2", "cylinder in closed square, Ca vs D/L")[2.0 * RADIUS / self.side])
 
 
-NARROW = PendulumBox(2.0, ROD, (64, 128, 256, 384))
-"""The bob rests in the middle."""
-
-WIDE = PendulumBox(4.0, 0.0, (128, 256, 512))
-"""For swings of more than 90 degrees, which would leave the other box."""
+NARROW, WIDE = PendulumBox(2.0, ROD, (64, 128, 256, 384)), PendulumBox(4.0, 0.0, (128, 256, 512))
+"""With the bob at rest in the middle; for swings by more than 90 degrees, which leave it."""
 
 
 def small_period(ratio: float, added: float) -> float:
@@ -337,7 +334,7 @@ def free_turn(quick: bool) -> list[Finding]:
     for n, part in zip(grids, lost, strict=True):
         title = f"part of the energy lost in half a turn, {n} cells"
         lines = [] if part >= 0.0 else ["the energy is larger than at the start"]
-        findings.append(replace(at_most(title, part, allowed[n], lines=lines), series=series))
+        findings.append(at_most(title, part, allowed[n], lines=lines, series=series))
     most = float(max(run.max() for run in runs))
     return [*findings, at_most("largest energy over that at the start", most, 1.0)]
 

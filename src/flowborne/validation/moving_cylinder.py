@@ -3,8 +3,6 @@ another cylinder (V8)."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from flowborne import Array, Grid, World
@@ -25,10 +23,8 @@ from flowborne.worlds import advance, make_world, set_velocity
 PERIOD, KC, REYNOLDS = 5.0, 5.0, 100.0
 """V3: s; Keulegan and Carpenter's number Umax T / D and Reynolds number; D = 1 m, Umax = 1 m/s."""
 
-SIDE = 20
-"""Diameters across V3's closed box."""
-
-CURVE = "C_D(t/T)=F/(0.5 rho Umax^2 D) digitised"
+SIDE, CURVE = 20, "C_D(t/T)=F/(0.5 rho Umax^2 D) digitised"
+"""Diameters across V3's closed box, and its force in the list."""
 
 SPRING_REYNOLDS, MASS = 150.0, 2.0
 """V5: Re, and the cylinder's mass over rho D^2; D = 1 m, U = 1 m/s."""
@@ -86,17 +82,16 @@ def swinging(quick: bool) -> list[Finding]:
     ]
     curves = (Curve("Duetsch et al.", phase, published, True), Curve("flowborne", *runs[-1]))
     plot = Plot("t/T", "in-line force coefficient", curves)
-    course = at_most("farthest from the measured curve", away, 0.15, grids)
-    findings = [
-        near("largest coefficient", peaks, largest, grids, relative=0.03),
-        replace(course, plot=plot),
-    ]
-    known = dict(part.split("=") for part in reference("V3", "Morison fit").split(", "))
+    known, sure = reference("V3", "Morison fit"), confirmed("V3", "Morison fit")
     coefficients = zip(*(morison(*run) for run in runs), strict=True)
-    for name, values in zip(("C_d", "C_i"), coefficients, strict=True):
-        fitted = near(f"Morison's {name}", values, float(known[name]), grids, relative=0.03)
-        findings.append(replace(fitted, confirmed=confirmed("V3", "Morison fit")))
-    return findings
+    return [
+        near("largest coefficient", peaks, largest, grids, relative=0.03),
+        at_most("farthest from the measured curve", away, 0.15, grids, plot=plot),
+        *(
+            near(f"Morison's {name}", values, exact, grids, relative=0.03, confirmed=sure)
+            for (name, exact), values in zip(known.items(), coefficients, strict=True)
+        ),
+    ]
 
 
 def sprung(cells: int, speed: float) -> World:
@@ -151,46 +146,33 @@ def vibrating(quick: bool) -> list[Finding]:
         lines=lines,
         confirmed=confirmed("V5", "(a) peak A/D"),
     )
-    drop = size / found[UNLOCKED][0]
-    locked = [
-        near(f"f/f_n {at}", frequency, 1.0, relative=0.1),
-        Finding(f"A/D {at} over that at {UNLOCKED:g}", drop, 5.0, "more than 5", drop > 5.0),
+    drop, sure = size / found[UNLOCKED][0], confirmed("V5", "lock-in")
+    title = f"A/D {at} over that at {UNLOCKED:g}"
+    return [
+        peak,
+        near(f"f/f_n {at}", frequency, 1.0, relative=0.1, confirmed=sure),
+        Finding(title, drop, 5.0, "more than 5", drop > 5.0, confirmed=sure),
     ]
-    sure = confirmed("V5", "lock-in")
-    return [peak, *(replace(finding, confirmed=sure) for finding in locked)]
 
 
-INNER, OUTER = 0.5, 1.0
-"""Radii a and b, m."""
+INNER, OUTER, SPIN = 0.5, 1.0, 1.0
+"""V8: radii a and b, m, and Omega, rad/s."""
 
-SPIN = 1.0
-"""Omega, rad/s."""
+SIDES, SHELL = 48, 0.1
+"""Boxes that make the outer cylinder, and half their thickness, m; the grids end inside them."""
 
-SIDES = 48
-"""Boxes that make the outer cylinder."""
-
-SHELL = 0.1
-"""Half the thickness of the outer cylinder, m; the grids end inside it."""
-
-VISCOSITY = 1.0
-"""Pa s; the fluid's density is 1 kg/m^3."""
-
-HEAVY = 1000.0
-"""kg/m^3, of the inner cylinder: its flow stays quasi-steady as it slows down."""
+VISCOSITY, HEAVY = 1.0, 1000.0
+"""Pa s; kg/m^3 of the inner cylinder, whose flow stays quasi-steady as it slows down."""
 
 TORQUE = 4.0 * np.pi * VISCOSITY * INNER**2 * OUTER**2 / (OUTER**2 - INNER**2)
-"""N m per m on the inner cylinder at 1 rad/s."""
-
 RATE = TORQUE / (0.5 * HEAVY * np.pi * INNER**4)
-"""1/s, of the spin-down."""
+"""N m per m on the inner cylinder at 1 rad/s, and 1/s of the spin-down."""
 
 
 def annulus(cells: int, free: bool) -> World:
-    """The inner cylinder in the outer one, with the prescribed SPIN or free.
-
-    The outer cylinder is a ring of boxes whose inner sides make a regular polygon; its mean radius
-    is that of the cylinder.
-    """
+    """The inner cylinder in the outer one, with the prescribed SPIN or free. The outer cylinder is
+    a ring of boxes whose inner sides make a regular polygon; its mean radius is that of the
+    cylinder."""
     h = OUTER / cells
     side = cells + 2
     grid = Grid.slab(2 * side, 2 * side, h, (-side * h, -side * h))
@@ -227,10 +209,8 @@ def measured(cells: int) -> tuple[float, float]:
 
 
 def between_cylinders(quick: bool) -> list[Finding]:
-    """V8: torque of the steady flow, and the spin-down of the free inner cylinder.
-
-    The list's unbounded cylinder is the limit of the same formula for large b.
-    """
+    """V8: torque of the steady flow, and the spin-down of the free inner cylinder. The list's
+    unbounded cylinder is the limit of the same formula for large b."""
     grids = Grids("cells across b", (16, 24) if quick else (16, 32, 64, 128))
     torques, rates = zip(*(measured(n) for n in grids.cells), strict=True)
     return [

@@ -69,11 +69,8 @@ svg { max-width: 100%; height: auto }
 
 
 def write_page(folder: Path) -> None:
-    """Draw the page of the report in `folder` from its data.
-
-    raises  ValueError when the folder's report.json is no report; OSError when the page cannot be
-            written
-    """
+    """Draw the page of the report in `folder` from its data. Raises ValueError when the folder's
+    report.json is no report; OSError when the page cannot be written."""
     page = page_of(read_report(folder))
     write_atomically(folder / PAGE, lambda file: file.write(page.encode()))
 
@@ -164,10 +161,8 @@ def plots_of(findings: Iterable[dict[str, Any]]) -> list[tuple[str, Callable[[],
 
 
 def svg(draw: Callable[[Axes], None], title: str) -> str:
-    """A drawing on axes, with the legend below them, as SVG; equal data give equal text.
-
-    Its width fits the screen of a telephone. Without Matplotlib it is the sentence NO_PLOT.
-    """
+    """A drawing on axes, with the legend below them, as SVG; equal data give equal text. Its width
+    fits the screen of a telephone. Without Matplotlib it is the sentence NO_PLOT."""
     if find_spec("matplotlib") is None:
         return f"<p class=source>{NO_PLOT}</p>"
     from matplotlib import rc_context

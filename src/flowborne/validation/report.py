@@ -20,7 +20,7 @@ from flowborne import __version__
 from flowborne.parts import write_atomically
 from flowborne.validation import case as case_of
 from flowborne.validation.case import THE_RUN, Result, Tier
-from flowborne.validation.findings import Verdict
+from flowborne.validation.findings import Verdict, spread_of
 
 DATA = "report.json"
 TIERS = tuple(reversed(Tier))
@@ -40,30 +40,16 @@ VERDICTS: tuple[Verdict, ...] = ("fail", "coarse", "pass", "unconfirmed")
 
 
 def read_report(folder: Path) -> Data:
-    """The cases of a report; none when there is no report yet.
-
-    Old reports have "quick" and "full" instead of tiers: such a case is in the present tier of that
-    run.
-
-    raises  ValueError when the file is no report
-    """
+    """The cases of a report; none when there is no report yet. Raises ValueError when the file is
+    no report."""
     path = folder / DATA
     if not path.exists():
         return {}
     try:
         data: Data = json.loads(path.read_text(encoding="utf-8"))["cases"]
-        return {
-            name: {_tier(name, filed): case for filed, case in tiers.items()}
-            for name, tiers in data.items()
-        }
+        return {name: dict(tiers) for name, tiers in data.items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path} is no report ({error}); name another folder") from error
-
-
-def _tier(name: str, filed: str) -> str:
-    if filed in ("quick", "full"):
-        return str(getattr(case_of(name), filed).value)
-    return Tier(filed).value
 
 
 def add_to_report(folder: Path, results: Sequence[Result], order: Iterable[str]) -> None:
@@ -93,10 +79,8 @@ def add_to_report(folder: Path, results: Sequence[Result], order: Iterable[str])
 
 @cache
 def code() -> str:
-    """Digest of every file of the package: solver, cases, references, scenes.
-
-    Two runs with the same digest were made by the same code.
-    """
+    """Digest of every file of the package: solver, cases, references, scenes. Two runs with the
+    same digest were made by the same code."""
     root = Path(flowborne.__file__).parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):
@@ -104,6 +88,20 @@ def code() -> str:
             digest.update(str(path.relative_to(root).as_posix()).encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
+
+
+def of_other_code(data: Data) -> list[str]:
+    """Cases that were measured with other code than the present; with the tiers of which that is
+    true, if it is not true of all."""
+    stale = {
+        name: [tier for tier, case in tiers.items() if case.get("code") != code()]
+        for name, tiers in data.items()
+    }
+    return [
+        name if len(old) == len(data[name]) else f"{name} ({', '.join(old)})"
+        for name, old in stale.items()
+        if old
+    ]
 
 
 def already_there(folder: Path, tiers: Mapping[str, Tier]) -> dict[str, list[Result]]:
@@ -141,10 +139,13 @@ def is_finest(name: str, tier: str) -> bool:
 
 
 def grid_of(finding: dict[str, Any]) -> str:
-    """The grid on which a figure was measured, such as "10 cells across D"; empty without a grid
-    series."""
+    """The grid on which a figure was measured, such as "10 cells across D", and its spread over
+    places in the cell; empty without a grid series."""
     series = finding.get("series")
-    return "" if series is None else f"{series['cells'][-1]:g} {series['label']}"
+    if series is None:
+        return ""
+    grid = f"{series['cells'][-1]:g} {series['label']}"
+    return f"{grid}, {spread_of(series['places'][-1])}" if "places" in series else grid
 
 
 def verdict_of(case: dict[str, Case]) -> Verdict:

@@ -7,10 +7,11 @@ import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, TextIO, TypeVar
+from typing import TextIO, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -133,63 +134,17 @@ def _not_in(name: str, tier: Tier) -> str:
     return f"case {name} is not in the tier {tier.value}: it has {has}; name one by --tier"
 
 
-class DiedError(Exception):
-    """The process died during its task, killed or out of memory."""
-
-
-class Worker:
-    """A process that runs one task after the other, and ends with its parent."""
-
-    def __init__(self) -> None:
-        spawned = multiprocessing.get_context("spawn")
-        self.pipe, theirs = spawned.Pipe()
-        self._process = spawned.Process(target=serve, args=(theirs,))
-        self._process.start()
-        theirs.close()
-
-    def begin(self, function: Callable[[Any], Any], task: object) -> None:
-        """Start a task; `pipe` can be read when it has ended."""
-        try:
-            self.pipe.send((function, task))
-        except BrokenPipeError:
-            return  # it has died; `answer` raises the error
-
-    def answer(self) -> Any:
-        """Result of the task. Raises its exception, or DiedError when the process died."""
-        try:
-            answer, error = self.pipe.recv()
-        except (EOFError, ConnectionResetError):
-            raise DiedError from None
-        if error is not None:
-            raise error
-        return answer
-
-    def end(self) -> None:
-        """End the process and its task."""
-        self._process.terminate()
-        self._process.join(GRACE)
-        self._process.kill()
-        self._process.join()
-        self.pipe.close()
-
-
-def serve(pipe: Connection) -> None:
-    """Run tasks in a worker, with BLAS on one thread; the parent handles Ctrl-C."""
+def begin_worker() -> None:
+    """Initialise a worker: BLAS on one thread, it ends with its parent, which handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # tasks clean up
     end_with_parent()
     threadpool_limits(limits=1, user_api="blas")
-    while True:
-        try:
-            function, task = pipe.recv()
-        except EOFError:
-            return
-        try:
-            pipe.send((function(task), None))
-        except BrokenPipeError:  # the parent is gone
-            return
-        except Exception as error:
-            pipe.send((None, error))
+
+
+def worker() -> ProcessPoolExecutor:
+    """A process that runs one task after the other."""
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), begin_worker)
 
 
 def side_by_side(
@@ -204,27 +159,33 @@ def side_by_side(
     on_begin  called with every task as it begins
     yields    (task, its answer); None where the process died, killed or out of memory
     """
-    waiting = deque(tasks)
-    free = [Worker() for _ in range(min(workers, len(tasks)))]
-    busy: dict[Any, tuple[Worker, Task]] = {}
+    waiting, others = deque(tasks), set(multiprocessing.active_children())
+    free = [worker() for _ in range(min(workers, len(tasks)))]
+    busy: dict[Future[Answer], tuple[ProcessPoolExecutor, Task]] = {}
     try:
         while waiting or busy:
             while waiting and free:
-                worker, task = free.pop(), waiting.popleft()
-                worker.begin(function, task)
-                busy[worker.pipe] = worker, task
+                executor, task = free.pop(), waiting.popleft()
+                busy[executor.submit(function, task)] = executor, task
                 on_begin(task)
-            for pipe in wait(list(busy)):
-                worker, task = busy[pipe]
+            for future in wait(busy, return_when=FIRST_COMPLETED).done:
+                executor, task = busy.pop(future)
+                free.append(executor)
                 answer: Answer | None = None
                 try:
-                    answer = worker.answer()
-                    free.append(worker)
-                except DiedError:
-                    worker.end()
-                    free.append(Worker())
-                del busy[pipe]
+                    answer = future.result()
+                except BrokenProcessPool:
+                    free[-1] = worker()
                 yield task, answer
     finally:
-        for worker in (*free, *(worker for worker, _ in busy.values())):
-            worker.end()
+        for executor in free:
+            executor.shutdown()
+        interrupted = set(multiprocessing.active_children()) - others
+        for process in interrupted:
+            process.terminate()
+        for executor, _ in busy.values():
+            executor.shutdown(wait=False)
+        for process in interrupted:
+            process.join(GRACE)
+            process.kill()
+            process.join()

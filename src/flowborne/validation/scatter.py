@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,13 +15,10 @@ from flowborne.validation.controller_in_flow import course, from_wind
 from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, falling, near
 
 BLOCK = "ns-block-drag-max"
-"""The scene."""
 
-POSES, APART = 48, 0.25
-"""Number of poses in an arc, and degrees from each to the next."""
-
-ARCS = (46.0, 34.0)
-"""Middles of the arcs, degrees. The scene starts at the first."""
+POSES, APART, ARCS = 48, 0.25, (46.0, 34.0)
+"""Number of poses in an arc, degrees from each to the next, and middles of the arcs in degrees, at
+the first of which the scene starts."""
 
 SHAPES = {
     "box": 'size="0.1 0.5 0.5"',
@@ -30,11 +26,9 @@ SHAPES = {
 }
 """The block's geom in MJCF, and a capsule of the same length and width."""
 
-STREAMS = {"ideal": 0.0, "Re 100": 10.0}
-"""Viscosities in Pa s; rho U L is 1000 Pa s."""
-
-PART = 0.05
-"""Largest scatter over poses on the finest grid, over the mean; chosen, see K12's reference."""
+STREAMS, PART = {"ideal": 0.0, "Re 100": 10.0}, 0.05
+"""Viscosities in Pa s (rho U L is 1000 Pa s); largest scatter over poses on the finest grid, over
+the mean, which is chosen, see K12's reference."""
 
 
 def arc(middle: float) -> Array:
@@ -44,12 +38,9 @@ def arc(middle: float) -> Array:
 
 
 def settled(shape: str, viscosity: float, cells: int, angles: Array) -> Array:
-    """Objective of the scene at each of some angles in degrees, N per m.
-
-    It is that of the controller's trial of the present pose, with the scene's steps to settle. The
-    flow starts as potential flow about that pose: a trial from another pose would add the body's
-    own motion.
-    """
+    """Objective of the scene at each of some angles in degrees, N per m. It is that of the
+    controller's trial of the present pose, with the scene's steps to settle. The flow starts as
+    potential flow about that pose: a trial from another pose would add the body's own motion."""
     model = resources.files("flowborne.scenes.library").joinpath("block.xml").read_text()
     found = []
     with TemporaryDirectory() as folder:
@@ -103,15 +94,13 @@ def in_stream(shape: str, stream: str, grids: Grids, arcs: Sequence[float]) -> F
         lines.append(f"{cells:>6g} {grids.label}: {', '.join(said)}")
         curves.append(Curve(f"{cells} {grids.label}", arc(arcs[0]), drags[0]))
     title = f"{shape}, {stream}: scatter of the settled objective over its mean"
-    found = at_most(title, values, PART, grids, lines=lines)
-    return replace(found, plot=Plot("angle (degrees)", "drag (N/m)", curves))
+    plot = Plot("angle (degrees)", "drag (N/m)", curves)
+    return at_most(title, values, PART, grids, lines=lines, plot=plot)
 
 
 def scatter_over_starts(quick: bool) -> list[Finding]:
-    """K13: final poses of most drag from several starts, on which they should not depend.
-
-    Poses at the same angle to either side of the stream are mirror images, and count as the same.
-    """
+    """K13: final poses of most drag from several starts, on which they should not depend. Poses at
+    the same angle to either side of the stream are mirror images, and count as the same."""
     grids = Grids("cells a side", (64,) if quick else (64, 128))
     starts = np.linspace(30.0, 60.0, 8)
     means, deviations, lines = [], [], []

@@ -5,7 +5,7 @@ V1 is in centimetres, grams and seconds, V2 in SI units.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from flowborne.bodies import WindForce
 from flowborne.validation.case import Case, confirmed, reference
 from flowborne.validation.findings import (
     Curve,
+    Details,
     Finding,
     Grids,
     GridSeries,
@@ -99,16 +100,15 @@ def settling_cylinder(quick: bool) -> list[Finding]:
     for fall in FALLS:
         values = [fastest(fall, n)[0] for n in grids.cells]
         title, interval = f"{fall.name}, largest Re", (fall.low, fall.high)
-        found = within(title, values, fall.reynolds, interval, grids)
-        findings.append(replace(found, confirmed=confirmed("V1", f"{fall.name} max Re")))
+        sure = confirmed("V1", f"{fall.name} max Re")
+        findings.append(within(title, values, fall.reynolds, interval, grids, confirmed=sure))
     return findings
 
 
 DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
-"""m and kg/m^3 of V2's sphere, m/s^2."""
-
 HALF, HEIGHT, START = 0.05, 0.16, 0.1275
-"""m: half the box's width, its height, and the height from which the sphere's centre falls."""
+"""m and kg/m^3 of V2's sphere, m/s^2; half the width of its box, the height of that, and the height
+from which its centre falls, m."""
 
 
 @dataclass(frozen=True)
@@ -140,10 +140,8 @@ OILS = (Oil("E1", 970.0, 0.373), Oil("E3", 962.0, 0.113))
 
 def quarter(oil: Oil, cells: int) -> World:
     """A quarter of the box, `cells` in 10 mm, between two planes about which the flow is symmetric.
-
     A quarter of the sphere's weight less its buoyancy pulls at a quarter of its mass. The whole box
-    gives the same velocities to 5e-7 m/s with 4 cells in 10 mm.
-    """
+    gives the same velocities to 5e-7 m/s with 4 cells in 10 mm."""
     h = 0.01 / cells
     counts = [round(side / h) for side in (HALF, HALF, HEIGHT)]
     grid = Grid((counts[0], counts[1], counts[2]), h, (0.0, 0.0, 0.0))
@@ -191,14 +189,14 @@ def settling(quick: bool) -> list[Finding]:
         findings.append(falling(near(title, series, oil.peak, relative=0.03)))
         found = [apart(one, times, measured, oil.peak) for one in falls]
         title = f"{oil.name}, farthest from the measured curve over its largest velocity"
-        course = at_most(title, [away for away, _ in found], 0.05, grids, lines=found[-1][1])
         moments, velocity, _ = falls[-1]
         thin = slice(None, None, max(1, len(moments) // 200))
         curves = (
             Curve("measured", times, measured, True),
             Curve("flowborne", moments[thin], velocity[thin]),
         )
-        findings.append(replace(course, plot=Plot("t (s)", "downward velocity (m/s)", curves)))
+        details = Details(lines=found[-1][1], plot=Plot("t (s)", "downward velocity (m/s)", curves))
+        findings.append(at_most(title, [away for away, _ in found], 0.05, grids, **details))
     return findings
 
 

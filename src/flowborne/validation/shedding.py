@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any, Unpack
 
 import numpy as np
 
 from flowborne import Array, StepReport, World
 from flowborne.validation.case import confirmed, reference
-from flowborne.validation.findings import Finding, Grids, Plot, within
-from flowborne.validation.worlds import Uniform, force_on, mjcf, recorded, refined
-from flowborne.worlds import Field
+from flowborne.validation.findings import Details, Figures, Finding, Grids, within
+from flowborne.validation.worlds import (
+    Place,
+    Uniform,
+    Vector,
+    force_on,
+    mjcf,
+    over_places,
+    recorded,
+)
+from flowborne.worlds import Field, velocity_at
 
-BEFORE = {True: 20.0, False: 40.0}
-AFTER = 15.0
-"""Times D/U before a flow that sheds vortices is evaluated: on the first grid, by quick, where
-shedding has to begin, and on a grid that starts from the flow of a coarser one."""
+BEFORE, AFTER = 40.0, 15.0
+"""Times D/U before a flow that sheds vortices is evaluated: in the first world, where shedding has
+to begin and in open water takes twice as long, and in one that starts from the flow of another."""
 
 PERIODS = {True: 2, False: 4}
 """Evaluated periods, by quick."""
@@ -91,10 +99,8 @@ class Oscillation:
         return self.dt * (at + away[at] / (away[at] - away[at + 1]))
 
     def last(self, periods: int) -> tuple[slice, float]:
-        """The samples of the last whole periods, and the length of one in s.
-
-        Raises ArithmeticError when there are not so many.
-        """
+        """The samples of the last whole periods, and the length of one in s. Raises ArithmeticError
+        when there are not so many."""
         rises = self.rises()
         if rises.size <= periods:
             raise ArithmeticError(f"the lift rises {rises.size} times, {periods + 1} are needed")
@@ -109,6 +115,16 @@ class Oscillation:
         lift = self.signal[samples]
         one, other = (amplitude(part) for part in (lift[:count], lift[-count:]))
         return f"lift's amplitude {one:.4f} in the first period, {other:.4f} in the last"
+
+
+def backflow(world: World, back: Vector, longest: float) -> float:
+    """Length of the backflow along x from a body's back, m, at most `longest`; 0 where there is
+    none one cell behind the back."""
+    h = world.flow()[0].grid.spacing
+    x = np.arange(h, longest, 0.05 * h)
+    u = velocity_at(world, np.array(back) + x[:, None] * np.array(STREAM.velocity))[:, 0]
+    i = int(np.argmax(u > 0.0))
+    return float(x[i] - 0.05 * h * u[i] / (u[i] - u[i - 1])) if i else 0.0
 
 
 def crest(values: Array) -> tuple[float, float]:
@@ -150,37 +166,39 @@ def watch(
 
 
 def shed(
-    build: Callable[[int], World], strouhal: float, grids: Sequence[int], quick: bool
-) -> tuple[list[tuple[float, ...]], list[str]]:
-    """Mean drag, amplitude of the lift and frequency from grid to grid, and lines for people, of a
-    cylinder at the origin in UNBOUNDED.
+    build: Callable[[int, Place], World],
+    strouhal: float,
+    grids: Sequence[int],
+    quick: bool,
+    once: Sequence[int] = (),
+) -> tuple[list[Any], list[str]]:
+    """Mean drag, amplitude of the lift and frequency of a cylinder at the origin in UNBOUNDED, as
+    `over_places` has them, by the cells across D.
 
-    build     a world, by the cells across D
     strouhal  rough value of the expected frequency
     """
-    periods, field = PERIODS[quick], Kicked(STREAM, UNBOUNDED, 0.0, 0.0)
-    rows, lines = [], []
-    for n, world, first in refined(grids, build, field):
-        before = 2.0 * BEFORE[quick] if first else AFTER
+    periods = PERIODS[quick]
+
+    def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
+        before = 2.0 * BEFORE if first else AFTER
         seen, drags, _ = watch(world, UNBOUNDED, before, strouhal, periods)
         steps, period = seen.last(periods)
-        mean = float(drags[steps].mean())
-        rows.append((mean, amplitude(seen.signal[steps]), UNBOUNDED.time / period))
-        lines.append(f"{n:>6g} cells across D: {seen.unsteadiness(periods)}")
-    return list(zip(*rows, strict=True)), lines
+        lift = amplitude(seen.signal[steps])
+        figures = float(drags[steps].mean()), lift, UNBOUNDED.time / period
+        return figures, seen.unsteadiness(periods)
+
+    return over_places(grids, build, Kicked(STREAM, UNBOUNDED, 0.0, 0.0), measure, once)
 
 
 def judged(
     name: str,
     quantity: str,
     grids: Sequence[int],
-    values: Sequence[float],
+    values: Figures,
     interval: tuple[float, float],
-    *,
-    lines: Sequence[str] = (),
-    plot: Plot | None = None,
+    **details: Unpack[Details],
 ) -> Finding:
     """A quantity of the case `name` on some grids, inside an interval of the list."""
     exact, on = reference(name, quantity), Grids("cells across D", grids)
-    found = within(quantity, values, exact, interval, on, lines=lines)
-    return replace(found, plot=plot, confirmed=confirmed(name, quantity))
+    details["confirmed"] = confirmed(name, quantity)
+    return within(quantity, values, exact, interval, on, **details)

@@ -35,11 +35,8 @@ ROOMS = (
 )
 """Boxes in diameters around the sphere."""
 
-LARGE = ((-2.5, -2.5, -2.5), (5.5, 2.5, 2.5))
-"""Box of 8 x 5 x 5 diameters that they are compared with."""
-
-UNDISTURBED = 10.0
-"""Times D/U before the sphere's drag is taken."""
+LARGE, UNDISTURBED = ((-2.5, -2.5, -2.5), (5.5, 2.5, 2.5)), 10.0
+"""Box of 8 x 5 x 5 diameters that they are compared with; times D/U before the drag is taken."""
 
 
 def sphere_drag(lower: tuple[float, ...], upper: tuple[float, ...], cells: int) -> float:

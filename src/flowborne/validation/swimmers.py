@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,30 +10,24 @@ from numpy.typing import NDArray
 from flowborne import Array, Grid, World
 from flowborne.bodies import Trajectory, TrajectorySinusoid, halfway_momentum, kinematics
 from flowborne.validation.case import Case, Tier, confirmed, reference
-from flowborne.validation.findings import Curve, Finding, Grids, Plot, at_most, near
+from flowborne.validation.findings import Curve, Details, Finding, Grids, Plot, at_most, near
 from flowborne.validation.worlds import RING, at_start, chain, history, square, whole_steps
 from flowborne.worlds import Boundaries, advance, make_world
 
 VISCOSITY = 1.4e-4
 """Pa s, of S1; the eel is 1 m long, its period is 1 s, fluid and eel have 1 kg/m^3."""
 
-LINKS = 20
-"""Rigid links of the eel; their hinges follow its midline."""
-
-TANK_LENGTH, TANK_WIDTH = 8, 2
-"""m, of S1's closed box along the eel's path and across."""
+LINKS, TANK_LENGTH, TANK_WIDTH = 20, 8, 2
+"""Rigid links of the eel, whose hinges follow its midline; m of S1's closed box along its path and
+across."""
 
 SPEED = "mean forward speed 2D"
 
 SWAY, OFFSET = 0.125 / 1.03125, 0.03125
 """Of the midline's lateral displacement SWAY (s + OFFSET) sin 2 pi (s - t), m."""
 
-BOX = 3.0
-LINK, WIDTH = 0.4, 0.1
-"""m, of S5: side of the box, length and width of a link."""
-
-PERIOD = 1.0
-"""s, of S5's gaits."""
+BOX, LINK, WIDTH, PERIOD = 3.0, 0.4, 0.1, 1.0
+"""S5: side of the box, length and width of a link, m; s of its gaits."""
 
 
 def half_width(s: float) -> float:
@@ -81,10 +75,8 @@ def direction(s: float, time: float) -> tuple[float, float]:
 
 
 def eel() -> str:
-    """A free chain of capsules with its nose at the origin and its tail at x = 1 m.
-
-    Neighbours overlap; each link has the mass of its part of the outline.
-    """
+    """A free chain of capsules with its nose at the origin and its tail at x = 1 m. Neighbours
+    overlap; each link has the mass of its part of the outline."""
     size, links = 1.0 / LINKS, []
     for k in range(LINKS):
         width = half_width((k + 0.5) * size)
@@ -139,8 +131,8 @@ def swimming(quick: bool) -> list[Finding]:
         Curve("flowborne, mean of a period", times[::8], mean[::8]),
     )
     plot = Plot("t/T", "forward speed (L/T)", curves)
-    found = near("mean forward speed, L/T", speeds, exact, grids, relative=0.1)
-    return [replace(found, plot=plot, confirmed=confirmed("S1", SPEED))]
+    details = Details(plot=plot, confirmed=confirmed("S1", SPEED))
+    return [near("mean forward speed, L/T", speeds, exact, grids, relative=0.1, **details)]
 
 
 def capsules(links: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from flowborne.worlds import (
 )
 
 Vector = tuple[float, float, float]
+On = TypeVar("On")
 
 NOWHERE: Vector = (0.0, 0.0, 0.0)
 PERIODIC = BoundaryPeriodic()
@@ -96,10 +97,8 @@ def history(world: World, dt: float, steps: int, figures: Callable[[], Any]) -> 
 
 
 def frames_of(simulation: Simulation, frames: int, figures: Callable[[FrameReport], Any]) -> Array:
-    """(frames, ...) figures after each of some frames, from the frame's report.
-
-    raises  ArithmeticError when the run blows up
-    """
+    """(frames, ...) figures after each of some frames, from the frame's report. Raises
+    ArithmeticError when the run blows up."""
     try:
         return np.array([figures(simulation.advance_frame()) for _ in range(frames)])
     except BlowUpError as error:
@@ -112,10 +111,8 @@ def force_on(report: StepReport, body: int = 1) -> Array:
 
 
 def start_at_once(world: World, dt: float) -> StepReport:
-    """The first step from a flow that is not yet adapted to its bodies: the impulsive start.
-
-    The pressure of this step is an impulse and no estimate of the next one, so it is cleared.
-    """
+    """The first step from a flow that is not yet adapted to its bodies: the impulsive start. The
+    pressure of this step is an impulse and no estimate of the next one, so it is cleared."""
     report = advance(world, dt)
     _, state = world.flow()
     for values in (*state.acceleration, state.pressure, state.previous_pressure):
@@ -170,24 +167,62 @@ def through_flow(profile: Profile) -> Boundaries:
 
 
 def refined(
-    grids: Iterable[int], build: Callable[[int], World], field: Field
-) -> Iterator[tuple[int, World, bool]]:
+    grids: Iterable[On], build: Callable[[On], World], field: Field
+) -> Iterator[tuple[On, World, bool]]:
     """A world for each grid, from coarse to fine.
 
-    The first starts from a field, the others from the last flow and bodies on the coarser grid.
+    The first starts from a field, the others from the last flow and bodies on the grid before.
 
-    yields  (cells, world, whether it is the first)
+    yields  (grid, world, whether it is the first)
     """
-    coarser = None
-    for cells in grids:
-        world = build(cells)
-        if coarser is None:
+    before = None
+    for grid in grids:
+        world = build(grid)
+        if before is None:
             set_velocity(world, field)
         else:
-            start_from(coarser, world)
-            world.solid.q[:], world.solid.v[:] = coarser.solid.q, coarser.solid.v
-        yield cells, world, coarser is None
-        coarser = world
+            start_from(before, world)
+            world.solid.q[:], world.solid.v[:] = before.solid.q, before.solid.v
+        yield grid, world, before is None
+        before = world
+
+
+PLACES = tuple(((k + 0.25) / 5.0 % 1.0, (2.0 * k + 0.25) / 5.0 % 1.0) for k in range(3, 8))
+"""Places (x, y) of a held body in a cell of its grid, in cells from the cell's lower corner. They
+are a lattice of five points, (k, 2 k) / 5, a quarter of its step away from the corner. Along each
+axis they are 1/5 of a cell apart and, with their mirror images, 1/10; none lies on a plane of nodes
+or half-way between two, where a grid cuts a round body into equal halves. In the first, which
+stands alone on the finest grids, B8's figures on 8 cells are within 1 % of their means."""
+
+Place = tuple[float, float]
+ORIGIN: Place = (0.0, 0.0)
+
+
+def over_places(
+    grids: Sequence[int],
+    build: Callable[[int, Place], World],
+    field: Field,
+    measure: Callable[[World, bool], tuple[Sequence[float], str]],
+    once: Sequence[int] = (),
+) -> tuple[list[Any], list[str]]:
+    """Figures of a held body at PLACES in a cell of each grid.
+
+    Each world starts from the last flow of the one before, as in `refined`.
+
+    build    a world, from the cells and the place of the body
+    measure  figures, and a line for people, from the world, and whether it is the first
+    once     grids with the first place only, as a run takes half an hour
+    returns  each figure by grid and place; lines
+    """
+    rows: dict[int, list[Sequence[float]]] = {cells: [] for cells in grids}
+    lines = []
+    every = [(n, place) for n in grids for place in PLACES[: 1 if n in once else None]]
+    for (n, place), world, first in refined(every, lambda at: build(*at), field):
+        figures, text = measure(world, first)
+        rows[n].append(figures)
+        lines.append(f"{n:>6g} cells, {place[0]:.2f} and {place[1]:.2f} of a cell: {text}")
+    by_grid = [list(zip(*found, strict=True)) for found in rows.values()]
+    return list(zip(*by_grid, strict=True)), lines
 
 
 def whole_steps(duration: float, longest: float) -> tuple[int, float]:
