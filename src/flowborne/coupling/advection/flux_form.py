@@ -13,6 +13,7 @@ from flowborne.coupling.inlets import (
     inlets_across,
     taken_by,
 )
+from flowborne.fluid.eddies import damp_eddies
 from flowborne.fluid.grid import Faces, faces_of
 from flowborne.fluid.transport import Transport, beside_faces, carry_component
 from flowborne.kernels.faces import still_to_come
@@ -44,6 +45,8 @@ class FluxForm(Advection):
             gained[axis] = start.density * (brought - float(carried.drained.sum()))
             for jet, taken in zip(jets, drunk, strict=True):
                 taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
+        if start.inviscid:
+            damp_eddies(faces_of(arrived), transport, grid, sides)
         for place, side in sides.around(grid):
             u = arrived[place.axis]
             before = u[place.layer].copy()
