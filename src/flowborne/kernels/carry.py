@@ -461,7 +461,7 @@ def carry(
     out: Array,
     u: Array,
     along: Array,
-    rising: bool,
+    rising: float,
     volumes: Volumes,
     flux: Fluxes,
     sides: Sides,
@@ -476,7 +476,7 @@ def carry(
     sides, what inflows gave to what was carried to them, and (n,) what left at each inlet.
 
     u            at the start
-    along        what else it is given, if `rising`, velocity per time
+    along        what else it is given, velocity per time, times `rising`
     dt           s, of each of `count` substeps
     least, most  times what a control volume holds that leaves it, see `level`
     """
@@ -497,8 +497,8 @@ def carry(
         for turn in range(2):
             weight = 1.0 - 0.5 * turn
             source, target = (start, middle) if turn == 0 else (middle, later)
-            if rising and s + turn > 0:
-                pad_field(padded, source, along, (s + turn) * dt)
+            if rising > 0.0 and s + turn > 0:
+                pad_field(padded, source, along, rising * (s + turn) * dt)
             else:
                 pad_field(padded, source, source, 0.0)
             fill_ghosts(padded, sides, s + turn, shape, c)

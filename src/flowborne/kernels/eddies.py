@@ -66,7 +66,7 @@ def list_edges(
         n2 = shape[2] - int(axis != 2 and across != 2)
         for f in cut[m]:
             i, j, k = f // (n1 * n2) + reach, (f // n2) % n1 + reach, f % n2 + reach
-            for end in range(2):
+            for _ in range(2):
                 for way in range(3):
                     for shift in range(-reach, reach + 1):
                         e = adds[0, i + shift * int(way == 0)]
