@@ -12,7 +12,7 @@ from flowborne.fluid.eddies import damp_eddies
 from flowborne.fluid.momentum import fluid_momentum, kinetic_energy
 from flowborne.fluid.transport import Transport
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.eddies import SHARE, edges_near, exchange, exchanges
+from flowborne.kernels.eddies import edges_near, exchange, exchanges
 from flowborne.validation.worlds import RING
 from flowborne.worlds import Boundaries
 
@@ -88,7 +88,7 @@ def test_edges_exchange_what_the_matrices_say(shape, axis, periodic):
     np.testing.assert_array_equal(edges.listed[2], smallest)
     before, faces, beside = edges.all_faces, *edges.listed[:2]
     given = exchanges(*edges.velocity, *edges.listed, rate)
-    wanted = SHARE * edges.exchange_matrix(rate) @ edges.C @ before
+    wanted = edges.exchange_matrix(rate) @ edges.C @ before / 64.0
     np.testing.assert_allclose(given, wanted, atol=1e-15)
     exchange(*edges.velocity, edges.volumes, faces, beside, given)
     taken = np.divide(
@@ -103,7 +103,7 @@ def test_no_wave_is_turned_over(shape, axis, periodic):
     edges = edges_of(shape, axis, periodic)
     open_face = edges.held > 0.0
     C = edges.C[:, open_face] / np.sqrt(edges.held[open_face])
-    values = np.linalg.eigvalsh(SHARE * C.T @ edges.exchange_matrix(1e9) @ C)
+    values = np.linalg.eigvalsh(C.T @ edges.exchange_matrix(1e9) @ C) / 64.0
     assert values[0] > -1e-12
     assert values[-1] < 1.0
 

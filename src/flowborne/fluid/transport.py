@@ -54,11 +54,6 @@ EXTRAPOLATION_COURANT = 2.0
 faster flow has left the place where pressure and forces gave it, and it would grow from step to
 step: noise as fine as the grid."""
 
-MIXED = (2.0, 2.5)
-"""Times what a control volume holds that leaves it in a substep, from which on it is mixed with
-the largest one beside it, and from which on wholly. Where c times it leaves, Heun's method keeps
-1 - c + c^2/2 of what it had, more than all from c = 2 on; mixing leaves (1 - 2 (c - 2)) of that."""
-
 
 def parts_for(amount: float) -> int:
     """Fewest equal parts of which none is greater than 1; one of what is not a finite number."""
@@ -205,7 +200,7 @@ def carry_component(
             fields = *fields[:2], plane(along, grid)
         rising = 0.0 if along is None else transport.extrapolated(grid)
         crossed, held_back, drained = carry(
-            *fields, rising, volumes, flux, table, inflows, scratch, dt, count, *MIXED
+            *fields, rising, volumes, flux, table, inflows, scratch, dt, count
         )
     return Carried(out, crossed, held_back, drained)
 

@@ -26,9 +26,6 @@ from numba import njit
 
 from flowborne.kernels.arrays import Array, Indices, Integers
 
-SHARE = 1.0 / 64.0
-"""Part of the difference of two circulations that is exchanged at most, see above."""
-
 
 @njit(nogil=True, cache=True)
 def positions(shape: Integers, axis: int, wraps: Integers, reach: int) -> Integers:
@@ -152,7 +149,7 @@ def exchanges(
                     volume = 0.5 * (part[n] + part[m]) * min(least[n], least[m])
                     both += volume * (circulation[n] - circulation[m])
             total += both
-        given[n] = SHARE * total
+        given[n] = total / 64.0
     return given
 
 
