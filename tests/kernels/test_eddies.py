@@ -7,17 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from flowborne import Array, Faces, Grid
-from flowborne.fluid.eddies import damp_eddies
-from flowborne.fluid.momentum import fluid_momentum, kinetic_energy
-from flowborne.fluid.transport import Transport
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.eddies import edges_near, exchange, exchanges
-from flowborne.validation.worlds import RING
-from flowborne.worlds import Boundaries
 
 from .references.eddies import circulation_matrix, exchange_matrix
-from .test_face_masses import BODIES, GRIDS, volumes_at
 
 CASES = [
     ((1, 6, 7), 0, (0, 0, 0)),
@@ -140,56 +133,3 @@ def test_edges_near_a_cut_face_are_listed_once(reach, count):
     listed = edges_near(number, held, (face, none), 0, np.zeros(3, np.int64), reach)
     assert len(listed[0]) == count
     np.testing.assert_array_equal(np.sort(number[number > 0]), np.arange(count) + 1)
-
-
-def transport_past(body: str, grid: Grid, sides: Boundaries, dt: float) -> Transport:
-    volumes, _ = volumes_at(body, grid, sides)
-    return Transport(grid.zeros_faces(), volumes, volumes, dt, 0.0)
-
-
-def random_flow(grid: Grid, sides: Boundaries) -> Faces:
-    random, velocity = np.random.default_rng(5), grid.zeros_faces()
-    for axis in grid.axes:
-        velocity[axis][:] = random.normal(size=velocity[axis].shape)
-        if sides.periodic()[axis]:
-            ends = np.moveaxis(velocity[axis], axis, 0)
-            ends[-1] = ends[0]
-    return velocity
-
-
-@pytest.mark.parametrize("sides", [Boundaries(), RING], ids=["closed", "ring"])
-@pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("name", GRIDS)
-def test_momentum_stays_and_energy_falls(name: str, body: str, sides: Boundaries) -> None:
-    grid = GRIDS[name]
-    for courant in (0.1, 1.0, 100.0):
-        transport = transport_past(body, grid, sides, courant * grid.spacing)
-        mass, velocity = transport.after.moving, random_flow(grid, sides)
-        before = [u.copy() for u in velocity]
-        damp_eddies(velocity, transport, grid, sides)
-        changed = sum(float(np.abs(u - b).sum()) for u, b in zip(velocity, before, strict=True))
-        was, now = (fluid_momentum(u, mass, grid, sides) for u in (tuple(before), velocity))
-        np.testing.assert_allclose(now, was, atol=1e-13 * grid.cell_volume * changed)
-        had, has = (kinetic_energy(u, mass, grid, sides) for u in (tuple(before), velocity))
-        assert 0.2 * had < has < had
-
-
-def potential(x: Array, y: Array, z: Array) -> Array:
-    return x * y + np.sin(3.0 * x) * np.cosh(2.0 * y) + y * z**2
-
-
-@pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("name", GRIDS)
-def test_flow_without_circulation_stays(name: str, body: str) -> None:
-    """Uniform flow among it."""
-    grid, sides = GRIDS[name], Boundaries()
-    transport = transport_past(body, grid, sides, grid.spacing)
-    x, y, z = np.meshgrid(*grid.cell_coordinates(), indexing="ij")
-    velocity = grid.zeros_faces()
-    for axis in grid.axes:
-        inner = tuple(slice(1, -1) if a == axis else slice(None) for a in range(3))
-        velocity[axis][inner] = 1.5 + np.diff(potential(x, y, z), axis=axis) / grid.spacing
-    before = [u.copy() for u in velocity]
-    damp_eddies(velocity, transport, grid, sides)
-    for u, b in zip(velocity, before, strict=True):
-        np.testing.assert_allclose(u, b, atol=1e-12)
