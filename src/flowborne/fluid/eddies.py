@@ -1,13 +1,12 @@
-"""Grid noise beside bodies that fluid slips along: eddies of two cells, which nothing else damps.
+"""Grid noise beside bodies that the fluid slips along: eddies of two cells.
 
-Control volumes that bodies cut get momentum through sides whose values are off by a fraction of a
-cell's difference, which makes eddies of two cells beside a body, moving or held. Elsewhere values
-of third order damp them; near cut faces means carry the momentum, which damp nothing. There the
-circulation around edges of the grid evens out as fast as third-order values damp the velocity:
-of a wave of two cells they take 4/3 while the flow crosses a cell. Momentum stays exact, and a flow
-without circulation as it is (see `kernels.eddies`).
+A cut control volume gets momentum through sides whose values are off by a fraction of a cell's
+difference. That makes eddies of two cells, beside moving and held bodies alike. Values of third
+order damp such eddies; the means that carry the momentum near cut faces do not. There the
+circulation around the edges of the grid evens out, as fast as third-order values damp a wave of two
+cells. Momentum stays exact, and so does a flow without circulation (see `kernels.eddies`).
 
-In viscous fluid there is none of it: it would act on boundary layers.
+Viscous fluid has none of it: it would act on boundary layers.
 """
 
 from __future__ import annotations
@@ -35,15 +34,10 @@ def damp_eddies(velocity: Faces, transport: Transport, grid: Grid, sides: Bounda
     rate, found = UPWIND_DAMPING * transport.dt / grid.spacing, []
     for axis in range(1 if grid.is_slab else 3):
         one, other = (axis + 1) % 3, (axis + 2) % 3
-        held, number = (
-            (volumes[one], volumes[other]),
-            np.zeros(count + (np.arange(3) != axis), np.int32),
-        )
-        faces, beside, least = edges_near(
-            number, held, (cut[one], cut[other]), axis, count * periodic, GHOSTS
-        )
-        u, v = fields[one], fields[other]
-        found.append((u, v, held, faces, beside, exchanges(u, v, faces, beside, least, rate)))
+        number = np.zeros(count + (np.arange(3) != axis), np.int32)
+        u, v, held = fields[one], fields[other], (volumes[one], volumes[other])
+        near = edges_near(number, held, (cut[one], cut[other]), axis, count * periodic, GHOSTS)
+        found.append((u, v, held, *near[:2], exchanges(u, v, *near, rate)))
     for each in found:
         exchange(*each)
     for axis in grid.axes:
