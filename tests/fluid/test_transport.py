@@ -262,6 +262,15 @@ def test_a_long_step_is_so_many_short_ones(grid: Grid) -> None:
         assert once.crossed == pytest.approx(crossed, rel=1e-12, abs=1e-15)
 
 
+@pytest.mark.parametrize(("crossed", "part"), [(0.0, 1.0), (1.9, 1.0), (8.0, 0.25)])
+def test_what_the_last_step_gave_goes_along_for_two_cells(crossed: float, part: float) -> None:
+    grid, sides = Grid.slab(8, 8, 0.1, (0.0, 0.0)), KEPT["ring"]
+    flux = grid.zeros_faces()
+    flux[0][:] = flux[1][:] = 0.5 * grid.face_area
+    transport = whole(grid, sides, flux, crossed * grid.spacing)
+    assert transport.extrapolated(grid) == pytest.approx(part)
+
+
 def test_what_an_inflow_holds_does_not_grow() -> None:
     """Noise in the stream behind it, which crosses 40 cells in a step of 200 parts."""
     grid, sides = Grid.slab(16, 12, 0.1, (0.0, 0.0)), Boundaries(INFLOW, OPEN)

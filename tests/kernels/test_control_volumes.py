@@ -196,14 +196,12 @@ def test_small_ones_mix_with_their_neighbours_and_keep_the_sum(
     field, listed = np.random.default_rng(3).standard_normal(case.volumes.shape), case.listed(0.3)
     if case.last is not None:
         field[case.last] = np.take(field, [0], component)
-    mixed, limits = field.copy(), (0.5, 2.0, 0.01)
+    mixed, nothing = field.copy(), 0.01
     leaving = np.random.default_rng(4).uniform(0.0, 0.5, listed.size)
-    least, most, nothing = limits
     nought = np.zeros(case.shape)
-    rest = nought, nothing, case.shape, case.wraps
-    level(mixed, case.volumes, listed, leaving, least, most, *rest)
+    level(mixed, case.volumes, listed, leaving, nought, nothing, case.shape, case.wraps)
     assert not nought.any()
-    expected = level_reference(field, case.volumes, listed, leaving, *limits, case.wraps)
+    expected = level_reference(field, case.volumes, listed, leaving, nothing, case.wraps)
     assert (mixed != field).any()
     np.testing.assert_allclose(mixed, expected, atol=1e-14)
     weights = case.volumes.copy()

@@ -11,7 +11,6 @@ from flowborne.kernels.flux import (
     CUT,
     GHOSTS,
     UPSTREAM,
-    fade,
     largest_crossing,
     pad_field,
     stage,
@@ -19,7 +18,6 @@ from flowborne.kernels.flux import (
 
 from .cut_cells import face_shape
 from .references.flux import (
-    fade_reference,
     largest_crossing_reference,
     side_fluxes_reference,
     stage_reference,
@@ -140,14 +138,3 @@ def test_largest_crossing(cells: Shape) -> None:
     q = fluxes(cells, np.random.default_rng(4))
     assert largest_crossing.parallel(*q) == largest_crossing(*q)
     assert largest_crossing(*q) == pytest.approx(largest_crossing_reference(q), rel=1e-14)
-
-
-@pytest.mark.parametrize("cells", [(5, 7, 6), (9, 8, 1)])
-def test_what_is_given_fades_where_the_flow_is_fast(cells: Shape) -> None:
-    q = fluxes(cells, np.random.default_rng(4))
-    most = largest_crossing(*q)
-    found = np.empty(cells)
-    fade(found, *q, 0.3 * most, 0.9 * most)
-    np.testing.assert_allclose(found, fade_reference(q, 0.3 * most, 0.9 * most), rtol=1e-12)
-    assert found.min() == 0.0
-    assert found.max() == 1.0

@@ -91,6 +91,7 @@ def departure(world: World) -> Departure:
         fluid.grid,
         fluid.boundaries,
         fluid.density,
+        fluid.viscosity == 0.0,
         state,
         cut,
         volumes_of(world, cut),

@@ -24,7 +24,7 @@ from math import prod
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.control_volumes import NOTHING, ControlVolumes, means
+from flowborne.fluid.control_volumes import NOTHING, ControlVolumes
 from flowborne.fluid.ghosts import edge, kernel_axes, packed_sides, plane, planes
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
@@ -37,7 +37,7 @@ from flowborne.kernels.carry import (
     prepare,
 )
 from flowborne.kernels.control_volumes import Transfers
-from flowborne.kernels.flux import GHOSTS, fade, largest_crossing
+from flowborne.kernels.flux import GHOSTS, largest_crossing
 
 COURANT = 0.8
 """Cells that the flow may cross in a substep, the axes added up: Heun's method with values of third
@@ -49,15 +49,10 @@ SUBSTEPS = 300
 SLACK = 1e-9
 """How much more than a whole number of parts is rounding, and needs no further part."""
 
-LASTING = (2.0, 4.0)
-"""Cells that the flow crosses in a step, the axes added up, up to which what the last step gave it
-goes along, and from which on nothing does. Pressure and forces gave it at a place that a faster
-flow leaves behind, and it would grow from step to step: noise as fine as the grid."""
-
-MIXED = (2.0, 2.5)
-"""Times what a control volume holds that leaves it in a substep, from which on it is mixed with
-the largest one beside it, and from which on wholly. Where c times it leaves, Heun's method keeps
-1 - c + c^2/2 of what it had, more than all from c = 2 on; mixing leaves (1 - 2 (c - 2)) of that."""
+EXTRAPOLATION_COURANT = 2.0
+"""Cells that the flow crosses, the axes added up, while what the last step gave it goes along. A
+faster flow has left the place where pressure and forces gave it, and it would grow from step to
+step: noise as fine as the grid."""
 
 
 def parts_for(amount: float) -> int:
@@ -114,15 +109,10 @@ class Transport:
         """In how many the step is done; in one where a flux is not a finite number."""
         return min(parts_for(self.courant(grid) / COURANT), SUBSTEPS)
 
-    def lasting(self, grid: Grid) -> Array | None:
-        """(nx, ny, nz) share of what the last step gave the flow that goes along with it, see
-        LASTING; None where all of it does."""
-        if self.courant(grid) <= LASTING[0]:
-            return None
-        share = np.empty(grid.shape)
-        least, most = (cells * grid.cell_volume / self.dt for cells in LASTING)
-        fade(share, *self.flux, least, most)
-        return share
+    def extrapolated(self, grid: Grid) -> float:
+        """Part of the step in which what the last one gave goes along, see
+        EXTRAPOLATION_COURANT."""
+        return EXTRAPOLATION_COURANT / max(self.courant(grid), EXTRAPOLATION_COURANT)
 
 
 @dataclass(frozen=True)
@@ -139,16 +129,6 @@ class Carried:
     crossed: float
     held: float
     drained: Array
-
-
-def beside_faces(cells: Array, axis: int, sides: Boundaries) -> Array:
-    """A field of the cells on the faces across an axis: the mean of both cells, or the one there
-    is."""
-    found = means(cells, axis, sides.periodic()[axis])
-    if not sides.periodic()[axis]:
-        found[edge(axis, 0)] *= 2.0
-        found[edge(axis, -1)] *= 2.0
-    return found
 
 
 @lru_cache(maxsize=64)
@@ -218,9 +198,10 @@ def carry_component(
             if ring:
                 along[edge(component, -1)] = along[edge(component, 0)]
             fields = *fields[:2], plane(along, grid)
+        rising = 0.0 if along is None else transport.extrapolated(grid)
         crossed, held_back, drained = carry(
-            *fields, along is not None, volumes, flux, table, inflows, scratch, dt, count, *MIXED,
-        )  # fmt: skip
+            *fields, rising, volumes, flux, table, inflows, scratch, dt, count
+        )
     return Carried(out, crossed, held_back, drained)
 
 

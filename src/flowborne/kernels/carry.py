@@ -404,15 +404,11 @@ def part_of_step(out: Array, start: Array, end: Array, part: float) -> None:
 
 
 @njit(nogil=True, cache=True)
-def settle(
-    later: Array, high: Array, volumes: Volumes, span: float, least: float, most: float,
-    nought: Array,
-) -> None:  # fmt: skip
+def settle(later: Array, high: Array, volumes: Volumes, span: float, nought: Array) -> None:
     """Give what closed control volumes got to their targets, and mix what is too small, in place.
 
-    high         volumes after the stage
-    span         s, of the substep
-    least, most  see `level`
+    high  volumes after the stage
+    span  s, of the substep
     """
     shut, targets, held = volumes.shut.faces, volumes.shut.targets, high.reshape(-1)
     was = np.empty((shut.size, 3))
@@ -421,7 +417,7 @@ def settle(
         was[n, 2] = held[shut[n]]
     join_small(later, high, shut, targets, volumes.shut.shares, volumes.nothing)
     leaving, shape, wraps = span * volumes.leaving, volumes.shape, volumes.wraps
-    level(later, high, volumes.cut, leaving, least, most, nought, volumes.nothing, shape, wraps)
+    level(later, high, volumes.cut, leaving, nought, volumes.nothing, shape, wraps)
     for n in range(shut.size):
         held[targets[n, 0]], held[targets[n, 1]] = was[n, 0], was[n, 1]
         held[shut[n]] = was[n, 2]
@@ -461,7 +457,7 @@ def carry(
     out: Array,
     u: Array,
     along: Array,
-    rising: bool,
+    rising: float,
     volumes: Volumes,
     flux: Fluxes,
     sides: Sides,
@@ -469,16 +465,13 @@ def carry(
     scratch: Scratch,
     dt: float,
     count: int,
-    least: float,
-    most: float,
 ) -> tuple[float, float, Array]:
     """A component a step later, in `out`; gives the volume times velocity that came in through the
     sides, what inflows gave to what was carried to them, and (n,) what left at each inlet.
 
-    u            at the start
-    along        what else it is given, if `rising`, velocity per time
-    dt           s, of each of `count` substeps
-    least, most  times what a control volume holds that leaves it, see `level`
+    u      at the start
+    along  what else it is given, velocity per time, times `rising`
+    dt     s, of each of `count` substeps
     """
     c, shape, nothing = volumes.component, volumes.shape, volumes.nothing
     padded, marks, net, middle = scratch.padded, scratch.marks, scratch.net, scratch.middle
@@ -497,8 +490,8 @@ def carry(
         for turn in range(2):
             weight = 1.0 - 0.5 * turn
             source, target = (start, middle) if turn == 0 else (middle, later)
-            if rising and s + turn > 0:
-                pad_field(padded, source, along, (s + turn) * dt)
+            if rising > 0.0 and s + turn > 0:
+                pad_field(padded, source, along, rising * (s + turn) * dt)
             else:
                 pad_field(padded, source, source, 0.0)
             fill_ghosts(padded, sides, s + turn, shape, c)
@@ -512,7 +505,7 @@ def carry(
             add_transfers(target, net, high, source, given, part, nothing)
             if turn == 1:
                 held += empty_at_walls(target, high, sides, shape, c, nothing)
-            settle(target, high, volumes, dt, least, most, scratch.nought)
+            settle(target, high, volumes, dt, scratch.nought)
             crossed += 0.5 * dt * came
             drained += 0.5 * dt * inlets
         if s < count - 1:

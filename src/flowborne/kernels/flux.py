@@ -218,33 +218,16 @@ def pad_field(out: Array, values: Array, along: Array, time: float) -> None:
                 inner[k] = one[k] + time * other[k]
 
 
-@inlined
-def crossing(qx: Array, qy: Array, qz: Array, i: int, j: int, k: int) -> float:
-    """Volume per time that crosses a cell, the axes added up."""
-    rate = max(abs(qx[i, j, k]), abs(qx[i + 1, j, k]))
-    rate += max(abs(qy[i, j, k]), abs(qy[i, j + 1, k]))
-    rate += max(abs(qz[i, j, k]), abs(qz[i, j, k + 1]))
-    return float(rate)
-
-
 @kernel
 def largest_crossing(qx: Array, qy: Array, qz: Array) -> float:
-    """Largest `crossing` of all cells."""
+    """Largest volume per time that crosses a cell, the axes added up."""
     n0, n1, n2 = qy.shape[0], qx.shape[1], qx.shape[2]
     most = np.zeros(n0)
     for i in prange(n0):
         for j in range(n1):
             for k in range(n2):
-                most[i] = max(most[i], crossing(qx, qy, qz, i, j, k))
+                rate = max(abs(qx[i, j, k]), abs(qx[i + 1, j, k]))
+                rate += max(abs(qy[i, j, k]), abs(qy[i, j + 1, k]))
+                rate += max(abs(qz[i, j, k]), abs(qz[i, j, k + 1]))
+                most[i] = max(most[i], rate)
     return float(most.max())
-
-
-@kernel
-def fade(out: Array, qx: Array, qy: Array, qz: Array, least: float, most: float) -> None:
-    """In each cell 1 where its `crossing` is up to `least`, 0 from `most` on, and linear between
-    them."""
-    for i in prange(out.shape[0]):
-        for j in range(out.shape[1]):
-            for k in range(out.shape[2]):
-                rate = crossing(qx, qy, qz, i, j, k)
-                out[i, j, k] = min(max((most - rate) / (most - least), 0.0), 1.0)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup
-from flowborne.fluid.transport import LASTING
+from flowborne.fluid.transport import EXTRAPOLATION_COURANT
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.holding import driven_dofs
@@ -27,7 +27,7 @@ BODY_CELLS = 1.0
 """Cells that a body may cross in a step. A faster body jumps over cells, and their fluid passes
 through it (docs/momentum.md: 9 % of a dye in 100 steps of 2.4 cells)."""
 
-FLOW_CELLS = LASTING[0]
+FLOW_CELLS = EXTRAPOLATION_COURANT
 """Cells that the undisturbed flow may cross in a step, summed over the axes. Below it the pressure
 and the forces of the last step are extrapolated; transport is done in substeps."""
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers, Marks
-from flowborne.kernels.control_volumes import CLOSED_BELOW, TURNS
+from flowborne.kernels.control_volumes import CLOSED_BELOW
 
 
 def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
@@ -118,8 +118,6 @@ def level_reference(
     volumes: Array,
     listed: Integers,
     leaving: Array,
-    least: float,
-    most: float,
     nothing: float,
     wraps: Integers,
 ) -> Array:
@@ -128,16 +126,16 @@ def level_reference(
     beside = neighbours_reference(np.array(field.shape), wraps)[:, listed]
     to, _ = largest_reference(beside, np.where(beside >= 0, volume[beside], -1.0), 0.0)
     part = leaving / np.where(volume[listed] > nothing, volume[listed], 1.0)
-    mixed = (volume[listed] > nothing) & (part > least) & (volume[to] > volume[listed])
+    mixed = (volume[listed] > nothing) & (part > 2.0) & (volume[to] > volume[listed])
     f, to = listed[mixed], to[mixed]
-    mixing = np.minimum((part[mixed] - least) / (most - least), 1.0) * volume[f]
+    growth = 1.0 - part[mixed] + 0.5 * part[mixed] ** 2
+    mixing = (1.0 - 1.0 / growth) * volume[f]
     whole = volume + np.bincount(to, mixing, volume.size)
-    for _ in range(TURNS):
-        apart = levelled[f] - levelled[to]
-        mean = np.bincount(to, mixing * apart, volume.size)[to] / whole[to]
-        exchange = mixing * (mean - apart)
-        np.add.at(levelled, f, exchange / volume[f])
-        np.subtract.at(levelled, to, exchange / volume[to])
+    apart = levelled[f] - levelled[to]
+    mean = np.bincount(to, mixing * apart, volume.size)[to] / whole[to]
+    exchange = mixing * (mean - apart)
+    np.add.at(levelled, f, exchange / volume[f])
+    np.subtract.at(levelled, to, exchange / volume[to])
     return levelled.reshape(field.shape)
 
 

@@ -88,18 +88,8 @@ def stage_reference(
 
 def largest_crossing_reference(q: Faces) -> float:
     """`largest_crossing` in NumPy."""
-    return float(_crossing(q).max())
-
-
-def fade_reference(q: Faces, least: float, most: float) -> Array:
-    """`fade` in NumPy."""
-    return np.clip((most - _crossing(q)) / (most - least), 0.0, 1.0)
-
-
-def _crossing(q: Faces) -> Array:
-    """(n0, n1, n2) `crossing` of all cells in NumPy."""
     rates = []
     for axis, flux in enumerate(q):
         size = np.moveaxis(np.abs(flux), axis, 0)
         rates.append(np.moveaxis(np.maximum(size[:-1], size[1:]), 0, axis))
-    return np.asarray(sum(rates))
+    return float(sum(rates).max())

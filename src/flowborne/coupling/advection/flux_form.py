@@ -13,8 +13,9 @@ from flowborne.coupling.inlets import (
     inlets_across,
     taken_by,
 )
+from flowborne.fluid.eddies import damp_eddies
 from flowborne.fluid.grid import Faces, faces_of
-from flowborne.fluid.transport import Transport, beside_faces, carry_component
+from flowborne.fluid.transport import Transport, carry_component
 from flowborne.kernels.faces import still_to_come
 
 
@@ -29,13 +30,11 @@ class FluxForm(Advection):
         dt, arrived = transport.dt, [np.zeros(u.shape) for u in velocity[len(grid.axes) :]]
         crossed, stopped, gained = np.zeros((3, 3))
         drunk = [np.zeros(3) for _ in jets]
-        lasting, cells = transport.lasting(grid), cells_with_inlets(jets, start.sources)
+        cells = cells_with_inlets(jets, start.sources)
         for axis in grid.axes:
             inlets = inlets_across(axis, cells, jets, start.sources, grid, sides)
             along = np.empty(velocity[axis].shape)
             still_to_come(along, state.acceleration[axis], velocity[axis], state.velocity[axis], dt)
-            if lasting is not None:
-                along *= beside_faces(lasting, axis, sides)
             carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
             arrived.insert(axis, carried.velocity)
             crossed[axis] = start.density * carried.crossed
@@ -44,6 +43,8 @@ class FluxForm(Advection):
             gained[axis] = start.density * (brought - float(carried.drained.sum()))
             for jet, taken in zip(jets, drunk, strict=True):
                 taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
+        if start.inviscid:
+            damp_eddies(faces_of(arrived), transport, grid, sides)
         for place, side in sides.around(grid):
             u = arrived[place.axis]
             before = u[place.layer].copy()

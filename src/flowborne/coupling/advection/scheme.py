@@ -22,6 +22,7 @@ class Departure:
 
     grid, sides  of the fluid
     density      kg/m^3
+    inviscid     whether the fluid has no viscosity
     state        of the fluid
     cut          the cut grid
     volumes      control volumes
@@ -35,6 +36,7 @@ class Departure:
     grid: Grid
     sides: Boundaries
     density: float
+    inviscid: bool
     state: FluidState
     cut: Geometry
     volumes: ControlVolumes
