@@ -42,5 +42,5 @@ def test_I9_a_free_body_never_gains_energy_and_loses_less_on_a_finer_grid() -> N
     coarse, fine = case.turning(8), case.turning(16)
     for energies in (coarse, fine):
         assert (np.diff(energies) < 0.0).all()
-    assert 1.0 - coarse[-1] < 0.06
-    assert 1.0 - fine[-1] < 0.02
+    assert 1.0 - coarse[-1] < 0.07
+    assert 1.0 - fine[-1] < 0.022

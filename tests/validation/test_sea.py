@@ -20,5 +20,5 @@ def test_B8_falls_short_of_the_published_drag_by_less_than_a_tenth_on_8_cells() 
     assert strouhal[0] == pytest.approx([reference("B5", "St")], rel=0.02)
 
 
-def test_I11_a_towed_cylinder_has_a_tenth_more_drag_than_a_held_one_on_8_cells() -> None:
-    assert float(case.towed_over_held(True).value) == pytest.approx(1.103, abs=0.005)
+def test_I11_a_towed_cylinder_has_a_twentieth_more_drag_than_a_held_one_on_8_cells() -> None:
+    assert float(case.towed_over_held(True).value) == pytest.approx(1.053, abs=0.005)

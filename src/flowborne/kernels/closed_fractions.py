@@ -105,7 +105,7 @@ def share_closed(
                     share[a, b, c] = 0.0
                     continue
                 share[a, b, c] = union * own / all_own
-                count += 1
+                count += int(share[a, b, c] > 0.0)
     return count
 
 

@@ -365,7 +365,7 @@ def disc(quick: bool) -> list[Finding]:
     """A disc broadside, and its limit for no thickness, as in the list. In the fluid it is 1.75
     cells thick, and a disc of this thickness has the added mass of the series."""
     half = 0.2
-    cells = (16, 32, 64) if quick else (32, 64, 128)
+    cells = (24, 48, 96) if quick else (32, 64, 128)
     geom = f'<geom type="cylinder" size="{half} {THIN}" zaxis="0 1 0"/>'
     displaced, exact = 2.0 * THIN * np.pi * half**2, 8.0 / 3.0 * half**3
     added = [4.0 * pushed(quarter(round(n / (2.0 * half))), geom, UP) for n in cells]
