@@ -138,6 +138,20 @@ def test_of_several_bodies_the_nearest_crossing_is_kept() -> None:
     np.testing.assert_array_equal(at[outer >= 0], outer[outer >= 0] + each[0][1].part.size)
 
 
+def test_a_crossing_at_the_node_inside_has_its_normal() -> None:
+    """What rounding puts just inside leaves the whole edge open."""
+    ball = placed(PRIMITIVES["sphere"](np.array([0.3, 0.0, 0.0])), np.zeros(3), np.eye(3))
+    origin = np.full(3, -6.0 * H)
+    phi, _ = crossed(ball, origin)
+    phi[9, 6, 6] = -1e-18
+    found = new_crossings(phi, H, False)
+    found.normal[:] = np.nan
+    cross_geometry(found, np.zeros(1, np.int64), phi, BOX, ball, 0, origin, H, False)
+    n = found.at[0, 9, 6, 6]
+    assert found.part[n] == pytest.approx(1.0)
+    np.testing.assert_allclose(found.normal[n], [1.0, 0.0, 0.0], atol=1e-9)
+
+
 def test_an_edge_that_a_corner_passes_is_crossed_twice() -> None:
     """A box on its edge, whose uppermost line lies 0.2 cells above a plane of nodes."""
     turn = Rotation.from_euler("z", 45.0, degrees=True).as_matrix()

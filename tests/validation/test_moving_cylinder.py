@@ -23,13 +23,13 @@ from flowborne.worlds import advance
 
 
 def test_V3_repeats_its_own_second_cycle_on_four_cells():
-    """The source asks for 3 % of the largest force and for 0.15 all the way; these are 5 % and 0.4
+    """The source asks for 3 % of the largest force and for 0.15 all the way; the latter is 0.4
     off."""
     phases, forces = last_cycle(4, 2)
     moments, published = np.array(reference("V3", CURVE)).T
     away = np.interp(moments, phases, forces, period=1.0) - published
     assert np.sqrt(np.mean(away**2)) == pytest.approx(0.2124, rel=0.01)
-    assert np.abs(forces).max() == pytest.approx(3.3181, rel=2e-3)
+    assert np.abs(forces).max() == pytest.approx(3.2653, rel=2e-3)
 
 
 def test_V3_the_coefficients_of_a_force_that_has_them():

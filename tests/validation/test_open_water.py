@@ -44,7 +44,7 @@ def test_B4_repeats_its_own_drag_and_bubble_on_four_cells_across_D():
     drag, lift = UNBOUNDED.coefficients(advance(world, 0.25, 40))
     assert drag == pytest.approx(1.6063, rel=2e-3)
     assert abs(lift) < 0.01 * drag
-    assert backflow(world, BACK, LONGEST) == pytest.approx(1.4, rel=0.01)
+    assert backflow(world, BACK, LONGEST) == pytest.approx(1.454, rel=0.01)
 
 
 def test_B4_the_flow_separates_where_it_turns_round():
@@ -64,12 +64,12 @@ def test_B4_figures_of_known_flows(place: Place):
 
 
 def test_B7_repeats_its_own_figures_on_four_cells_across_D():
-    """Too few for the 3 % of the source: drag at Re 100, length of the bubble, no separation one
-    cell from the sphere, drag at Re 150."""
+    """Drag at Re 100 within the 3 % of the source; too few for the length of the bubble, no
+    separation one cell from the sphere; drag at Re 150."""
     found = case("B7").run(quick=True)
     own = 1.08416, 0.636676, 180.0, 0.902163
     assert [result.value for result in found] == pytest.approx(own, rel=2e-3)
-    assert {result.verdict for result in found} == {"coarse"}
+    assert [result.verdict for result in found[:3]] == ["pass", "coarse", "coarse"]
 
 
 def test_the_bubble_ends_where_the_flow_on_the_axis_turns_round():

@@ -152,7 +152,7 @@ def add_crossing(
         assert n + int(twice) < found.part.size
         found.at[d, i, j, k] = n
         used[0] += 1 + int(twice)
-        found.part[n : used[0]] = 1.0
+        found.part[n : used[0]] = np.inf
     n += int(upper)
     if part < found.part[n]:
         found.part[n], found.piece[n] = part, piece
