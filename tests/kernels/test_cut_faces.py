@@ -28,7 +28,8 @@ def square(corners: tuple[float, ...]) -> Array:
 
 
 def on_edges(phi: Array, line: Array, normals: Array, pieces: list[int]) -> Crossings:
-    """Crossings of the edges of one cell with lines n . x = c, each of the one that is nearest.
+    """Crossings of the edges of one cell with the body behind lines n . x = c: where an edge passes
+    the last of them.
 
     line  (n,) c;  normals  (n, 2)
     """
@@ -48,12 +49,10 @@ def on_edges(phi: Array, line: Array, normals: Array, pieces: list[int]) -> Cros
             if n[d] != 0.0
         ]
         way[(way < 0.0) | (normals[:, d] * along >= 0.0)] = np.inf
-        nearest = (
-            int(np.argmin(way)) if len(line) == 1 else int(np.argmax(np.where(way < 2, way, -1)))
-        )
+        last = int(np.argmax(np.where(np.isfinite(way), way, -1.0)))
         found.at[d, node[0], node[1]] = used
-        found.part[used], found.piece[used] = way[nearest], pieces[nearest]
-        found.normal[used] = [*normals[nearest], 0.0]
+        found.part[used], found.piece[used] = way[last], pieces[last]
+        found.normal[used] = [*normals[last], 0.0]
         used += 1
     return found
 

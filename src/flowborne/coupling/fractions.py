@@ -254,7 +254,6 @@ def geometry(
     beside = beside_sides(shape, walls)
     ox, oy, oz = opened = [np.ones(grid.face_shape(d)) for d in range(3)]
     total = grid.zeros_faces()
-    pieces = []
     boxes = body_boxes(shapes, position, rotation, first_skin)
     pieces = list(around_bodies(shapes, position, rotation, boxes, skins, grid, boundaries))
     crossings = together(distance.shape, [piece.crossings for piece in pieces])
