@@ -93,6 +93,17 @@ def test_a_slab_has_the_area_of_a_body_wherever_it_is(cut: Cut, shape: str) -> N
     assert away < 5e-3 * np.sqrt(area)
 
 
+def test_a_box_of_few_cells_has_its_area_wherever_it_is(cut: Cut) -> None:
+    """Its corners pass between nodes: 8 x 5 cells, to rounding."""
+    random, grid, worst = np.random.default_rng(4), Grid.slab(12, 12, 1.0, (-6.0, -6.0)), 0.0
+    for _ in range(PLACES):
+        (x, y), turn = random.random(2) - 0.5, random.uniform(0.0, 6.28)
+        box = '<geom type="box" size="4 2.5 1"/>'
+        body = f'<body pos="{x} {y} 0" euler="0 0 {turn}"><freejoint/>{box}</body>'
+        worst = max(worst, abs(solid(cut(grid, body), grid)[0] / 40.0 - 1.0))
+    assert worst < 1e-11
+
+
 @pytest.mark.parametrize("shape", ROUND)
 def test_a_room_has_the_volume_of_a_body_wherever_it_is(cut: Cut, shape: str) -> None:
     """Within 0.5 % in a hundred places and turns, its sections within 3 % of the largest."""

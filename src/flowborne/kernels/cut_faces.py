@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array
-from flowborne.kernels.edge_crossings import Crossings
+from flowborne.kernels.edge_crossings import PIECES, Crossings
 from flowborne.kernels.jit import inlined
 
 FLAT = 1e-2
@@ -154,6 +154,31 @@ def add_wall(
     return int(kink)
 
 
+@inlined
+def of_one_geometry(
+    crossing: tuple[int, int, int, int], values: tuple[float, float, float, float], found: Crossings
+) -> bool:
+    """Whether the edges of a face, crossed or not, meet one geometry alone.
+
+    crossing  see `edges_of`;  values  distance at its corners in turn
+    """
+    own = -1
+    for n in range(4):
+        first, begins, ends = crossing[n], values[n] < 0.0, values[(n + 1) % 4] < 0.0
+        if begins and ends:
+            continue
+        if first < 0:
+            if begins != ends:
+                return False
+            continue
+        for e in range(first, first + 1 + int(begins == ends)):
+            geometry = found.piece[e] // PIECES
+            if own >= 0 and geometry != own:
+                return False
+            own = geometry
+    return True
+
+
 @njit(nogil=True, cache=True)
 def closed_face(
     phi: Array, found: Crossings, axis: int, i: int, j: int, k: int, flat: bool, straight: bool
@@ -163,7 +188,8 @@ def closed_face(
 
     The sum over what bodies take of the edges and the walls from where the way around the face
     leaves bodies to where it next enters one (Green's theorem). So corners inside across a diagonal
-    are joined: a thin body stays in one piece. A `straight` wall is the chord from crossing to
+    are joined: a thin body stays in one piece. Of several geometries what closes the middle of an
+    edge stays by itself. A `straight` wall is the chord from crossing to
     crossing. In a slab, `flat`, a face across x or y is an edge.
     """
     s, t = other_axes(axis)
@@ -186,6 +212,7 @@ def closed_face(
         phi[i + ti, j + tj, k + tk],
     )
     crossing = edges_of(axis, i, j, k, found)
+    joined = of_one_geometry(crossing, values, found)
     sums, corners = np.zeros(5), 0
     p, exit, waits = (0.0, 0.0), -1, False
     for turn in range(8):
@@ -194,27 +221,32 @@ def closed_face(
             break
         begins, ends, e = values[n] < 0.0, values[m] < 0.0, crossing[n]
         c, o = corner_of(n), corner_of(m)
-        if begins == ends:
-            if begins and first:
-                add_line(sums, c, o)
-            elif e >= 0 and first:  # a part in between
-                f, g = e + int(n >= 2), e + int(n < 2)
-                c, o = between(c, o, found.part[f]), between(o, c, found.part[g])
-                add_line(sums, c, o)
-                corners += add_wall(sums, o, c, g, f, found, s, t, straight)
-            continue
-        outer, inner = (m, n) if begins else (n, m)
-        part = found.part[e] if e >= 0 else values[outer] / (values[outer] - values[inner])
-        q = between(o, c, part) if begins else between(c, o, part)
-        if begins and first:
-            add_line(sums, c, q)
-            p, exit, waits = q, e, True
-        elif ends:
-            if waits:
-                corners += add_wall(sums, p, q, exit, e, found, s, t, straight)
-                waits = False
-            if first:
-                add_line(sums, q, o)
+        enters, leaves = c, o
+        f = g = e
+        if begins != ends:
+            outer, inner = (m, n) if begins else (n, m)
+            part = found.part[e] if e >= 0 else values[outer] / (values[outer] - values[inner])
+            if begins:
+                leaves = between(o, c, part)
+            else:
+                enters = between(c, o, part)
+        elif not begins:
+            if e < 0:
+                continue
+            f, g = e + int(n >= 2), e + int(n < 2)
+            enters, leaves = between(c, o, found.part[f]), between(o, c, found.part[g])
+            if not joined:
+                if first:
+                    add_line(sums, enters, leaves)
+                    corners += add_wall(sums, leaves, enters, g, f, found, s, t, straight)
+                continue
+        if not begins and waits:
+            corners += add_wall(sums, p, enters, exit, f, found, s, t, straight)
+            waits = False
+        if first:
+            add_line(sums, enters, leaves)
+            if not ends:
+                p, exit, waits = leaves, g, True
     area = 0.5 * sums[2]
     if area <= 0.0:
         return 0.0, 0.0, 0.0, corners, sums[3], sums[4]
