@@ -4,8 +4,9 @@ With B the velocity of the wall points and C the couple of the bodies' own rotat
 
     (m/dt + L + W) u - W B s = m u*/dt + given          s = s* + M dt (B^T W (u - B s) - C s)
 
-where L are the links and M the motion that a unit impulse gives. Tied faces, whose velocity is
-B s, count among the walls with the weight m/dt. The bodies are eliminated exactly,
+where L are the links and M the motion that a unit impulse gives. W is diagonal but at corners of
+bodies. Tied faces, whose velocity is B s, count among the walls with the weight m/dt. The bodies
+are eliminated exactly,
 
     s = s* + N dt (B^T W (u - B s*) - C s*)             N = (M^-1 + dt (B^T W B + C))^-1
 
@@ -28,6 +29,7 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.viscosity import ViscousFaces
 from flowborne.kernels.arrays import Integers
+from flowborne.kernels.corner_friction import AROUND
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.viscosity import TIED
 from flowborne.kernels.viscous_operator import apply_component
@@ -41,11 +43,12 @@ for a domain of MOST cells."""
 
 @dataclass(frozen=True)
 class Walls:
-    """Pieces of wall beside faces, and faces tied to a body, listed over all components.
+    """Pieces of wall beside faces, faces around corners, and faces tied to a body, listed over all
+    components.
 
     index   (n,) position among the concatenated faces; a face may have several pieces
     tied    (n,) whether the face moves with the body
-    weight  (n,) W, or m/dt of tied faces, kg/s
+    weight  (n, n) W, and m/dt of tied faces, kg/s
     body    (n,) the body
     columns (n, m) entries of the motion that move the point, the twist of its body unless told
     arm     (n, m) velocity of the point along the face's axis for each of them
@@ -56,7 +59,7 @@ class Walls:
 
     index: Integers
     tied: NDArray[np.bool_]
-    weight: Array
+    weight: csr_array
     body: Integers
     columns: Integers
     arm: Array
@@ -71,12 +74,12 @@ class Walls:
         at the wall point, is larger by this; about any point for a closed surface, else about
         the middle of its wall points. Symmetric but for the coarseness of the cells, and made so.
         """
-        couples = np.zeros((bodies, 3, 3))
+        couples, weight = np.zeros((bodies, 3, 3)), self.weight.diagonal()
         for body in np.unique(self.body[self.body < bodies]):
             own = self.body == body
             point, across, gap = self.point[own], self.across[own], self.gap[own]
             lever = np.cross(point - point.mean(axis=0), across)
-            couple = (self.weight[own, None] * lever).T @ np.cross(gap, across)
+            couple = (weight[own, None] * lever).T @ np.cross(gap, across)
             share, axes = np.linalg.eigh(0.5 * (couple + couple.T))
             couples[body] = (axes * np.maximum(share, 0.0)) @ axes.T
         return couples
@@ -95,12 +98,12 @@ class Walls:
             arms = csr_array((self.arm.ravel(), (row, self.columns.ravel())), shape=(count, size))
             rest = csr_array((size - 6 * bodies, size - 6 * bodies))
             couple = block_diag([*blocks, rest], format="csr")
-            return csr_array(arms.T @ (diags_array(self.weight) @ arms) + couple)
+            return csr_array(arms.T @ (self.weight @ arms) + couple)
         drag = np.zeros((bodies, 6, bodies, 6))
         for body in range(bodies):
             own = self.body == body
             arm = self.arm[own]
-            drag[body, :, body] = blocks[body] + (self.weight[own, None] * arm).T @ arm
+            drag[body, :, body] = blocks[body] + (self.weight @ self.arm)[own].T @ arm
         return drag.reshape(size, size)
 
 
@@ -111,18 +114,24 @@ def walls_of(systems: list[ViscousFaces], cut: Geometry, grid: Grid) -> Walls:
     for axis, system in zip(grid.axes, systems, strict=True):
         parts.append(walls_across(axis, first, system, cut, grid))
         first += system.kind.size
-    names = [field.name for field in fields(Walls)]
-    return Walls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    joined = {
+        field.name: np.concatenate([getattr(part, field.name) for part in parts])
+        for field in fields(Walls)
+        if field.name != "weight"
+    }
+    weight = block_diag([part.weight for part in parts], format="csr")
+    return Walls(**joined, weight=csr_array(weight))
 
 
 def walls_across(axis: int, first: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> Walls:
-    """The pieces of wall of the faces across `axis`, and the tied ones; each belongs to the body
-    nearest to one of its nodes.
+    """The pieces of wall of the faces across `axis`, those around corners, and the tied ones; each
+    belongs to the body nearest to one of its nodes.
 
     first  position of the component among the concatenated faces
     """
     moved = np.flatnonzero(system.kind == TIED)
-    index = np.concatenate([system.beside, moved])
+    around, _, corner_node = system.corners
+    index = np.concatenate([system.beside, around.ravel(), moved])
     at = np.stack(np.unravel_index(index, system.kind.shape), axis=1)
     coordinates = grid.face_coordinates(axis)
     point = np.stack([coordinates[d][at[:, d]] for d in range(3)], axis=1)
@@ -130,26 +139,54 @@ def walls_across(axis: int, first: int, system: ViscousFaces, cut: Geometry, gri
         point[:, 2] = 0.0
     point[: system.beside.size] += system.place
     others = [d for d in range(3) if d != axis]
-    point[system.beside.size :, others] += system.centre.reshape(2, -1)[:, moved].T
+    met = system.beside.size
+    point[met:, others] += system.centre.reshape(2, -1)[:, index[met:]].T
     one, other = np.delete(np.eye(3, dtype=np.int64), axis, 0)
-    low = at[system.beside.size :]
+    low = at[met + around.size :]
     corners = np.stack([low, low + one, low + other, low + one + other])
     which = np.argmin(cut.distance[tuple(np.moveaxis(corners, -1, 0))], axis=0)
     corner = corners[which, np.arange(moved.size)]
-    body = np.concatenate([cut.nearest.reshape(-1)[system.node], cut.nearest[tuple(corner.T)]])
+    nodes = np.concatenate([system.node, np.repeat(corner_node, AROUND)])
+    body = np.concatenate([cut.nearest.reshape(-1)[nodes], cut.nearest[tuple(corner.T)]])
     point = cut.images.at_bodies(point, body)
     across = np.tile(np.eye(3)[axis], (index.size, 1))
     return Walls(
         index=first + index,
-        tied=np.arange(index.size) >= system.beside.size,
-        weight=np.concatenate([system.wall, system.mass.reshape(-1)[moved]]),
+        tied=np.arange(index.size) >= met + around.size,
+        weight=weights(system, system.mass.reshape(-1)[moved]),
         body=body,
         columns=6 * body[:, None] + np.arange(6),
         arm=np.concatenate([across, np.cross(point, across)], axis=1),
         across=across,
         point=point,
-        gap=np.concatenate([system.gap, np.zeros((moved.size, 3))]),
+        gap=np.concatenate([system.gap, np.zeros((index.size - met, 3))]),
     )
+
+
+def weights(system: ViscousFaces, tied: Array) -> csr_array:
+    """(n, n) W of a component: walls, corners, and the faces with these masses that are tied."""
+    values = system.wall, system.corners.matrix.ravel(), tied
+    first, around = system.wall.size, system.corners.faces.size
+    total = first + around + tied.size
+    each = np.ones(total, np.int64)
+    each[first : first + around] = AROUND
+    columns = np.repeat(np.arange(first, first + around).reshape(-1, 1, AROUND), AROUND, axis=1)
+    places = np.arange(first), columns.ravel(), np.arange(first + around, total)
+    starts = np.append(0, np.cumsum(each))
+    return csr_array((np.concatenate(values), np.concatenate(places), starts), (total, total))
+
+
+def between_faces(walls: Walls, scale: Array) -> tuple[Integers, csr_array]:
+    """The faces that corners couple, and what W has between them, scaled on both sides.
+
+    scale  (n,) of the faces beside each wall
+    """
+    beyond = (walls.weight - diags_array(walls.weight.diagonal())).tocoo()
+    kept = beyond.data != 0.0
+    row, column, value = beyond.row[kept], beyond.col[kept], beyond.data[kept]
+    faces, place = np.unique(walls.index[[row, column]], return_inverse=True)
+    between = value * scale[row] * scale[column]
+    return faces, csr_array((between, place.reshape(2, -1)), (faces.size, faces.size))
 
 
 class ViscousSystem:
@@ -182,10 +219,12 @@ class ViscousSystem:
         self.couples = walls.couples(bodies)
         self.answer = answering(dt * walls.drag(self.couples, size))
         count, entries = walls.arm.shape
-        self.loose = np.where(walls.tied, 0.0, walls.weight)
-        pull = (self.scale[walls.index] * self.loose)[:, None] * walls.arm
+        self.loose = diags_array(1.0 - walls.tied) @ walls.weight
+        scale = self.scale[walls.index]
+        pull = scale[:, None] * (self.loose @ walls.arm)
         starts = np.arange(0, count * entries + 1, entries)
         self.rows = walls.index, starts, walls.columns.ravel(), pull.ravel()
+        self.corner_faces, self.corners = between_faces(walls, scale)
 
     def at_walls(self, twist: Array) -> Array:
         """(n,) B s: velocity of the bodies at the wall faces, m/s."""
@@ -201,6 +240,8 @@ class ViscousSystem:
             part = slice(first, first + system.kind.size)
             apply_component(product[part], given[part], self.scale[part], system.links, self.wraps)
             first += system.kind.size
+        if self.corner_faces.size:
+            product[self.corner_faces] += self.corners @ given[self.corner_faces]
         if self.answer.yields:
             push = sum_rows(x, self.rows, self.size)
             add_rows(out, self.rows, -self.answer.change(self.dt * push))
@@ -226,7 +267,7 @@ class ViscousSystem:
         unknown = self.diagonal > 0.0
         rhs = np.where(unknown, mass * start + given, 0.0)
         known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist, blown))[0]
-        np.add.at(rhs, walls.index, self.loose * (self.at_walls(twist + known) + blown))
+        np.add.at(rhs, walls.index, self.loose @ (self.at_walls(twist + known) + blown))
         x, converged = self._conjugate_gradients(rhs, np.where(unknown, start, 0.0), tolerance)
         result = np.where(unknown, x, start)
         change, impulse = self.answer.to(self.push(result, twist, blown))
@@ -240,7 +281,7 @@ class ViscousSystem:
         velocity  over the concatenated faces, m/s;  twist  (k,) s;  slip  (n,) as in `solve`
         """
         walls, bodies = self.walls, len(self.couples)
-        force = walls.weight * (velocity[walls.index] - self.at_walls(twist) - slip)
+        force = walls.weight @ (velocity[walls.index] - self.at_walls(twist) - slip)
         each = (force[:, None] * walls.arm).ravel()
         push = np.asarray(np.bincount(walls.columns.ravel(), each, twist.size), float)
         spin = twist[: 6 * bodies].reshape(bodies, 6)[:, 3:]

@@ -26,6 +26,7 @@ the body's velocity at the face. A body of volume V and spin w feels  -2 mu V w 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.control_volumes import CLOSED_BELOW
+from flowborne.kernels.corner_friction import AROUND, corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.viscosity import (
     INACTIVE,
@@ -53,6 +55,25 @@ SIDE_MASS = 0.75
 lies nearer to them than to the side. With it a parabola is exact."""
 
 
+class Corners(NamedTuple):
+    """What corners of bodies add to the matrix, see `kernels.corner_friction`.
+
+    faces   (c, 5) flat indices of the faces around each
+    matrix  (c, 5, 5) kg/s, whose diagonals are part of that of the system
+    node    (c,) flat index of the node there that is nearest to a body
+    """
+
+    faces: Integers
+    matrix: Array
+    node: Integers
+
+
+def no_corners(count: int) -> Corners:
+    """Room for some."""
+    faces, node = np.zeros((count, AROUND), np.int64), np.zeros(count, np.int64)
+    return Corners(faces, np.zeros((count, AROUND, AROUND)), node)
+
+
 @dataclass
 class ViscousFaces:
     """The viscous system of the faces across one axis; arrays have the shape of the faces.
@@ -68,6 +89,7 @@ class ViscousFaces:
     gap       (n, 3) from the middle of the piece to the centre of the face's open part, m
     place     (n, 3) from the centre of the whole face to the middle of the piece, m
     node      (n,) flat index of the node there that is nearest to a body
+    corners   what they add
     """
 
     kind: NDArray[np.uint8]
@@ -81,6 +103,7 @@ class ViscousFaces:
     gap: Array
     place: Array
     node: Integers
+    corners: Corners
 
 
 @dataclass(frozen=True)
@@ -120,7 +143,8 @@ def assemble_viscosity(
     h = grid.spacing
     stiffness = viscosity * grid.face_area / h
     edges, parts = (cut.distance, cut.crossings), cut.cells / grid.cell_volume
-    systems = []
+    systems, wraps = [], np.array(grid.shape) * np.array(periodic)
+    found = find_corners(*edges, h)
     for axis in grid.axes:
         shape, opened = grid.face_shape(axis), cut.faces[axis]
         kind, away = np.empty(shape, np.uint8), np.empty(shape)
@@ -160,10 +184,19 @@ def assemble_viscosity(
             wall, gap, place, node,
         )  # fmt: skip
         diagonal.reshape(-1)[beside] += wall.sum(axis=1)
+        corners = no_corners(len(found[0]))
+        count = corner_stiffness(
+            axis, *found, kind, opened, parts, links, beside, wall[:, 0], stiffness, wraps,
+            cut.distance, *corners,
+        )  # fmt: skip
+        faces, matrix, at = corners
+        corners = Corners(faces[:count], matrix[:count], at[:count])
+        np.add.at(diagonal.reshape(-1), corners.faces, np.einsum("nii->ni", corners.matrix))
         met = wall != 0.0
         beside = np.repeat(beside, met.sum(axis=1))
         pieces = beside, wall[met], h * gap[met], h * place[met], node[met]
-        systems.append(ViscousFaces(kind, mass, diagonal, links, given, h * centre, *pieces))
+        system = kind, mass, diagonal, links, given, h * centre, *pieces, corners
+        systems.append(ViscousFaces(*system))
     return systems
 
 

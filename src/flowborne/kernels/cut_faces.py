@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.edge_crossings import PIECES, Crossings
 from flowborne.kernels.jit import inlined
 
@@ -19,6 +19,7 @@ FLAT = 1e-2
 ones leave rounding errors."""
 
 Place = tuple[float, float]
+Four = tuple[float, float, float, float]
 
 
 @njit(nogil=True, cache=True)
@@ -43,16 +44,23 @@ def open_edge(phi: Array, found: Crossings, d: int, i: int, j: int, k: int) -> f
 
 
 @inlined
-def nodes_inside(phi: Array, axis: int, i: int, j: int, k: int) -> int:
-    """How many of the four nodes of face (i, j, k) across `axis` are inside."""
+def values_at(phi: Array, axis: int, i: int, j: int, k: int) -> Four:
+    """Distance at the corners of face (i, j, k) across `axis` in turn."""
     s, t = other_axes(axis)
     si, sj, ti, tj, tk = int(s == 0), int(s == 1), int(t == 0), int(t == 1), int(t == 2)
     return (
-        int(phi[i, j, k] < 0.0)
-        + int(phi[i + si, j + sj, k] < 0.0)
-        + int(phi[i + si + ti, j + sj + tj, k + tk] < 0.0)
-        + int(phi[i + ti, j + tj, k + tk] < 0.0)
+        phi[i, j, k],
+        phi[i + si, j + sj, k],
+        phi[i + si + ti, j + sj + tj, k + tk],
+        phi[i + ti, j + tj, k + tk],
     )
+
+
+@inlined
+def nodes_inside(phi: Array, axis: int, i: int, j: int, k: int) -> int:
+    """How many of the four nodes of face (i, j, k) across `axis` are inside."""
+    a, b, c, d = values_at(phi, axis, i, j, k)
+    return int(a < 0.0) + int(b < 0.0) + int(c < 0.0) + int(d < 0.0)
 
 
 @inlined
@@ -154,28 +162,32 @@ def add_wall(
     return int(kink)
 
 
-@inlined
-def of_one_geometry(
-    crossing: tuple[int, int, int, int], values: tuple[float, float, float, float], found: Crossings
-) -> bool:
-    """Whether the edges of a face, crossed or not, meet one geometry alone.
+@njit(nogil=True, cache=True)
+def crossings_on(values: Four, crossing: tuple[int, int, int, int], out: Integers) -> int:
+    """Write the numbers of the crossings around a face to `out`, -1 where one is not known; gives
+    how many there are.
 
-    crossing  see `edges_of`;  values  distance at its corners in turn
+    values  distance at its corners in turn;  crossing  see `edges_of`;  out  (8,)
     """
-    own = -1
+    count = 0
     for n in range(4):
-        first, begins, ends = crossing[n], values[n] < 0.0, values[(n + 1) % 4] < 0.0
-        if begins and ends:
-            continue
-        if first < 0:
-            if begins != ends:
-                return False
-            continue
-        for e in range(first, first + 1 + int(begins == ends)):
-            geometry = found.piece[e] // PIECES
-            if own >= 0 and geometry != own:
-                return False
-            own = geometry
+        begins, ends, e = values[n] < 0.0, values[(n + 1) % 4] < 0.0, crossing[n]
+        if begins != ends:
+            out[count] = e
+            count += 1
+        elif not begins and e >= 0:
+            out[count], out[count + 1] = e, e + 1
+            count += 2
+    return count
+
+
+@inlined
+def of_one_geometry(listed: Integers, found: Crossings) -> bool:
+    """Whether all crossings in a list are with the same one; not where one is not known."""
+    for n in range(listed.size):
+        e = listed[n]
+        if e < 0 or found.piece[e] // PIECES != found.piece[listed[0]] // PIECES:
+            return False
     return True
 
 
@@ -204,15 +216,9 @@ def closed_face(
         elif upper and n >= 0:
             low = found.part[n]
         return part, part * (low + 0.5 * part - 0.5), 0.0, 0, 0.0, 0.0
-    si, sj, ti, tj, tk = int(s == 0), int(s == 1), int(t == 0), int(t == 1), int(t == 2)
-    values = (
-        phi[i, j, k],
-        phi[i + si, j + sj, k],
-        phi[i + si + ti, j + sj + tj, k + tk],
-        phi[i + ti, j + tj, k + tk],
-    )
-    crossing = edges_of(axis, i, j, k, found)
-    joined = of_one_geometry(crossing, values, found)
+    values, crossing = values_at(phi, axis, i, j, k), edges_of(axis, i, j, k, found)
+    listed = np.empty(8, np.int64)
+    joined = of_one_geometry(listed[: crossings_on(values, crossing, listed)], found)
     sums, corners = np.zeros(5), 0
     p, exit, waits = (0.0, 0.0), -1, False
     for turn in range(8):
