@@ -22,9 +22,6 @@ from flowborne import (
     step,
 )
 from flowborne.bodies import JointCommand, TrajectorySinusoid, kinetic_energy
-from flowborne.coupling.advection.flux_form import FluxForm
-from flowborne.coupling.advection.scheme import Advection
-from flowborne.coupling.advection.semi_lagrangian import SemiLagrangian
 from flowborne.coupling.bodies_step import move_bodies
 from flowborne.coupling.cut import departure, volumes_of
 from flowborne.coupling.flow import advect, leak_proof_transport
@@ -271,12 +268,3 @@ def test_dye_that_is_everywhere_stays_so(name: str, monkeypatch: pytest.MonkeyPa
         taken(world)
         filled = state.cell_volume > 1e-6 * fluid.grid.cell_volume
         assert np.abs(state.scalars["even"][filled] - 0.7).max() < 1e-12
-
-
-@pytest.mark.parametrize("advection", [FluxForm(), SemiLagrangian()])
-def test_dye_goes_with_the_same_fluxes_in_either_scheme(advection: Advection) -> None:
-    world = with_dye(free(SQUARE))
-    fluid, _ = world.flow()
-    world.setup = replace(world.setup, fluid=replace(fluid, advection=advection))
-    for _ in range(5):
-        assert taken(world).dye_error < 1e-12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import AdvectionResult
+from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.half_pressure import HalfPressure
 from flowborne.coupling.report import Momentum
 from flowborne.coupling.solve import Solved
@@ -37,14 +37,12 @@ def momentum_balance(
     sides = projected.sides + half.sides
     exchanged += linear(half.impulse, first).sum(axis=0)
     forces = pressed - fluid_momentum(advected.velocity, mass, grid, boundaries)
-    came = advected.crossed + advected.expelled + advected.lost
-    given = came + advected.stopped + forces + sides - exchanged
+    given = advected.crossed + advected.expelled + advected.stopped + forces + sides - exchanged
     unknown = float(np.abs(after - half.start - given).max())
     return Momentum(
         fluid=after,
         exchanged=exchanged,
         exchange_error=missing / scale if scale > 0.0 else 0.0,
-        advection=advected.lost,
         boundary=sides + advected.stopped,
         crossed=advected.crossed,
         jet=advected.expelled,

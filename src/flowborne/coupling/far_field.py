@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import AdvectionResult, Departure
-from flowborne.coupling.cut import moved_since
+from flowborne.coupling.cut import Departure, moved_since
+from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, faces_of

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import Departure
+from flowborne.coupling.cut import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import beyond_sides
 from flowborne.coupling.swept import swept_cells

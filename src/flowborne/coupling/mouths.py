@@ -23,12 +23,12 @@ from scipy.ndimage import map_coordinates
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.errors import BreakdownError
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0
-"""Cells under the skin to which faces hold the velocity of the jet, for paths that lead there."""
+"""Cells along a mouth, beyond its radius, within which skin may belong to it."""
 
 
 class Strength(Protocol):
@@ -79,10 +79,6 @@ class Jet:
     skin      (3,) v_b, velocity of the body at the centre, m/s
     cells     (k,) flat indices of the cells at the mouth
     rates     (k,) part of Q that comes into each, m^3/s
-    axis      (n,) faces at or under the mouth: axis,
-    face      (n,) flat index among the faces across that axis,
-    share     (n,) part of the face that belongs to the mouth,
-    closed    (n,) and that the body closes
     """
 
     mouth: Mouth
@@ -94,10 +90,6 @@ class Jet:
     skin: Array
     cells: Integers
     rates: Array
-    axis: Integers
-    face: Integers
-    share: Array
-    closed: Array
 
 
 def jets_of(
@@ -130,9 +122,6 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
             f"{mouth.name} covers no cell at {centre.round(6).tolist()} m, {time:g} s. Put its "
             "position on the body's skin, inside the domain, with the direction out of the body"
         )
-    own = np.flatnonzero(skin_of(mouth, cut.body, bodies))
-    share = share_of(cut.place[own], mouth, centre, along, cut, grid)
-    face = own[share > 0.0]
     twist = pose.twist_jacobian[mouth.body] @ v
     return Jet(
         mouth,
@@ -144,10 +133,6 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
         twist[:3] + np.cross(twist[3:], centre),
         cells[here],
         rate * skin[here] / skin.sum(),
-        cut.axis[face],
-        cut.face[face],
-        share[share > 0.0],
-        cut.closed[face],
     )
 
 
@@ -178,8 +163,8 @@ def covered(x: Array, mouth: Mouth, centre: Array, along: Array, grid: Grid) -> 
 def share_of(
     x: Array, mouth: Mouth, centre: Array, along: Array, cut: Geometry, grid: Grid
 ) -> Array:
-    """(n,) part of a face at each place x (n, 3), in the body or on its skin, that belongs to a
-    mouth: `covered`, and with the skin that is nearest to it on the mouth's side."""
+    """(n,) part of a face at each place x (n, 3) on the skin that belongs to a mouth: `covered`,
+    and with the skin that is nearest to it on the mouth's side."""
     share = covered(x, mouth, centre, along, grid)
     found = np.flatnonzero(share)
     step = 0.5 * grid.spacing * along
@@ -217,35 +202,6 @@ def skin_slip(
         share = share_of(point[own], jet.mouth, jet.centre, jet.along, cut, grid)
         slip[own] += share * (across[own] @ jet.velocity)
     return slip
-
-
-def add_closed_slip(advecting_velocity: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
-    """Let a leak-proof field come out of the closed parts of faces as the jets do, in place."""
-    for jet in jets:
-        for axis in grid.axes:
-            own = jet.axis == axis
-            part = jet.closed[own] * jet.share[own]
-            advecting_velocity[axis].reshape(-1)[jet.face[own]] += part * jet.velocity[axis]
-
-
-def fill_mouths(carried: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
-    """Put the fluid that is to be expelled under the skin of the mouths, in place (m/s)."""
-    for jet in jets:
-        if jet.rate <= 0.0:
-            continue
-        for axis in grid.axes:
-            own = jet.axis == axis
-            at, part = jet.face[own], jet.closed[own] * jet.share[own]
-            values = carried[axis].reshape(-1)
-            values[at] += part * (jet.skin[axis] + jet.velocity[axis] - values[at])
-
-
-def jet_force(jets: tuple[Jet, ...], density: float) -> Array:
-    """(3,) momentum per time that comes into the fluid with the jets, N."""
-    force = np.zeros(3)
-    for jet in jets:
-        force += density * jet.rate * (jet.skin + jet.velocity)
-    return force
 
 
 def jet_wrench(jets: tuple[Jet, ...], density: float, nbody: int) -> Array:

@@ -19,7 +19,7 @@ Deviations from the paper, and their reasons:
        start the scheme would be of first order. The projection matches the exact change of the
        cells' open volumes, which momentum and dye in flux form need (`leak_proof`).
     5  Momentum is advected in flux form: along particle paths the fluid loses a tenth of what a
-       swimmer exchanges with it. `advection = "semi-lagrangian"` is the paper's scheme.
+       swimmer exchanges with it.
     6  Viscosity is solved for first, with friction at bodies and the last pressure (`friction`).
 """
 
