@@ -27,7 +27,6 @@ from flowborne.coupling.cut import departure, volumes_of
 from flowborne.coupling.flow import advect, leak_proof_transport
 from flowborne.coupling.mouths import Mouth
 from flowborne.fluid import momentum as of_fluid
-from flowborne.fluid.control_volumes import means
 from flowborne.fluid.momentum import face_masses
 from flowborne.motion.inflow import FactorSteady
 from flowborne.solids.tissue.growth import Law, add_flesh
@@ -42,6 +41,8 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+
+from ..kernels.references.faces import face_means
 
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))
@@ -174,7 +175,7 @@ def test_a_stream_past_a_body_that_goes_with_it_stays_uniform(
         transport = leak_proof_transport(world, start, cut_by_bodies(world), DT)
         advected, _ = advect(world, start, state.velocity, transport)
         for axis in grid.axes:
-            volume = means(advected.volumes.cells, axis, fluid.boundaries.periodic()[axis])
+            volume = face_means(advected.volumes.cells, axis, fluid.boundaries.periodic()[axis])
             holds = volume > 1e-9 * grid.cell_volume
             drift = np.abs(advected.velocity[axis][holds] - speed[axis]).max()
             assert drift < 1e-12, f"{drift} across {axis}"

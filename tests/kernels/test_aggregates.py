@@ -13,9 +13,9 @@ from flowborne.kernels.levels import (
     wrap_ghosts,
 )
 from flowborne.kernels.orphans import add_orphan_weights, assign_orphans
-from flowborne.kernels.vectors import cells_of
 from flowborne.solvers.pressure import PressureSystem
 
+from .padded import cells_of
 from .references.aggregates import mark_interpolated_reference, mark_own_reference
 from .references.orphans import add_orphan_weights_reference, assign_orphans_reference
 from .test_multigrid import SHAPES, system_of

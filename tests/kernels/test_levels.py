@@ -20,8 +20,8 @@ from flowborne.kernels.levels import (
     weights_at,
 )
 from flowborne.kernels.regions import label_regions, region_loads, region_sums, remove_null
-from flowborne.kernels.vectors import cells_of
 
+from .padded import cells_of
 from .references.centres import distance_ratio_reference, interpolation_weights_reference
 from .references.levels import (
     coarse_sums_reference,

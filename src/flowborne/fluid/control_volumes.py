@@ -31,7 +31,6 @@ from flowborne.kernels.control_volumes import (
     sort_faces,
 )
 from flowborne.kernels.face_masses import ROUNDS, share_out, with_neighbours
-from flowborne.kernels.faces import face_means
 
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
@@ -69,13 +68,6 @@ class ControlVolumes:
         """Give closed faces the velocity of their targets, in place."""
         for axis in grid.axes:
             share_velocity(velocity[axis], *self.closed[axis])
-
-
-def means(cells: Array, axis: int, periodic: bool) -> Array:
-    """Mean of both cells of each face across `axis`; 0 beyond the sides of the domain."""
-    out = np.empty([n + int(a == axis) for a, n in enumerate(cells.shape)])
-    face_means(out, np.ascontiguousarray(cells), axis, periodic)
-    return out
 
 
 def control_volumes(

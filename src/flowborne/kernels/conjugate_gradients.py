@@ -29,7 +29,7 @@ from flowborne.kernels.mobility import respond
 from flowborne.kernels.regions import remove_null
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
-from flowborne.kernels.vectors import descend_on, dot, scaled, scaled_dot, true_residual, turn
+from flowborne.kernels.vectors import descend, dot, scaled, true_residual, turn
 
 LIMIT = 500
 """Most iterations."""
@@ -120,7 +120,7 @@ def solve(
             v_cycle(hierarchy, cycle[0], cycle[1], cycle[2])
             before = product
             if amounts.size == 0 and not ring:
-                product = scaled_dot(z, r, 1.0 / scale)
+                product = dot(z, r, 1.0 / scale)
                 beta = product / before if before > 0.0 else 0.0
                 curvature = turn_and_apply(q, p, z, 1.0 / scale, beta, finest)
             else:
@@ -138,6 +138,6 @@ def solve(
             if not (curvature > 0.0 and product > 0.0):
                 break
             scale = 1.0 / np.sqrt(square)
-            square = descend_on(x, r, p, q, product / curvature, b, scale)
+            square = descend(x, r, p, q, product / curvature, b, scale)
             iterations += 1
     return iterations, residual / norm, converged

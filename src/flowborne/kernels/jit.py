@@ -225,7 +225,8 @@ class Kernel(Generic[P, R]):
                 self._twin = self.serial
             else:
                 name = function.__name__ + "_parallel"
-                copy = FunctionType(function.__code__, {**function.__globals__, **twins}, name)
+                names_there = {**function.__globals__, **twins}
+                copy = FunctionType(function.__code__, names_there, name, function.__defaults__)
                 copy.__qualname__ = name
                 copy.__module__ = function.__module__
                 option = ONLY_PRANGE if "prange" in names else False

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
 
@@ -19,7 +18,6 @@ ScalarProfile = Callable[[Array, Array, Array, float], Array]
 """value(x, y, z, time) of a carried scalar: broadcasting arrays in m and s."""
 
 Slices = tuple[slice, ...]
-Field = NDArray[Any]
 
 
 @dataclass(frozen=True)
