@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from flowborne.coupling.inlets import at_faces
+from flowborne.coupling.mouths import at_faces
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.ghosts import edge

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.blocks import BLOCK
-from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
+from flowborne.kernels.laplacian import BLOCK, apply_laplacian, turn_and_apply
 from flowborne.kernels.smoothing import defect, first_smooth, smooth, smooth_down, smooth_up
 from flowborne.kernels.vectors import descend, dot
 

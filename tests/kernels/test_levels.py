@@ -7,14 +7,15 @@ import itertools
 import numpy as np
 import pytest
 
-from flowborne.kernels.centres import distance_ratio, interpolation_weights
 from flowborne.kernels.levels import (
     N0,
     S0,
     at_level,
     coarse_sums,
     coarse_weights,
+    distance_ratio,
     finest_weights,
+    interpolation_weights,
     inverse_diagonal,
     orphans_at,
     weights_at,

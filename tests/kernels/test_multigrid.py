@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flowborne.kernels.deflation import deflated
+from flowborne.kernels.conjugate_gradients import deflated
 from flowborne.kernels.laplacian import apply_laplacian
 from flowborne.kernels.levels import at_level, interpolation_at, orphans_at, weights_at, wrap_ghosts
 from flowborne.kernels.smoothing import STEPS, defect, first_smooth, smooth

@@ -9,15 +9,15 @@ import numpy as np
 from flowborne.coupling.cut import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.half_pressure import HalfPressure
-from flowborne.coupling.inlets import (
+from flowborne.coupling.leak_proof import leak_proof_flux
+from flowborne.coupling.mouths import (
+    Jet,
     after_drinking,
     brought_by,
     cells_with_inlets,
     inlets_across,
     taken_by,
 )
-from flowborne.coupling.leak_proof import leak_proof_flux
-from flowborne.coupling.mouths import Jet
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.solve import Solved
 from flowborne.coupling.world import Fluid, World

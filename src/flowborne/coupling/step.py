@@ -27,7 +27,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.balance import momentum_balance
 from flowborne.coupling.bodies_step import (
     equations,
     move_bodies,
@@ -46,11 +45,10 @@ from flowborne.coupling.half_pressure import explicit_half_pressure
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised
 from flowborne.coupling.parts import joined, part_of, parts_of
-from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.report import Outcome, StepReport, Timer
 from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_together
-from flowborne.coupling.step_report import blank, known_push, report_coupled
-from flowborne.coupling.timer import Timer
+from flowborne.coupling.step_report import blank, known_push, momentum_balance, report_coupled
 from flowborne.coupling.window import follow
 from flowborne.coupling.world import World
 from flowborne.fluid.momentum import face_masses

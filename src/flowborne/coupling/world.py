@@ -9,10 +9,9 @@ from typing import Any, SupportsIndex
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.motion import NOTHING_TOLD, Told, Trajectory
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
-from flowborne.coupling.told import NOTHING_TOLD, Told
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Grid

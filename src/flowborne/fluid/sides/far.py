@@ -38,10 +38,10 @@ Velocity = tuple[float, float, float]
 
 
 class Strength(Protocol):
-    """How strong a stream is over time."""
+    """How strong a stream or a mouth is over time."""
 
     def at(self, time: float) -> float:
-        """Part of the full velocity at `time` (s), at least 0."""
+        """Part of the full velocity or rate at `time` (s); of a stream's at least 0."""
         ...
 
 
