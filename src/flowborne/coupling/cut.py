@@ -9,7 +9,7 @@ import numpy as np
 
 from flowborne.coupling.flesh import skins_on
 from flowborne.coupling.fractions import Geometry, geometry, uncut
-from flowborne.coupling.mouths import Jet, add_rates, jets_of
+from flowborne.coupling.mouths import Jet, add_rates, jet_of
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
@@ -62,7 +62,8 @@ def jets_at(
         return ()
     if pose is None:
         pose = kinematics(setup.solid, world.solid.q)
-    return jets_of(setup.mouths, cut, pose, world.solid.v, world.flow()[0].grid, time)
+    given = cut, pose, world.solid.v, world.flow()[0].grid, time
+    return tuple(jet_of(mouth, *given) for mouth in setup.mouths)
 
 
 def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:

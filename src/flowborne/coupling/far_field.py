@@ -65,11 +65,6 @@ class FarField:
             stopped[place.axis] += float((mass[place.axis][place.layer] * change).sum())
         return replace(advected, velocity=velocity, stopped=stopped)
 
-    def store(self, world: World) -> None:
-        """The sea's part of the state at the end of the step, in place."""
-        state = world.flow()[1]
-        state.wake, state.sea = self.wake, self.velocity
-
     def beyond(self, fluid: Fluid) -> Iterator[tuple[Place, Array]]:
         """Of each far side p dt of the sea's change at the end of the columns, Pa s, so that a
         uniform flow changes alike."""

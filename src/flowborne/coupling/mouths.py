@@ -88,18 +88,11 @@ class Jet:
     rates: Array
 
 
-def jets_of(
-    mouths: tuple[Mouth, ...], cut: Geometry, pose: Kinematics, v: Array, grid: Grid, time: float
-) -> tuple[Jet, ...]:
-    """What the mouths do at `time` (s), on bodies with the generalised velocity v (nv,).
-
-    raises  ValueError when a mouth covers no cell
-    """
-    return tuple(jet_of(mouth, cut, pose, v, grid, time) for mouth in mouths)
-
-
 def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, time: float) -> Jet:
-    """See `jets_of`."""
+    """What a mouth does at `time` (s), on bodies with the generalised velocity v (nv,).
+
+    raises  ValueError when it covers no cell
+    """
     turn = pose.body_rotation[mouth.body]
     centre = pose.body_position[mouth.body] + turn @ np.array(mouth.position)
     along = turn @ np.array(mouth.direction)

@@ -99,7 +99,7 @@ def step_coupled(
     world: World, dt: float, command: JointCommand, done: StepReport, timer: Timer
 ) -> None:
     """Bodies and fluid a step later, in place; the numbers are those above."""
-    fluid, end = world.flow()[0], world.time + dt
+    (fluid, state), end = world.flow(), world.time + dt
     start = departure(world)
     timer.lap("geometry")
     far = far_field(world, start, dt)
@@ -125,7 +125,7 @@ def step_coupled(
     jets, limit = jets_at(world, cut, end, pose), command.torque_limit
     solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit, timer)  # 6
     store_state(world, half, advected, dyed, solved, cut, pose)  # 7
-    far.store(world)
+    state.wake, state.sea = far.wake, far.velocity
     done.momentum = momentum_balance(world, mass, half, driven_sides, solved)
     done.dye_error = dyed.error
     report_coupled(done, world, pose, half.impulse, solved)

@@ -88,12 +88,9 @@ def moving_volumes(
     """What moves with the faces across an axis, and what `ControlVolumes` has of them."""
     axis, shape, wraps = kernel_axes(component, grid, boundaries)
     told, ring, cell = boundaries.prescribed(component), wraps[axis] > 0, grid.cell_volume
-    found, room, wide = (
-        np.empty(grid.face_shape(component)),
-        plane(cells, grid),
-        planes(opened, grid),
-    )
-    volume, kinds = plane(found, grid), np.empty(shape, np.uint8)
+    room, wide = plane(cells, grid), planes(opened, grid)
+    found, kinds = np.empty(grid.face_shape(component)), np.empty(shape, np.uint8)
+    volume = plane(found, grid)
     counts = np.empty((shape[0] * shape[1], 3), np.int64)
     limits = cell, WHOLE, SLACK * cell, NOTHING * cell
     sort_faces(volume, kinds, counts, room, wide[axis], axis, told, ring, limits)
