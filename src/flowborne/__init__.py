@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from flowborne.control.trial import Hypothesis, Velocities
     from flowborne.coupling.named import BodyState, JointState
     from flowborne.coupling.report import Momentum, Outcome, StepReport
-    from flowborne.coupling.sensed import FlowState
     from flowborne.coupling.step import step
+    from flowborne.coupling.stream import FlowState
     from flowborne.coupling.world import Fluid, Setup, World
     from flowborne.error_bars import ErrorBar, Refinement, error_bar
     from flowborne.errors import PartError, SceneError
@@ -134,7 +134,7 @@ _PLACES = {
     "Decision": "flowborne.control.controller",
     "ErrorBar": "flowborne.error_bars",
     "Faces": "flowborne.fluid.grid",
-    "FlowState": "flowborne.coupling.sensed",
+    "FlowState": "flowborne.coupling.stream",
     "Fluid": "flowborne.coupling.world",
     "FluidState": "flowborne.fluid.state",
     "FrameReport": "flowborne.runs.frame_report",

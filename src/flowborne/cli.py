@@ -614,7 +614,7 @@ def _compilation_shown() -> Iterator[None]:
 
     began = perf_counter()
     with ProgressDisplay() as display:
-        from flowborne.kernels.compilation import compilation_watched
+        from flowborne.kernels.jit import compilation_watched
 
         def show(kernels: int) -> None:
             display(RunProgress("compiling", 0, 0, perf_counter() - began, kernels))

@@ -20,7 +20,7 @@ from flowborne.coupling.named import Sensed
 from flowborne.coupling.seen import seen_bodies
 from flowborne.errors import PartError, SceneError, WorkerError
 from flowborne.extras import missing_to_draw
-from flowborne.kernels.compilation import compilation_watched
+from flowborne.kernels.jit import compilation_watched
 from flowborne.progress import RunProgress, Stage
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.runs.frame_report import PARTS, FrameReport

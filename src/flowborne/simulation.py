@@ -17,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
 from flowborne.coupling.named import BodyState, JointState, Named, Sensed
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
-from flowborne.coupling.sensed import FlowState, flow_at
+from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import PartError, SceneError, described
 from flowborne.fluid.boundary import SIDES

@@ -23,11 +23,9 @@ from flowborne.coupling.step import step
 from flowborne.coupling.stream import Sampled
 from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.advection import CENTRE, carry, cells_per_step
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.dye import Passage, nothing_brought
-from flowborne.fluid.ghosts import pad_cells
 from flowborne.fluid.grid import Array, Grid, faces_of
 from flowborne.fluid.momentum import face_masses
 from flowborne.fluid.momentum import kinetic_energy as kinetic_energy_of_fluid
@@ -46,7 +44,6 @@ from flowborne.solids.wind import Wind
 from flowborne.solvers.pressure import PressureSolution, PressureSystem
 
 __all__ = [
-    "CENTRE",
     "Boundaries",
     "Boundary",
     "BoundaryClosed",
@@ -64,8 +61,6 @@ __all__ = [
     "Source",
     "Transport",
     "advance",
-    "carry",
-    "cells_per_step",
     "control_volumes",
     "cut_by_bodies",
     "faces_of",
@@ -73,7 +68,6 @@ __all__ = [
     "kinetic_energy",
     "make_world",
     "nothing_brought",
-    "pad_cells",
     "set_going",
     "set_velocity",
     "start",

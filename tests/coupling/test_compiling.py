@@ -12,7 +12,7 @@ from flowborne.coupling.compiling import (
 )
 from flowborne.kernels import conjugate_gradients, jit
 from flowborne.kernels.carry import carry
-from flowborne.kernels.compilation import compilation_watched
+from flowborne.kernels.jit import compilation_watched
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world, step
 

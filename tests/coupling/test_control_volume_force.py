@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flowborne.coupling.advection import flux_form
+from flowborne.coupling import flow
 from flowborne.coupling.cut import cut_by_bodies, volumes_of
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
@@ -93,7 +93,7 @@ def test_the_force_is_that_of_a_control_volume(
         ]
 
     monkeypatch.setattr(kernels, "stage", recorded)
-    monkeypatch.setattr(flux_form, "damp_eddies", evened)
+    monkeypatch.setattr(flow, "damp_eddies", evened)
     monkeypatch.setattr(transport, "carry", kernels.carry.__wrapped__)
     box, area = box_in(grid), grid.face_area
     fluid, state = world.flow()

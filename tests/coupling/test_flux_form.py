@@ -22,15 +22,11 @@ from flowborne import (
     step,
 )
 from flowborne.bodies import JointCommand, TrajectorySinusoid, kinetic_energy
-from flowborne.coupling.advection.flux_form import FluxForm
-from flowborne.coupling.advection.scheme import Advection
-from flowborne.coupling.advection.semi_lagrangian import SemiLagrangian
 from flowborne.coupling.bodies_step import move_bodies
 from flowborne.coupling.cut import departure, volumes_of
 from flowborne.coupling.flow import advect, leak_proof_transport
 from flowborne.coupling.mouths import Mouth
 from flowborne.fluid import momentum as of_fluid
-from flowborne.fluid.control_volumes import means
 from flowborne.fluid.momentum import face_masses
 from flowborne.motion.inflow import FactorSteady
 from flowborne.solids.tissue.growth import Law, add_flesh
@@ -45,6 +41,8 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+
+from ..kernels.references.faces import face_means
 
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))
@@ -177,7 +175,7 @@ def test_a_stream_past_a_body_that_goes_with_it_stays_uniform(
         transport = leak_proof_transport(world, start, cut_by_bodies(world), DT)
         advected, _ = advect(world, start, state.velocity, transport)
         for axis in grid.axes:
-            volume = means(advected.volumes.cells, axis, fluid.boundaries.periodic()[axis])
+            volume = face_means(advected.volumes.cells, axis, fluid.boundaries.periodic()[axis])
             holds = volume > 1e-9 * grid.cell_volume
             drift = np.abs(advected.velocity[axis][holds] - speed[axis]).max()
             assert drift < 1e-12, f"{drift} across {axis}"
@@ -271,12 +269,3 @@ def test_dye_that_is_everywhere_stays_so(name: str, monkeypatch: pytest.MonkeyPa
         taken(world)
         filled = state.cell_volume > 1e-6 * fluid.grid.cell_volume
         assert np.abs(state.scalars["even"][filled] - 0.7).max() < 1e-12
-
-
-@pytest.mark.parametrize("advection", [FluxForm(), SemiLagrangian()])
-def test_dye_goes_with_the_same_fluxes_in_either_scheme(advection: Advection) -> None:
-    world = with_dye(free(SQUARE))
-    fluid, _ = world.flow()
-    world.setup = replace(world.setup, fluid=replace(fluid, advection=advection))
-    for _ in range(5):
-        assert taken(world).dye_error < 1e-12

@@ -19,7 +19,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.momentum import face_masses
-from flowborne.kernels.outflow import outflow
+from flowborne.kernels.projection import outflow
 
 Cut = Callable[..., Geometry]
 

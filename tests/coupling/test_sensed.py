@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.coupling.sensed import flow_at
+from flowborne.coupling.stream import flow_at
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world, set_velocity
 

@@ -8,7 +8,6 @@ import pytest
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.control_volumes import means
 from flowborne.fluid.ghosts import packed_sides
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.open import BoundaryOpen
@@ -16,6 +15,8 @@ from flowborne.fluid.transport import neighbours, planes
 from flowborne.kernels.carry import Fluxes, cross_sides, draw_in, fill_ghosts, mark_volumes
 from flowborne.kernels.flux import GHOSTS
 from flowborne.solids.model import SolidModel
+
+from ..kernels.references.faces import face_means
 
 OPEN = BoundaryOpen()
 
@@ -40,10 +41,10 @@ def test_what_comes_in_has_the_mean_velocity_and_what_leaves_its_own(
     cross_sides(table, through, cells.reshape(1, 7, 6), axis, shape)
     fill_ghosts(padded, table, 0, shape, axis)
     came = draw_in(padded, marks, table, shape)
-    mean = float(np.average(u[-end], weights=means(cells, component, False)[-end]))
+    mean = float(np.average(u[-end], weights=face_means(cells, component, False)[-end]))
     rate = (-flux[0] if end else flux[0])[[-end]]
     if component == 1:
-        rate = means(rate, 1, False)
+        rate = face_means(rate, 1, False)
     expected = float((rate * np.where(rate > 0.0, mean, u[[-end]])).sum())
     assert came == pytest.approx(expected, rel=1e-12)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import impose_sides, pad_cells, pad_faces
+from flowborne.fluid.ghosts import impose_sides, kernel_axes, packed_sides, plane
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.inflow import BoundaryInflow
@@ -14,6 +14,8 @@ from flowborne.fluid.sides.no_slip import BoundaryNoSlip
 from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.fluid.sides.periodic import BoundaryPeriodic
 from flowborne.fluid.sides.side import Boundary
+from flowborne.kernels.carry import fill_ghosts
+from flowborne.kernels.flux import GHOSTS
 
 SLAB = Grid.slab(6, 5, 0.5, (0.0, 1.0))
 CUBE = Grid((6, 5, 4), 0.5, (0.0, 1.0, -1.0))
@@ -29,12 +31,32 @@ def profile(x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Ar
     return y**2 + time + 0 * x, np.sin(y) + x + time, x * y + z
 
 
-def at_side(field: Array, axis: int, upper: bool) -> Array:
-    """Value half-way between the last two layers of a padded field, ghosts of other axes off."""
-    inside = tuple(slice(None) if a == axis else slice(1, -1) for a in range(3))
-    layers = np.moveaxis(field[inside] if field.shape[2] > 2 else field[inside[:2]], axis, 0)
-    near, far = (layers[-2], layers[-1]) if upper else (layers[1], layers[0])
-    return 0.5 * (near + far)
+def with_ghosts(
+    velocity: Faces, component: int, grid: Grid, sides: Boundaries, time: float
+) -> Array:
+    """A component with its layers of ghosts, in the order of the kernels' axes."""
+    axis, shape, _ = kernel_axes(component, grid, sides)
+    inside = plane(velocity[component], grid)
+    field = np.pad(inside, [(GHOSTS * (n > 1),) * 2 for n in inside.shape])
+    table = packed_sides(component, grid, sides, [time], grid.zeros_faces())
+    fill_ghosts(field, table, 0, shape, axis)
+    return field
+
+
+def layers(field: Array, axis: int, upper: bool, grid: Grid) -> Array:
+    """Layers of a field with ghosts across an axis of the grid, from the outermost one on; without
+    the ghosts of the other axes."""
+    across = axis + grid.is_slab
+    inside = [slice(GHOSTS, -GHOSTS) if n > 1 else slice(None) for n in field.shape]
+    inside[across] = slice(None)
+    found = np.moveaxis(field[tuple(inside)], across, 0)
+    return found[::-1] if upper else found
+
+
+def at_side(field: Array, axis: int, upper: bool, grid: Grid) -> list[Array]:
+    """Mean of the n-th ghost and the n-th layer inside, for each n."""
+    found = layers(field, axis, upper, grid)
+    return [0.5 * (found[GHOSTS - 1 - n] + found[GHOSTS + n]) for n in range(GHOSTS)]
 
 
 @pytest.mark.parametrize("grid", [SLAB, CUBE], ids=["slab", "cube"])
@@ -42,37 +64,40 @@ def at_side(field: Array, axis: int, upper: bool) -> Array:
 def test_a_sliding_wall_gives_its_own_velocity(grid: Grid, upper: bool) -> None:
     lid = BoundaryNoSlip((1.5, 0.0, -0.5))
     sides = Boundaries(y_max=lid) if upper else Boundaries(y_min=lid)
-    padded = pad_faces(random_faces(grid), grid, sides, 0.0)
-    np.testing.assert_allclose(at_side(padded[0], 1, upper), 1.5, atol=1e-15)
-    if not grid.is_slab:
-        np.testing.assert_allclose(at_side(padded[2], 1, upper), -0.5, atol=1e-15)
-    rates = pad_faces(random_faces(grid), grid, sides, 0.0, rate=True)
-    np.testing.assert_allclose(at_side(rates[0], 1, upper), 0.0, atol=1e-15)
+    for component in set(grid.axes) - {1}:
+        field = with_ghosts(random_faces(grid), component, grid, sides, 0.0)
+        for mean in at_side(field, 1, upper, grid):
+            np.testing.assert_allclose(mean, lid.velocity[component], atol=1e-15)
 
 
 @pytest.mark.parametrize("grid", [SLAB, CUBE], ids=["slab", "cube"])
 def test_an_inflow_gives_its_profile_where_each_component_lives(grid: Grid) -> None:
     sides = Boundaries(x_min=BoundaryInflow(profile), x_max=BoundaryOpen())
-    padded = pad_faces(random_faces(grid), grid, sides, 2.0)
+    field = with_ghosts(random_faces(grid), 1, grid, sides, 2.0)
     y = grid.face_coordinates(1)[1]
     expected = np.sin(y) + grid.origin[0] + 2.0
-    found = at_side(padded[1], 0, False)
-    np.testing.assert_allclose(
-        found,
-        np.broadcast_to(expected.reshape((-1, *[1] * (found.ndim - 1))), found.shape),
-        atol=1e-14,
-    )
+    expected = expected[None] if grid.is_slab else expected[:, None]
+    for mean in at_side(field, 0, False, grid):
+        np.testing.assert_allclose(mean, np.broadcast_to(expected, mean.shape), atol=1e-14)
 
 
 @pytest.mark.parametrize("side", [BoundaryClosed(), BoundaryOpen()], ids=["closed", "open"])
 @pytest.mark.parametrize("upper", [False, True])
 def test_closed_and_open_sides_continue_what_is_along_them(side: Boundary, upper: bool) -> None:
+    """A closed one mirrors it, an open one holds it."""
     velocity = random_faces(CUBE)
     sides = Boundaries(x_max=side) if upper else Boundaries(x_min=side)
-    padded = pad_faces(velocity, CUBE, sides, 0.0)
-    ghost, inner = (-1, -2) if upper else (0, 1)
     for component in (1, 2):
-        np.testing.assert_array_equal(padded[component][ghost], padded[component][inner])
+        found = layers(with_ghosts(velocity, component, CUBE, sides, 0.0), 0, upper, CUBE)
+        np.testing.assert_array_equal(found[1], found[2])
+        np.testing.assert_array_equal(found[0], found[2] if side.free else found[3])
+
+
+@pytest.mark.parametrize("upper", [False, True])
+def test_ghosts_across_a_side_hold_what_its_faces_do(upper: bool) -> None:
+    field = with_ghosts(random_faces(CUBE), 2, CUBE, Boundaries(), 0.0)
+    found = layers(field, 2, upper, CUBE)
+    np.testing.assert_array_equal(found[:GHOSTS], np.stack([found[GHOSTS]] * GHOSTS))
 
 
 def test_a_periodic_axis_continues_around_the_ring() -> None:
@@ -80,26 +105,15 @@ def test_a_periodic_axis_continues_around_the_ring() -> None:
     sides = Boundaries(ring, ring, ring, ring, ring, ring)
     velocity = random_faces(CUBE)
     impose_sides(velocity, CUBE, sides, 0.0)
-    padded = pad_faces(velocity, CUBE, sides, 0.0)
-    values = np.random.default_rng(1).random(CUBE.shape)
-    cells = pad_cells(values, CUBE, sides)
-    for axis in range(3):
-        np.testing.assert_array_equal(velocity[axis].take(0, axis), velocity[axis].take(-1, axis))
-        wrapped = np.pad(
-            np.delete(velocity[axis], -1, axis),
-            [(1, 1) if a != axis else (1, 2) for a in range(3)],
-            mode="wrap",
-        )
-        np.testing.assert_array_equal(padded[axis], wrapped)
-    np.testing.assert_array_equal(cells, np.pad(values, 1, mode="wrap"))
-
-
-def test_cells_have_zero_gradient_at_every_other_side() -> None:
-    values = np.random.default_rng(1).random(SLAB.shape)
-    sides = Boundaries(BoundaryInflow(profile), BoundaryOpen(), BoundaryNoSlip(), BoundaryClosed())
-    np.testing.assert_array_equal(
-        pad_cells(values, SLAB, sides), np.pad(values, [(1, 1), (1, 1), (0, 0)], mode="edge")
-    )
+    for component in range(3):
+        u = velocity[component]
+        np.testing.assert_array_equal(u.take(0, component), u.take(-1, component))
+        field = with_ghosts(velocity, component, CUBE, sides, 0.0)
+        beyond = [(GHOSTS, GHOSTS + int(a == component)) for a in range(3)]
+        wrapped = np.pad(np.delete(u, -1, component), beyond, mode="wrap")
+        for axis in range(3):
+            found, expected = (layers(f, axis, False, CUBE) for f in (field, wrapped))
+            np.testing.assert_array_equal(found, expected)
 
 
 def test_sides_impose_what_crosses_them() -> None:

@@ -18,7 +18,7 @@ from flowborne.fluid.sides.inflow import BoundaryInflow
 from flowborne.fluid.sides.no_slip import BoundaryNoSlip
 from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.fluid.sides.periodic import BoundaryPeriodic
-from flowborne.kernels.outflow import outflow
+from flowborne.kernels.projection import outflow
 from flowborne.solids.model import SolidModel
 from flowborne.solvers.pressure import PressureSystem
 

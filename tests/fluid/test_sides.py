@@ -13,7 +13,7 @@ from flowborne.fluid.sides.inflow import BoundaryInflow
 from flowborne.fluid.sides.no_slip import BoundaryNoSlip
 from flowborne.fluid.sides.open import BoundaryOpen
 from flowborne.fluid.sides.periodic import BoundaryPeriodic
-from flowborne.fluid.sides.side import Boundary, Layers
+from flowborne.fluid.sides.side import Boundary
 from flowborne.scenes import sides as tables
 
 CUBE = Grid((6, 5, 4), 0.5, (0.0, 1.0, -1.0))
@@ -45,25 +45,6 @@ def test_pressure_acts_where_the_flux_is_not_prescribed(side: Boundary) -> None:
         across = side.prescribed_velocity(place, place.axis, 0.0)
         assert np.all(weight == 0.0) == side.prescribes == (across is not None)
         assert side.free + side.joined + side.prescribes == 1
-
-
-@KINDS
-def test_ghosts_meet_what_the_side_prescribes_in_layers_of_any_depth(side: Boundary) -> None:
-    """Half-way to the n-th ghost lies the side."""
-    for place in places(side):
-        for component in {0, 1, 2} - {place.axis}:
-            wall = side.prescribed_velocity(place, component, 0.7)
-            if wall is None:
-                continue
-            span = tuple(slice(None) if a == place.axis else slice(2, -2) for a in range(3))
-            field = np.random.default_rng(1).normal(
-                size=[n + 4 for n in CUBE.face_shape(component)]
-            )
-            layers = Layers(place, 2, span)
-            side.fill(field, layers, wall)
-            for n in (0, 1):
-                middle = 0.5 * (field[layers.inside(n)] + field[layers.outside(n)])
-                np.testing.assert_allclose(middle, np.broadcast_to(wall, middle.shape), atol=1e-14)
 
 
 @KINDS

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from flowborne.coupling.inlets import at_faces
+from flowborne.coupling.mouths import at_faces
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.control_volumes import control_volumes, means
+from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.sides.closed import BoundaryClosed
@@ -24,6 +24,8 @@ from flowborne.fluid.transport import (
     Transport,
     carry_component,
 )
+
+from ..kernels.references.faces import face_means
 
 SLAB = Grid.slab(13, 11, 0.1, (0.0, 0.0))
 ROOM = Grid((8, 7, 9), 0.1)
@@ -132,7 +134,7 @@ def test_a_uniform_flow_stays_uniform(grid: Grid, name: str, inlets: bool) -> No
             brought = case.inlets(axis) if inlets else NO_INLETS
             u = np.full(grid.face_shape(axis), SPEED)
             done = carry_component(u, None, axis, case.transport, brought, grid, sides)
-            volume = means(case.transport.after.cells, axis, sides.periodic()[axis])
+            volume = face_means(case.transport.after.cells, axis, sides.periodic()[axis])
             holds = volume > 1e-6 * grid.cell_volume
             assert np.abs(done.velocity[holds] - SPEED).max() < 1e-12
             empty += np.count_nonzero(~holds)

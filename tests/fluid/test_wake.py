@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.fluid.biot_savart import node_circulation, nodes_of
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.induced import after_move
 from flowborne.fluid.sea import Sea
+from flowborne.fluid.sea_slab import across, leaving, node_circulation, nodes_of, stream_function
 from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.side import Place
@@ -21,7 +21,6 @@ from flowborne.fluid.wake import (
     wake_line,
     with_all_circulation_0,
 )
-from flowborne.fluid.wake_slab import across, leaving, stream_function
 
 GRID = Grid.slab(12, 8, 0.5, (-1.0, 2.0))
 

@@ -9,12 +9,19 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.induced import after_move
 from flowborne.fluid.sea import Sea
+from flowborne.fluid.sea_room import (
+    edge_circulation,
+    edges_of,
+    grouped,
+    images,
+    leaving,
+    potential,
+    source_rate,
+)
 from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.side import Place
-from flowborne.fluid.vector_potential import edge_circulation, edges_of
 from flowborne.fluid.wake import BINS, wake_line
-from flowborne.fluid.wake_room import grouped, images, leaving, potential, source_rate
 
 GRID = Grid((8, 6, 6), 0.5, (-1.0, -1.5, -1.5))
 FAR = BoundaryFar((1.0, 0.0, 0.0))

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from flowborne.kernels.aggregates import OWN, mark_interpolated, mark_own
+from flowborne.kernels.aggregates import (
+    OWN,
+    add_orphan_weights,
+    assign_orphans,
+    mark_interpolated,
+    mark_own,
+)
 from flowborne.kernels.levels import (
     S0,
     at_level,
@@ -12,10 +18,9 @@ from flowborne.kernels.levels import (
     weights_at,
     wrap_ghosts,
 )
-from flowborne.kernels.orphans import add_orphan_weights, assign_orphans
-from flowborne.kernels.vectors import cells_of
 from flowborne.solvers.pressure import PressureSystem
 
+from .padded import cells_of
 from .references.aggregates import mark_interpolated_reference, mark_own_reference
 from .references.orphans import add_orphan_weights_reference, assign_orphans_reference
 from .test_multigrid import SHAPES, system_of

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.blocks import BLOCK
-from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
+from flowborne.kernels.laplacian import BLOCK, apply_laplacian, turn_and_apply
 from flowborne.kernels.smoothing import defect, first_smooth, smooth, smooth_down, smooth_up
-from flowborne.kernels.vectors import cells_of, descend, descend_on, dot, scaled_dot
+from flowborne.kernels.vectors import descend, dot
 
+from .padded import cells_of
 from .references.laplacian import operator
 
 SHAPES = pytest.mark.parametrize(
@@ -72,11 +72,11 @@ def test_turn_and_apply(shape: tuple[int, int, int], threads: str) -> None:
 
 @SHAPES
 @THREADS
-def test_descend_on(shape: tuple[int, int, int], threads: str) -> None:
+def test_descend_and_scale(shape: tuple[int, int, int], threads: str) -> None:
     _, x, (r, p, q) = system(shape, np.float64)
     b, one, other = np.zeros(x.shape, np.float32), x.copy(), r.copy()
     square = descend(one, other, p, q, 0.3)
-    assert getattr(descend_on, threads)(x, r, p, q, 0.3, b, 2.0) == square
+    assert getattr(descend, threads)(x, r, p, q, 0.3, b, 2.0) == square
     for found, expected in ((x, one), (r, other), (b, (2.0 * other).astype(np.float32))):
         np.testing.assert_array_equal(found, expected)
-    assert getattr(scaled_dot, threads)(p, r, 0.5) == pytest.approx(0.5 * dot(p, r), rel=1e-12)
+    assert getattr(dot, threads)(p, r, 0.5) == pytest.approx(0.5 * dot(p, r), rel=1e-12)

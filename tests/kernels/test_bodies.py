@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from flowborne.kernels.crossings import crossings
 from flowborne.kernels.momentum import about_origin, momentum_impulse
 from flowborne.kernels.thickness import any_within, by_cells, way_inward
+from flowborne.kernels.triangles import crossings
 from flowborne.kernels.wind import places, pushed
 
 from .references.crossings import crossings_reference

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.body_velocity import add_body_velocity
 from flowborne.kernels.coupling_rows import (
     COVERED,
     ENCLOSED,
     NARROW,
     WIDE,
+    add_body_velocity,
     flesh_rows,
     kinds_of_cells,
     list_cells,

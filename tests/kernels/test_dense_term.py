@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.dense_term import LANES, add_term
+from flowborne.kernels.conjugate_gradients import LANES, add_term
 
 
 @pytest.mark.parametrize("count", [0, 1, LANES, 3 * LANES + 2])

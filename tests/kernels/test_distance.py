@@ -19,9 +19,8 @@ from flowborne.kernels.distance import (
     signed_distance,
 )
 from flowborne.kernels.edge_crossings import Geometries
-from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.kernels.node_distance import BAND, merge, node_box, sample_body
-from flowborne.kernels.triangles import closest_on_triangle, squared_distance
+from flowborne.kernels.triangles import closest_on_triangle, distances_to_mesh, squared_distance
 
 from .references.distance import signed_distance_reference
 from .references.mesh_distance import distances_to_mesh_reference

@@ -6,8 +6,8 @@ import pytest
 from flowborne.kernels.even import ROUNDING, find_even
 from flowborne.kernels.laplacian import apply_laplacian
 from flowborne.kernels.smoothing import defect, smooth
-from flowborne.kernels.vectors import cells_of
 
+from .padded import cells_of
 from .references.laplacian import operator
 
 SHAPES = pytest.mark.parametrize("shape", [(6, 7, 12), (1, 9, 14)])

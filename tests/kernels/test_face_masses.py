@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from flowborne import Grid
-from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, means
+from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.face_masses import add_transfers, even_out
 from flowborne.validation.worlds import RING, mjcf
 from flowborne.worlds import Boundaries, cut_by_bodies, make_world
+
+from .references.faces import face_means
 
 BODIES = {
     "disc": '<body pos="0.51 0.47 {z}"><freejoint/><geom type="sphere" size="0.21"/></body>',
@@ -41,7 +43,7 @@ def test_what_moves_with_faces_is_near_their_opening_and_all_there_is(
     grid = GRIDS[name]
     found, opened = volumes_at(body, grid, sides)
     for axis in grid.axes:
-        volume = means(found.cells, axis, sides.periodic()[axis])
+        volume = face_means(found.cells, axis, sides.periodic()[axis])
         moving, given = found.moving[axis], found.transfers[axis]
         reached = volume.ravel().copy()
         np.subtract.at(reached, given.givers, given.volume)

@@ -7,21 +7,22 @@ import itertools
 import numpy as np
 import pytest
 
-from flowborne.kernels.centres import distance_ratio, interpolation_weights
 from flowborne.kernels.levels import (
     N0,
     S0,
     at_level,
     coarse_sums,
     coarse_weights,
+    distance_ratio,
     finest_weights,
+    interpolation_weights,
     inverse_diagonal,
     orphans_at,
     weights_at,
 )
 from flowborne.kernels.regions import label_regions, region_loads, region_sums, remove_null
-from flowborne.kernels.vectors import cells_of
 
+from .padded import cells_of
 from .references.centres import distance_ratio_reference, interpolation_weights_reference
 from .references.levels import (
     coarse_sums_reference,

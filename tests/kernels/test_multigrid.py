@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from flowborne.kernels.deflation import deflated
+from flowborne.kernels.conjugate_gradients import deflated
 from flowborne.kernels.laplacian import apply_laplacian
 from flowborne.kernels.levels import at_level, interpolation_at, orphans_at, weights_at, wrap_ghosts
 from flowborne.kernels.smoothing import STEPS, defect, first_smooth, smooth
 from flowborne.kernels.transfer import interpolate, restrict
 from flowborne.kernels.v_cycle import v_cycle
-from flowborne.kernels.vectors import cells_of
 from flowborne.solvers.pressure import PressureSystem
 
+from .padded import cells_of
 from .references.deflation import deflated_reference
 from .references.laplacian import apply_laplacian_reference, operator
 from .references.smoothing import defect_reference, smooth_reference

@@ -13,9 +13,9 @@ from flowborne.kernels.arrays import Integers
 from flowborne.kernels.closed_fractions import close_faces
 from flowborne.kernels.cut_faces import nodes_inside
 from flowborne.kernels.edge_crossings import new_crossings
-from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import BESIDE, ON_SKIN, sample_skin, skin_box, skin_weights
+from flowborne.kernels.triangles import distances_to_mesh
 
 Skin = tuple[Array, Integers]
 """Vertices (n, 3) in m and triangles (k, 3)."""

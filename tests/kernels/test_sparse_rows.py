@@ -7,9 +7,8 @@ import pytest
 from scipy.sparse import csc_array, csr_array
 
 from flowborne.kernels.arrays import Rows
-from flowborne.kernels.conjugate_gradients import apply_low_rank
-from flowborne.kernels.deflation import mode_strengths
-from flowborne.kernels.mobility import respond
+from flowborne.kernels.cholesky import respond
+from flowborne.kernels.conjugate_gradients import apply_low_rank, mode_strengths
 from flowborne.kernels.sparse_rows import add_rows, padded_rows, row_gram, row_gram_along, sum_rows
 from flowborne.solvers.cholesky import cholesky, ordering_of
 from flowborne.solvers.mobility import dense_mobility, factored_mobility

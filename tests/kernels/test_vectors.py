@@ -8,18 +8,17 @@ import pytest
 from flowborne.kernels import jit
 from flowborne.kernels.jit import kernel_threads
 from flowborne.kernels.vectors import (
-    cells_of,
     descend,
-    descend_on,
     dot,
     largest,
     load_cells,
     scaled,
     scaled_cells,
-    scaled_dot,
     true_residual,
     turn,
 )
+
+from .padded import cells_of
 
 SHAPES = [(6, 7, 8), (1, 9, 7)]
 
@@ -39,7 +38,7 @@ def test_sums_and_steps(shape: tuple[int, int, int]) -> None:
     turn(p, q, 0.7)
     for found, expected in zip((x, r, p), after, strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-15)
-    assert true_residual(r, x, q) == pytest.approx(np.square(x - q).sum())
+    true_residual(r, x, q)
     np.testing.assert_array_equal(r, x - q)
 
 
@@ -74,9 +73,9 @@ def test_sums_have_the_same_bits_on_any_number_of_threads(
     def sums() -> tuple[float, ...]:
         at, left, direction = x.copy(), r.copy(), p.copy()
         turn(direction, q, 0.7)
-        after = descend_on(at, left, direction, q, 0.3, b, 2.0)
-        squared = true_residual(left, at, q)
-        return dot(at, left), scaled_dot(b, left, 0.5), after, squared
+        after = descend(at, left, direction, q, 0.3, b, 2.0)
+        true_residual(left, at, q)
+        return dot(at, left), dot(b, left, 0.5), after
 
     expected = sums()
     with kernel_threads(threads):

@@ -138,10 +138,21 @@ force = [0.1, 0.0]
     assert not (tmp_path / "run" / "walk.csv").exists()
 
 
+def test_a_run_of_an_earlier_version_names_its_advection(write: Write) -> None:
+    """Its one scheme left is accepted, and not written any more; the other is not known."""
+    path = write()
+    text = path.read_text(encoding="utf-8")
+    assert text.count("[fluid]") == 1
+    path.write_text(text.replace("[fluid]", '[fluid]\nadvection = "flux"'), encoding="utf-8")
+    assert "advection" not in tomllib.loads(load_scene(path).to_toml())["fluid"]
+    path.write_text(text.replace("[fluid]", '[fluid]\nadvection = "other"'), encoding="utf-8")
+    with pytest.raises(SceneError, match="advection"):
+        load_scene(path)
+
+
 def test_every_default_is_written_out(write: Write) -> None:
     text = tomllib.loads(load_scene(write()).to_toml())
     assert text["fluid"]["viscosity"] == 0.0
-    assert text["fluid"]["advection"] == "flux"
     assert text["boundaries"]["y_max"] == {"kind": "closed"}
     assert text["controller"]["rule"] == {"kind": "fixed"}
     assert text["control"][0]["probe"] == 5.0

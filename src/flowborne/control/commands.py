@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from flowborne.control.creature import within_range
-from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.motion import Told, Trajectory, TrajectoryKnots
 from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo, driven
-from flowborne.coupling.told import Told, TrajectoryKnots
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers

@@ -9,12 +9,11 @@ import numpy as np
 
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised
-from flowborne.coupling.report import StepReport
+from flowborne.coupling.report import StepReport, Timer
 from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import report_bodies
 from flowborne.coupling.stream import winds_on
-from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
 from flowborne.solids.driven import Driven, drive

@@ -3,18 +3,22 @@ a step starts from."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from flowborne.coupling.advection.scheme import Departure
 from flowborne.coupling.flesh import skins_on
 from flowborne.coupling.fractions import Geometry, geometry, uncut
-from flowborne.coupling.mouths import Jet, add_rates, jets_of
+from flowborne.coupling.mouths import Jet, add_rates, jet_of
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import cells_in
+from flowborne.fluid.boundary import Boundaries, cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.state import FluidState
 from flowborne.solids.dynamics import Kinematics, kinematics
+from flowborne.solids.model import SolidModel
+from flowborne.solids.state import SolidState
 
 
 def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
@@ -58,7 +62,8 @@ def jets_at(
         return ()
     if pose is None:
         pose = kinematics(setup.solid, world.solid.q)
-    return jets_of(setup.mouths, cut, pose, world.solid.v, world.flow()[0].grid, time)
+    given = cut, pose, world.solid.v, world.flow()[0].grid, time
+    return tuple(jet_of(mouth, *given) for mouth in setup.mouths)
 
 
 def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
@@ -78,6 +83,37 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
         if clear.any():
             rate[box][clear] += source.volume_rate / np.count_nonzero(clear)
     return rate
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Fluid and bodies at the start of a step, t^n.
+
+    grid, sides  of the fluid
+    density      kg/m^3
+    inviscid     whether the fluid has no viscosity
+    state        of the fluid
+    cut          the cut grid
+    volumes      control volumes
+    jets         of the mouths
+    sources      (nx, ny, nz) volume per time that sources bring into each cell, m^3/s
+    rate         (nx, ny, nz) the same of sources and mouths
+    solid        the bodies
+    bodies       and their state
+    """
+
+    grid: Grid
+    sides: Boundaries
+    density: float
+    inviscid: bool
+    state: FluidState
+    cut: Geometry
+    volumes: ControlVolumes
+    jets: tuple[Jet, ...]
+    sources: Array
+    rate: Array
+    solid: SolidModel
+    bodies: SolidState
 
 
 def departure(world: World) -> Departure:

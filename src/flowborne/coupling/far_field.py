@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import AdvectionResult, Departure
-from flowborne.coupling.cut import moved_since
+from flowborne.coupling.cut import Departure, moved_since
+from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, faces_of
@@ -64,11 +64,6 @@ class FarField:
             change = (velocity[place.axis] - advected.velocity[place.axis])[place.layer]
             stopped[place.axis] += float((mass[place.axis][place.layer] * change).sum())
         return replace(advected, velocity=velocity, stopped=stopped)
-
-    def store(self, world: World) -> None:
-        """The sea's part of the state at the end of the step, in place."""
-        state = world.flow()[1]
-        state.wake, state.sea = self.wake, self.velocity
 
     def beyond(self, fluid: Fluid) -> Iterator[tuple[Place, Array]]:
         """Of each far side p dt of the sea's change at the end of the columns, Pa s, so that a

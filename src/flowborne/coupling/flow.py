@@ -2,25 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from flowborne.coupling.advection.scheme import AdvectionResult, Departure
+from flowborne.coupling.cut import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.half_pressure import HalfPressure
-from flowborne.coupling.inlets import brought_by
 from flowborne.coupling.leak_proof import leak_proof_flux
+from flowborne.coupling.mouths import (
+    Jet,
+    after_drinking,
+    brought_by,
+    cells_with_inlets,
+    inlets_across,
+    taken_by,
+)
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.solve import Solved
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
-from flowborne.fluid.control_volumes import control_volumes
+from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
+from flowborne.fluid.eddies import damp_eddies
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import Faces, faces_of
+from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.projection import accelerated
-from flowborne.fluid.transport import Transport
-from flowborne.kernels.faces import changes_of_step, fill_empty_faces
+from flowborne.fluid.transport import Transport, carry_component
+from flowborne.kernels.faces import changes_of_step, fill_empty_faces, still_to_come
 from flowborne.solids.dynamics import Kinematics
+
+
+@dataclass(frozen=True)
+class AdvectionResult:
+    """The fluid after advection.
+
+    velocity  Faces u*, m/s
+    volumes   control volumes at the end of the step
+    crossed   (3,) momentum that the flow carried in through the sides, N s
+    stopped   (3,) momentum that sides with a prescribed velocity gave to the flow, N s
+    expelled  (3,) momentum that came in through mouths and sources, N s
+    jets      of the mouths; those that take fluid in have the velocity of that fluid
+    """
+
+    velocity: Faces
+    volumes: ControlVolumes
+    crossed: Array
+    stopped: Array
+    expelled: Array
+    jets: tuple[Jet, ...]
 
 
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
@@ -40,7 +70,49 @@ def advect(
         inflow = brought_by(start.jets, start.rate, tuple(state.scalars))
         passage = Passage(transport, inflow, start.grid, start.sides, world.steps % 2 == 1)
         dyed = carry_dye(state.scalars, passage, fluid.sources)
-    return fluid.advection.carry(start, velocity, transport), dyed
+    return advect_momentum(start, velocity, transport), dyed
+
+
+def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:
+    """Every component on its moving control volumes; nothing is lost (see `fluid.transport`).
+
+    velocity   Faces at the start, with half of the last pressure, m/s
+    transport  leak-proof fluxes, and the control volumes at both ends of the step
+    """
+    grid, sides, state, jets = start.grid, start.sides, start.state, start.jets
+    dt, arrived = transport.dt, [np.zeros(u.shape) for u in velocity[len(grid.axes) :]]
+    crossed, stopped, gained = np.zeros((3, 3))
+    drunk = [np.zeros(3) for _ in jets]
+    cells = cells_with_inlets(jets, start.sources)
+    for axis in grid.axes:
+        inlets = inlets_across(axis, cells, jets, start.sources, grid, sides)
+        along = np.empty(velocity[axis].shape)
+        still_to_come(along, state.acceleration[axis], velocity[axis], state.velocity[axis], dt)
+        carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
+        arrived.insert(axis, carried.velocity)
+        crossed[axis] = start.density * carried.crossed
+        stopped[axis] = start.density * carried.held
+        brought = dt * float(inlets.gain @ inlets.velocity)
+        gained[axis] = start.density * (brought - float(carried.drained.sum()))
+        for jet, taken in zip(jets, drunk, strict=True):
+            taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
+    if start.inviscid:
+        damp_eddies(faces_of(arrived), transport, grid, sides)
+    for place, side in sides.around(grid):
+        u = arrived[place.axis]
+        before = u[place.layer].copy()
+        side.impose(u, place, transport.time + dt)
+        if not side.joined:
+            mass = start.density * transport.after.moving[place.axis][place.layer]
+            stopped[place.axis] += float((mass * (u[place.layer] - before)).sum())
+    return AdvectionResult(
+        faces_of(arrived),
+        transport.after,
+        crossed,
+        stopped,
+        gained,
+        tuple(after_drinking(jet, taken, dt) for jet, taken in zip(jets, drunk, strict=True)),
+    )
 
 
 def apply_body_force_and_sides(

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import Departure
-from flowborne.coupling.cut import moved_since
+from flowborne.coupling.cut import Departure, moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, faces_of
@@ -48,8 +47,8 @@ class HalfPressure:
 def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPressure:
     """Half of the last pressure, on the grid and the control volumes of the start.
 
-    It is 0 if the bodies have been moved since, with the paper's own advection, and in a domain
-    with an open side: fluid that comes in there brings energy, which the step without it damps.
+    It is 0 if the bodies have been moved since, and in a domain with an open side: fluid that comes
+    in there brings energy, which the step without it damps.
     Behind a far side there is a sea, and what comes in has no more energy than that has; the
     pressure that changes the sea's velocity is not half of it given beforehand.
 
@@ -60,9 +59,7 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     mass = face_masses(start.volumes, fluid.density)
     momentum = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
-    plain = sides.gain_energy(grid) or not fluid.advection.explicit_half_pressure
-    plain |= sea_changes(world, dt)
-    if plain or moved_since(world):
+    if sides.gain_energy(grid) or sea_changes(world, dt) or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)
         return HalfPressure(state.velocity, *still, momentum)
     gradient = pressure_gradient(opened, mass, fluid.density, grid, sides)

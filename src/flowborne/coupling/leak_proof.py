@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.advection.scheme import Departure
+from flowborne.coupling.cut import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import beyond_sides
 from flowborne.coupling.swept import swept_cells
@@ -28,7 +28,7 @@ from flowborne.fluid.ghosts import impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.faces import mean_flux
-from flowborne.kernels.outflow import net_out
+from flowborne.kernels.projection import net_out
 from flowborne.solvers.pressure import PressureSystem
 
 TOLERANCE = 1e-9

@@ -8,14 +8,14 @@ relative to the body, along its direction d. With the body's velocity v_b at the
     -rho Q dt w                    impulse on the body, at the middle of the mouth
 
 What body and fluid gain together, rho Q dt v_b, is the momentum of what a body of constant mass is
-filled with. All of it holds for a mouth that takes fluid in (Q < 0) as well.
+filled with. All of it holds for a mouth that takes fluid in (Q < 0) as well. Sources bring fluid
+in from within as mouths do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,20 +23,16 @@ from scipy.ndimage import map_coordinates
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.errors import BreakdownError
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.dye import Brought
+from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.sides.far import Strength
+from flowborne.fluid.transport import NO_INLETS, Inlets
 from flowborne.kernels.arrays import Integers
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0
-"""Cells under the skin to which faces hold the velocity of the jet, for paths that lead there."""
-
-
-class Strength(Protocol):
-    """How strongly a mouth blows over time."""
-
-    def at(self, time: float) -> float:
-        """Part of the full volume rate at `time` (s)."""
-        ...
+"""Cells along a mouth, beyond its radius, within which skin may belong to it."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +75,6 @@ class Jet:
     skin      (3,) v_b, velocity of the body at the centre, m/s
     cells     (k,) flat indices of the cells at the mouth
     rates     (k,) part of Q that comes into each, m^3/s
-    axis      (n,) faces at or under the mouth: axis,
-    face      (n,) flat index among the faces across that axis,
-    share     (n,) part of the face that belongs to the mouth,
-    closed    (n,) and that the body closes
     """
 
     mouth: Mouth
@@ -94,24 +86,13 @@ class Jet:
     skin: Array
     cells: Integers
     rates: Array
-    axis: Integers
-    face: Integers
-    share: Array
-    closed: Array
-
-
-def jets_of(
-    mouths: tuple[Mouth, ...], cut: Geometry, pose: Kinematics, v: Array, grid: Grid, time: float
-) -> tuple[Jet, ...]:
-    """What the mouths do at `time` (s), on bodies with the generalised velocity v (nv,).
-
-    raises  ValueError when a mouth covers no cell
-    """
-    return tuple(jet_of(mouth, cut, pose, v, grid, time) for mouth in mouths)
 
 
 def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, time: float) -> Jet:
-    """See `jets_of`."""
+    """What a mouth does at `time` (s), on bodies with the generalised velocity v (nv,).
+
+    raises  ValueError when it covers no cell
+    """
     turn = pose.body_rotation[mouth.body]
     centre = pose.body_position[mouth.body] + turn @ np.array(mouth.position)
     along = turn @ np.array(mouth.direction)
@@ -130,9 +111,6 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
             f"{mouth.name} covers no cell at {centre.round(6).tolist()} m, {time:g} s. Put its "
             "position on the body's skin, inside the domain, with the direction out of the body"
         )
-    own = np.flatnonzero(skin_of(mouth, cut.body, bodies))
-    share = share_of(cut.place[own], mouth, centre, along, cut, grid)
-    face = own[share > 0.0]
     twist = pose.twist_jacobian[mouth.body] @ v
     return Jet(
         mouth,
@@ -144,10 +122,6 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
         twist[:3] + np.cross(twist[3:], centre),
         cells[here],
         rate * skin[here] / skin.sum(),
-        cut.axis[face],
-        cut.face[face],
-        share[share > 0.0],
-        cut.closed[face],
     )
 
 
@@ -178,8 +152,8 @@ def covered(x: Array, mouth: Mouth, centre: Array, along: Array, grid: Grid) -> 
 def share_of(
     x: Array, mouth: Mouth, centre: Array, along: Array, cut: Geometry, grid: Grid
 ) -> Array:
-    """(n,) part of a face at each place x (n, 3), in the body or on its skin, that belongs to a
-    mouth: `covered`, and with the skin that is nearest to it on the mouth's side."""
+    """(n,) part of a face at each place x (n, 3) on the skin that belongs to a mouth: `covered`,
+    and with the skin that is nearest to it on the mouth's side."""
     share = covered(x, mouth, centre, along, grid)
     found = np.flatnonzero(share)
     step = 0.5 * grid.spacing * along
@@ -219,35 +193,6 @@ def skin_slip(
     return slip
 
 
-def add_closed_slip(advecting_velocity: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
-    """Let a leak-proof field come out of the closed parts of faces as the jets do, in place."""
-    for jet in jets:
-        for axis in grid.axes:
-            own = jet.axis == axis
-            part = jet.closed[own] * jet.share[own]
-            advecting_velocity[axis].reshape(-1)[jet.face[own]] += part * jet.velocity[axis]
-
-
-def fill_mouths(carried: Faces, jets: tuple[Jet, ...], grid: Grid) -> None:
-    """Put the fluid that is to be expelled under the skin of the mouths, in place (m/s)."""
-    for jet in jets:
-        if jet.rate <= 0.0:
-            continue
-        for axis in grid.axes:
-            own = jet.axis == axis
-            at, part = jet.face[own], jet.closed[own] * jet.share[own]
-            values = carried[axis].reshape(-1)
-            values[at] += part * (jet.skin[axis] + jet.velocity[axis] - values[at])
-
-
-def jet_force(jets: tuple[Jet, ...], density: float) -> Array:
-    """(3,) momentum per time that comes into the fluid with the jets, N."""
-    force = np.zeros(3)
-    for jet in jets:
-        force += density * jet.rate * (jet.skin + jet.velocity)
-    return force
-
-
 def jet_wrench(jets: tuple[Jet, ...], density: float, nbody: int) -> Array:
     """(nbody, 6) reaction of the jets on the bodies about the world origin, N and N m."""
     wrench = np.zeros((nbody, 6))
@@ -255,3 +200,98 @@ def jet_wrench(jets: tuple[Jet, ...], density: float, nbody: int) -> Array:
         force = -density * jet.rate * jet.velocity
         wrench[jet.mouth.body] += np.concatenate([force, np.cross(jet.centre, force)])
     return wrench
+
+
+def cells_with_inlets(jets: tuple[Jet, ...], sources: Array) -> Integers:
+    """Flat cells into which mouths and sources bring something, ascending."""
+    cells = np.flatnonzero(sources)
+    for jet in jets:
+        cells = np.union1d(cells, jet.cells)
+    return cells
+
+
+def inlets_across(
+    axis: int,
+    cells: Integers,
+    jets: tuple[Jet, ...],
+    sources: Array,
+    grid: Grid,
+    sides: Boundaries,
+) -> Inlets:
+    """What mouths and sources bring to the control volumes of the faces across `axis`.
+
+    A mouth that drinks, and a source, take or bring fluid as fast as that around.
+
+    cells  see `cells_with_inlets`
+    """
+    if cells.size == 0:
+        return NO_INLETS
+    gain, weighted, local = np.zeros(cells.size), np.zeros(cells.size), -sources.reshape(-1)[cells]
+    for jet in jets:
+        at = np.searchsorted(cells, jet.cells)
+        if jet.rate > 0.0:
+            gain[at] += jet.rates
+            weighted[at] += jet.rates * (jet.skin[axis] + jet.velocity[axis])
+        else:
+            local[at] -= jet.rates
+    index, (gains, speeds, losses) = at_faces(cells, (gain, weighted, local), axis, grid, sides)
+    used = (gains != 0.0) | (losses != 0.0)
+    index, gains, speeds, losses = index[used], gains[used], speeds[used], losses[used]
+    speeds = np.divide(speeds, gains, out=np.zeros(index.size), where=gains != 0.0)
+    return Inlets(index, gains, speeds, losses)
+
+
+def taken_by(
+    jet: Jet, axis: int, inlets: Inlets, drained: Array, grid: Grid, sides: Boundaries
+) -> float:
+    """What a mouth that drinks took of volume times velocity across `axis` in a step, m^4/s."""
+    if jet.rate >= 0.0:
+        return 0.0
+    index, (rates,) = at_faces(jet.cells, (-jet.rates,), axis, grid, sides)
+    share, at = np.zeros(inlets.index.size), np.searchsorted(inlets.index, index)
+    known = (at < inlets.index.size) & (inlets.index[at.clip(0, inlets.index.size - 1)] == index)
+    share[at[known]] = rates[known]
+    share = np.divide(share, inlets.loss, out=np.zeros(share.size), where=inlets.loss != 0.0)
+    return float(share @ drained)
+
+
+def after_drinking(jet: Jet, taken: Array, dt: float) -> Jet:
+    """The jet of a mouth that drinks with the velocity of what it took, relative to the body."""
+    if jet.rate >= 0.0:
+        return jet
+    return replace(jet, velocity=taken / (-jet.rate * dt) - jet.skin)
+
+
+def at_faces(
+    cells: Integers, values: tuple[Array, ...], axis: int, grid: Grid, sides: Boundaries
+) -> tuple[Integers, list[Array]]:
+    """Half of what comes into each of some cells for both of its faces across `axis`: the faces,
+    flat and ascending, and the sums on them. The last face along a periodic axis is the first."""
+    at = np.stack(np.unravel_index(cells, grid.shape))
+    above = at.copy()
+    above[axis] += 1
+    if sides.periodic()[axis]:
+        above[axis] %= grid.shape[axis]
+    shape = grid.face_shape(axis)
+    both = [np.ravel_multi_index(tuple(place), shape) for place in (at, above)]
+    index, which = np.unique(np.concatenate(both), return_inverse=True)
+    sums = [np.bincount(which, np.tile(v, 2), index.size) for v in values]
+    return index, [np.asarray(0.5 * total, float) for total in sums]
+
+
+def brought_by(jets: tuple[Jet, ...], rate: Array, names: tuple[str, ...]) -> Brought:
+    """What mouths and sources bring into the cells: mouths their own dye, none that they do not
+    name; sources, and mouths that drink, the fluid that is there.
+
+    rate   (nx, ny, nz) what all of them bring, m^3/s
+    names  of the scalars
+    """
+    blown = [jet for jet in jets if jet.rate > 0.0]
+    gain, dye = np.zeros(rate.shape), {name: np.zeros(rate.shape) for name in names}
+    for jet in blown:
+        gain.reshape(-1)[jet.cells] += jet.rates
+        for name in names:
+            dye[name].reshape(-1)[jet.cells] += jet.mouth.scalars.get(name, 0.0) * jet.rates
+    cells = np.flatnonzero(gain)
+    amounts = {name: dye[name].reshape(-1)[cells] for name in names}
+    return Brought(rate, cells, gain.reshape(-1)[cells], amounts)

@@ -12,13 +12,11 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.world import World
+from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 
 class Report(Protocol):

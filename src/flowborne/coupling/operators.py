@@ -16,7 +16,7 @@ from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.arrays import DenseTerm
-from flowborne.kernels.body_velocity import add_body_velocity
+from flowborne.kernels.coupling_rows import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.pressure import NO_DENSE_TERM

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import BreakdownError, PartError, WorkerError
-
-Array = NDArray[np.float64]
+from flowborne.kernels.arrays import Array, Integers
 
 BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
 """Errors with which a step may end; their text says what happened."""
@@ -118,8 +117,8 @@ class StepReport:
     dye_error: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)
     contacts: int = 0
-    limited: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    unsettled: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    limited: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
+    unsettled: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def fluid_wrench(self) -> Array:
         """(nbody, 6) everything that the fluid and the winds do to each body."""
@@ -139,3 +138,17 @@ def about(wrench: Array, points: Array) -> Array:
     """(n, 6) wrenches about the world origin as wrenches about points (n, 3)."""
     force, torque = wrench[:, :3], wrench[:, 3:]
     return np.concatenate([force, torque - np.cross(points, force)], axis=1)
+
+
+class Timer:
+    """Seconds by part of a step."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = perf_counter()
+
+    def lap(self, part: str) -> None:
+        """Book the time since the last lap to `part`."""
+        now = perf_counter()
+        self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
+        self._last = now

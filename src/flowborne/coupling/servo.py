@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.coupling.motion import JointCommand, Trajectory, velocity_after
+from flowborne.kernels.arrays import Array
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
-
-Array = NDArray[np.float64]
 
 
 class Servo(Protocol):

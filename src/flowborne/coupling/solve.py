@@ -32,14 +32,13 @@ from flowborne.coupling.operators import (
     pressure_push,
     side_push,
 )
-from flowborne.coupling.report import Outcome
-from flowborne.coupling.timer import Timer
+from flowborne.coupling.report import Outcome, Timer
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Integers
 from flowborne.kernels.faces import largest_open
-from flowborne.kernels.outflow import outflow
+from flowborne.kernels.projection import outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.mobility import Mobility
@@ -48,11 +47,9 @@ from flowborne.solvers.pressure import NO_REACTION, NO_TERM, LowRankTerm, Pressu
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
 
-FIRST_TOLERANCE = 1e-3
-"""Relative residual of the first of several solves of one step."""
-
 TIGHTENING = 1e-3
-"""Tolerance of a solve over that of the one before: what a correction changes shrinks as fast."""
+"""Relative residual of the first of several solves of one step, and tolerance of each later one
+over that of the one before: what a correction changes shrinks as fast."""
 
 SPLIT_TOLERANCE = 1e-3
 """Relative residual of the added-mass part of the pressure, whose forces are then off by 2e-4 at
@@ -182,7 +179,7 @@ def solve_together(
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
     if correct_under(pressure, cut, pose, driven, torque_limit) is not None:
-        tolerance = max(tolerance, FIRST_TOLERANCE)
+        tolerance = max(tolerance, TIGHTENING)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
     timer.lap("projection")

@@ -19,7 +19,7 @@ Deviations from the paper, and their reasons:
        start the scheme would be of first order. The projection matches the exact change of the
        cells' open volumes, which momentum and dye in flux form need (`leak_proof`).
     5  Momentum is advected in flux form: along particle paths the fluid loses a tenth of what a
-       swimmer exchanges with it. `advection = "semi-lagrangian"` is the paper's scheme.
+       swimmer exchanges with it.
     6  Viscosity is solved for first, with friction at bodies and the last pressure (`friction`).
 """
 
@@ -27,7 +27,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.balance import momentum_balance
 from flowborne.coupling.bodies_step import (
     equations,
     move_bodies,
@@ -46,11 +45,10 @@ from flowborne.coupling.half_pressure import explicit_half_pressure
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised
 from flowborne.coupling.parts import joined, part_of, parts_of
-from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.report import Outcome, StepReport, Timer
 from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_together
-from flowborne.coupling.step_report import blank, known_push, report_coupled
-from flowborne.coupling.timer import Timer
+from flowborne.coupling.step_report import blank, known_push, momentum_balance, report_coupled
 from flowborne.coupling.window import follow
 from flowborne.coupling.world import World
 from flowborne.fluid.momentum import face_masses
@@ -101,7 +99,7 @@ def step_coupled(
     world: World, dt: float, command: JointCommand, done: StepReport, timer: Timer
 ) -> None:
     """Bodies and fluid a step later, in place; the numbers are those above."""
-    fluid, end = world.flow()[0], world.time + dt
+    (fluid, state), end = world.flow(), world.time + dt
     start = departure(world)
     timer.lap("geometry")
     far = far_field(world, start, dt)
@@ -127,7 +125,7 @@ def step_coupled(
     jets, limit = jets_at(world, cut, end, pose), command.torque_limit
     solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit, timer)  # 6
     store_state(world, half, advected, dyed, solved, cut, pose)  # 7
-    far.store(world)
+    state.wake, state.sea = far.wake, far.velocity
     done.momentum = momentum_balance(world, mass, half, driven_sides, solved)
     done.dye_error = dyed.error
     report_coupled(done, world, pose, half.impulse, solved)

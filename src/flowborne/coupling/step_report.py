@@ -1,18 +1,20 @@
-"""What a step reports about the bodies, filled in as it becomes known."""
+"""What a step reports about the bodies and the fluid's momentum, filled in as it becomes known."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from flowborne.coupling.flesh import hydrostatic_push
+from flowborne.coupling.flow import AdvectionResult
+from flowborne.coupling.half_pressure import HalfPressure
 from flowborne.coupling.mouths import Jet, jet_wrench
 from flowborne.coupling.operators import buoyancy_wrench
-from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.report import Momentum, Outcome, StepReport, Timer
 from flowborne.coupling.solve import Solved
 from flowborne.coupling.stream import winds_on
-from flowborne.coupling.timer import Timer
 from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array
+from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.momentum import fluid_momentum, momentum_change
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.momentum import halfway_momentum
@@ -97,3 +99,46 @@ def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
     force = push[first:].reshape(-1, 3)
     wrench = np.concatenate([force, np.cross(pose.vertices, force)], axis=1)
     return push[:first].reshape(-1, 6) + flesh.carried.T @ wrench
+
+
+def momentum_balance(
+    world: World,
+    mass: Faces,
+    half: HalfPressure,
+    advected: AdvectionResult,
+    solved: Solved,
+) -> Momentum:
+    """The fluid's budget of a step that ends with the masses `mass` of the faces."""
+    fluid, _ = world.flow()
+    projected, before = solved.projected, solved.before_pressure
+    assert projected is not None
+    assert before is not None
+    grid, boundaries = fluid.grid, fluid.boundaries
+    first = 6 * world.setup.solid.nbody
+    pressed = fluid_momentum(before, mass, grid, boundaries)
+    taken, moved = momentum_change(before, projected.velocity, mass, grid, boundaries)
+    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
+    pushes = linear(projected.impulse, first)
+    exchanged = pushes.sum(axis=0)
+    scale = float(np.abs(pushes).sum()) + moved
+    missing = float(np.abs(exchanged + taken - projected.sides).max())
+    sides = projected.sides + half.sides
+    exchanged += linear(half.impulse, first).sum(axis=0)
+    forces = pressed - fluid_momentum(advected.velocity, mass, grid, boundaries)
+    given = advected.crossed + advected.expelled + advected.stopped + forces + sides - exchanged
+    unknown = float(np.abs(after - half.start - given).max())
+    return Momentum(
+        fluid=after,
+        exchanged=exchanged,
+        exchange_error=missing / scale if scale > 0.0 else 0.0,
+        boundary=sides + advected.stopped,
+        crossed=advected.crossed,
+        jet=advected.expelled,
+        forces=forces,
+        budget_error=unknown / scale if scale > 0.0 else 0.0,
+    )
+
+
+def linear(push: Array, first: int) -> Array:
+    """(n, 3) the forces in a push (k,), with the wrenches on bodies before index `first`."""
+    return np.concatenate([push[:first].reshape(-1, 6)[:, :3], push[first:].reshape(-1, 3)])

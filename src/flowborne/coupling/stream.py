@@ -1,4 +1,5 @@
-"""One-way coupling: the fluid's own velocity as a simple wind on the bodies (eq. 2)."""
+"""The fluid at points: one-way coupling, in which its velocity is a simple wind on the bodies
+(eq. 2), and the flow that a creature's sensors read."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from flowborne.coupling.cut import cut_by_bodies
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.solids.dynamics import Kinematics
@@ -62,3 +64,32 @@ def winds_on(world: World, pose: Kinematics) -> Array:
             blowing = WindFaces(field, wind.density, wind.bodies)
         total += blowing.wrench(world.setup.solid, pose, world.solid.v, world.time)
     return total
+
+
+@dataclass(frozen=True, eq=False)
+class FlowState:
+    """The fluid at points, in world axes.
+
+    velocity  (n, 3) m/s
+    pressure  (n,) dynamic pressure, Pa; nan where no fluid is within a cell
+    """
+
+    velocity: Array
+    pressure: Array
+
+
+def flow_at(world: World, x: Array) -> FlowState:
+    """The fluid at points x (n, 3), linear between faces and between the centres of cells that hold
+    fluid; beyond the domain that at its side. Raises ValueError without a fluid."""
+    fluid, state = world.flow()
+    grid = fluid.grid
+    at = ((x - np.array(grid.origin)) / grid.spacing - 0.5).T
+    if grid.is_slab:
+        at[2] = 0.0
+    wet = (cut_by_bodies(world).volume > 0.0).astype(np.float64)
+    pressed, share = (
+        map_coordinates(values, at, order=1, mode="nearest")
+        for values in (wet * state.pressure, wet)
+    )
+    pressure = np.divide(pressed, share, out=np.full(share.shape, np.nan), where=share > 0.0)
+    return FlowState(Sampled(state.velocity, grid)(x, world.time), pressure)

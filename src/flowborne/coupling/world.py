@@ -8,13 +8,10 @@ from typing import Any, SupportsIndex
 
 import numpy as np
 
-from flowborne.coupling.advection.flux_form import FluxForm
-from flowborne.coupling.advection.scheme import Advection
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.motion import NOTHING_TOLD, Told, Trajectory
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
-from flowborne.coupling.told import NOTHING_TOLD, Told
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Array, Grid
@@ -40,7 +37,6 @@ class Fluid:
     sources       interior sources
     scalars       names of the carried scalars
     body_force    (3,) uniform force per mass on the fluid, m/s^2, besides gravity
-    advection     scheme that carries the velocity
     tolerance     relative residual of the pressure solve
     one_way       whether the bodies do not act on the fluid, which acts on them as a wind alone
     window        how the grid follows bodies; None if it stays where it is
@@ -54,7 +50,6 @@ class Fluid:
     sources: tuple[Source, ...] = ()
     scalars: tuple[str, ...] = ()
     body_force: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    advection: Advection = field(default_factory=FluxForm)
     tolerance: float = 1e-9
     one_way: bool = False
     window: Window | None = None

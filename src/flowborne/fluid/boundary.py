@@ -78,18 +78,15 @@ class Boundaries:
         return self._pairs[axis]
 
     def periodic(self) -> tuple[bool, bool, bool]:
-        return self._periodic
+        """Of each axis."""
+        x, y, z = (low.joined for low, _ in self._pairs)
+        return x, y, z
 
     @cached_property
     def _pairs(self) -> tuple[tuple[Boundary, Boundary], ...]:
         sides = [getattr(self, name) for name in SIDES]
         pairs = list(zip(sides[::2], sides[1::2], strict=True))
         return tuple((low.among(pairs), high.among(pairs)) for low, high in pairs)
-
-    @cached_property
-    def _periodic(self) -> tuple[bool, bool, bool]:
-        x, y, z = (low.joined for low, _ in self._pairs)
-        return x, y, z
 
     def around(self, grid: Grid) -> Iterator[tuple[Place, Boundary]]:
         """Every side of a grid, with its place: along each axis the lower and then the upper."""
@@ -103,10 +100,6 @@ class Boundaries:
     def codes(self) -> Integers:
         """(3, 2) what the lower and upper side of each axis are to the pressure: CLOSED, OPEN or
         PERIODIC."""
-        return self._codes
-
-    @cached_property
-    def _codes(self) -> Integers:
         code = {(False, False): CLOSED, (True, False): OPEN, (False, True): PERIODIC}
         return np.array([[code[side.free, side.joined] for side in pair] for pair in self._pairs])
 

@@ -31,7 +31,6 @@ from flowborne.kernels.control_volumes import (
     sort_faces,
 )
 from flowborne.kernels.face_masses import ROUNDS, share_out, with_neighbours
-from flowborne.kernels.faces import face_means
 
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
@@ -71,13 +70,6 @@ class ControlVolumes:
             share_velocity(velocity[axis], *self.closed[axis])
 
 
-def means(cells: Array, axis: int, periodic: bool) -> Array:
-    """Mean of both cells of each face across `axis`; 0 beyond the sides of the domain."""
-    out = np.empty([n + int(a == axis) for a, n in enumerate(cells.shape)])
-    face_means(out, np.ascontiguousarray(cells), axis, periodic)
-    return out
-
-
 def control_volumes(
     cells: Array, opened: Faces, grid: Grid, boundaries: Boundaries
 ) -> ControlVolumes:
@@ -96,12 +88,9 @@ def moving_volumes(
     """What moves with the faces across an axis, and what `ControlVolumes` has of them."""
     axis, shape, wraps = kernel_axes(component, grid, boundaries)
     told, ring, cell = boundaries.prescribed(component), wraps[axis] > 0, grid.cell_volume
-    found, room, wide = (
-        np.empty(grid.face_shape(component)),
-        plane(cells, grid),
-        planes(opened, grid),
-    )
-    volume, kinds = plane(found, grid), np.empty(shape, np.uint8)
+    room, wide = plane(cells, grid), planes(opened, grid)
+    found, kinds = np.empty(grid.face_shape(component)), np.empty(shape, np.uint8)
+    volume = plane(found, grid)
     counts = np.empty((shape[0] * shape[1], 3), np.int64)
     limits = cell, WHOLE, SLACK * cell, NOTHING * cell
     sort_faces(volume, kinds, counts, room, wide[axis], axis, told, ring, limits)

@@ -13,7 +13,8 @@ import numpy as np
 from scipy import fft
 
 from flowborne.fluid.grid import Array
-from flowborne.kernels.layers import sum_layers
+from flowborne.fluid.sides.side import Place
+from flowborne.kernels.potentials import sum_layers
 
 
 @lru_cache(maxsize=32)
@@ -50,3 +51,23 @@ def on_planes(sources: Array, axis: int, at: tuple[int, ...]) -> list[Array]:
         values = fft.irfftn(total.reshape(half), size)
         found.append(values[tuple(slice(n) for n in shape)])
     return found
+
+
+def with_images(
+    circulation: Array, axis: int, mirrors: tuple[Place, ...]
+) -> tuple[Array, tuple[slice, ...]]:
+    """Circulations round edges along `axis`, in a slab the nodes along z, with their images behind
+    mirrors, and where the domain lies among them. Vorticity across a mirror has images of its sign,
+    that along it of the other.
+    """
+    inside = [slice(None)] * circulation.ndim
+    for place in mirrors:
+        own, count = place.axis == axis, circulation.shape[place.axis]
+        image = np.flip(circulation, place.axis) * (1.0 if own else -1.0)
+        index = [slice(None)] * circulation.ndim
+        if not own:  # edges on the mirror are their own images
+            index[place.axis] = slice(1, None) if place.upper else slice(None, -1)
+        parts = [circulation, image[tuple(index)]]
+        inside[place.axis] = slice(count) if place.upper else slice(-count, None)
+        circulation = np.concatenate(parts if place.upper else parts[::-1], place.axis)
+    return circulation, tuple(inside)

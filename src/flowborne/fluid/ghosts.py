@@ -1,8 +1,4 @@
-"""One layer of ghost values around a field, so that kernels sample without asking for sides.
-
-A ghost value is such that the linear interpolation to the side gives what the side prescribes; see
-`Boundary.fill` of each kind of side for what it is where it prescribes nothing.
-"""
+"""Fields and sides as kernels take them: layers, axes, and what lies beyond each side."""
 
 from __future__ import annotations
 
@@ -13,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.irrotational import comes_in, tangential_change
-from flowborne.fluid.sides.side import Boundary, Layers, hold
+from flowborne.fluid.grid import Faces, Grid
+from flowborne.fluid.sides.side import tangential_change
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.carry import HELD, JOINED, MIRRORED, PRESCRIBED, Sides
 
@@ -51,63 +46,6 @@ def kernel_axes(component: int, grid: Grid, sides: Boundaries) -> tuple[int, Int
     if not grid.is_slab:
         return component, shape, wraps
     return component + 1, np.array([1, *shape[:2]]), np.array([0, *wraps[:2]])
-
-
-def pad(values: NDArray[Scalar], axes: tuple[int, ...]) -> NDArray[Scalar]:
-    """Copy with one more layer at both ends of each of `axes`; corners hold the nearest value."""
-    padded = np.empty([n + 2 * (axis in axes) for axis, n in enumerate(values.shape)], values.dtype)
-    padded[tuple(slice(1, -1) if axis in axes else slice(None) for axis in range(3))] = values
-    for axis in axes:
-        padded[edge(axis, 0)] = padded[edge(axis, 1)]
-        padded[edge(axis, -1)] = padded[edge(axis, -2)]
-    return padded
-
-
-def pad_cells(values: Array, grid: Grid, boundaries: Boundaries) -> Array:
-    """Cell field with ghosts: zero gradient, or the other end where periodic."""
-    padded = pad(values, grid.axes)
-    for place, side in boundaries.around(grid):
-        side.fill(padded, Layers(place, 1), None)
-    return padded
-
-
-def pad_faces(
-    velocity: Faces, grid: Grid, boundaries: Boundaries, time: float, rate: bool = False
-) -> Faces:
-    """The three face fields with ghosts that carry the boundary conditions.
-
-    velocity  Faces, m/s (or an acceleration, with `rate`: then walls prescribe zero)
-    returns   Faces, each larger by one layer at both ends of every axis of the grid
-    """
-    padded = [pad(values, grid.axes) for values in velocity]
-    for component in grid.axes:
-        for place, side in boundaries.around(grid):
-            wall = None
-            if component != place.axis:
-                wall = side.prescribed_velocity(place, component, time)
-            if wall is not None and rate:
-                wall = 0.0
-            if isinstance(wall, np.ndarray):
-                wall = pad(wall, tuple(a for a in grid.axes if a != place.axis))
-            fill(padded[component], side, component, Layers(place, 1), wall)
-            if component != place.axis and side.irrotational_inflow(place) and not rate:
-                normal, ring = velocity[place.axis][place.layer], boundaries.periodic()[component]
-                change = tangential_change(normal, place, component, ring)
-                change *= comes_in(normal, place, component, ring)
-                wide = pad(change, tuple(a for a in grid.axes if a != place.axis))
-                padded[component][Layers(place, 1).outside(0)] += wide
-    return padded[0], padded[1], padded[2]
-
-
-def fill(
-    padded: Array, side: Boundary, component: int, layers: Layers, wall: Array | float | None
-) -> None:
-    """Set the ghosts of a component beyond a side, in place. Along its own axis they hold what the
-    side's faces do."""
-    if component == layers.place.axis and not side.joined:
-        hold(padded, layers)
-    else:
-        side.fill(padded, layers, wall)
 
 
 def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: float) -> None:

@@ -88,11 +88,7 @@ class Grid:
 
     def zeros_faces(self) -> Faces:
         """Zero on every face."""
-        return (
-            np.zeros(self.face_shape(0)),
-            np.zeros(self.face_shape(1)),
-            np.zeros(self.face_shape(2)),
-        )
+        return faces_of([np.zeros(self.face_shape(axis)) for axis in range(3)])
 
     def cell_coordinates(self) -> tuple[Array, Array, Array]:
         """x (nx,), y (ny,), z (nz,) of the cell centres in m."""

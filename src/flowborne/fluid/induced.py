@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.fluid import biot_savart, vector_potential, wake_room, wake_slab
+from flowborne.fluid import sea_room, sea_slab
 from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.sea import Sea, number_of
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.wake import followed, moved, wake_line, with_all_circulation_0
-from flowborne.kernels.outflow import net_out
+from flowborne.kernels.projection import net_out
 
 Normal = dict[Place, Array]
 """Velocity across the faces of sides, like their layers, m/s."""
@@ -32,43 +32,42 @@ def induced(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Arr
 def in_slab(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
     """`induced` in two dimensions."""
     grid, later = sea.far[0].grid, np.zeros(wake.shape)
-    circulation = biot_savart.node_circulation(field, grid)
-    sides = biot_savart.stream_functions(circulation, grid, sea.mirrors)
+    circulation = sea_slab.node_circulation(field, grid)
+    sides = sea_slab.stream_functions(circulation, grid, sea.mirrors)
     if sea.exit is not None:
         line, number = wake_line(sea), number_of(sea.exit)
         bins = with_all_circulation_0(wake[number], circulation.sum(keepdims=True).ravel())
-        whole = bins * wake_slab.IMAGES if sea.mirrors else bins
+        whole = bins * sea_slab.IMAGES if sea.mirrors else bins
         for place in sea.driven:
-            sides[place] += wake_slab.stream_function(line, whole, biot_savart.nodes_of(place))
-        rate, speed = wake_slab.leaving(circulation, field, sea.exit, line)
+            sides[place] += sea_slab.stream_function(line, whole, sea_slab.nodes_of(place))
+        rate, speed = sea_slab.leaving(circulation, field, sea.exit, line)
         later[number] = moved(bins, dt * rate, min(1.0, speed * dt / line.length))
-    return {p: biot_savart.normal_velocity(sides[p], p) for p in sea.driven}, later
+    return {p: sea_slab.normal_velocity(sides[p], p) for p in sea.driven}, later
 
 
 def in_room(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Array]:
     """`induced` in three dimensions."""
     grid, later = sea.far[0].grid, np.zeros(wake.shape)
-    x, y, z = (vector_potential.edge_circulation(field, grid, axis) for axis in range(3))
-    sides = vector_potential.potentials((x, y, z), grid, sea.mirrors)
+    x, y, z = (sea_room.edge_circulation(field, grid, axis) for axis in range(3))
+    sides = sea_room.potentials((x, y, z), grid, sea.mirrors)
     ends: Normal = {place: np.zeros(()) for place in sea.driven}
     if sea.exit is not None:
         line, number = wake_line(sea), number_of(sea.exit)
         inside = grid.spacing * np.array([x.sum(), y.sum(), z.sum()])
         bins = with_all_circulation_0(wake[number], inside)
-        whole = bins * wake_room.images(sea.mirrors)
-        source = np.array([wake_room.source_rate(line, whole)])
-        groups = wake_room.grouped(line, whole)
+        whole = bins * sea_room.images(sea.mirrors)
+        source = np.array([sea_room.source_rate(line, whole)])
+        groups = sea_room.grouped(line, whole)
         for place in sea.driven:
             for axis, values in sides[place].items():
-                edges = vector_potential.edges_of(place, axis)
-                values += wake_room.potential(groups, edges, axis).reshape(values.shape)
+                edges = sea_room.edges_of(place, axis)
+                values += sea_room.potential(groups, edges, axis).reshape(values.shape)
             if source.any():
-                ends[place] = vector_potential.source_velocity(line.end, source, place)
-        rate, speed = wake_room.leaving((x, y, z), field, sea.exit, line)
+                ends[place] = sea_room.source_velocity(line.end, source, place)
+        rate, speed = sea_room.leaving((x, y, z), field, sea.exit, line)
         later[number] = moved(bins, dt * rate, min(1.0, speed * dt / line.length))
     return {
-        place: vector_potential.normal_velocity(sides[place], place) + ends[place]
-        for place in sea.driven
+        place: sea_room.normal_velocity(sides[place], place) + ends[place] for place in sea.driven
     }, later
 
 
@@ -83,11 +82,11 @@ def after_move(wake: Array, velocity: Faces, before: Sea, after: Sea) -> Array:
     place, grid, found = before.exit, before.exit.grid, wake.copy()
     old, new = wake_line(before), wake_line(after)
     if grid.is_slab:
-        circulation = biot_savart.node_circulation(velocity, grid)
-        left = wake_slab.summed(wake_slab.column(circulation, place), place, new)
+        circulation = sea_slab.node_circulation(velocity, grid)
+        left = sea_slab.summed(sea_slab.column(circulation, place), place, new)
     else:
-        x, y, z = (vector_potential.edge_circulation(velocity, grid, axis) for axis in range(3))
-        left = grid.spacing * wake_room.summed(wake_room.layer((x, y, z), place), place, new)
+        x, y, z = (sea_room.edge_circulation(velocity, grid, axis) for axis in range(3))
+        left = grid.spacing * sea_room.summed(sea_room.layer((x, y, z), place), place, new)
     found[number_of(place)] = followed(wake[number_of(place)], left, old, new)
     return found
 
@@ -104,7 +103,7 @@ def brought(field: Faces, sea: Sea) -> Normal:
     if not rate.any():
         return {}
     points, rates = pooled(rate, sea)
-    through = (biot_savart if grid.is_slab else vector_potential).source_velocity
+    through = (sea_slab if grid.is_slab else sea_room).source_velocity
     return {place: through(points, rates, place) for place in sea.driven}
 
 

@@ -20,7 +20,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.faces import accelerate, weigh
-from flowborne.kernels.pressure_gradient import subtract_gradient
+from flowborne.kernels.projection import subtract_gradient
 
 EVEN = 1e-9
 """Relative difference of masses of uncut faces: solves leave some 1e-12 in the volumes."""

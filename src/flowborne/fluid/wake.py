@@ -1,7 +1,7 @@
 """The wake beyond the side through which the stream leaves: a line of bins of vorticity.
 
 Each bin is BIN cells long and has the circulation G of what is in it, and its first moment M across
-the stream (`wake_slab`, `wake_room`). The first is fed by what leaves the domain; all move on with
+the stream (`sea_slab`, `sea_room`). The first is fed by what leaves the domain; all move on with
 what leaves. Kelvin's theorem is obeyed: the first bin takes what makes the circulation of all the
 fluid 0. What has gone beyond the last bin goes on as that one: a line of moments M per length that
 has no end is a source at its beginning.

@@ -10,8 +10,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.induced import after_move
-from flowborne.fluid.irrotational import tangential_change
-from flowborne.fluid.sides.side import Boundary, Place
+from flowborne.fluid.sides.side import Boundary, Place, tangential_change
 from flowborne.fluid.state import FluidState
 
 

@@ -29,7 +29,7 @@ Labels = NDArray[np.int32]
 Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Marks, Real, Marks, Indices, Indices]
 """Table of levels; which axes are periodic; packed over the levels: weights across each axis, what
 is added to the diagonal, the inverse of that, which rows are even (see `even`), interpolation
-coefficients (see `centres.interpolation_weights`), marks, orphans and their aggregates (see
+coefficients (see `levels.interpolation_weights`), marks, orphans and their aggregates (see
 `aggregates`)."""
 
 Finest = tuple[Array, Array, Array, Array]

@@ -3,13 +3,15 @@
 A block of columns first..last has its own triangle (w, w) and, below it, the rows (m,) that all of
 them share: m values of each column in turn, so that the innermost loops run along memory. After
 Ng and Peyton (1993), with each block's update given to the blocks on its right at once.
+
+Also A^-1 on a load by such a factor, see `solvers.mobility`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Blocks, Indices, Integers
+from flowborne.kernels.arrays import Array, Blocks, Indices, Integers, MobilityArrays
 from flowborne.kernels.jit import kernel
 
 
@@ -194,3 +196,38 @@ def backwards(x: Array, begin: int, end: int, shared: Indices, block: Array, wor
         for r in range(c + 1, w):
             total -= own[r] * here[r]
         here[c] = total / own[c]
+
+
+@kernel
+def respond(load: Array, mobility: MobilityArrays) -> Array:
+    """(k,) A^-1 load."""
+    dense, t_start, t_column, t_value, value, blocks, order, taken = mobility
+    size = load.size
+    motion = np.zeros(size)
+    if t_start.size == 1:
+        for a in range(size):
+            for b in range(size):
+                motion[a] += dense[a, b] * load[b]
+        return motion
+    force = np.zeros(order.size)
+    for a in range(size):
+        if load[a] != 0.0:
+            for e in range(t_start[a], t_start[a + 1]):
+                force[t_column[e]] += t_value[e] * load[a]
+    turned = np.empty((1, order.size))
+    for i in range(order.size):
+        turned[0, order[i]] = force[i]
+    solve_factored(turned, value, blocks)
+    answer = np.empty(order.size)
+    for i in range(order.size):
+        answer[i] = turned[0, order[i]]
+    for c in range(taken.shape[1]):
+        part = 0.0
+        for i in range(order.size):
+            part += taken[i, c] * force[i]
+        for i in range(order.size):
+            answer[i] -= part * taken[i, c]
+    for a in range(size):
+        for e in range(t_start[a], t_start[a + 1]):
+            motion[a] += t_value[e] * answer[t_column[e]]
+    return motion

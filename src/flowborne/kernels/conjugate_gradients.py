@@ -1,17 +1,20 @@
 """Conjugate gradients on K + J A^-1 J^T, preconditioned by one V-cycle on K and a deflation.
 
-All vectors are padded (see `levels`).
+With Y = V B and C = (1 + B^T Y)^-1 R^T (see `solvers.deflation`) the preconditioned residual r is
+V r - Y (C J^T V r). All vectors are padded (see `levels`).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numba import prange
 
 from flowborne.kernels.arrays import (
     ROUNDING,
     Array,
     DenseTerm,
     Hierarchy,
+    Integers,
     Labels,
     MobilityArrays,
     Operator,
@@ -20,22 +23,98 @@ from flowborne.kernels.arrays import (
     Triple,
     Vectors,
 )
-from flowborne.kernels.deflation import deflated, mode_strengths
-from flowborne.kernels.dense_term import add_term
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.cholesky import respond
+from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
 from flowborne.kernels.levels import at_level, wrap_ghosts
-from flowborne.kernels.mobility import respond
 from flowborne.kernels.regions import remove_null
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
-from flowborne.kernels.vectors import descend_on, dot, scaled, scaled_dot, true_residual, turn
+from flowborne.kernels.vectors import descend, dot, in_order, scaled, true_residual, turn
 
 LIMIT = 500
 """Most iterations."""
 
 STAGNATION = 0.5
 """A restart from the true residual that has not fallen below this times the last ends the solve."""
+
+LANES = 8
+"""Partial sums of a scalar product, so that the compiler makes vector code of it."""
+
+
+@inlined
+def product(a: Array, b: Array) -> float:
+    """a . b, in LANES sums."""
+    parts, whole = np.zeros(LANES), a.size // LANES * LANES
+    for start in range(0, whole, LANES):
+        for lane in range(LANES):
+            parts[lane] += a[start + lane] * b[start + lane]
+    total = in_order(parts)
+    for n in range(whole, a.size):
+        total += a[n] * b[n]
+    return total
+
+
+@kernel
+def add_term(out: Array, p: Array, cells: Integers, vectors: Array, strengths: Array) -> float:
+    """out += U diag(s) U^T p between some cells; returns p . U diag(s) U^T p.
+
+    cells      (n,) padded flat; a cell may be there several times
+    vectors    (m, n) U^T
+    strengths  (m,) s
+    """
+    flat, added = p.reshape(-1), out.reshape(-1)
+    held, given, energy = np.empty(cells.size), np.zeros(cells.size), 0.0
+    for n in range(cells.size):
+        held[n] = flat[cells[n]]
+    for m in range(strengths.size):
+        vector = vectors[m]
+        load = product(vector, held)
+        motion = strengths[m] * load
+        energy += motion * load
+        for n in range(cells.size):
+            given[n] += motion * vector[n]
+    for n in range(cells.size):
+        added[cells[n]] += given[n]
+    return energy
+
+
+@kernel
+def mode_strengths(z: Real, rows: Rows, amounts: Array, scale: float) -> Array:
+    """(m,) C J^T z x scale for a padded field z = V r and amounts C (m, k)."""
+    count, size = amounts.shape
+    strength = np.zeros(count)
+    if count:
+        load = sum_rows(z, rows, size)
+        for n in range(count):
+            for c in range(size):
+                strength[n] += amounts[n, c] * (scale * load[c])
+    return strength
+
+
+@kernel
+def deflated(out: Array, z: Real, r: Array, scale: float, strength: Array, fields: Real) -> float:
+    """out = scale z - Y strength in the cells; returns out . r.
+
+    In double precision, because a compliant mode leaves very little of z where it acts.
+    """
+    d = 1 if z.shape[0] > 1 else 0
+    planes, last = z.shape[0] - 2 * d, z.shape[2] - 1
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        m = i + d
+        row = np.zeros(last + 1)
+        for j in range(1, z.shape[1] - 1):
+            for k in range(1, last):
+                out[m, j, k] = scale * z[m, j, k]
+            for n in range(strength.size):
+                for k in range(1, last):
+                    out[m, j, k] -= strength[n] * fields[n, m, j, k]
+            for k in range(1, last):
+                row[k] += out[m, j, k] * r[m, j, k]
+        for k in range(1, last):
+            parts[i] += row[k]
+    return in_order(parts)
 
 
 @kernel
@@ -73,9 +152,9 @@ def solve(
     finest     K on the finest level, with its diagonal
     vectors    padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
                vectors, x as well at the end
-    rows       of J with padded flat cells; mobility: A^-1 (see `mobility`)
-    beyond     what belongs to K besides: padded flat cells, vectors, strengths; see `dense_term`
-    null       see `solvers.regions.null_basis`
+    rows       of J with padded flat cells; mobility: A^-1 (see `solvers.mobility`)
+    beyond     what belongs to K besides: padded flat cells, vectors, strengths; see `add_term`
+    null       see `solvers.deflation.null_basis`
     fields, amounts  of the modes in the preconditioner, at the scale of the hierarchy; see
                `solvers.deflation`
     returns    iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
@@ -120,7 +199,7 @@ def solve(
             v_cycle(hierarchy, cycle[0], cycle[1], cycle[2])
             before = product
             if amounts.size == 0 and not ring:
-                product = scaled_dot(z, r, 1.0 / scale)
+                product = dot(z, r, 1.0 / scale)
                 beta = product / before if before > 0.0 else 0.0
                 curvature = turn_and_apply(q, p, z, 1.0 / scale, beta, finest)
             else:
@@ -138,6 +217,6 @@ def solve(
             if not (curvature > 0.0 and product > 0.0):
                 break
             scale = 1.0 / np.sqrt(square)
-            square = descend_on(x, r, p, q, product / curvature, b, scale)
+            square = descend(x, r, p, q, product / curvature, b, scale)
             iterations += 1
     return iterations, residual / norm, converged

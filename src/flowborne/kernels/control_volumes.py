@@ -21,9 +21,9 @@ AHEAD = 16
 CLOSED_BELOW = 1e-9
 """Open part of a face up to which it counts as closed."""
 
-DRIVEN, PART, SHUT, UNEVEN = 1, 2, 4, 8
+DRIVEN, PART, SHUT, UNEVEN, LISTED = 1, 2, 4, 8, 16
 """Kinds of faces: pressure acts on it; its control volume is not whole; pressure does not act on
-it, and it has one; its control volume is not what its opening says."""
+it, and it has one; its control volume is not what its opening says; it is in a list."""
 
 
 class Closed(NamedTuple):

@@ -11,23 +11,17 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import ROUNDING, Array, Integers, Marks
 from flowborne.kernels.control_volumes import neighbour, place_of
 from flowborne.kernels.jit import kernel
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Marks = NDArray[np.uint8]
 
 WHOLE, CUT, EMPTY = range(3)
 """What a cell is in a step: nothing but fluid, in part or for some time, or never any."""
 
 SWEEPS = 500
-"""Most times that what leaves all cut cells is worked out, one after the other."""
-
-SETTLED = 1e-15
-"""Change of what leaves a cell, relative to the largest, at which that is done."""
+"""Most times that what leaves all cut cells is worked out, one after the other; sooner where only
+rounding errors change."""
 
 
 @kernel
@@ -184,7 +178,7 @@ def pass_on(
             change = max(change, abs(now - leaving[n]))
             scale = max(scale, abs(now))
             leaving[n] = now
-        if change <= SETTLED * scale:
+        if change <= ROUNDING * scale:
             break
     for n in range(count):
         own = listed[n]

@@ -11,12 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import prange
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Marks
 from flowborne.kernels.jit import inlined, kernel
-
-Array = NDArray[np.float64]
-Marks = NDArray[np.uint8]
 
 WIDTH = 64
 """Lines of cells that one thread goes through side by side."""

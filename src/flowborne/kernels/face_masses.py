@@ -12,6 +12,7 @@ from numba import njit
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import (
     DRIVEN,
+    LISTED,
     Closed,
     Transfers,
     across_axis,
@@ -29,9 +30,6 @@ ROUNDS = 2
 velocity on cut faces of the potential flow past a circle is off by 0.050, 0.025, 0.019 of the
 stream (rms) with 8, 16, 32 cells to its diameter; with one round by 0.046, 0.043, 0.040, with three
 by 0.061, 0.030, 0.018, and by 0.115, 0.135, 0.121 where control volumes keep what they have."""
-
-LISTED = 16
-"""Kind of a face that is in a list, beside those of `control_volumes`."""
 
 
 @njit(nogil=True, cache=True)

@@ -17,7 +17,8 @@ LANES = 64
 
 @njit(nogil=True, cache=True)
 def mean_row(row: Array, cells: Array, i: int, j: int, axis: int, periodic: bool) -> None:
-    """Row (i, j) of `face_means`."""
+    """Means of both cells of each face of row (i, j) across `axis`; 0 beyond the ends of an axis
+    that is not periodic."""
     n = cells.shape[axis]
     if axis == 2:
         line = cells[i, j]
@@ -36,15 +37,6 @@ def mean_row(row: Array, cells: Array, i: int, j: int, axis: int, periodic: bool
         second = 0.5 if periodic or at < n else 0.0
         for k in range(row.size):
             row[k] = first * one[k] + second * other[k]
-
-
-@kernel
-def face_means(out: Array, cells: Array, axis: int, periodic: bool) -> None:
-    """Mean of both cells of each face across `axis`; 0 beyond the ends of an axis that is not
-    periodic."""
-    for i in prange(out.shape[0]):
-        for j in range(out.shape[1]):
-            mean_row(out[i, j], cells, np.int64(i), j, axis, periodic)
 
 
 @njit(forceinline=True, nogil=True, cache=True)

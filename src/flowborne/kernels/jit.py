@@ -225,7 +225,8 @@ class Kernel(Generic[P, R]):
                 self._twin = self.serial
             else:
                 name = function.__name__ + "_parallel"
-                copy = FunctionType(function.__code__, {**function.__globals__, **twins}, name)
+                names_there = {**function.__globals__, **twins}
+                copy = FunctionType(function.__code__, names_there, name, function.__defaults__)
                 copy.__qualname__ = name
                 copy.__module__ = function.__module__
                 option = ONLY_PRANGE if "prange" in names else False
@@ -236,3 +237,30 @@ class Kernel(Generic[P, R]):
 def kernel(function: Callable[P, R]) -> Kernel[P, R]:
     """Decorator of module-level functions on plain arrays; see the module."""
     return Kernel(function)
+
+
+@contextmanager
+def compilation_watched(notify: Callable[[int], None]) -> Iterator[None]:
+    """Call `notify(n)` when the n-th kernel begins to compile.
+
+    Kernels that come from the cache of an earlier run are not compiled, and nothing is called.
+    Calls come from whichever thread compiles.
+    """
+    from numba.core import event
+
+    class Listener(event.Listener):
+        compiled = 0
+
+        def on_start(self, started: object) -> None:
+            self.compiled += 1
+            notify(self.compiled)
+
+        def on_end(self, ended: object) -> None:
+            """Nothing: only the beginning of a compilation is news."""
+
+    listener = Listener()
+    event.register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)

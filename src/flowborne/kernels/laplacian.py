@@ -1,4 +1,5 @@
-"""The weighted cell Laplacian K on the finest level."""
+"""The weighted cell Laplacian K on the finest level, by blocks of planes that several operations go
+through together while they are in cache."""
 
 from __future__ import annotations
 
@@ -6,10 +7,22 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Array, Operator, Real
-from flowborne.kernels.blocks import BLOCK, reach
 from flowborne.kernels.even import at_cell
 from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.vectors import in_order
+
+BLOCK = 16
+"""Fewest planes of a block: more than an operation leaves to when all blocks are done."""
+
+
+@inlined
+def reach(block: int, blocks: int, planes: int, behind: int) -> tuple[int, int]:
+    """First plane, and that after the last, of a block that an operation may go through which takes
+    both neighbours of a plane from the one before it, and so on `behind` times; the planes between
+    two blocks are left to when all blocks are done."""
+    start, end = planes * block // blocks, planes * (block + 1) // blocks
+    first = start if block == 0 else start + behind
+    return first, end if block == blocks - 1 else end - behind
 
 
 @kernel

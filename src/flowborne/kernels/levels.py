@@ -21,7 +21,13 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.aggregates import OWN, mark_interpolated, mark_own
+from flowborne.kernels.aggregates import (
+    OWN,
+    add_orphan_weights,
+    assign_orphans,
+    mark_interpolated,
+    mark_own,
+)
 from flowborne.kernels.arrays import (
     Array,
     Hierarchy,
@@ -32,10 +38,64 @@ from flowborne.kernels.arrays import (
     Real,
     Triple,
 )
-from flowborne.kernels.centres import distance_ratio, interpolation_weights
 from flowborne.kernels.even import SINGLE, find_even
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.orphans import add_orphan_weights, assign_orphans
+
+
+@kernel
+def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool) -> float:
+    """Distance between the centres beside fine face `factor * face` over that of the coarse face.
+
+    face    of the coarse level, 0 to its last
+    factor  1 or 2, the coarsening of this axis
+    fine    finest cells in a fine cell of this axis; `cells` finest cells in all
+    """
+    ratio = np.zeros(2)
+    for n in range(2):
+        size = fine if n == 0 else fine * factor
+        count = (cells + size - 1) // size
+        at = min(factor * face, count) if n == 0 else face
+        below, above = at - 1, at
+        if periodic:
+            below, above = below % count, above % count
+        for c in (below, above):
+            if 0 <= c < count:
+                ratio[n] += min(size, cells - c * size)
+    return float(ratio[0] / ratio[1])
+
+
+@kernel
+def interpolation_weights(
+    interpolation: Real, n: int, factor: int, size: int, cells: int, periodic: bool
+) -> None:
+    """How far each fine cell's centre lies from its coarse cell's towards the next coarse cell.
+
+    interpolation  (n + 2,) with ghosts: fraction of the distance between the coarse centres (at
+                   an open side: of that to the side), negative towards the lower neighbour
+    size      finest cells in a fine cell of this axis, `cells` finest cells in all
+    """
+    interpolation[:] = 0.0
+    if factor == 1:
+        return
+    count = (n + 1) // 2
+    for i in range(n):
+        c = i // 2
+        first, second = 2 * c, 2 * c + 1
+        if second >= n:
+            continue
+        a = float(min(size, cells - first * size))
+        b = float(min(size, cells - second * size))
+        other = c - 1 if i == first else c + 1
+        if periodic:
+            other = other % count
+        width = 0.0
+        if 0 <= other < count:
+            width = float(min(2 * size, cells - other * 2 * size))
+        reach = a + b + width
+        interpolation[i + 1] = -b / reach if i == first else a / reach
+    if periodic:
+        interpolation[0], interpolation[n + 1] = interpolation[n], interpolation[1]
+
 
 OFFSET, N0, N1, N2, INTERPOLATION, S0, S1, S2, ORPHANS, ROW, COMMON = range(11)
 """Columns of the table of levels: where it begins in the packed arrays, cells along each axis,
@@ -150,7 +210,7 @@ def coarse_weights(
     """Coarse lower-face weights across `axis` from faces between fine cells marked as OWN.
 
     factor  fine cells in a coarse one along each axis
-    ratio   of distances, per coarse face across `axis`; see `centres.distance_ratio`
+    ratio   of distances, per coarse face across `axis`; see `distance_ratio`
     """
     f0, f1, f2 = factor
     d = 1 if fine.shape[0] > 1 else 0

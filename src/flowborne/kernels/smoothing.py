@@ -19,9 +19,9 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Operator, Real
-from flowborne.kernels.blocks import BLOCK, reach
 from flowborne.kernels.even import at_cell
 from flowborne.kernels.jit import kernel
+from flowborne.kernels.laplacian import BLOCK, reach
 
 STEPS = 3
 """Steps on the way down and on the way up, odd: they go from one array into the other and back."""

@@ -65,7 +65,7 @@ def way_inward(vertices: Array, triangles: Integers) -> Array:
 
     vertices, triangles  (n, 3) m; (k, 3) outward
     """
-    return _way_inward(vertices, triangles, *by_cells(vertices, triangles))
+    return _way_inward(vertices, triangles, by_cells(vertices, triangles))
 
 
 def by_cells(vertices: Array, triangles: Integers) -> Cells:
@@ -106,22 +106,15 @@ def any_within(
     found = np.zeros(len(places), np.bool_)
     for part in (0.25, 0.5, 1.0):
         left = ~found
-        found[left] = _any_within(places[left], part * radius, vertices, triangles, *cells)
+        found[left] = _any_within(places[left], part * radius, vertices, triangles, cells)
     return found
 
 
 @njit(nogil=True, cache=True)
 def _any_within(
-    places: Array,
-    radius: float,
-    vertices: Array,
-    triangles: Integers,
-    low: Array,
-    edge: float,
-    counts: Integers,
-    start: Integers,
-    listed: Integers,
+    places: Array, radius: float, vertices: Array, triangles: Integers, cells: Cells
 ) -> NDArray[np.bool_]:
+    low, edge, counts, start, listed = cells
     found = np.zeros(len(places), np.bool_)
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     looked_at = np.full(len(triangles), -1)
@@ -153,20 +146,13 @@ def _any_within(
 
 
 @njit(nogil=True, cache=True)
-def _way_inward(
-    vertices: Array,
-    triangles: Integers,
-    low: Array,
-    edge: float,
-    counts: Integers,
-    start: Integers,
-    listed: Integers,
-) -> Array:
+def _way_inward(vertices: Array, triangles: Integers, cells: Cells) -> Array:
     """From cell to cell along each ray (Amanatides and Woo 1987).
 
     It meets a triangle where the volumes that it spans with its edges have one sign (Möller and
     Trumbore 1997).
     """
+    low, edge, counts, start, listed = cells
     way = np.full(len(triangles), np.inf)
     cell, step = np.empty(3, np.int64), np.empty(3, np.int64)
     leaves, through = np.empty(3), np.empty(3)

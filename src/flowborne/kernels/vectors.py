@@ -5,20 +5,11 @@ Sums run plane after plane, so that they do not depend on how many threads there
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import prange
-from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Real
 from flowborne.kernels.jit import inlined, kernel
-
-
-def cells_of(padded: NDArray[Any]) -> tuple[slice, slice, slice]:
-    """Index of the cells of a padded array, without its ghosts."""
-    i, j, k = (slice(1, -1) if n > 1 else slice(None) for n in padded.shape)
-    return i, j, k
 
 
 @kernel
@@ -58,41 +49,30 @@ def in_order(parts: Array) -> float:
 
 
 @kernel
-def dot(a: Array, b: Array) -> float:
-    """Sum of a x b, planes in order."""
-    planes, size = a.shape[0], a.shape[2]
+def dot(a: Real, b: Array, scale: float = 1.0) -> float:
+    """Sum of scale x a x b, planes in order."""
+    planes, size = b.shape[0], b.shape[2]
     parts = np.zeros(planes)
     for i in prange(planes):
         row = np.zeros(size)
-        for j in range(a.shape[1]):
+        for j in range(b.shape[1]):
             for k in range(size):
-                row[k] += a[i, j, k] * b[i, j, k]
+                row[k] += scale * a[i, j, k] * b[i, j, k]
         parts[i] = in_order(row)
     return in_order(parts)
 
 
 @kernel
-def descend(x: Array, r: Array, p: Array, q: Array, alpha: float) -> float:
-    """x += alpha p, r -= alpha q; returns r . r."""
-    planes, size = r.shape[0], r.shape[2]
-    parts = np.zeros(planes)
-    for i in prange(planes):
-        row = np.zeros(size)
-        for j in range(r.shape[1]):
-            for k in range(size):
-                x[i, j, k] += alpha * p[i, j, k]
-                value = r[i, j, k] - alpha * q[i, j, k]
-                r[i, j, k] = value
-                row[k] += value * value
-        parts[i] = in_order(row)
-    return in_order(parts)
-
-
-@kernel
-def descend_on(
-    x: Array, r: Array, p: Array, q: Array, alpha: float, b: Real, scale: float
+def descend(
+    x: Array,
+    r: Array,
+    p: Array,
+    q: Array,
+    alpha: float,
+    b: Real | None = None,
+    scale: float = 1.0,
 ) -> float:
-    """`descend`, and b = scale x r in b's precision."""
+    """x += alpha p, r -= alpha q, and b = scale x r in b's precision; returns r . r."""
     planes, size = r.shape[0], r.shape[2]
     parts = np.zeros(planes)
     for i in prange(planes):
@@ -102,22 +82,9 @@ def descend_on(
                 x[i, j, k] += alpha * p[i, j, k]
                 value = r[i, j, k] - alpha * q[i, j, k]
                 r[i, j, k] = value
-                b[i, j, k] = scale * value
+                if b is not None:
+                    b[i, j, k] = scale * value
                 row[k] += value * value
-        parts[i] = in_order(row)
-    return in_order(parts)
-
-
-@kernel
-def scaled_dot(z: Real, r: Array, scale: float) -> float:
-    """Sum of scale x z x r, planes in order."""
-    planes, size = r.shape[0], r.shape[2]
-    parts = np.zeros(planes)
-    for i in prange(planes):
-        row = np.zeros(size)
-        for j in range(r.shape[1]):
-            for k in range(size):
-                row[k] += scale * z[i, j, k] * r[i, j, k]
         parts[i] = in_order(row)
     return in_order(parts)
 
@@ -132,13 +99,12 @@ def turn(p: Array, z: Array, beta: float) -> None:
 
 
 @kernel
-def true_residual(r: Array, rhs: Array, q: Array) -> float:
-    """r = rhs - q; returns r . r."""
+def true_residual(r: Array, rhs: Array, q: Array) -> None:
+    """r = rhs - q."""
     for i in prange(r.shape[0]):
         for j in range(r.shape[1]):
             for k in range(r.shape[2]):
                 r[i, j, k] = rhs[i, j, k] - q[i, j, k]
-    return dot(r, r)
 
 
 @kernel

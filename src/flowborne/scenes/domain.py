@@ -8,9 +8,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.coupling.advection.flux_form import FluxForm
-from flowborne.coupling.advection.scheme import Advection
-from flowborne.coupling.advection.semi_lagrangian import SemiLagrangian
 from flowborne.fluid.grid import Grid
 from flowborne.runs.summary import machine_memory
 from flowborne.tables import Corner, Count, NotNegative, Places, Positive, Table, Text, Vector
@@ -138,8 +135,6 @@ class FluidTable(Table):
     viscosity   dynamic, Pa s; 0 is inviscid
     velocity    initial velocity everywhere, m/s
     body_force  uniform force per mass besides gravity, m/s^2
-    advection   scheme that carries the velocity: "flux" keeps its momentum exactly, the paper's
-                "semi-lagrangian" does not
     tolerance   relative residual at which the pressure solve stops
     coupling    "two-way": fluid and bodies exert forces on each other. "one-way": the fluid flows
                 as without bodies, and winds of kind "stream" exert its force on them. "none": no
@@ -150,13 +145,16 @@ class FluidTable(Table):
     viscosity: NotNegative = 0.0
     velocity: Vector = (0.0, 0.0, 0.0)
     body_force: Vector = (0.0, 0.0, 0.0)
-    advection: Literal["flux", "semi-lagrangian"] = "flux"
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
     coupling: Literal["two-way", "one-way", "none"] = "two-way"
 
-    def scheme(self) -> Advection:
-        """The scheme that carries the velocity."""
-        return FluxForm() if self.advection == "flux" else SemiLagrangian()
+    @model_validator(mode="before")
+    @classmethod
+    def _without_scheme(cls, data: Any) -> Any:
+        """Runs of earlier versions name the one scheme that still carries the velocity."""
+        if isinstance(data, dict) and data.get("advection") == "flux":
+            return {key: value for key, value in data.items() if key != "advection"}
+        return data
 
 
 def fits_memory(counts: list[int]) -> bool:

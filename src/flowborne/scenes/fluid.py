@@ -41,7 +41,6 @@ def fluid_of(scene: Scene) -> Fluid | None:
         sources=sources,
         scalars=scene.scalars(),
         body_force=triple(table.body_force),
-        advection=table.scheme(),
         tolerance=table.tolerance,
         one_way=table.coupling == "one-way",
     )

@@ -10,8 +10,9 @@ from pydantic import Field, model_validator
 
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.cut import cut_by_bodies, jets_at
-from flowborne.coupling.mouths import Mouth, Strength
+from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup, World
+from flowborne.fluid.sides.far import Strength
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorPulse, FactorSteady
 from flowborne.scenes.factors import FactorsTable

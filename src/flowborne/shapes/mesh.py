@@ -8,13 +8,12 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from flowborne.kernels.crossings import crossings
 from flowborne.kernels.distance import MESH
-from flowborne.kernels.mesh_distance import distances_to_mesh
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.sheets import lower_to_sheets
 from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.thickness import way_inward
+from flowborne.kernels.triangles import crossings, distances_to_mesh
 from flowborne.shapes.section import Section, cross
 from flowborne.shapes.shape import (
     DIRECTIONS,

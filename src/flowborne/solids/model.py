@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.mesh_distance import distances_to_mesh
+from flowborne.kernels.triangles import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf

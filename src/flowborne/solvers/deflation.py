@@ -1,4 +1,4 @@
-"""Compliant modes in the preconditioner.
+"""Compliant modes in the preconditioner, and null vectors of the operator.
 
 A V-cycle V on K alone is a poor guide to  K + J A^-1 J^T  where the term of low rank outweighs K.
 With A^-1 = R R^T and B = J R,
@@ -7,14 +7,18 @@ With A^-1 = R R^T and B = J R,
 
 takes in every mode, a column of R, at the price of a V-cycle each (Woodbury's identity). Modes that
 weigh little against K are left out.
+
+In a region without an open side K knows the unknown only up to a constant. A sum of such constants,
+c_r in region r, is a null vector when A^-1 is 0 on the load  J^T (sum of c_r 1_r).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Hierarchy, Real, Rows
+from flowborne.kernels.arrays import Array, Hierarchy, Labels, Real, Rows
 from flowborne.kernels.levels import at_level
+from flowborne.kernels.regions import NULL
 from flowborne.kernels.sparse_rows import add_rows, row_gram, row_gram_along, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
 from flowborne.kernels.vectors import scaled_cells
@@ -84,3 +88,32 @@ def mode_amounts(modes: Array, gram: Array) -> Array:
     scale = 1.0 / np.sqrt(np.diag(matrix))
     inverse: Array = scale[:, None] * np.linalg.inv(scale[:, None] * matrix * scale) * scale
     return inverse @ modes.T
+
+
+def null_basis(count: Labels, loads: Array, mobility: Mobility) -> Array:
+    """(regions, q) constants per region of an orthonormal basis of the operator's null space.
+
+    count     (regions,) cells of each region without an open side
+    loads     (regions, k) J^T 1_r of each region
+    mobility  A^-1
+
+    A region whose load has no response is a null vector of its own. Among the others, combinations
+    c with  c^T F c = 0  for F_rs = (J^T 1_r)^T A^-1 (J^T 1_s) are: of two regions whose loads are
+    opposite, only the constant that both share.
+    """
+    scale = 1.0 / np.sqrt(count)
+    answers = mobility.times(loads)
+    strength = np.einsum("rk,rk->r", answers, loads) * scale**2
+    largest = mobility.largest() * np.square(loads * scale[:, None]).max(initial=0)
+    held = strength > NULL * largest
+    free = np.flatnonzero(~held)
+    basis = np.zeros((count.size, free.size))
+    basis[free, np.arange(free.size)] = scale[free]
+    if not held.any():
+        return basis
+    scaled = loads[held] * scale[held, None]
+    energy, vectors = np.linalg.eigh(mobility.times(scaled) @ scaled.T)
+    null = vectors[:, energy < NULL * energy[-1]]
+    joint = np.zeros((count.size, null.shape[1]))
+    joint[held] = scale[held, None] * null
+    return np.concatenate([basis, joint], axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array, MobilityArrays
-from flowborne.kernels.mobility import respond
+from flowborne.kernels.cholesky import respond
 from flowborne.solvers.cholesky import Cholesky
 
 

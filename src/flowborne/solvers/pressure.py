@@ -5,7 +5,7 @@
                                       A^-1  the response between their columns (see `mobility`)
 
 Equation (9) of the paper with all other unknowns eliminated: symmetric positive definite but for
-its null vectors (see `regions`).
+its null vectors (see `deflation`).
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ from flowborne.kernels.levels import at_level
 from flowborne.kernels.regions import region_loads
 from flowborne.kernels.sparse_rows import padded_rows
 from flowborne.kernels.vectors import load_cells
-from flowborne.solvers.deflation import compliant_modes, mode_amounts, mode_fields
+from flowborne.solvers.deflation import compliant_modes, mode_amounts, mode_fields, null_basis
 from flowborne.solvers.hierarchy import borrow, prepare
 from flowborne.solvers.mobility import Mobility, dense_mobility
-from flowborne.solvers.regions import null_basis
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class Deflation:
     """What a term adds to the system of one geometry, the same for every right-hand side.
 
     rows     of J in active cells, with padded flat indices
-    null     see `regions.null_basis`
+    null     see `deflation.null_basis`
     fields   (m, padded shape) and
     amounts  (m, k) of the modes in the preconditioner; see `deflation`
     """

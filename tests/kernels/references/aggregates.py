@@ -6,7 +6,8 @@ import numpy as np
 
 from flowborne.kernels.aggregates import OWN, WEAK
 from flowborne.kernels.arrays import Integers, Marks, Real, Triple
-from flowborne.kernels.vectors import cells_of
+
+from ..padded import cells_of
 
 
 def mark_own_reference(w: Triple, inverse: Real, factor: Integers) -> Marks:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Real
-from flowborne.kernels.vectors import cells_of
+
+from ..padded import cells_of
 
 
 def deflated_reference(z: Real, scale: float, strength: Array, fields: Real) -> Array:

@@ -7,8 +7,9 @@ import numpy as np
 from flowborne.kernels.arrays import Array
 
 
-def face_means_reference(cells: Array, axis: int, periodic: bool) -> Array:
-    """`face_means` in NumPy."""
+def face_means(cells: Array, axis: int, periodic: bool) -> Array:
+    """Mean of both cells of each face across `axis`, as `mean_row` gives it for a row; 0 beyond the
+    ends of an axis that is not periodic."""
     ends = [(int(a == axis),) * 2 for a in range(3)]
     wide = np.moveaxis(np.pad(cells, ends, mode="wrap" if periodic else "constant"), axis, 0)
     return np.moveaxis(0.5 * (wide[:-1] + wide[1:]), 0, axis)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Operator, Real, Triple
-from flowborne.kernels.vectors import cells_of
+
+from ..padded import cells_of
 
 
 def operator(w: Triple, diagonal: Real) -> Operator:

@@ -6,8 +6,8 @@ import numpy as np
 
 from flowborne.kernels.aggregates import OWN
 from flowborne.kernels.arrays import Array, Faces, Finest, Indices, Integers, Marks, Real, Triple
-from flowborne.kernels.vectors import cells_of
 
+from ..padded import cells_of
 from .laplacian import neighbour_sum
 
 

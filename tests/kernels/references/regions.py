@@ -6,8 +6,8 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Finest, Labels, Periodic, Rows
 from flowborne.kernels.regions import NULL
-from flowborne.kernels.vectors import cells_of
 
+from ..padded import cells_of
 from .sparse_rows import dense_rows
 
 

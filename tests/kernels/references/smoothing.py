@@ -6,8 +6,8 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Real, Triple
 from flowborne.kernels.smoothing import WEIGHTS
-from flowborne.kernels.vectors import cells_of
 
+from ..padded import cells_of
 from .laplacian import neighbour_sum
 
 

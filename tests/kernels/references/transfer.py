@@ -8,7 +8,8 @@ import numpy as np
 
 from flowborne.kernels.aggregates import OWN
 from flowborne.kernels.arrays import Array, Indices, Integers, Marks, Periodic, Real, Triple
-from flowborne.kernels.vectors import cells_of
+
+from ..padded import cells_of
 
 
 def coarse_parents(

@@ -38,10 +38,10 @@ Velocity = tuple[float, float, float]
 
 
 class Strength(Protocol):
-    """How strong a stream is over time."""
+    """How strong a stream or a mouth is over time."""
 
     def at(self, time: float) -> float:
-        """Part of the full velocity at `time` (s), at least 0."""
+        """Part of the full velocity or rate at `time` (s); of a stream's at least 0."""
         ...
 
 
@@ -105,10 +105,8 @@ class BoundaryFar(BoundaryOpen):
 
     def velocity_beyond(self, velocity: Array, place: Place, component: int, time: float) -> Array:
         """That of the sea, and what differs from it falls as the velocity of a dipole, r^-D."""
-        lengths, h = (
-            self.lengths(place.grid, place.face_coordinates(component)),
-            place.grid.spacing,
-        )
+        lengths = self.lengths(place.grid, place.face_coordinates(component))
+        h = place.grid.spacing
         distance2 = sum(length**2 for length in lengths.values())
         farther2 = distance2 + h * (2.0 * abs(lengths[place.axis]) + h)
         sea = self.strength.at(time) * self.velocity[component]

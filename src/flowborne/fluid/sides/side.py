@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
 
@@ -19,7 +18,6 @@ ScalarProfile = Callable[[Array, Array, Array, float], Array]
 """value(x, y, z, time) of a carried scalar: broadcasting arrays in m and s."""
 
 Slices = tuple[slice, ...]
-Field = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -67,45 +65,10 @@ def _face_coordinates(place: Place, component: int) -> tuple[Array, Array, Array
     return found
 
 
-@dataclass(slots=True)
-class Layers:
-    """Layers of a padded field on both sides of a side of the domain.
-
-    depth  number of layers of ghosts
-    span   of each layer along the other axes
-    """
-
-    place: Place
-    depth: int
-    span: Slices = (slice(None),) * 3
-
-    def inside(self, n: int) -> Slices:
-        """Index of the layer that is the n-th inside the side, from 0."""
-        return self._at(self.depth + n)
-
-    def outside(self, n: int) -> Slices:
-        """Index of the layer of ghosts that is the n-th outside the side, from 0."""
-        return self._at(self.depth - 1 - n)
-
-    def across(self, n: int) -> Slices:
-        """Index of the layer a period away from that outside."""
-        return self._at(self.depth - 1 - n + self.place.grid.shape[self.place.axis])
-
-    def _at(self, layer: int) -> Slices:
-        """Index of a layer, counted from the outermost ghosts."""
-        index = list(self.span)
-        stop = -layer or None
-        index[self.place.axis] = (
-            slice(-1 - layer, stop) if self.place.upper else slice(layer, layer + 1)
-        )
-        return tuple(index)
-
-
 class Boundary:
     """One side of the domain; by default a wall that nothing crosses and nothing sticks to.
 
-    A kind of side overrides what it does otherwise. Fields and layers are indexed as in `Place` and
-    `Layers`.
+    A kind of side overrides what it does otherwise. Fields are indexed as in `Place`.
 
     kind      its name in scenes and messages
     free      whether the pressure determines the flux through it; otherwise the side prescribes it.
@@ -147,19 +110,6 @@ class Boundary:
         if across is not None:
             field[place.layer] = across
 
-    def fill(self, field: Field, layers: Layers, wall: Array | float | None) -> None:
-        """Set the ghosts of a field beyond the side, in place.
-
-        wall  value at the side, half-way between field and ghosts; None mirrors the field, and
-              holds its values beyond a free side
-        """
-        for n in range(layers.depth):
-            if self.joined:
-                field[layers.outside(n)] = field[layers.across(n)]
-                continue
-            inner = field[layers.inside(0 if self.free and wall is None else n)]
-            field[layers.outside(n)] = inner if wall is None else 2.0 * wall - inner
-
     def pressure_weight(self, place: Place) -> Array | float:
         """Acceleration of its faces by the pressure in the cells next to it, relative to that with
         p = 0 on the side: 0 if the flux is prescribed, 1 on an open side, (h/2) / (h/2 + l) with a
@@ -170,7 +120,7 @@ class Boundary:
 
     def irrotational_inflow(self, place: Place) -> bool:
         """Whether fluid that comes in has no vorticity: its tangential velocity is then that of
-        `irrotational.tangential_change`, and not the mean along a free side."""
+        `tangential_change`, and not the mean along a free side."""
         return False
 
     def velocity_beyond(self, velocity: Array, place: Place, component: int, time: float) -> Array:
@@ -189,7 +139,23 @@ Pair = tuple[Boundary | type[Boundary], Boundary | type[Boundary]]
 """Lower and upper side across an axis, or their kinds."""
 
 
-def hold(field: Field, layers: Layers) -> None:
-    """Set the ghosts of a field to its values at the side, in place."""
-    for n in range(layers.depth):
-        field[layers.outside(n)] = field[layers.inside(0)]
+def tangential_change(normal: Array, place: Place, component: int, periodic: bool) -> Array:
+    """What a tangential component has more one cell beyond the side than in the layer inside it,
+    m/s, in fluid without vorticity.
+
+    There it changes across the side as the normal one does along it, du_t/dx_n = du_n/dx_t: so the
+    circulation around each node (in rooms: each edge) of the side is 0.
+
+    normal    velocity across the side on its faces, m/s
+    periodic  whether the side is joined to itself along the component's axis
+    returns   like the layer of the component's faces at the side; at both ends, where a face of
+              the side is missing, as next to them
+    """
+    steps = np.diff(normal, axis=component)
+    if periodic:
+        around = np.take(normal, [0], component) - np.take(normal, [-1], component)
+        steps = np.concatenate([around, steps, around], axis=component)
+    else:
+        wide = [(int(axis == component),) * 2 for axis in range(3)]
+        steps = np.pad(steps, wide, mode="edge")
+    return steps if place.upper else -steps

@@ -7,14 +7,14 @@ import pytest
 
 from flowborne.fluid.boundary import places
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.sides.side import Place
-from flowborne.fluid.vector_potential import (
+from flowborne.fluid.sea_room import (
     edge_circulation,
     edges_of,
     normal_velocity,
     potentials,
     source_velocity,
 )
+from flowborne.fluid.sides.side import Place
 
 GRID = Grid((7, 5, 6), 0.5, (-1.0, 2.0, 0.0))
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.fluid.biot_savart import (
+from flowborne.fluid.boundary import places
+from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.sea_slab import (
     node_circulation,
     nodes_of,
     normal_velocity,
     source_velocity,
     stream_functions,
 )
-from flowborne.fluid.boundary import places
-from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.side import Place
 
 GRID = Grid.slab(11, 7, 0.5, (-1.0, 2.0))

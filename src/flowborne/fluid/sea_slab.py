@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.fluid.convolution import on_planes
+from flowborne.fluid.convolution import on_planes, with_images
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.sides.side import Place
+from flowborne.fluid.wake import WakeLine
 
 
 def node_circulation(velocity: Faces, grid: Grid) -> Array:
@@ -22,29 +23,12 @@ def node_circulation(velocity: Faces, grid: Grid) -> Array:
     return nodes
 
 
-def with_images(circulation: Array, mirrors: tuple[Place, ...]) -> tuple[Array, tuple[slice, ...]]:
-    """Circulations with their images behind mirrors, and where the domain lies among them."""
-    inside = [slice(None), slice(None)]
-    for place in mirrors:
-        image = -np.flip(circulation, place.axis)
-        index = [slice(None), slice(None)]
-        index[place.axis] = slice(1, None) if place.upper else slice(None, -1)
-        count = circulation.shape[place.axis]
-        if place.upper:
-            circulation = np.concatenate([circulation, image[tuple(index)]], place.axis)
-            inside[place.axis] = slice(count)
-        else:
-            circulation = np.concatenate([image[tuple(index)], circulation], place.axis)
-            inside[place.axis] = slice(count - 1, None)
-    return circulation, tuple(inside)
-
-
 def stream_functions(
     circulation: Array, grid: Grid, mirrors: tuple[Place, ...]
 ) -> dict[Place, Array]:
     """Stream function at the nodes of each side of a slab, m^2/s, of circulations (nx+1, ny+1)
     around the nodes inside and of their images."""
-    extended, inside = with_images(circulation, mirrors)
+    extended, inside = with_images(circulation, 2, mirrors)
     found = {}
     for axis in (0, 1):
         first, stop, _ = inside[axis].indices(extended.shape[axis])
@@ -82,3 +66,54 @@ def source_velocity(points: Array, rates: Array, place: Place) -> Array:
     flux = np.abs(np.arctan2(cross, along)) @ rates / (2.0 * np.pi * place.grid.spacing)
     outward = flux if place.upper else -flux
     return outward[None, :, None] if place.axis == 0 else outward[:, None, None]
+
+
+IMAGES = np.array([0.0, 2.0])
+"""G and M of a wake on a mirror together with its image, over its own."""
+
+
+def across(line: WakeLine) -> Array:
+    """(2,) unit vector, the stream's turned to the left."""
+    return np.array([-line.along[1], line.along[0]])
+
+
+def stream_function(line: WakeLine, bins: Array, nodes: Array) -> Array:
+    """(n,) of the bins (BINS, 2) at nodes (n, 2), m^2/s."""
+    away = nodes[:, None, :] - line.middles
+    square = np.einsum("nki,nki->nk", away, away)
+    circulation = np.einsum("k,nk->n", bins[:, 0], np.log(square))
+    moment = np.einsum("k,nk->n", bins[:, 1], (away @ across(line)) / square)
+    rest = nodes - line.end
+    angle = np.arctan2(-rest @ across(line), -rest @ line.along)
+    source = -bins[-1, 1] / line.length
+    return np.asarray((moment - 0.5 * circulation + source * angle) / (2.0 * np.pi))
+
+
+def leaving(
+    circulation: Array, velocity: Faces, place: Place, line: WakeLine
+) -> tuple[Array, float]:
+    """(2,) circulation and moment that leave per time through the exit at a place, and the speed
+    at which the vorticity goes, m/s: of the column of nodes next to it.
+
+    circulation  (nx+1, ny+1) at the nodes, m^2/s
+    """
+    axis, nodes = place.axis, column(circulation, place)
+    normal = velocity[axis][:, :, 0]
+    end = -2 if place.upper else 1
+    faces = normal[end] if axis == 0 else normal[:, end]
+    outward = 0.5 * (faces[:-1] + faces[1:]) * (1.0 if place.upper else -1.0)
+    rate, size = outward * nodes / place.grid.spacing, float(np.abs(nodes).sum())
+    speed = float(np.abs(outward * nodes).sum()) / size if size > 0.0 else 0.0
+    return summed(rate, place, line), speed
+
+
+def column(circulation: Array, place: Place) -> Array:
+    """Circulations (n,) around the nodes next to a side, but those on other sides, m^2/s."""
+    end = -2 if place.upper else 1
+    return (circulation[end] if place.axis == 0 else circulation[:, end])[1:-1]
+
+
+def summed(column: Array, place: Place, line: WakeLine) -> Array:
+    """(2,) G and M of a column next to the exit."""
+    arms = (nodes_of(place)[1:-1] - line.start) @ across(line)
+    return np.array([column.sum(), column @ arms])

@@ -7,8 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from flowborne.kernels.outflow import net_out, outflow
-from flowborne.kernels.pressure_gradient import subtract_gradient
+from flowborne.kernels.projection import net_out, outflow, subtract_gradient
 from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 from .references.outflow import outflow_reference

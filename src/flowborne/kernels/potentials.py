@@ -1,9 +1,10 @@
-"""Vector potential of a line of vorticity, by its first moments."""
+"""Potentials of what induces velocity: of the layers of a field, and of a line of vorticity."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
+from numba import njit, prange
+from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import kernel
@@ -26,3 +27,19 @@ def wake_potential(
             arm = moment[k, 0] * x + moment[k, 1] * y + moment[k, 2] * z
             total += np.sqrt(near) * (circulation[k] + near * arm)
         out[n] = total / (4.0 * np.pi)
+
+
+Complex = NDArray[np.complex128]
+
+
+@njit(nogil=True, cache=True)
+def sum_layers(out: Complex, layers: Complex, weights: Array, at: int) -> None:
+    """Sum of the layers (n, m), each times the weights (k, m) of its distance from the layer `at`.
+
+    NumPy:  out[:] = sum(weights[abs(i - at)] * layers[i] for i in range(n))
+    """
+    out[:] = 0.0
+    for i in range(layers.shape[0]):
+        layer, weight = layers[i], weights[abs(i - at)]
+        for k in range(out.size):
+            out[k] += weight[k] * layer[k]

@@ -1,18 +1,105 @@
-"""The bins of a wake in a room: G_i = int w_i, and M_ji = int y_j w_i with y across the stream.
+"""What vorticity in a room induces on the sides of the domain, by Biot and Savart's law.
 
-A bin has the three of G and then the nine of M, i by i within each j. The wake beyond the last bin
-is a source of the rate  -e.(y x w) / (2 length)  there, for the stream along e.
+A field without divergence is the curl of the vector potential  A = (1/4 pi) sum G h / r  of the
+circulations G round its edges, up to an irrotational stream. Each component, on the edges along its
+axis, is a sum over all edges along it (`convolution`). The velocity across a face of a side is the
+circulation of A around it over its area, so that no fluid appears or goes.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
+from flowborne.fluid.boundary import places
+from flowborne.fluid.convolution import on_planes, with_images
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces
+from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.wake import BINS, WakeLine
-from flowborne.kernels.wake_potential import wake_potential
+from flowborne.kernels.potentials import wake_potential
+
+OnSide = dict[int, Array]
+"""Component of A -> its values on the edges of a side along that axis, like the side's layer."""
+
+
+def edge_circulation(velocity: Faces, grid: Grid, axis: int) -> Array:
+    """Circulation round the edges along `axis` inside a room, m^2/s; 0 round those on the sides.
+
+    returns  (n along the axis, n+1 along the others)
+    """
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    inner, inside = [slice(None)] * 3, [slice(None)] * 3
+    inner[other], inside[one] = slice(1, -1), slice(1, -1)
+    turning = np.diff(velocity[other][tuple(inner)], axis=one)
+    turning -= np.diff(velocity[one][tuple(inside)], axis=other)
+    edges = np.zeros([n + (a != axis) for a, n in enumerate(grid.shape)])
+    inner[one] = slice(1, -1)
+    np.multiply(grid.spacing, turning, out=edges[tuple(inner)])
+    return edges
+
+
+def potentials(
+    circulation: tuple[Array, Array, Array], grid: Grid, mirrors: tuple[Place, ...]
+) -> dict[Place, OnSide]:
+    """Both tangential components of A on the edges of each side.
+
+    circulation  round the edges along each axis, m^2/s
+    """
+    found: dict[Place, OnSide] = {place: {} for place in places(grid)}
+    for axis in grid.axes:
+        extended, inside = with_images(circulation[axis], axis, mirrors)
+        for across in (a for a in grid.axes if a != axis):
+            first, stop, _ = inside[across].indices(extended.shape[across])
+            others = tuple(s for a, s in enumerate(inside) if a != across)
+            planes = on_planes(extended, across, (first, stop - 1))
+            for upper, values in zip((False, True), planes, strict=True):
+                values = np.expand_dims(values[others], across)
+                found[Place(grid, across, upper)][axis] = values
+    return found
+
+
+@lru_cache(maxsize=64)
+def edges_of(place: Place, axis: int) -> Array:
+    """(n, 3) middles of the edges of a side along `axis`, m, in the order of its layer; not to be
+    written."""
+    grid = place.grid
+    along = [
+        grid.origin[a] + grid.spacing * (np.arange(grid.shape[a] + (a != axis)) + 0.5 * (a == axis))
+        for a in range(3)
+    ]
+    along[place.axis] = np.array([place.at])
+    found = np.stack([c.ravel() for c in np.meshgrid(*along, indexing="ij")], axis=1)
+    found.flags.writeable = False
+    return found
+
+
+def normal_velocity(potential: OnSide, place: Place) -> Array:
+    """Velocity across a side, like its layer of faces, m/s, of A on its edges."""
+    one, other = (place.axis + 1) % 3, (place.axis + 2) % 3
+    turning = np.diff(potential[other], axis=one) - np.diff(potential[one], axis=other)
+    return np.asarray(turning / place.grid.spacing)
+
+
+def source_velocity(points: Array, rates: Array, place: Place) -> Array:
+    """Velocity across a side, like its layer of faces, m/s, that point sources in or beside a room
+    give it: each face gets the part of the rate that belongs to the solid angle under which it is
+    seen (Van Oosterom and Strackee 1983 have the formula of a rectangle).
+
+    points  (n, 3) m
+    rates   (n,) m^3/s
+    """
+    grid, axis = place.grid, place.axis
+    one, other = (a for a in range(3) if a != axis)
+    nodes = [grid.origin[a] + grid.spacing * np.arange(grid.shape[a] + 1) for a in (one, other)]
+    flux = np.zeros((grid.shape[one], grid.shape[other]))
+    for point, rate in zip(points, rates, strict=True):
+        x, y, z = nodes[0][:, None] - point[one], nodes[1] - point[other], place.at - point[axis]
+        seen = np.arctan(x * y / (z * np.sqrt(x * x + y * y + z * z)))
+        flux += rate * np.diff(np.diff(seen, axis=0), axis=1)
+    return np.expand_dims(flux / (4.0 * np.pi * grid.spacing**2), axis)
+
 
 GROUPS = np.repeat([1, 2, 4, 8], [8, 4, 4, 4])
 """Bins that act on the sides together, from the exit on: none is longer than it is far away."""
