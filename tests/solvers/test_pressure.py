@@ -57,21 +57,17 @@ def random_term(shape, bodies, seed=1, rank=None):
     cells = np.sort(rng.choice(np.prod(shape), np.prod(shape) // 3))
     columns = (6 * rng.integers(0, bodies, cells.size)[:, None] + np.arange(6)).ravel()
     half = rng.standard_normal((k, k if rank is None else rank))
-    return LowRankTerm(
-        cells,
-        6 * np.arange(cells.size + 1),
-        columns,
-        rng.standard_normal(columns.size),
-        dense_mobility(half @ half.T),
-    )
+    rows = cells, 6 * np.arange(cells.size + 1), columns, rng.standard_normal(columns.size)
+    return LowRankTerm(rows, dense_mobility(half @ half.T))
 
 
 def row_matrix(term, cells):
     """Dense J."""
     J = np.zeros((cells, term.mobility.size))
-    for n, cell in enumerate(term.cells):
-        for e in range(term.row_start[n], term.row_start[n + 1]):
-            J[cell, term.columns[e]] += term.values[e]
+    at, start, columns, values = term.rows
+    for n, cell in enumerate(at):
+        for e in range(start[n], start[n + 1]):
+            J[cell, columns[e]] += values[e]
     return J
 
 
@@ -177,7 +173,7 @@ def channel(n, low=0, high=0):
     mobility[0, 0] = 2.0
     rows = np.arange(2 * n + 1)
     columns = np.zeros(2 * n, np.int64)
-    return weights, LowRankTerm(cells, rows, columns, values, dense_mobility(mobility))
+    return weights, LowRankTerm((cells, rows, columns, values), dense_mobility(mobility))
 
 
 def test_plug_between_closed_cavities_shares_one_constant():
@@ -232,7 +228,7 @@ def disc_term(weights, n, mass):
     mobility = np.zeros((6, 6))
     mobility[0, 0] = 1.0 / mass
     columns = np.zeros(cells.size, np.int64)
-    return LowRankTerm(cells, rows, columns, values[cells], dense_mobility(mobility))
+    return LowRankTerm((cells, rows, columns, values[cells]), dense_mobility(mobility))
 
 
 def stream(n):

@@ -61,10 +61,12 @@ def solve_small_slab() -> None:
         for end in (0, -1):
             np.moveaxis(weights[axis], axis, 0)[end] = 0.0
     term = LowRankTerm(
-        np.array([27, 28]),
-        np.array([0, 6, 12]),
-        np.tile(np.arange(6), 2),
-        np.append(np.ones(6), -np.ones(6)),
+        (
+            np.array([27, 28]),
+            np.array([0, 6, 12]),
+            np.tile(np.arange(6), 2),
+            np.append(np.ones(6), -np.ones(6)),
+        ),
         dense_mobility(100.0 * np.eye(6)),
     )
     rhs = np.zeros((SMALL, SMALL, 1))

@@ -11,13 +11,12 @@ from flowborne.coupling.flesh import skins_on
 from flowborne.coupling.fractions import Geometry, geometry, uncut
 from flowborne.coupling.mouths import Jet, add_rates, jet_of
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.fluid.boundary import Boundaries, cells_in
+from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.state import FluidState
 from flowborne.solids.dynamics import Kinematics, kinematics
-from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 
 
@@ -89,30 +88,23 @@ def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:
 class Departure:
     """Fluid and bodies at the start of a step, t^n.
 
-    grid, sides  of the fluid
-    density      kg/m^3
-    inviscid     whether the fluid has no viscosity
-    state        of the fluid
-    cut          the cut grid
-    volumes      control volumes
-    jets         of the mouths
-    sources      (nx, ny, nz) volume per time that sources bring into each cell, m^3/s
-    rate         (nx, ny, nz) the same of sources and mouths
-    solid        the bodies
-    bodies       and their state
+    fluid    and its
+    state
+    cut      the cut grid
+    volumes  control volumes
+    jets     of the mouths
+    sources  (nx, ny, nz) volume per time that sources bring into each cell, m^3/s
+    rate     (nx, ny, nz) the same of sources and mouths
+    bodies   their state
     """
 
-    grid: Grid
-    sides: Boundaries
-    density: float
-    inviscid: bool
+    fluid: Fluid
     state: FluidState
     cut: Geometry
     volumes: ControlVolumes
     jets: tuple[Jet, ...]
     sources: Array
     rate: Array
-    solid: SolidModel
     bodies: SolidState
 
 
@@ -123,20 +115,8 @@ def departure(world: World) -> Departure:
     jets, sources = jets_at(world, cut, world.time), source_rate(fluid, world.time, cut.open)
     rate = sources.copy()
     add_rates(rate, jets)
-    return Departure(
-        fluid.grid,
-        fluid.boundaries,
-        fluid.density,
-        fluid.viscosity == 0.0,
-        state,
-        cut,
-        volumes_of(world, cut),
-        jets,
-        sources,
-        rate,
-        world.setup.solid,
-        world.solid.copy(),
-    )
+    volumes, bodies = volumes_of(world, cut), world.solid.copy()
+    return Departure(fluid, state, cut, volumes, jets, sources, rate, bodies)
 
 
 def volumes_of(world: World, cut: Geometry) -> ControlVolumes:

@@ -99,7 +99,7 @@ def far_field(world: World, start: Departure, dt: float) -> FarField:
             for place in sea.driven
         }
         return FarField(kept, state.wake, velocity, gained)
-    moving = boundary_velocity(kinematics(start.solid, start.bodies.q), start.bodies.v)
+    moving = boundary_velocity(kinematics(world.setup.solid, start.bodies.q), start.bodies.v)
     field = leak_proof(state.velocity, start.cut, moving, fluid.grid)
     normal, wake = induced(field, sea, state.wake, dt)
     for place, values in brought(field, sea).items():

@@ -56,7 +56,7 @@ class AdvectionResult:
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
     """Fluxes past the moving bodies, and the control volumes that they lead to at the cut `end`."""
     flux, cells = leak_proof_flux(start, end, world.time + 0.5 * dt, dt)
-    volumes = control_volumes(cells, end.open, start.grid, start.sides)
+    volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
     return Transport(flux, start.volumes, volumes, dt, world.time)
 
 
@@ -68,7 +68,8 @@ def advect(
     dyed = Dyed({}, 0.0)
     if state.scalars:
         inflow = brought_by(start.jets, start.rate, tuple(state.scalars))
-        passage = Passage(transport, inflow, start.grid, start.sides, world.steps % 2 == 1)
+        backwards = world.steps % 2 == 1
+        passage = Passage(transport, inflow, fluid.grid, fluid.boundaries, backwards)
         dyed = carry_dye(state.scalars, passage, fluid.sources)
     return advect_momentum(start, velocity, transport), dyed
 
@@ -79,7 +80,8 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
     velocity   Faces at the start, with half of the last pressure, m/s
     transport  leak-proof fluxes, and the control volumes at both ends of the step
     """
-    grid, sides, state, jets = start.grid, start.sides, start.state, start.jets
+    fluid, state, jets = start.fluid, start.state, start.jets
+    grid, sides = fluid.grid, fluid.boundaries
     dt, arrived = transport.dt, [np.zeros(u.shape) for u in velocity[len(grid.axes) :]]
     crossed, stopped, gained = np.zeros((3, 3))
     drunk = [np.zeros(3) for _ in jets]
@@ -90,20 +92,20 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
         still_to_come(along, state.acceleration[axis], velocity[axis], state.velocity[axis], dt)
         carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
         arrived.insert(axis, carried.velocity)
-        crossed[axis] = start.density * carried.crossed
-        stopped[axis] = start.density * carried.held
+        crossed[axis] = fluid.density * carried.crossed
+        stopped[axis] = fluid.density * carried.held
         brought = dt * float(inlets.gain @ inlets.velocity)
-        gained[axis] = start.density * (brought - float(carried.drained.sum()))
+        gained[axis] = fluid.density * (brought - float(carried.drained.sum()))
         for jet, taken in zip(jets, drunk, strict=True):
             taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
-    if start.inviscid:
+    if fluid.viscosity == 0.0:
         damp_eddies(faces_of(arrived), transport, grid, sides)
     for place, side in sides.around(grid):
         u = arrived[place.axis]
         before = u[place.layer].copy()
         side.impose(u, place, transport.time + dt)
         if not side.joined:
-            mass = start.density * transport.after.moving[place.axis][place.layer]
+            mass = fluid.density * transport.after.moving[place.axis][place.layer]
             stopped[place.axis] += float((mass * (u[place.layer] - before)).sum())
     return AdvectionResult(
         faces_of(arrived),

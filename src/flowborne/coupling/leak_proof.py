@@ -58,7 +58,7 @@ def leak_proof_flux(
     time       s in its middle
     """
     state, before, cells = departure.state, departure.cut, departure.volumes.cells
-    grid, sides = departure.grid, departure.sides
+    grid, sides = departure.fluid.grid, departure.fluid.boundaries
     flux, weights = grid.zeros_faces(), grid.zeros_faces()
     for axis in grid.axes:
         ends = before.open[axis], after.open[axis]

@@ -30,6 +30,7 @@ from flowborne.coupling.operators import (
     boundary_velocity,
     generalised,
     pressure_push,
+    rows_of,
     side_push,
 )
 from flowborne.coupling.report import Outcome, Timer
@@ -185,7 +186,7 @@ def solve_together(
     timer.lap("projection")
     smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
     timer.lap("viscosity")
-    term = LowRankTerm(cut.cells, cut.row_start, cut.columns, cut.values, mobility)
+    term = LowRankTerm(rows_of(cut), mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     floor = rounding_floor(smooth, fluid.grid)
     iterations, tried = 0, driven

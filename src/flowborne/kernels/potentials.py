@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import kernel
 
+Complex = NDArray[np.complex128]
+
 
 @kernel
 def wake_potential(
@@ -27,9 +29,6 @@ def wake_potential(
             arm = moment[k, 0] * x + moment[k, 1] * y + moment[k, 2] * z
             total += np.sqrt(near) * (circulation[k] + near * arm)
         out[n] = total / (4.0 * np.pi)
-
-
-Complex = NDArray[np.complex128]
 
 
 @njit(nogil=True, cache=True)

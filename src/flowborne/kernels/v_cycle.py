@@ -51,16 +51,14 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
     xl, bl = at_level(x, table, level), at_level(b, table, level)
     rl = at_level(r, table, level)
     fine = not periodic.any() and level < coarsest
+    between = (
+        at_level(marks, table, level),
+        interpolation_at(interpolation, table, level),
+        orphans_at(orphans, table, level),
+        at_level(aggregates, table, level),
+    )
     if not down:
-        interpolate(
-            rl,
-            xl,
-            at_level(x, table, level + 1),
-            at_level(marks, table, level),
-            interpolation_at(interpolation, table, level),
-            orphans_at(orphans, table, level),
-            at_level(aggregates, table, level),
-        )
+        interpolate(rl, xl, at_level(x, table, level + 1), *between)
     if fine and down:
         smooth_down(xl, rl, bl, operator)
     elif fine:
@@ -79,14 +77,7 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
             defect(rl, xl, bl, operator)
             wrap_ghosts(rl, periodic)
     if down and level < coarsest:
-        restrict(
-            at_level(b, table, level + 1),
-            rl,
-            at_level(marks, table, level),
-            interpolation_at(interpolation, table, level),
-            orphans_at(orphans, table, level),
-            at_level(aggregates, table, level),
-        )
+        restrict(at_level(b, table, level + 1), rl, *between)
 
 
 serial_leg = leg.serial

@@ -30,33 +30,19 @@ from flowborne.solvers.mobility import Mobility, dense_mobility
 class LowRankTerm:
     """J A^-1 J^T: rows of J in some of the cells, and A^-1.
 
-    cells      (m,) flat index of the cell of each row; a cell may have several rows
-    row_start  (m+1,) where each row's entries begin
-    columns    (nnz,) column of J, row of A^-1
-    values     (nnz,) entries
-    mobility   A^-1
+    rows      of J; a cell may have several
+    mobility  A^-1
     """
 
-    cells: Integers
-    row_start: Integers
-    columns: Integers
-    values: Array
+    rows: Rows
     mobility: Mobility
-
-    @property
-    def rows(self) -> Rows:
-        return self.cells, self.row_start, self.columns, self.values
 
 
 NO_TERM = LowRankTerm(
-    np.zeros(0, np.int64),
-    np.zeros(1, np.int64),
-    np.zeros(0, np.int64),
-    np.zeros(0),
+    (np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0)),
     dense_mobility(np.zeros((0, 0))),
 )
 """K alone."""
-
 
 NO_DENSE_TERM: DenseTerm = np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0)
 
