@@ -21,7 +21,7 @@ def add_body_velocity(
     twist: Array,
     flesh: Array,
 ) -> None:
-    """Add closed fraction x body velocity on the faces across `axis`, at their centres.
+    """Add closed fraction x body velocity on the faces across `axis`, at the centres of the parts.
 
     place           (n, 3) these centres at the bodies themselves, m
     corner, weight  (nf, 3) vertices that move the last nf parts
