@@ -1,4 +1,4 @@
-"""Velocity on cut faces: the mean over their open part, of the potential flow past a circle."""
+"""Velocity on cut faces: the mean over their open part."""
 
 from __future__ import annotations
 
@@ -67,3 +67,15 @@ def test_the_velocity_on_cut_faces_is_that_of_potential_flow(cells: int, bound: 
     places = [(0.0, 0.0), (0.5, 0.5), (0.13, 0.37), (0.29, 0.08), (0.41, 0.22)]
     wrong = np.concatenate([errors(cells, place)[0] for place in places])
     assert np.sqrt(np.mean(wrong**2)) < bound
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.13, 0.37)])
+def test_a_disc_that_turns_leaves_the_fluid_at_rest(place: tuple[float, float]) -> None:
+    """It displaces nothing, and a fluid without viscosity does not slow it down."""
+    grid = Grid.slab(24, 24, 0.1, (-1.2, -1.2))
+    world = make_world(mjcf('<body><freejoint/><geom type="sphere" size="0.5"/></body>'), grid)
+    world.solid.q[:2] = np.multiply(place, grid.spacing)
+    world.solid.v[-1] = 2.0
+    for _ in range(10):
+        assert advance(world, 0.05).fastest < 1e-12
+    assert world.solid.v[-1] == pytest.approx(2.0, rel=1e-12)

@@ -32,9 +32,12 @@ def test_close_faces(shape: tuple[int, int, int], axis: int) -> None:
     before = np.random.default_rng(1).random(face_shape(shape, axis))
     expected, total = face_closed_reference(made.phi, axis), before.copy()
     assert expected.max() > 0.5
-    own = np.empty(expected.shape)
-    close_faces(own, total, made.phi, made.own_crossings, made.box, axis, made.flat)
+    own, centre = np.empty(expected.shape), np.zeros((2, *expected.shape))
+    close_faces(own, centre, total, made.phi, made.own_crossings, made.box, axis, made.flat)
     np.testing.assert_allclose(own, expected, atol=1e-14)
+    cut_through = (expected > 0.0) & (expected < 1.0)
+    assert not centre[:, ~cut_through].any()
+    assert np.abs(centre[:, cut_through]).max() < 0.5
     before[faces_in(made.box, axis)] += own
     np.testing.assert_allclose(total, before, atol=1e-14)
 
@@ -59,27 +62,46 @@ def test_shares_and_their_list(
     made, codes, random = cut(shape), np.array(sides), np.random.default_rng(3)
     beside = random.integers(0, 3, shape)
     share = face_closed_reference(made.phi, axis)
+    centre = random.uniform(-0.5, 0.5, (2, *share.shape))
+    own_centre, alone = centre.copy(), share.copy()
     total = np.zeros(face_shape(shape, axis))
     total[faces_in(made.box, axis)] = share
     total *= np.maximum(random.uniform(0.0, 2.0, total.shape), 1.0)
     opened = np.ones(total.shape)
     union = face_closed_reference(made.distance, axis)
     assert ((union > 1.0 - 10.0 * CREASE) & (union < 1.0)).any()
-    parts = share, opened, total, made.distance
+    parts = opened, total, made.distance
     rest = beside, made.box, axis, codes
-    expected, opening = share_closed_reference(*parts, *rest)
-    count = share_closed(*parts, made.crossings, *rest, made.flat)
+    expected, opening = share_closed_reference(share, *parts, *rest)
+    count = share_closed(share, centre, *parts, made.crossings, *rest, made.flat)
     np.testing.assert_allclose(share, expected, atol=1e-14)
     np.testing.assert_allclose(opened, opening, atol=1e-14)
     assert count == (expected > 0.0).sum()
+    at = faces_in(made.box, axis)
+    shut = (alone > 0.0) & (opening[at] == 0.0)
+    assert not centre[:, shut].any()
+    single = ~shut & (alone == total[at])
+    np.testing.assert_array_equal(centre[:, single], own_centre[:, single])
+    both, middle = np.zeros(total.shape), np.zeros((2, *total.shape))
+    everywhere = np.array([[0, n] for n in made.distance.shape])
+    close_faces(
+        both, middle, total.copy(), made.distance, made.crossings, everywhere, axis, made.flat
+    )
+    several = ~shut & (alone > 0.0) & (alone != total[at])
+    np.testing.assert_array_equal(centre[:, several], middle[:, *at][:, several])
+    assert single.any()
+    assert several.any()
+    assert shut.any()
     counts = np.array(total.shape)
-    faces, closed = list_closed_reference(share, made.box, counts)
+    faces, closed, centres = list_closed_reference(share, centre, made.box, counts)
     found = [np.full(count + 3, -1) for _ in range(3)]
-    parts_of = np.full(count + 3, -1.0)
-    assert list_closed(share, made.box, axis, 7, counts, 2, *found, parts_of) == count + 2
+    parts_of, place_of = np.full(count + 3, -1.0), np.full((count + 3, 2), -1.0)
+    listed = *found, parts_of, place_of
+    assert list_closed(share, centre, made.box, axis, 7, counts, 2, *listed) == count + 2
     inner = slice(2, count + 2)
     np.testing.assert_array_equal(found[0][inner], axis)
     np.testing.assert_array_equal(found[1][inner], faces)
     np.testing.assert_array_equal(found[2][inner], 7)
     np.testing.assert_array_equal(parts_of[inner], closed)
+    np.testing.assert_array_equal(place_of[inner], centres)
     assert (np.delete(parts_of, inner) == -1.0).all()

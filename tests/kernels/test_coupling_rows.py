@@ -44,16 +44,19 @@ def test_kinds_of_cells(shape: tuple[int, int, int], walls: np.ndarray) -> None:
 def test_list_cells(shape: tuple[int, int, int]) -> None:
     made, random = cut(shape), np.random.default_rng(4)
     inside = made.box[:, 1] - made.box[:, 0] - 1
-    share = [random.random(inside + (np.arange(3) == d)) for d in range(3)]
+    share = tuple(random.random(inside + (np.arange(3) == d)) for d in range(3))
     for values in share:
         values[random.random(values.shape) < 0.7] = 0.0
-    given = random.random(shape) < 0.5, made.box, 5, ORIGIN, H, 0.3, made.flat
+    centre = tuple(random.uniform(-0.5, 0.5, (2, *values.shape)) for values in share)
+    for values in centre if made.flat else ():
+        values[1] = 0.0
+    given = centre, random.random(shape) < 0.5, made.box, 5, ORIGIN, H, 0.3, made.flat
     expected = list_cells_reference(share, *given)
     none, nothing = np.zeros(0, np.int64), np.zeros(0)
-    count = list_cells(*share, *given, 0, none, none, nothing)
+    count = list_cells(share, *given, 0, none, none, nothing)
     assert 0 < count == expected[0].size < inside.prod()
     found = np.empty(count, np.int64), np.empty(6 * count, np.int64), np.empty(6 * count)
-    assert list_cells(*share, *given, 0, *found) == count
+    assert list_cells(share, *given, 0, *found) == count
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-14)
 

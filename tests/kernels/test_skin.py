@@ -312,7 +312,8 @@ def test_closed_area_of_a_sphere_is_second_order(axis: int) -> None:
             phi, _ = sample(skin, grid, box)
             total = np.zeros(grid.face_shape(axis))
             own = np.empty(np.array(phi.shape) - 1 + (np.arange(3) == axis))
-            close_faces(own, total, phi, new_crossings(phi, grid.spacing, False), box, axis, False)
+            crossings, centre = new_crossings(phi, grid.spacing, False), np.zeros((2, *own.shape))
+            close_faces(own, centre, total, phi, crossings, box, axis, False)
             place = grid.face_coordinates(axis)[axis]
             middle = int(np.argmin(np.abs(place)))
             area = h**2 * np.take(total, middle, axis).sum()

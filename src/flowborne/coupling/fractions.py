@@ -14,10 +14,11 @@ from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.arrays import Integers, Rows
 from flowborne.kernels.closed_fractions import close_faces, count_beside, list_closed, share_closed
 from flowborne.kernels.coupling_rows import COVERED, NARROW, flesh_rows, kinds_of_cells, list_cells
+from flowborne.kernels.cut_faces import other_axes
 from flowborne.kernels.edge_crossings import (
     Crossings,
     Geometries,
@@ -33,6 +34,9 @@ from flowborne.kernels.volumes import open_cells
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
+
+OTHER_AXES = np.array([other_axes(d) for d in range(3)])
+"""(3, 2) the axes along a face, for each axis that it may be across."""
 
 NO_VERTICES = np.zeros((0, 3))
 
@@ -53,7 +57,8 @@ class Geometry:
     face       (n,) its flat index among the faces across that axis,
     body       (n,) the body,
     closed     (n,) the fraction that this body closes,
-    place      (n, 3) its centre, at the body itself where an image closes it, m
+    place      (n, 3) centre of what bodies close of it, of the face where flesh does; at the body
+               itself where an image closes it, m
     corner     (nf, 3) vertices that move the last nf of them, closed by flesh,
     weight     (nf, 3) and how much each does
     cells      (m,) flat index of cells beside closed parts, one row per cell and body; of flesh,
@@ -262,38 +267,43 @@ def geometry(
         bodies = 1 if piece.body < first_skin else ITS_FOLDS
         count_beside(beside, piece.distance, piece.box, bodies)
     join_ends(distance, boundaries)
-    first, shares = 0, []
+    first, own = 0, []
     for piece in pieces:
-        own = piece.crossings.at, piece.distance, piece.box
-        merge_crossings(crossings.at, crossings.part, distance, *own, first)
+        alone = piece.crossings.at, piece.distance, piece.box
+        merge_crossings(crossings.at, crossings.part, distance, *alone, first)
         first += piece.crossings.part.size
         inside = piece.box[:, 1] - piece.box[:, 0] - 1
-        shares.append([np.zeros(inside + (np.arange(3) == d)) for d in range(3)])
+        sizes = [inside + (np.arange(3) == d) for d in range(3)]
+        share = faces_of([np.zeros(size) for size in sizes])
+        middle = faces_of([np.zeros((2, *size)) for size in sizes])
+        own.append((piece, share, middle))
         for d in grid.axes:
-            alone = shares[-1][d], total[d], piece.distance, piece.crossings, piece.box
-            close_faces(*alone, d, flat)
+            faces = share[d], middle[d], total[d]
+            close_faces(*faces, piece.distance, piece.crossings, piece.box, d, flat)
     parts = 0
-    for piece, share in zip(pieces, shares, strict=True):
+    for piece, share, middle in own:
         for d in grid.axes:
             parts += share_closed(
-                share[d], opened[d], total[d], distance, crossings, beside, piece.box, d, codes[d],
-                flat,
+                share[d], middle[d], opened[d], total[d], distance, crossings, beside, piece.box, d,
+                codes[d], flat,
             )  # fmt: skip
     join_faces(opened, boundaries)
     axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
-    closed, last = np.empty(parts), 0
-    for piece, share in zip(pieces, shares, strict=True):
+    closed, centre, last = np.empty(parts), np.empty((parts, 2)), 0
+    for piece, share, middle in own:
         for d in grid.axes:
             counts = np.array(grid.face_shape(d))
-            listed = axis, face, part_body, closed
-            last = list_closed(share[d], piece.box, d, piece.body, counts, last, *listed)
+            listed = axis, face, part_body, closed, centre
+            last = list_closed(share[d], middle[d], piece.box, d, piece.body, counts, last, *listed)
     kind = kinds_of_cells(ox, oy, oz, walls)
     with_rows = kind >= NARROW
-    bones = [each for each in zip(pieces, shares, strict=True) if each[0].body < first_skin]
-    middle = np.concatenate([boxes.mean(axis=1), skins.middle])
-    images = Images(periods(grid, boundaries), middle)
-    centres, index = face_centres(axis, face, grid)
-    place = images.at_bodies(centres, part_body)
+    bones = [each for each in own if each[0].body < first_skin]
+    middles = np.concatenate([boxes.mean(axis=1), skins.middle])
+    images = Images(periods(grid, boundaries), middles)
+    place, index = face_centres(axis, face, grid)
+    first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else parts
+    place[np.arange(first)[:, None], OTHER_AXES[axis[:first]]] += h * centre[:first]
+    place = images.at_bodies(place, part_body)
     rows = bone_rows(bones, with_rows, grid)
     common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED, grid)
     if flat:
@@ -303,9 +313,8 @@ def geometry(
         open_cells(volume, distance, crossings, ox, oy, oz, piece.box)
     volume *= grid.cell_volume
     owner, force = rows[2][::6] // 6, rows[3].reshape(-1, 6)[:, :3]
-    first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else axis.size
     corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
-    if first < axis.size:
+    if first < parts:
         corner, weight = skin_at(skins, place[first:], grid)
         skin = axis[first:], index[first:], closed[first:], corner, weight, 6 * first_skin, area
         part, of_skin = flesh_rows(*skin, with_rows)
@@ -347,17 +356,17 @@ def geometry(
 
 
 def bone_rows(
-    bones: list[tuple[Piece, list[Array]]], listed: NDArray[np.bool_], grid: Grid
+    bones: list[tuple[Piece, Faces, Faces]], listed: NDArray[np.bool_], grid: Grid
 ) -> Rows:
     """Rows of J of bones in listed cells.
 
-    bones   and what each closes of the faces in its box
+    bones   and what each closes of the faces in its box, and where, see `list_cells`
     listed  (nx, ny, nz)
     """
     none, counts, size = np.zeros(0, np.int64), [0], (grid.spacing, grid.face_area, grid.is_slab)
     given = [
-        (*share, listed, piece.box, piece.body, np.array(piece.grid.origin), *size)
-        for piece, share in bones
+        (share, centre, listed, piece.box, piece.body, np.array(piece.grid.origin), *size)
+        for piece, share, centre in bones
     ]
     for bone in given:
         counts.append(list_cells(*bone, counts[-1], none, none, np.zeros(0)))

@@ -29,6 +29,7 @@ from flowborne.coupling.operators import (
     beyond_sides,
     boundary_velocity,
     generalised,
+    leak_proof,
     pressure_push,
     rows_of,
     side_push,
@@ -188,7 +189,8 @@ def solve_together(
     timer.lap("viscosity")
     term = LowRankTerm(rows_of(cut), mobility)
     net = net_outflow(smooth, cut, rate, fluid)
-    floor = rounding_floor(smooth, fluid.grid)
+    carried = leak_proof(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
+    floor = rounding_floor(carried, fluid.grid)
     iterations, tried = 0, driven
     for _ in range(PASSES):
         start = boundary_velocity(pose, driven.after(generalised(pose, viscous)))
@@ -314,6 +316,9 @@ def largest_divergence(
 
 
 def rounding_floor(velocity: Faces, grid: Grid) -> float:
-    """Norm over all cells of what rounding leaves of the net outflow, m^3/s."""
+    """Norm over all cells of what rounding leaves of the net outflow, m^3/s.
+
+    velocity  of fluid and bodies: a body that turns displaces less than its faces move
+    """
     fastest = max(max(float(u.max()), -float(u.min())) for u in velocity)
     return float(ROUNDING * grid.face_area * fastest * np.sqrt(np.prod(grid.shape)))

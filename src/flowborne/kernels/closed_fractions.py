@@ -10,6 +10,7 @@ from numba import njit
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.cut_faces import closed_face, is_cut
 from flowborne.kernels.edge_crossings import Crossings
+from flowborne.kernels.jit import inlined
 from flowborne.kernels.sides import CLOSED, PERIODIC
 
 CREASE = 0.02
@@ -20,17 +21,33 @@ through such a face, at a thousand times their speed."""
 
 @njit(nogil=True, cache=True)
 def close_faces(
-    own: Array, total: Array, phi: Array, found: Crossings, box: Integers, axis: int, flat: bool
-) -> None:
-    """What one body alone closes of each face across `axis` in its box; added to `total`, too."""
+    own: Array, centre: Array, total: Array, phi: Array, found: Crossings, box: Integers, axis: int,
+    flat: bool,
+) -> None:  # fmt: skip
+    """What one body alone closes of each face across `axis` in its box; added to `total`, too.
+
+    centre  (2, ...) of this part, from that of the face along the other axes, cells, in place
+    """
     for i in range(own.shape[0]):
         for j in range(own.shape[1]):
             for k in range(own.shape[2]):
                 closed = 1.0 if phi[i, j, k] < 0.0 else 0.0
                 if is_cut(phi, found, axis, i, j, k):
-                    closed = closed_face(phi, found, axis, i, j, k, flat, False)[0]
+                    closed = closed_part(centre, (i, j, k), phi, found, axis, i, j, k, flat)
                 own[i, j, k] = closed
                 total[i + box[0, 0], j + box[1, 0], k + box[2, 0]] += closed
+
+
+@inlined
+def closed_part(
+    centre: Array, at: tuple[int, int, int], phi: Array, found: Crossings, axis: int, i: int,
+    j: int, k: int, flat: bool,
+) -> float:  # fmt: skip
+    """Closed part of face (i, j, k) across `axis`; its centre is written to `centre`, at `at`."""
+    closed, x, y, _, _, _ = closed_face(phi, found, axis, i, j, k, flat, False)
+    for m in range(2 if closed > 0.0 else 0):
+        centre[m, at[0], at[1], at[2]] = min(max((x, y)[m] / closed, -0.5), 0.5)
+    return closed
 
 
 @njit(nogil=True, cache=True)
@@ -71,12 +88,13 @@ def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool)
 
 @njit(nogil=True, cache=True)
 def share_closed(
-    share: Array, opened: Array, total: Array, distance: Array, found: Crossings, beside: Integers,
-    box: Integers, axis: int, codes: Integers, flat: bool,
+    share: Array, centre: Array, opened: Array, total: Array, distance: Array, found: Crossings,
+    beside: Integers, box: Integers, axis: int, codes: Integers, flat: bool,
 ) -> int:  # fmt: skip
     """This body's part of each closed face in its box, and the open fractions; counts parts.
 
-    share     what the body alone closes, overwritten
+    share     what the body alone closes, overwritten;  centre  (2, ...) of it, see `close_faces`,
+              on return of what all bodies close
     total     the sum of what each body alone closes
     distance, found  to all bodies at the nodes, and where edges cross any
     beside    (nx, ny, nz) how many bodies and solid sides bound each cell
@@ -94,11 +112,12 @@ def share_closed(
                     continue
                 union = own
                 if own != all_own:
-                    union = closed_face(distance, found, axis, i, j, k, flat, False)[0]
+                    union = closed_part(centre, (a, b, c), distance, found, axis, i, j, k, flat)
                 if union > 1.0 - CREASE and (
                     union > 1.0 - 1e-9 or in_a_crease(beside, axis, i, j, k, ring)
                 ):
                     union = 1.0
+                    centre[:, a, b, c] = 0.0
                 opened[i, j, k] = 1.0 - union
                 n = i if axis == 0 else (j if axis == 1 else k)
                 if (n == 0 and codes[0] == CLOSED) or (n == last and codes[1] == CLOSED):
@@ -112,6 +131,7 @@ def share_closed(
 @njit(nogil=True, cache=True)
 def list_closed(
     share: Array,
+    centre: Array,
     box: Integers,
     axis: int,
     body: int,
@@ -121,18 +141,22 @@ def list_closed(
     out_face: Integers,
     out_body: Integers,
     out_closed: Array,
+    out_centre: Array,
 ) -> int:
-    """Write one body's closed parts across `axis` from position `at` on; gives the next one."""
+    """Write one body's closed parts across `axis`, and their centres, from position `at` on; gives
+    the next one."""
     upper = box[:, 1] - 1
     upper[axis] += 1
     for i in range(box[0, 0], upper[0]):
         for j in range(box[1, 0], upper[1]):
             for k in range(box[2, 0], upper[2]):
-                closed = share[i - box[0, 0], j - box[1, 0], k - box[2, 0]]
+                a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
+                closed = share[a, b, c]
                 if closed > 0.0:
                     out_axis[at] = axis
                     out_face[at] = (i * counts[1] + j) * counts[2] + k
                     out_body[at] = body
                     out_closed[at] = closed
+                    out_centre[at] = centre[:, a, b, c]
                     at += 1
     return at

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers, Rows
+from flowborne.kernels.arrays import Array, Faces, Integers, Rows
 from flowborne.kernels.jit import inlined, kernel
 
 Kinds = NDArray[np.int8]
@@ -59,17 +59,18 @@ def cell_wrench(
     i: int,
     j: int,
     k: int,
-    sx: Array,
-    sy: Array,
-    sz: Array,
+    share: Faces,
+    centre: Faces,
     box: Integers,
     origin: Array,
     h: float,
     area: float,
     flat: bool,
 ) -> None:
-    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given."""
+    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given: what acts on
+    a closed part of a face acts at its centre."""
     a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
+    (sx, sy, sz), (cx, cy, cz) = share, centre
     x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
     z = 0.0 if flat else origin[2] + h * (k + 0.5)
     wrench[:] = 0.0
@@ -77,24 +78,23 @@ def cell_wrench(
         sign = 2.0 * side - 1.0
         f = sign * area * sx[a + side, b, c]
         wrench[0] += f
-        wrench[4] += z * f
-        wrench[5] -= y * f
+        wrench[4] += (z + h * cx[1, a + side, b, c]) * f
+        wrench[5] -= (y + h * cx[0, a + side, b, c]) * f
         f = sign * area * sy[a, b + side, c]
         wrench[1] += f
-        wrench[3] -= z * f
-        wrench[5] += x * f
+        wrench[3] -= (z + h * cy[1, a, b + side, c]) * f
+        wrench[5] += (x + h * cy[0, a, b + side, c]) * f
         if not flat:
             f = sign * area * sz[a, b, c + side]
             wrench[2] += f
-            wrench[3] += y * f
-            wrench[4] -= x * f
+            wrench[3] += (y + h * cz[1, a, b, c + side]) * f
+            wrench[4] -= (x + h * cz[0, a, b, c + side]) * f
 
 
 @njit(nogil=True, cache=True)
 def list_cells(
-    sx: Array,
-    sy: Array,
-    sz: Array,
+    share: Faces,
+    centre: Faces,
     listed: NDArray[np.bool_],
     box: Integers,
     body: int,
@@ -109,10 +109,13 @@ def list_cells(
 ) -> int:
     """Write the coupling rows of one body in listed cells from row `at` on; gives the next one.
 
-    With `cells` of length 0 it only counts. Where the body closes as much on either side of a cell
-    it has no row.
+    With `cells` of length 0 it only counts. Where the body closes as much on either side of a cell,
+    at the same place, it has no row.
+
+    share   what the body closes of each face in its box
+    centre  (2, ...) of what is closed, see `close_faces`
     """
-    wrench = np.empty(6)
+    wrench, (sx, sy, sz) = np.empty(6), share
     n = listed.shape
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
@@ -123,7 +126,7 @@ def list_cells(
                     closed += sz[a, b, c] + sz[a, b, c + 1]
                 if closed == 0.0 or not listed[i, j, k]:
                     continue
-                cell_wrench(wrench, i, j, k, sx, sy, sz, box, origin, h, area, flat)
+                cell_wrench(wrench, i, j, k, share, centre, box, origin, h, area, flat)
                 if wrench.any():
                     if cells.size:
                         cells[at] = (i * n[1] + j) * n[2] + k
@@ -192,7 +195,7 @@ def add_body_velocity(
     twist: Array,
     flesh: Array,
 ) -> None:
-    """Add closed fraction x body velocity on the faces across `axis`, at their centres.
+    """Add closed fraction x body velocity on the faces across `axis`, at the centres of the parts.
 
     place           (n, 3) these centres at the bodies themselves, m
     corner, weight  (nf, 3) vertices that move the last nf parts

@@ -72,12 +72,9 @@ def displaced(world: World) -> tuple[Array, Array]:
     volume, moment = np.zeros((count, 3)), np.zeros((count, 3, 3))
     for axis in grid.axes:
         across = cut.axis == axis
-        centres = grid.face_coordinates(axis)
-        index = np.unravel_index(cut.face[across], grid.face_shape(axis))
         part = grid.cell_volume * cut.closed[across]
         np.add.at(volume[:, axis], cut.body[across], part)
-        for d in grid.axes:
-            np.add.at(moment[:, axis, d], cut.body[across], part * centres[d][index[d]])
+        np.add.at(moment[:, axis], cut.body[across], part[:, None] * cut.place[across])
     return volume, moment / np.where(volume > 0.0, volume, 1.0)[:, :, None]
 
 

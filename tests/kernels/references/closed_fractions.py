@@ -75,7 +75,10 @@ def share_closed_reference(
     return np.divide(part, total[at], np.zeros_like(own), where=counts), out
 
 
-def list_closed_reference(share: Array, box: Integers, counts: Integers) -> tuple[Integers, Array]:
-    """`list_closed` in NumPy: flat indices of the faces and their closed parts."""
-    places = np.stack(np.nonzero(share > 0.0)) + box[:, :1]
-    return np.ravel_multi_index(tuple(places), tuple(counts)), share[share > 0.0]
+def list_closed_reference(
+    share: Array, centre: Array, box: Integers, counts: Integers
+) -> tuple[Integers, Array, Array]:
+    """`list_closed` in NumPy: flat indices of the faces, their closed parts, and the centres."""
+    there = share > 0.0
+    places = np.stack(np.nonzero(there)) + box[:, :1]
+    return np.ravel_multi_index(tuple(places), tuple(counts)), share[there], centre[:, there].T

@@ -34,6 +34,7 @@ def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
 
 def list_cells_reference(
     share: Faces,
+    centre: Faces,
     listed: NDArray[np.bool_],
     box: Integers,
     body: int,
@@ -44,17 +45,23 @@ def list_cells_reference(
 ) -> tuple[Integers, Integers, Array]:
     """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
     inside = tuple(slice(low, high - 1) for low, high in box)
-    found = listed[inside]
-    force = np.zeros((*found.shape, 3))
+    cell = np.moveaxis(np.indices(listed.shape)[(slice(None), *inside)], 0, -1)
+    wrench = np.zeros((*cell.shape[:3], 6))
     for axis in range(2 if flat else 3):
-        ends = np.moveaxis(share[axis], axis, 0)
-        force[..., axis] = np.moveaxis(area * (ends[1:] - ends[:-1]), 0, axis)
-    found = found & force.any(axis=3)
+        for side in range(2):
+            ends = slice(side, None if side else -1)
+            faces = tuple(ends if d == axis else slice(None) for d in range(3))
+            place = cell + 0.5
+            place[..., np.arange(3) != axis] += np.moveaxis(centre[axis][:, *faces], 0, -1)
+            place = origin + h * place
+            if flat:
+                place[..., 2] = 0.0
+            force = np.zeros(cell.shape)
+            force[..., axis] = (2 * side - 1) * area * share[axis][faces]
+            wrench += np.concatenate([force, np.cross(place, force)], axis=3)
+    found = listed[inside] & wrench.any(axis=3)
     place = np.stack(np.nonzero(found), axis=1) + box[:, 0]
-    centre = origin + h * (place + 0.5)
-    if flat:
-        centre[:, 2] = 0.0
-    values = np.concatenate([force[found], np.cross(centre, force[found])], axis=1)
+    values = wrench[found]
     cells = np.ravel_multi_index(tuple(place.T), listed.shape)
     return cells, np.tile(6 * body + np.arange(6), cells.size), values.ravel()
 
