@@ -74,7 +74,9 @@ def test_parts_of_a_frame_add_up():
 
 
 def test_memory_of_a_run_does_not_grow():
-    per_cell, growth = frame_costs.footprint(load_scene(frame_costs.BLOCK, COARSE), early=3, late=9)
+    """After thirty frames, when NumPy has filled its caches of small blocks: 0.1 MB of 3.6."""
+    scene = load_scene(frame_costs.BLOCK, COARSE)
+    per_cell, growth = frame_costs.footprint(scene, early=30, late=60)
     assert 100.0 < per_cell.value < 100_000.0
     assert growth.verdict == "pass", growth
     assert growth.value > 0.0
