@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.flesh import Skins, face_centres, skin_at, skins_on
 from flowborne.coupling.images import Images, displaced, periods
@@ -15,7 +14,7 @@ from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers, Rows
+from flowborne.kernels.arrays import Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import close_faces, count_beside, list_closed, share_closed
 from flowborne.kernels.coupling_rows import COVERED, NARROW, flesh_rows, kinds_of_cells, list_cells
 from flowborne.kernels.edge_crossings import (
@@ -346,9 +345,7 @@ def geometry(
     )
 
 
-def bone_rows(
-    bones: list[tuple[Piece, list[Array]]], listed: NDArray[np.bool_], grid: Grid
-) -> Rows:
+def bone_rows(bones: list[tuple[Piece, list[Array]]], listed: Mask, grid: Grid) -> Rows:
     """Rows of J of bones in listed cells.
 
     bones   and what each closes of the faces in its box

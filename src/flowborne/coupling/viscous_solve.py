@@ -20,7 +20,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, diags_array
 
 from flowborne.coupling.fractions import Geometry
@@ -28,7 +27,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.viscosity import ViscousFaces
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Integers, Mask
 from flowborne.kernels.corner_friction import AROUND
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.viscosity import TIED
@@ -58,7 +57,7 @@ class Walls:
     """
 
     index: Integers
-    tied: NDArray[np.bool_]
+    tied: Mask
     weight: csr_array
     body: Integers
     columns: Integers

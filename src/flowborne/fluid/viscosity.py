@@ -29,11 +29,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import CLOSED_BELOW
 from flowborne.kernels.corner_friction import AROUND, corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings
@@ -92,7 +91,7 @@ class ViscousFaces:
     corners   what they add
     """
 
-    kind: NDArray[np.uint8]
+    kind: Marks
     mass: Array
     diagonal: Array
     links: Array
@@ -201,7 +200,7 @@ def assemble_viscosity(
 
 
 def stick_to_sides(
-    kind: NDArray[np.uint8],
+    kind: Marks,
     stiffness: float,
     grid: Grid,
     boundaries: Boundaries,

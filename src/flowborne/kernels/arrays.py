@@ -13,6 +13,7 @@ Faces = tuple[Array, Array, Array]
 """One array per axis: u (nx+1, ny, nz), v (nx, ny+1, nz), w (nx, ny, nz+1)."""
 
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 Real = NDArray[np.floating]
 """Double precision, or single in the preconditioner."""
 

@@ -16,9 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Marks
 from flowborne.kernels.cut_faces import (
     closed_face,
     crossings_on,
@@ -211,7 +210,7 @@ def wall_at(beside: Integers, wall: Array, f: int) -> float:
 
 @njit(nogil=True, cache=True)
 def corner_stiffness(
-    axis: int, cells: Integers, corner: Array, kind: NDArray[np.uint8], opened: Array, parts: Array,
+    axis: int, cells: Integers, corner: Array, kind: Marks, opened: Array, parts: Array,
     links: Array, beside: Integers, wall: Array, stiffness: float, wraps: Integers, distance: Array,
     faces: Integers, matrix: Array, node: Integers,
 ) -> int:  # fmt: skip

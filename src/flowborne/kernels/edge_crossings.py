@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.kernels.distance import BOX, CYLINDER, signed_distance
 from flowborne.kernels.jit import inlined
 
@@ -45,7 +44,7 @@ class Crossings(NamedTuple):
     piece   (n,) smooth piece of the surface; between two pieces there is an edge or a corner
     """
 
-    at: NDArray[np.int32]
+    at: Indices
     part: Array
     normal: Array
     piece: Integers
@@ -240,7 +239,7 @@ def dip(body: Placed, point: Array, d: int, h: float) -> float:
 
 @njit(nogil=True, cache=True)
 def merge_crossings(
-    at: NDArray[np.int32], part: Array, distance: Array, own: NDArray[np.int32], phi: Array,
+    at: Indices, part: Array, distance: Array, own: Indices, phi: Array,
     box: Integers, first: int,
 ) -> None:  # fmt: skip
     """Let each edge in a body's box keep the crossings that leave the least of it open.

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numba import prange
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.sides import CLOSED, PERIODIC
 
@@ -50,7 +48,7 @@ def subtract_gradient(
     pressure: Array,
     axis: int,
     scale: float,
-    codes: NDArray[np.int64],
+    codes: Integers,
 ) -> None:
     """Subtract scale rate (p_upper - p_lower) from the velocity of the faces across `axis`.
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Marks
 from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import kernel
@@ -44,9 +43,7 @@ def face_distances(distance: Array, axis: int, out: Array) -> None:
 
 
 @kernel
-def classify(
-    kind: NDArray[np.uint8], opened: Array, axis: int, codes: Integers, touching: float
-) -> None:
+def classify(kind: Marks, opened: Array, axis: int, codes: Integers, touching: float) -> None:
     """Kind of every face across `axis` from its open part."""
     last = kind.shape[axis] - 1
     for i in prange(kind.shape[0]):
@@ -146,7 +143,7 @@ def nearest_node(distance: Array, i: int, j: int, k: int, ni: int, nj: int, nk: 
 def link_faces(
     axis: int,
     d: int,
-    kind: NDArray[np.uint8],
+    kind: Marks,
     away: Array,
     distance: Array,
     crossings: Crossings,
@@ -205,7 +202,7 @@ def link_faces(
 @kernel
 def meet_walls(
     axis: int,
-    kind: NDArray[np.uint8],
+    kind: Marks,
     distance: Array,
     crossings: Crossings,
     opened: Array,
