@@ -9,7 +9,7 @@ from flowborne import Grid, World
 from flowborne.bodies import TrajectorySinusoid, kinematics
 from flowborne.coupling.cut import volumes_of
 from flowborne.coupling.operators import twists
-from flowborne.fluid.momentum import face_masses
+from flowborne.fluid.control_volumes import face_masses
 from flowborne.fluid.projection import accelerated, face_weights
 from flowborne.kernels.closed_fractions import CREASE
 from flowborne.validation.swimmers import BOX, LINK, PERIOD, swimmer

@@ -16,8 +16,7 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import BoundaryOpen, BoundaryPeriodic
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import SolidModel

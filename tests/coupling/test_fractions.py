@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
 from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Shape
 

@@ -11,7 +11,7 @@ import pytest
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, Tissue, World, step
 from flowborne.coupling.cut import jets_at, volumes_of
 from flowborne.coupling.mouths import Mouth, share_of
-from flowborne.fluid.momentum import face_masses, fluid_momentum
+from flowborne.fluid.control_volumes import face_masses, fluid_momentum
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorSteady
 from flowborne.solids.tissue.growth import Law, add_flesh

@@ -16,10 +16,9 @@ from flowborne.coupling.operators import (
     pressure_push,
 )
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.control_volumes import control_volumes
+from flowborne.fluid.control_volumes import control_volumes, face_masses
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.momentum import face_masses
-from flowborne.kernels.projection import outflow
+from flowborne.kernels.projection import net_out
 
 Cut = Callable[..., Geometry]
 
@@ -52,7 +51,7 @@ def rigid(grid: Grid, twist: Array) -> Faces:
 def net_outflow(velocity: Faces, cut: Geometry, twist: Array, grid: Grid) -> Array:
     """(nx, ny, nz) what flows out of the open parts of each cell, and what bodies displace."""
     net = np.empty(grid.shape)
-    outflow(net, *velocity, *cut.open)
+    net_out(net, *(part * u for part, u in zip(cut.open, velocity, strict=True)))
     net *= grid.face_area
     add_flux(net, cut, twist.ravel())
     return net

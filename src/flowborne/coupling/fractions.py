@@ -14,7 +14,7 @@ from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers, Mask, Rows
+from flowborne.kernels.arrays import CLOSED, Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import close_faces, count_beside, list_closed, share_closed
 from flowborne.kernels.coupling_rows import COVERED, NARROW, flesh_rows, kinds_of_cells, list_cells
 from flowborne.kernels.edge_crossings import (
@@ -26,7 +26,6 @@ from flowborne.kernels.edge_crossings import (
     together,
 )
 from flowborne.kernels.node_distance import BAND, NEAR, merge, node_box, sample_body
-from flowborne.kernels.sides import CLOSED
 from flowborne.kernels.skin import cross_skin, sample_skin
 from flowborne.kernels.volumes import open_cells
 

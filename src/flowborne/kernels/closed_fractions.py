@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
 from flowborne.kernels.cut_faces import closed_face, is_cut
 from flowborne.kernels.edge_crossings import Crossings
-from flowborne.kernels.sides import CLOSED, PERIODIC
 
 CREASE = 0.02
 """Open part below which a face in a crease is closed. Bodies that overlap at a joint, or reach into

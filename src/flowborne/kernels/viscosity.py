@@ -1,4 +1,5 @@
-"""Finite volumes of the viscous system around the faces across one axis (see `fluid.viscosity`).
+"""Finite volumes of the viscous system around the faces across one axis (see `fluid.viscosity`),
+and its links on a vector of faces.
 
 The velocity of a face is that at the centre of its open part; `centre` holds how far that is from
 the centre of the whole face along the two other axes, in cells.
@@ -9,11 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers, Marks
 from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.sides import CLOSED, PERIODIC
 
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
@@ -302,3 +302,30 @@ def meet_walls(
                 where = min(max((mine - yours) / (own - other), -0.5), 0.5)
                 place[n, entry, others[m]] = where
                 gap[n, entry, others[m]] = centre[m, i, j, k] - where
+
+
+@kernel
+def apply_component(out: Array, x: Array, scale: Array, links: Array, wraps: Integers) -> None:
+    """out = x - scale sum of links (scale x) of the neighbours, for one component.
+
+    wraps  (3,) number of distinct faces along each axis where the domain is periodic, else 0
+    """
+    _, ni, nj, nk = links.shape
+    steps = nj * nk, nk, 1
+    link = links.reshape(3, -1)
+    for plane in prange(ni):
+        i = np.int64(plane)
+        for j in range(nj):
+            for k in range(nk):
+                f = i * steps[0] + j * steps[1] + k
+                total = 0.0
+                for d in range(3):
+                    at = i if d == 0 else (j if d == 1 else k)
+                    around = steps[d] * (wraps[d] - 1)
+                    if link[d, f] != 0.0:
+                        g = f - around if at + 1 == wraps[d] else f + steps[d]
+                        total += link[d, f] * scale[g] * x[g]
+                    if at != wraps[d]:
+                        g = f - steps[d] if at > 0 else f + around
+                        total += link[d, g] * scale[g] * x[g]
+                out[f] = x[f] - scale[f] * total

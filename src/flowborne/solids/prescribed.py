@@ -22,8 +22,7 @@ from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics, SolidSystem, System, assemble
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-from flowborne.solvers.answers import Answering, DenseAnswer, Drag
-from flowborne.solvers.mobility import Mobility, dense_mobility
+from flowborne.solvers.mobility import Answering, DenseAnswer, Drag, Mobility, dense_mobility
 
 MOST_ROUNDS = 50
 """Most changes of the set of active contacts and limits."""
