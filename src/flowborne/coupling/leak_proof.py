@@ -233,7 +233,7 @@ def ways_in(cut: Geometry, grid: Grid, sides: Boundaries) -> tuple[Integers, Arr
     much more of their faces on one side than on the other, a vector into the body. It has no part
     along an axis across a side of the domain that the cell lies at."""
     count = int(np.prod(grid.shape))
-    keys, row = np.unique(cut.cells + cut.owner * count, return_inverse=True)
+    keys, row = np.unique(cut.rows[0] + cut.owner * count, return_inverse=True)
     into = np.zeros((keys.size, 3))
     np.add.at(into, row, cut.area / grid.face_area)
     at = np.unravel_index(keys % count, grid.shape)

@@ -98,7 +98,7 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     rate = mouth.volume_rate * mouth.strength.at(time)
     bodies = len(pose.body_position)
     rows = np.flatnonzero(skin_of(mouth, cut.owner, bodies))
-    cells, row = np.unique(cut.cells[rows], return_inverse=True)
+    cells, row = np.unique(cut.rows[0][rows], return_inverse=True)
     at = np.stack(np.unravel_index(cells, grid.shape), axis=1)
     skin = np.zeros(len(cells))
     np.add.at(skin, row, -cut.area[rows] @ along)

@@ -29,7 +29,6 @@ from flowborne.coupling.operators import (
     boundary_velocity,
     generalised,
     pressure_push,
-    rows_of,
     side_push,
 )
 from flowborne.coupling.report import Outcome, Timer
@@ -186,7 +185,7 @@ def solve_together(
     timer.lap("projection")
     smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
     timer.lap("viscosity")
-    term = LowRankTerm(rows_of(cut), mobility)
+    term = LowRankTerm(cut.rows, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     floor = rounding_floor(smooth, fluid.grid)
     iterations, tried = 0, driven
@@ -281,7 +280,7 @@ def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:
     """
     if mobility.is_dense:
         return NO_REACTION
-    random, cells = np.random.default_rng(0), cut.cells
+    random, cells = np.random.default_rng(0), cut.rows[0]
     room = np.zeros(grid.shape)
     for _ in range(PROBES):
         signs, moved = np.zeros(grid.shape), np.zeros(grid.shape)

@@ -50,26 +50,13 @@ class Crossings(NamedTuple):
     piece: Integers
 
 
-class Geometries(NamedTuple):
-    """Geometries with a signed distance, see `coupling.shapes`, and where they are.
-
-    kind, size        (ng,), (ng, 3)
-    position          (ng, 3) m;  rotation  (ng, 3, 3) of their frames to the world's
-    tables, table, corner, pitch  of the sampled ones
-    """
-
-    kind: Integers
-    size: Array
-    position: Array
-    rotation: Array
-    tables: Array
-    table: Integers
-    corner: Array
-    pitch: Array
-
-
 class Placed(NamedTuple):
-    """One of them."""
+    """A geometry with a signed distance, see `coupling.shapes`, and where it is.
+
+    kind, size                    of it; (3,)
+    position, rotation            (3,) m; (3, 3) of its frame to the world's
+    tables, table, corner, pitch  of a sampled one
+    """
 
     kind: int
     size: Array
@@ -79,15 +66,6 @@ class Placed(NamedTuple):
     table: Integers
     corner: Array
     pitch: float
-
-
-@inlined
-def placed(bodies: Geometries, g: int) -> Placed:
-    """Geometry g."""
-    return Placed(
-        bodies.kind[g], bodies.size[g], bodies.position[g], bodies.rotation[g],
-        bodies.tables, bodies.table[g], bodies.corner[g], bodies.pitch[g],
-    )  # fmt: skip
 
 
 @inlined
@@ -160,14 +138,14 @@ def add_crossing(
 
 @njit(nogil=True, cache=True)
 def cross_geometry(
-    found: Crossings, used: Integers, phi: Array, box: Integers, bodies: Geometries, g: int,
+    found: Crossings, used: Integers, phi: Array, box: Integers, body: Placed, number: int,
     origin: Array, h: float, flat: bool,
 ) -> None:  # fmt: skip
-    """Note where edges cross a geometry of a body.
+    """Note where edges cross a geometry, this `number`, of a body.
 
     phi  distance to the body at the nodes of its box, m;  box  (3, 2) node ranges
     """
-    body, point, normal = placed(bodies, g), np.empty(3), np.empty(3)
+    point, normal = np.empty(3), np.empty(3)
     ni, nj, nk = phi.shape
     for i in range(ni):
         for j in range(nj):
@@ -199,7 +177,7 @@ def cross_geometry(
                         step = goal - point[d]
                         part = abs(step) / h * root(body, point, d, step, ROOT * h)
                         if part >= 0.0:
-                            piece = int(g) * PIECES + surface_at(body, point, SHIFT * h, normal)
+                            piece = number * PIECES + surface_at(body, point, SHIFT * h, normal)
                             at_upper = twice and upper > 0
                             add_crossing(
                                 found, used, d, i, j, k, twice, at_upper, part, normal, piece
