@@ -15,7 +15,13 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import CLOSED, Integers, Mask, Rows
-from flowborne.kernels.closed_fractions import close_faces, count_beside, list_closed, share_closed
+from flowborne.kernels.closed_fractions import (
+    close_faces,
+    count_beside,
+    list_closed,
+    open_cells,
+    share_closed,
+)
 from flowborne.kernels.coupling_rows import (
     COVERED,
     NARROW,
@@ -34,7 +40,6 @@ from flowborne.kernels.edge_crossings import (
 )
 from flowborne.kernels.node_distance import BAND, NEAR, lower_to_body, merge, node_box
 from flowborne.kernels.skin import cross_skin, sample_skin
-from flowborne.kernels.volumes import open_cells
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
