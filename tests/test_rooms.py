@@ -21,7 +21,7 @@ BELOW = {
     "shapes": {"kernels"},
     "solids": {"files", "kernels", "solvers", "shapes"},
     "coupling": {"kernels", "solvers", "fluid", "shapes", "solids"},
-    "motion": {"files", "shapes", "solids"},
+    "motion": {"files", "kernels", "shapes", "solids"},
     "runs": {"files", "kernels", "fluid", "shapes", "solids", "coupling"},
 }
 """Rooms that each of these may import from, besides itself; single modules are free."""

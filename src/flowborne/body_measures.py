@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.named import BodyState, Named, Report
+from flowborne.kernels.arrays import Array
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 UNITS = {
     "centre": "m",

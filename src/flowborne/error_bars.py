@@ -10,16 +10,14 @@ from tempfile import TemporaryDirectory
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array
 from flowborne.running import RunOutcome, run
 from flowborne.runs.open_run import OpenRun
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
-
-Array = NDArray[np.float64]
 
 FORMAL_ORDER = 2.0
 """Order of the scheme in grid and step for smooth flows."""

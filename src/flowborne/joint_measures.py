@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.world import Setup
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.runs.frame_report import FrameReport
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 POSITION = {HINGE: ("angle", "rad"), SLIDE: ("position", "m")}
 """Kind of joint -> what its position is called, and its unit."""
@@ -138,7 +135,7 @@ def _kind(model: SolidModel, joint: str) -> int:
     return int(model.mj.jnt_type[model.joint(joint)])
 
 
-def _mask(model: SolidModel, dofs: list[Integers]) -> NDArray[np.bool_]:
+def _mask(model: SolidModel, dofs: list[Integers]) -> Mask:
     mask = np.zeros(model.nv, bool)
     for some in dofs:
         mask[some] = True

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.body_measures import BodyMeasures
 from flowborne.control.objectives import name_of
@@ -15,14 +14,13 @@ from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import SceneError
 from flowborne.joint_measures import JointMeasures
+from flowborne.kernels.arrays import Array
 from flowborne.runs.frame_report import FrameReport
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.geoms import quaternion_of
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
-
-Array = NDArray[np.float64]
 
 IMPULSES = ("exchanged", "advection", "boundary", "crossed", "forces")
 """Parts of the budget that are impulses of a whole frame."""

@@ -10,11 +10,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import PartError, SceneError
-
-Array = NDArray[np.float64]
+from flowborne.kernels.arrays import Array
 
 
 def find_function(name: str) -> Callable[..., Any]:

@@ -11,7 +11,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
@@ -21,6 +20,7 @@ from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.errors import PartError, SceneError, described
 from flowborne.fluid.boundary import SIDES
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.measures import Measures
 from flowborne.runs.frame_report import PARTS, FrameReport
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
     from flowborne.solids.model import SolidModel
 
-Array = NDArray[np.float64]
 Step = Callable[[World, float, "JointCommand | None"], StepReport]
 
 MAX_INVERTED = 0.02
@@ -452,14 +451,14 @@ def departed(world: World, report: StepReport) -> str | None:
     return None
 
 
-def _listed(world: World, dofs: NDArray[np.int64]) -> str:
+def _listed(world: World, dofs: Integers) -> str:
     """Names of the first few of some dofs."""
     names = [world.setup.solid.dof_names[dof] for dof in dofs[:LISTED]]
     more = len(dofs) - len(names)
     return ", ".join(names) + (f" and {more} more" if more else "")
 
 
-def turning_dofs(model: SolidModel) -> NDArray[np.bool_]:
+def turning_dofs(model: SolidModel) -> Mask:
     """(nv,) which dofs are rotations: hinges, balls and the last three of free joints."""
     kind, first = model.mj.jnt_type[model.mj.dof_jntid], model.mj.jnt_dofadr[model.mj.dof_jntid]
     of_free = np.arange(model.nv) - first >= 3

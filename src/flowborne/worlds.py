@@ -24,17 +24,18 @@ from flowborne.coupling.stream import Sampled
 from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, Source
-from flowborne.fluid.control_volumes import control_volumes
+from flowborne.fluid.control_volumes import control_volumes, face_masses
+from flowborne.fluid.control_volumes import kinetic_energy as kinetic_energy_of_fluid
 from flowborne.fluid.dye import Passage, nothing_brought
 from flowborne.fluid.grid import Array, Grid, faces_of
-from flowborne.fluid.momentum import face_masses
-from flowborne.fluid.momentum import kinetic_energy as kinetic_energy_of_fluid
-from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.no_slip import BoundaryNoSlip
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import (
+    BoundaryClosed,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    BoundaryPeriodic,
+)
 from flowborne.fluid.sides.side import Boundary, Profile
 from flowborne.fluid.transport import Transport
 from flowborne.fluid.wake import resampled

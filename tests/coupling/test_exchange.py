@@ -10,7 +10,7 @@ import pytest
 from flowborne import Array, Grid, Simulation, World, load_scene, step
 from flowborne.bodies import TrajectorySinusoid, momentum
 from flowborne.coupling.cut import volumes_of
-from flowborne.fluid.momentum import face_masses, fluid_momentum
+from flowborne.fluid.control_volumes import face_masses, fluid_momentum
 from flowborne.validation.worlds import RING, mjcf
 from flowborne.worlds import (
     Boundaries,

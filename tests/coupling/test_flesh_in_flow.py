@@ -16,8 +16,7 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import BoundaryOpen, BoundaryPeriodic
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import SolidModel
@@ -146,9 +145,9 @@ def test_fluid_that_moves_with_flesh_is_not_disturbed() -> None:
     carried = leak_proof((field[0], field[1], field[2]), cut, moving, ROOM)
     for axis in ROOM.axes:
         deep = np.zeros(ROOM.face_shape(axis), bool)  # farther inside than the skin is known
-        entries = cut.axis[-len(cut.corner) :] == axis
-        deep.reshape(-1)[cut.face[-len(cut.corner) :][entries]] = (
-            cut.weight[entries].sum(axis=1) == 0.0
+        entries = cut.closed.axis[-len(cut.closed.corner) :] == axis
+        deep.reshape(-1)[cut.closed.face[-len(cut.closed.corner) :][entries]] = (
+            cut.closed.weight[entries].sum(axis=1) == 0.0
         )
         np.testing.assert_allclose(carried[axis][~deep], velocity[axis], rtol=1e-12)
 

@@ -26,8 +26,8 @@ from flowborne.coupling.bodies_step import move_bodies
 from flowborne.coupling.cut import departure, volumes_of
 from flowborne.coupling.flow import advect, leak_proof_transport
 from flowborne.coupling.mouths import Mouth
-from flowborne.fluid import momentum as of_fluid
-from flowborne.fluid.momentum import face_masses
+from flowborne.fluid import control_volumes as of_fluid
+from flowborne.fluid.control_volumes import face_masses
 from flowborne.motion.inflow import FactorSteady
 from flowborne.solids.tissue.growth import Law, add_flesh
 from flowborne.validation.flesh_bars import bar_mesh

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
 from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Shape
 
@@ -157,9 +156,9 @@ def shares(cut: Geometry, body: int, grid: Grid) -> list[Array]:
     """What one body closes of every face, per axis."""
     parts = []
     for axis in range(3):
-        own = (cut.axis == axis) & (cut.body == body)
+        own = (cut.closed.axis == axis) & (cut.closed.body == body)
         part = np.zeros(grid.face_shape(axis))
-        np.add.at(part.reshape(-1), cut.face[own], cut.closed[own])
+        np.add.at(part.reshape(-1), cut.closed.face[own], cut.closed.part[own])
         parts.append(part)
     return parts
 
@@ -214,9 +213,9 @@ def test_sides_decide_what_crosses_them_and_not_the_body(cut: Cut) -> None:
 def test_cells_deep_inside_a_body_have_no_row(cut: Cut) -> None:
     grid = Grid.slab(32, 32, 1.0, (0.0, 0.0))
     found = cut(grid, '<body pos="16 16 0"><freejoint/><geom type="sphere" size="8"/></body>')
-    x, y = found.cells // 32 + 0.5, found.cells % 32 + 0.5
+    x, y = found.rows[0] // 32 + 0.5, found.rows[0] % 32 + 0.5
     assert np.abs(np.hypot(x - 16, y - 16) - 8).max() < np.sqrt(2.0)
-    assert np.unique(found.cells).size == found.cells.size
+    assert np.unique(found.rows[0]).size == found.rows[0].size
 
 
 @pytest.mark.parametrize("meshes", [False, True], ids=["box", "mesh"])

@@ -9,8 +9,8 @@ from flowborne import Array, Grid, Simulation, World, load_scene, step
 from flowborne.bodies import TrajectoryConstant, TrajectorySinusoid, kinetic_energy
 from flowborne.coupling.cut import volumes_of
 from flowborne.coupling.fractions import Geometry
-from flowborne.fluid import momentum as of_fluid
-from flowborne.fluid.momentum import face_masses
+from flowborne.fluid import control_volumes as of_fluid
+from flowborne.fluid.control_volumes import face_masses
 from flowborne.validation.worlds import mjcf
 from flowborne.worlds import (
     Boundaries,

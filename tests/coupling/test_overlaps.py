@@ -18,7 +18,7 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics

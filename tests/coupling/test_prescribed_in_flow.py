@@ -13,8 +13,7 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
 from flowborne.motion.tracks import Curve, TrajectoryKeyframes, TrajectorySinusoid
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel

@@ -10,8 +10,7 @@ from flowborne.coupling.stream import Sampled, WindStream
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
 from flowborne.solids.model import SolidModel
 from flowborne.solids.wind import WindFaces
 

@@ -9,13 +9,12 @@ import pytest
 
 from flowborne import Array, Faces, Grid
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.friction import TOLERANCE
-from flowborne.coupling.viscous_solve import ViscousSystem, walls_of
+from flowborne.coupling.viscous_solve import TOLERANCE, ViscousSystem, walls_of
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
-from flowborne.solvers.answers import DenseAnswer
 from flowborne.solvers.conjugate_gradients import spread
+from flowborne.solvers.mobility import DenseAnswer
 from flowborne.validation.worlds import PERIODIC, RING, mjcf
 from flowborne.worlds import Boundaries, BoundaryNoSlip, cut_by_bodies, faces_of, make_world
 

@@ -4,8 +4,7 @@ import pytest
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import BoundaryOpen, BoundaryPeriodic
 
 
 def test_periodic_sides_come_in_pairs() -> None:

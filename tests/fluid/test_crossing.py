@@ -10,7 +10,7 @@ from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import packed_sides
 from flowborne.fluid.grid import Grid, faces_of
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.transport import neighbours, planes
 from flowborne.kernels.carry import Fluxes, cross_sides, draw_in, fill_ghosts, mark_volumes
 from flowborne.kernels.flux import GHOSTS

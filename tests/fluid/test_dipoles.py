@@ -7,10 +7,8 @@ import pytest
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import BoundaryClosed, BoundaryOpen, BoundaryPeriodic
 
 FAR, CLOSED, OPEN, RING = BoundaryFar(), BoundaryClosed(), BoundaryOpen(), BoundaryPeriodic()
 SLAB = Grid.slab(24, 12, 0.1, (-1.2, -0.6))

@@ -9,9 +9,7 @@ from flowborne.fluid.boundary import Boundaries, Source, cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Passage, carry_dye, nothing_brought
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen, BoundaryPeriodic
 from flowborne.fluid.transport import Transport
 
 RING = BoundaryPeriodic()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Faces, Grid
+from flowborne.fluid.control_volumes import fluid_momentum, kinetic_energy
 from flowborne.fluid.eddies import damp_eddies
-from flowborne.fluid.momentum import fluid_momentum, kinetic_energy
 from flowborne.fluid.transport import Transport
 from flowborne.validation.worlds import RING
 from flowborne.worlds import Boundaries

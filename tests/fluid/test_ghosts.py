@@ -8,11 +8,13 @@ import pytest
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import impose_sides, kernel_axes, packed_sides, plane
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.fluid.sides.closed import BoundaryClosed
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.no_slip import BoundaryNoSlip
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import (
+    BoundaryClosed,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    BoundaryPeriodic,
+)
 from flowborne.fluid.sides.side import Boundary
 from flowborne.kernels.carry import fill_ghosts
 from flowborne.kernels.flux import GHOSTS

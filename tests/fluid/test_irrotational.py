@@ -8,7 +8,7 @@ import pytest
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.sides.far import BoundaryFar
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.sides.side import Boundary, Place, tangential_change
 from flowborne.fluid.transport import NO_INLETS, Transport, carry_component
 from flowborne.worlds import control_volumes

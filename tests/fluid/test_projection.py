@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 
 from flowborne.coupling.cut import source_rate
-from flowborne.coupling.fractions import uncut
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
-from flowborne.fluid.sides.closed import BoundaryClosed
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.no_slip import BoundaryNoSlip
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
-from flowborne.kernels.projection import outflow
+from flowborne.fluid.sides.kinds import (
+    BoundaryClosed,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    BoundaryPeriodic,
+)
+from flowborne.kernels.projection import net_out
 from flowborne.solids.model import SolidModel
 from flowborne.solvers.pressure import PressureSystem
 
@@ -52,10 +53,16 @@ def random_faces(grid: Grid) -> Faces:
     return u, v, w
 
 
+def all_open(grid: Grid) -> Faces:
+    """Open parts of the faces without bodies."""
+    u, v, w = (np.ones(grid.face_shape(axis)) for axis in range(3))
+    return u, v, 0.0 * w if grid.is_slab else w
+
+
 def net_outflow(velocity: Faces, opened: Faces, grid: Grid) -> Array:
     """(nx, ny, nz) m^3/s."""
     net = np.empty(grid.shape)
-    outflow(net, *velocity, *opened)
+    net_out(net, *(part * u for part, u in zip(opened, velocity, strict=True)))
     return net * grid.face_area
 
 
@@ -84,7 +91,7 @@ def project(velocity: Faces, opened: Faces, grid: Grid, sides: Boundaries, rate:
 @pytest.mark.parametrize("grid", [SLAB, CUBE], ids=["slab", "cube"])
 @pytest.mark.parametrize("name", SIDES)
 def test_projected_flow_is_free_of_divergence(name: str, grid: Grid) -> None:
-    sides, velocity, opened = SIDES[name], random_faces(grid), uncut(grid).open
+    sides, velocity, opened = SIDES[name], random_faces(grid), all_open(grid)
     impose_sides(velocity, grid, sides, 0.0)
     none = np.zeros(grid.shape)
     start = np.linalg.norm(net_outflow(velocity, opened, grid))
@@ -100,7 +107,7 @@ def test_projected_flow_is_free_of_divergence(name: str, grid: Grid) -> None:
 @pytest.mark.parametrize("grid", [SLAB, CUBE], ids=["slab", "cube"])
 def test_what_is_taken_away_is_orthogonal_to_what_is_left(grid: Grid) -> None:
     """Helmholtz: a gradient and a field without divergence, weighed by the faces' mass."""
-    sides, velocity, opened = Boundaries(x_max=OPEN), random_faces(grid), uncut(grid).open
+    sides, velocity, opened = Boundaries(x_max=OPEN), random_faces(grid), all_open(grid)
     impose_sides(velocity, grid, sides, 0.0)
     before = [values.copy() for values in velocity]
     project(velocity, opened, grid, sides, np.zeros(grid.shape))
@@ -113,7 +120,7 @@ def test_what_is_taken_away_is_orthogonal_to_what_is_left(grid: Grid) -> None:
 def test_sources_and_cut_faces_are_balanced_by_the_open_side() -> None:
     """What a source makes leaves through the open side, around faces that are partly closed."""
     sides, velocity = Boundaries(x_max=OPEN), SLAB.zeros_faces()
-    opened = uncut(SLAB).open
+    opened = all_open(SLAB)
     opened[0][10, 5:15] = 0.0
     opened[1][14, 3:9] = 0.35
     fluid = Fluid(
@@ -131,7 +138,7 @@ def test_sources_and_cut_faces_are_balanced_by_the_open_side() -> None:
 
 def test_hydrostatic_force_becomes_pressure_and_nothing_moves() -> None:
     """A uniform push in a closed box: the pressure's gradient, exactly."""
-    velocity, opened = SLAB.zeros_faces(), uncut(SLAB).open
+    velocity, opened = SLAB.zeros_faces(), all_open(SLAB)
     velocity[1][:] = -2.0
     impose_sides(velocity, SLAB, Boundaries(), 0.0)
     pressure = project(velocity, opened, SLAB, Boundaries(), np.zeros(SLAB.shape))
@@ -150,8 +157,8 @@ def test_a_stepped_flow_with_inflow_source_and_driven_region_has_no_divergence(g
         report = step(world, 0.025)
         assert report.outcome.name == "DONE"
         _, state = world.flow()
-        net = net_outflow(state.velocity, uncut(grid).open, grid)
-        rate = source_rate(fluid, world.time, uncut(grid).open)
+        net = net_outflow(state.velocity, all_open(grid), grid)
+        rate = source_rate(fluid, world.time, all_open(grid))
         assert rate.sum() == pytest.approx(0.4 if n < 3 else 0.0, abs=1e-12)
         largest = np.abs(net - rate).max() / grid.cell_volume
         assert largest < 1e-6

@@ -7,12 +7,14 @@ import pytest
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.no_slip import BoundaryNoSlip
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import (
+    BoundaryClosed,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    BoundaryPeriodic,
+)
 from flowborne.fluid.sides.side import Boundary
 from flowborne.scenes import sides as tables
 

@@ -12,11 +12,13 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.sides.closed import BoundaryClosed
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.no_slip import BoundaryNoSlip
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import (
+    BoundaryClosed,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    BoundaryPeriodic,
+)
 from flowborne.fluid.transport import (
     COURANT,
     NO_INLETS,

@@ -10,8 +10,8 @@ from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.induced import after_move
 from flowborne.fluid.sea import Sea
 from flowborne.fluid.sea_slab import across, leaving, node_circulation, nodes_of, stream_function
-from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
+from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.wake import (
     BIN,

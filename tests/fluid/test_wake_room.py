@@ -18,8 +18,8 @@ from flowborne.fluid.sea_room import (
     potential,
     source_rate,
 )
-from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import BoundaryFar
+from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.wake import BINS, wake_line
 

@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.laplacian import BLOCK, apply_laplacian, turn_and_apply
-from flowborne.kernels.smoothing import defect, first_smooth, smooth, smooth_down, smooth_up
+from flowborne.kernels.smoothing import (
+    BLOCK,
+    apply_laplacian,
+    defect,
+    first_smooth,
+    smooth,
+    smooth_down,
+    smooth_up,
+    turn_and_apply,
+)
 from flowborne.kernels.vectors import descend, dot
 
 from .padded import cells_of

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC
 from flowborne.kernels.closed_fractions import (
     CREASE,
     close_faces,
@@ -12,7 +13,6 @@ from flowborne.kernels.closed_fractions import (
     list_closed,
     share_closed,
 )
-from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.closed_fractions import (

@@ -10,6 +10,7 @@ from flowborne.kernels.coupling_rows import (
     ENCLOSED,
     NARROW,
     WIDE,
+    ClosedParts,
     add_body_velocity,
     flesh_rows,
     kinds_of_cells,
@@ -100,5 +101,6 @@ def test_body_velocity(shape: tuple[int, int, int], skin: int) -> None:
         expected, own = out.copy(), axis == d
         np.add.at(expected, tuple(at[own].T), (closed * moved)[own])
         face = np.where(own, np.ravel_multi_index(tuple(at.T), out.shape, mode="clip"), 0)
-        add_body_velocity(out, d, axis, face, body, closed, place, corner, weight, twist, flesh)
+        listed = ClosedParts(axis, face, body, closed, place, corner, weight)
+        add_body_velocity(out, d, listed, twist, flesh)
         np.testing.assert_allclose(out, expected, atol=1e-13)

@@ -18,8 +18,8 @@ from flowborne.kernels.distance import (
     distances,
     signed_distance,
 )
-from flowborne.kernels.edge_crossings import Geometries
-from flowborne.kernels.node_distance import BAND, merge, node_box, sample_body
+from flowborne.kernels.edge_crossings import Placed
+from flowborne.kernels.node_distance import BAND, lower_to_body, merge, node_box
 from flowborne.kernels.triangles import closest_on_triangle, distances_to_mesh, squared_distance
 
 from .references.distance import signed_distance_reference
@@ -111,8 +111,11 @@ def test_a_body_of_several_geometries_at_the_nodes(shape: tuple[int, int, int]) 
             flat,
         )
         expected = sample_body_reference(*given)
-        phi = np.empty(expected.shape)
-        sample_body(phi, *given[:2], Geometries(*given[2:10]), *given[10:])
+        phi = np.full(expected.shape, BAND * h)
+        for g in geoms:
+            at = position[g], rotation[g]
+            body = Placed(KINDS[g], size[g], *at, TABLES, TABLE, CORNER, PITCH)
+            lower_to_body(phi, box, body, origin, h, flat)
         np.testing.assert_allclose(phi, expected, atol=1e-13)
         assert expected.max() <= BAND * h
 

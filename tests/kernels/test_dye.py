@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.cut_dye import CUT, EMPTY, WHOLE, list_flows, pass_on, sort_cells
-from flowborne.kernels.dye import sweep
+from flowborne.kernels.dye import CUT, EMPTY, WHOLE, list_flows, pass_on, sort_cells, sweep
 
 from .references.cut_dye import beside_reference, pass_on_reference, sort_cells_reference
 from .references.dye import bend_reference, sweep_reference

@@ -10,12 +10,12 @@ from flowborne.fluid.grid import Array
 from flowborne.kernels.edge_crossings import (
     PIECES,
     Crossings,
-    Geometries,
+    Placed,
     cross_geometry,
     merge_crossings,
     new_crossings,
 )
-from flowborne.kernels.node_distance import sample_body
+from flowborne.kernels.node_distance import lower_to_body
 from flowborne.kernels.skin import cross_skin
 from flowborne.shapes.mesh import ShapeMesh, smooth_sheets
 from flowborne.shapes.primitives import PRIMITIVES
@@ -33,21 +33,18 @@ SIZES = {
 PLACES = np.random.default_rng(5)
 
 
-def placed(shape: Primitive, middle: Array, turn: Array) -> Geometries:
-    one = np.zeros((1, 4), np.int64)
-    return Geometries(
-        np.array([shape.code]), shape.size[None], middle[None], turn[None], np.zeros(1), one,
-        np.zeros((1, 3)), np.ones(1),
-    )  # fmt: skip
+def placed(shape: Primitive, middle: Array, turn: Array) -> Placed:
+    none = np.zeros(1), np.zeros(4, np.int64), np.zeros(3), 1.0
+    return Placed(shape.code, shape.size, middle, turn, *none)
 
 
-def crossed(bodies: Geometries, origin: Array) -> tuple[Array, Crossings]:
-    """Distances at the nodes, and where edges cross the first geometry."""
-    phi, geoms = np.empty((NODES,) * 3), np.array([0])
-    sample_body(phi, BOX, geoms, bodies, origin, H, False)
+def crossed(body: Placed, origin: Array) -> tuple[Array, Crossings]:
+    """Distances at the nodes, and where edges cross a geometry."""
+    phi = np.full((NODES,) * 3, np.inf)
+    lower_to_body(phi, BOX, body, origin, H, False)
     found = new_crossings(phi, H, False)
     used = np.zeros(1, np.int64)
-    cross_geometry(found, used, phi, BOX, bodies, 0, origin, H, False)
+    cross_geometry(found, used, phi, BOX, body, 0, origin, H, False)
     assert 100 < used[0] <= found.part.size
     return phi, found._replace(piece=found.piece[: used[0]])
 
@@ -103,11 +100,10 @@ def test_crossings_of_a_mesh_are_those_of_its_geometry(flat: bool) -> None:
         turn = Rotation.from_euler("z", PLACES.uniform(0.0, 6.0)).as_matrix()
         turn = turn if flat else Rotation.random(random_state=PLACES).as_matrix()
         origin = -H * (0.5 * NODES + PLACES.random(3))
-        bodies, geoms = placed(shape, np.zeros(3), turn), np.array([0])
-        phi = np.empty(box[:, 1])
-        sample_body(phi, box, geoms, bodies, origin, H, flat)
+        body, phi = placed(shape, np.zeros(3), turn), np.full(box[:, 1], np.inf)
+        lower_to_body(phi, box, body, origin, H, flat)
         one, other = new_crossings(phi, H, flat), new_crossings(phi, H, flat)
-        cross_geometry(one, np.zeros(1, np.int64), phi, box, bodies, 0, origin, H, flat)
+        cross_geometry(one, np.zeros(1, np.int64), phi, box, body, 0, origin, H, flat)
         skin = mesh.vertices @ turn.T, mesh.faces, sheets, 3
         cross_skin(other, np.zeros(1, np.int64), phi, *skin, box, origin, H, flat)
         both = (one.at >= 0) & (other.at >= 0)

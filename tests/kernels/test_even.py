@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from flowborne.kernels.even import ROUNDING, find_even
-from flowborne.kernels.laplacian import apply_laplacian
-from flowborne.kernels.smoothing import defect, smooth
+from flowborne.kernels.smoothing import apply_laplacian, defect, smooth
 
 from .padded import cells_of
 from .references.laplacian import operator

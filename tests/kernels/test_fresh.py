@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.fresh import fill_fresh
+from flowborne.kernels.projection import fill_fresh
 
 
 def row(pressures: list[float], opened: list[float], ring: bool = False) -> list[float]:

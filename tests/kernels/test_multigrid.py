@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from flowborne.kernels.conjugate_gradients import deflated
-from flowborne.kernels.laplacian import apply_laplacian
 from flowborne.kernels.levels import at_level, interpolation_at, orphans_at, weights_at, wrap_ghosts
-from flowborne.kernels.smoothing import STEPS, defect, first_smooth, smooth
-from flowborne.kernels.transfer import interpolate, restrict
-from flowborne.kernels.v_cycle import v_cycle
+from flowborne.kernels.smoothing import STEPS, apply_laplacian, defect, first_smooth, smooth
+from flowborne.kernels.v_cycle import interpolate, restrict, v_cycle
 from flowborne.solvers.pressure import PressureSystem
 
 from .padded import cells_of

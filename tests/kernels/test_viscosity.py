@@ -7,20 +7,20 @@ import itertools
 import numpy as np
 import pytest
 
+from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC
 from flowborne.kernels.edge_crossings import new_crossings
-from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
 from flowborne.kernels.viscosity import (
     GIVEN,
     INACTIVE,
     TIED,
     UNKNOWN,
+    apply_component,
     classify,
     face_distances,
     find_centres,
     link_faces,
     meet_walls,
 )
-from flowborne.kernels.viscous_operator import apply_component
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.viscosity import (

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flowborne.fluid.grid import Array
+from flowborne.kernels.closed_fractions import open_cells
 from flowborne.kernels.cut_faces import closed_face
 from flowborne.kernels.edge_crossings import Crossings, new_crossings
 from flowborne.kernels.node_distance import allow_for_curvature
-from flowborne.kernels.volumes import open_cells
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.node_distance import allow_for_curvature_reference

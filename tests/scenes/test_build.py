@@ -20,8 +20,7 @@ from flowborne.control.phases import PhaseIntervals, PhaseTrack
 from flowborne.control.rules import GoldenSection
 from flowborne.coupling.servo import ServoExact, ServoPD, TrajectoryServo
 from flowborne.coupling.stream import WindStream
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.no_slip import BoundaryNoSlip
+from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryNoSlip
 from flowborne.motion.inflow import FactorSteady
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.load import load_scene

@@ -9,12 +9,10 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne import Scene, Simulation
+from flowborne import Array, Scene, Simulation
 from flowborne.machine import kernel_threads
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 Verdict = Literal["pass", "fail", "info"]

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
-
-Array = NDArray[np.float64]
+from flowborne.kernels.arrays import Array
 
 MAX_FILE_BYTES = 1 << 30
 """Size of a file, and total size of its buffers."""

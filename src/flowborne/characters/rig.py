@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.characters.limits import (
     MAX_NAME_LENGTH,
@@ -19,9 +18,7 @@ from flowborne.characters.limits import (
     check_surface,
 )
 from flowborne.errors import SceneError
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from flowborne.kernels.arrays import Array, Integers
 
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Rotation from axes with y up to the world's, the inverse of the one that exporters apply."""

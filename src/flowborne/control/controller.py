@@ -14,7 +14,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.control import creature
 from flowborne.control.course import Course, Step, Trials
@@ -30,13 +29,10 @@ from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import BREAKDOWNS, StepReport
 from flowborne.coupling.servo import Servo, ServoExact
 from flowborne.errors import PartError
+from flowborne.kernels.arrays import Array, Integers, Mask
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

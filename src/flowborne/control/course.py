@@ -12,19 +12,17 @@ from operator import methodcaller
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.control.executors import Mapper
 from flowborne.control.gradients import Gradient, OffsetPoses
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
+from flowborne.kernels.arrays import Array, Integers
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Step = Callable[["World", float, JointCommand | None], StepReport]
 """step(world, dt, command): advances `world` in place."""
 

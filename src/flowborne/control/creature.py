@@ -9,20 +9,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.servo import Servo
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.following import follow, outboard_dofs, rigidify
 from flowborne.solids.state import SolidState
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import Setup, World
     from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 
 def given(setup: Setup) -> Mask:

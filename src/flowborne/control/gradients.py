@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, Tag
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.registry import Registry
 from flowborne.tables import BUILT_IN, OWN, OwnTable, Table, by_kind_or_own
-
-Array = NDArray[np.float64]
 
 
 class Poses(Protocol):
@@ -77,7 +75,7 @@ class Estimate:
 class Gradient(Protocol):
     """Estimates the gradient of the objective."""
 
-    def of(self, indices: NDArray[np.int64], scale: Array) -> Gradient:
+    def of(self, indices: Integers, scale: Array) -> Gradient:
         """The same for some of the dofs, with these parts (m,) of their displacements."""
         ...
 
@@ -119,7 +117,7 @@ class FiniteDifference:
         if not 0.0 <= self.resolution < 1.0:
             raise ValueError(f"resolution is {self.resolution}: give a number from 0 to below 1")
 
-    def of(self, indices: NDArray[np.int64], scale: Array) -> Self:
+    def of(self, indices: Integers, scale: Array) -> Self:
         """The same for the dofs at some indices (m,) of all, with parts (m,) of their d."""
         d = np.asarray(self.displacement, dtype=np.float64)
         return replace(self, displacement=tuple((scale * (d[indices] if d.ndim else d)).tolist()))

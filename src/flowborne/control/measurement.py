@@ -7,19 +7,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.control import creature
 from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import StepReport
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.momentum import momentum
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, Tag, model_validator
 
 from flowborne.control.measurement import Measurement
@@ -19,6 +18,7 @@ from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallabl
 from flowborne.control.phases import PhaseTable
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
 from flowborne.python_function import with_parameters
 from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind
@@ -39,8 +39,6 @@ from flowborne.tables import (
     triple,
 )
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Direction = tuple[float, float, float]
 Names = Annotated[tuple[Text, ...], Field(min_length=1)]
 

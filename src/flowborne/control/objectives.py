@@ -11,14 +11,12 @@ from dataclasses import dataclass, field
 from typing import Protocol, SupportsFloat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.control.measurement import Measurement
 from flowborne.control.phases import PhaseAlways, Phases
 from flowborne.errors import PartError
+from flowborne.kernels.arrays import Integers
 from flowborne.registry import Registry
-
-Integers = NDArray[np.int64]
 
 
 class Objective(Protocol):

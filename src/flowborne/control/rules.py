@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, Tag
 
 from flowborne.control.gradients import Poses
 from flowborne.control.surroundings import Surroundings
+from flowborne.kernels.arrays import Array
 from flowborne.registry import Registry
 from flowborne.tables import BUILT_IN, OWN, OwnTable, Positive, Steps, Table, by_kind_or_own
-
-Array = NDArray[np.float64]
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 

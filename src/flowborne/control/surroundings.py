@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Integers
 from flowborne.phrases import suggestion
 from flowborne.python_function import with_parameters
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.model import SolidModel
-
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.control import creature
 from flowborne.control.course import Step, TrialError, advance
@@ -19,12 +18,11 @@ from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.coupling.bodies_step import advance_prescribed
 from flowborne.coupling.motion import JointCommand
+from flowborne.kernels.arrays import Array, Integers
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Velocities = Literal["removed", "present", "probe"]
 
 

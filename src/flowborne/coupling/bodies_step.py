@@ -1,6 +1,9 @@
 """The bodies in a step: they move, then forces and drives change their velocities.
 
-Without a fluid this is the whole step.
+Without a fluid this is the whole step. With one, no body crosses more than one cell in any part of
+a step. What a body leaves behind and takes up is known on the mean of both ends alone, so that
+fluid leaks through a plate that crosses more than its own thickness: 8.8 % of the dye at 2.4 cells
+a step. The fluid's own speed asks for no parts: its transport has substeps (see `fluid.transport`).
 """
 
 from __future__ import annotations
@@ -8,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.operators import generalised
+from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, Timer
 from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_bodies
@@ -16,6 +19,7 @@ from flowborne.coupling.step_report import report_bodies
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array
+from flowborne.fluid.transport import parts_for
 from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow
@@ -82,3 +86,33 @@ def advance_prescribed(world: World, dt: float, command: JointCommand) -> bool:
     world.solid.v[:] = command.final_velocity
     world.advance_clock(dt)
     return True
+
+
+def parts_of(world: World, velocity: Array, dt: float) -> int:
+    """Number of parts of a step in which the bodies move with `velocity` (nv,) for `dt` (s): no
+    point of them crosses more than a cell in a part."""
+    fluid, model = world.setup.fluid, world.setup.solid
+    if fluid is None or fluid.one_way or not velocity.any():
+        return 1
+    pose, fastest = kinematics(model, world.solid.q), 0.0
+    shapes = world.setup.shapes
+    if shapes.body.size:
+        turned = np.einsum("gij,gkj->gki", pose.geom_rotation[shapes.source], shapes.tips)
+        at = turned + pose.geom_position[shapes.source][:, None]
+        twist = twists(pose, velocity)[shapes.body][:, None]
+        speed = twist[..., :3] + np.cross(twist[..., 3:], at)
+        fastest = float(np.linalg.norm(speed, axis=-1).max())
+    if pose.vertices.size:
+        skin = (pose.vertex_jacobian @ velocity).reshape(-1, 3)
+        fastest = max(fastest, float(np.linalg.norm(skin, axis=1).max()))
+    return parts_for(fastest * dt / fluid.grid.spacing)
+
+
+def part_of(command: JointCommand, world: World, left: int) -> JointCommand:
+    """What the joints do in the next of `left` parts of what is left of a step: the same, but
+    drives that may give way change their velocity evenly."""
+    part, v = command.copy(), world.solid.v
+    limited = np.isfinite(command.torque_limit)
+    evenly = v + (command.final_velocity - v) / left
+    part.final_velocity[limited] = evenly[limited]
+    return part

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.coupling.flesh import skins_on
-from flowborne.coupling.fractions import Geometry, geometry, uncut
+from flowborne.coupling.fractions import Geometry, geometry
 from flowborne.coupling.mouths import Jet, add_rates, jet_of
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import cells_in
@@ -36,8 +36,6 @@ def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
     """The grid cut by the bodies in a pose."""
     assert setup.fluid is not None
     flesh = None if setup.fluid.one_way else setup.solid.flesh
-    if setup.shapes.body.size == 0 and flesh is None:
-        return uncut(setup.fluid.grid, pose.vertices)
     return geometry(
         setup.shapes,
         pose.geom_position[setup.shapes.source],

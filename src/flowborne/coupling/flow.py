@@ -29,7 +29,7 @@ from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component
-from flowborne.kernels.faces import changes_of_step, fill_empty_faces, still_to_come
+from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
 
 
@@ -166,7 +166,7 @@ def store_state(
     velocity = projected.velocity
     inside = leak_proof(velocity, cut, boundary_velocity(pose, solved.v), grid)
     for axis in grid.axes:
-        fill_empty_faces(velocity[axis], volumes.moving[axis], inside[axis])
+        np.copyto(velocity[axis], inside[axis], where=volumes.moving[axis] == 0.0)
     volumes.follow(velocity, grid)
     for axis in grid.axes:
         change, acceleration = state.velocity[axis], state.acceleration[axis]

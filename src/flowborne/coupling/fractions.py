@@ -6,39 +6,47 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.coupling.flesh import Skins, face_centres, skin_at, skins_on
+from flowborne.coupling.flesh import Skins, face_centres, skin_at
 from flowborne.coupling.images import Images, displaced, periods
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.kernels.arrays import Integers, Rows
-from flowborne.kernels.closed_fractions import close_faces, count_beside, list_closed, share_closed
-from flowborne.kernels.coupling_rows import COVERED, NARROW, flesh_rows, kinds_of_cells, list_cells
+from flowborne.kernels.arrays import CLOSED, Integers, Mask, Rows
+from flowborne.kernels.closed_fractions import (
+    close_faces,
+    count_beside,
+    list_closed,
+    open_cells,
+    share_closed,
+)
+from flowborne.kernels.coupling_rows import (
+    COVERED,
+    NARROW,
+    ClosedParts,
+    flesh_rows,
+    kinds_of_cells,
+    list_cells,
+)
 from flowborne.kernels.cut_faces import other_axes
 from flowborne.kernels.edge_crossings import (
     Crossings,
-    Geometries,
+    Placed,
     cross_geometry,
     merge_crossings,
     new_crossings,
     together,
 )
-from flowborne.kernels.node_distance import BAND, NEAR, merge, node_box, sample_body
-from flowborne.kernels.sides import CLOSED
+from flowborne.kernels.node_distance import BAND, NEAR, lower_to_body, merge, node_box
 from flowborne.kernels.skin import cross_skin, sample_skin
-from flowborne.kernels.volumes import open_cells
 
 ITS_FOLDS = 2
 """How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
 
 OTHER_AXES = np.array([other_axes(d) for d in range(3)])
 """(3, 2) the axes along a face, for each axis that it may be across."""
-
-NO_VERTICES = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -53,22 +61,14 @@ class Geometry:
     crossings  of the edges with the nearest body
     open       open fraction of each face
     volume     (nx, ny, nz) open volume of each cell, m^3
-    axis       (n,) closed parts of faces, one entry per face and body: axis of the face,
-    face       (n,) its flat index among the faces across that axis,
-    body       (n,) the body,
-    closed     (n,) the fraction that this body closes,
-    place      (n, 3) centre of what bodies close of it, of the face where flesh does; at the body
-               itself where an image closes it, m
-    corner     (nf, 3) vertices that move the last nf of them, closed by flesh,
-    weight     (nf, 3) and how much each does
-    cells      (m,) flat index of cells beside closed parts, one row per cell and body; of flesh,
-               one per cell and face; then one per cell that lends its pressure to covered ones,
-               see `overlaps`
+    closed     parts of faces
+    rows       of J, m of them: of the cells beside closed parts, one per cell and body; of flesh,
+               one per cell and face; then one per cell that lends its pressure to covered ones, see
+               `overlaps`. Columns are entries of the motion: 6 body + component, then 3 vertex +
+               component; values what unit pressure in the cell exerts on each: wrench about the
+               origin, force; m^2
     owner      (m,) the body; -1 of the last ones, whose area is 0
     area       (m, 3) area vector of the row's closed parts, m^2: force of unit pressure
-    row_start  (m+1,) where the row's entries begin
-    columns    entries of the motion: 6 body + component, then 3 vertex + component
-    values     what unit pressure in the cell exerts on each: wrench about the origin, force; m^2
     skins      the skins at the nodes
     images     of bodies across periodic sides
     """
@@ -78,19 +78,10 @@ class Geometry:
     crossings: Crossings
     open: Faces
     volume: Array
-    axis: Integers
-    face: Integers
-    body: Integers
-    closed: Array
-    place: Array
-    corner: Integers
-    weight: Array
-    cells: Integers
+    closed: ClosedParts
+    rows: Rows
     owner: Integers
     area: Array
-    row_start: Integers
-    columns: Integers
-    values: Array
     skins: Skins
     images: Images
 
@@ -161,7 +152,7 @@ def around_bodies(
 
 
 def piece_of_body(
-    body: int, shapes: Shapes, placed: Geometries, geoms: Integers, box: Integers, grid: Grid
+    body: int, shapes: Shapes, placed: list[Placed], geoms: Integers, box: Integers, grid: Grid
 ) -> Piece:
     """A body on a grid: the union of its geometries."""
     skinned = [g for g in geoms if g in shapes.skins]
@@ -172,7 +163,7 @@ def piece_of_body(
     found = new_crossings(phi, grid.spacing, grid.is_slab)
     used, on = np.zeros(1, np.int64), (np.array(grid.origin), grid.spacing, grid.is_slab)
     for g in plain:
-        cross_geometry(found, used, phi, box, placed, g, *on)
+        cross_geometry(found, used, phi, box, placed[g], int(g), *on)
     for g in skinned:
         skin = at_place(shapes, placed, g), shapes.skins[g][1], shapes.pieces[g], int(g)
         cross_skin(found, used, phi, *skin, box, *on)
@@ -189,35 +180,27 @@ def body_boxes(shapes: Shapes, position: Array, rotation: Array, bodies: int) ->
     return boxes
 
 
-def join_faces(opened: list[Array], boundaries: Boundaries) -> None:
-    """Make the open parts of the faces on both sides across a periodic axis alike, in place."""
-    for d, faces in enumerate(opened):
-        if boundaries.periodic()[d]:
-            first, last = edge(d, 0), edge(d, -1)
-            faces[first] = faces[last] = np.minimum(faces[first], faces[last])
+def join_ends(values: Array, axis: int) -> None:
+    """Make what is open, or the distances, on both sides across a periodic axis alike, in place."""
+    first, last = edge(axis, 0), edge(axis, -1)
+    values[first] = values[last] = np.minimum(values[first], values[last])
 
 
-def join_ends(distance: Array, boundaries: Boundaries) -> None:
-    """Make the distances at the nodes on both sides across a periodic axis alike, in place."""
-    for axis in np.flatnonzero(boundaries.periodic()):
-        first, last = edge(int(axis), 0), edge(int(axis), -1)
-        distance[first] = distance[last] = np.minimum(distance[first], distance[last])
-
-
-def sampled(placed: Geometries, geoms: Integers, box: Integers, grid: Grid) -> Array:
+def sampled(placed: list[Placed], geoms: Integers, box: Integers, grid: Grid) -> Array:
     """(box shape) distance to the nearest of some geometries at the nodes of a box, m."""
-    phi = np.empty(box[:, 1] - box[:, 0])
-    sample_body(phi, box, geoms, placed, np.array(grid.origin), grid.spacing, grid.is_slab)
+    phi = np.full(box[:, 1] - box[:, 0], BAND * grid.spacing)
+    for g in geoms:
+        lower_to_body(phi, box, placed[g], np.array(grid.origin), grid.spacing, grid.is_slab)
     return phi
 
 
-def at_place(shapes: Shapes, placed: Geometries, geom: int) -> Array:
+def at_place(shapes: Shapes, placed: list[Placed], geom: int) -> Array:
     """(n, 3) vertices of a geometry with a skin, m."""
-    return np.asarray(placed.position[geom] + shapes.skins[geom][0] @ placed.rotation[geom].T)
+    return np.asarray(placed[geom].position + shapes.skins[geom][0] @ placed[geom].rotation.T)
 
 
 def skin_distance(
-    shapes: Shapes, placed: Geometries, geom: int, box: Integers, grid: Grid
+    shapes: Shapes, placed: list[Placed], geom: int, box: Integers, grid: Grid
 ) -> Array:
     """(box shape) distance to a geometry with a skin at the nodes of a box, m.
 
@@ -266,7 +249,9 @@ def geometry(
         merge(distance, nearest, piece.distance, piece.box, piece.body)
         bodies = 1 if piece.body < first_skin else ITS_FOLDS
         count_beside(beside, piece.distance, piece.box, bodies)
-    join_ends(distance, boundaries)
+    around = [d for d in range(3) if boundaries.periodic()[d]]
+    for d in around:
+        join_ends(distance, d)
     first, own = 0, []
     for piece in pieces:
         alone = piece.crossings.at, piece.distance, piece.box
@@ -287,14 +272,15 @@ def geometry(
                 share[d], middle[d], opened[d], total[d], distance, crossings, beside, piece.box, d,
                 codes[d], flat,
             )  # fmt: skip
-    join_faces(opened, boundaries)
+    for d in around:
+        join_ends(opened[d], d)
     axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
     closed, centre, last = np.empty(parts), np.empty((parts, 2)), 0
     for piece, share, middle in own:
         for d in grid.axes:
             counts = np.array(grid.face_shape(d))
-            listed = axis, face, part_body, closed, centre
-            last = list_closed(share[d], middle[d], piece.box, d, piece.body, counts, last, *listed)
+            into = axis, face, part_body, closed, centre
+            last = list_closed(share[d], middle[d], piece.box, d, piece.body, counts, last, *into)
     kind = kinds_of_cells(ox, oy, oz, walls)
     with_rows = kind >= NARROW
     bones = [each for each in own if each[0].body < first_skin]
@@ -333,31 +319,12 @@ def geometry(
         owner = np.append(owner, np.full(lent[0].size, -1))
         force = np.concatenate([force, np.zeros((lent[0].size, 3))])
         rows = joined(rows, lent)
-    return Geometry(
-        distance,
-        nearest,
-        crossings,
-        (ox, oy, oz),
-        volume,
-        axis,
-        face,
-        part_body,
-        closed,
-        place,
-        corner,
-        weight,
-        rows[0],
-        owner,
-        force,
-        *rows[1:],
-        skins,
-        images,
-    )
+    listed = ClosedParts(axis, face, part_body, closed, place, corner, weight)
+    cut = distance, nearest, crossings, (ox, oy, oz), volume
+    return Geometry(*cut, listed, rows, owner, force, skins, images)
 
 
-def bone_rows(
-    bones: list[tuple[Piece, Faces, Faces]], listed: NDArray[np.bool_], grid: Grid
-) -> Rows:
+def bone_rows(bones: list[tuple[Piece, Faces, Faces]], listed: Mask, grid: Grid) -> Rows:
     """Rows of J of bones in listed cells.
 
     bones   and what each closes of the faces in its box, and where, see `list_cells`
@@ -387,39 +354,4 @@ def joined(rows: Rows, more: Rows) -> Rows:
         np.append(rows[1], rows[1][-1] + start[1:]),
         np.append(rows[2], columns),
         np.append(rows[3], values),
-    )
-
-
-def uncut(grid: Grid, vertices: Array = NO_VERTICES) -> Geometry:
-    """Geometry of a domain that no body cuts.
-
-    vertices  (n, 3) of flesh that the fluid does not feel, m
-    """
-    nx, ny, nz = grid.shape
-    opened = [np.ones(grid.face_shape(axis)) for axis in range(3)]
-    if grid.is_slab:
-        opened[2][:] = 0.0
-    none = np.zeros(0, np.int64)
-    far = np.full((nx + 1, ny + 1, nz + 1), BAND * grid.spacing)
-    return Geometry(
-        far,
-        np.zeros(far.shape, np.int64),
-        new_crossings(far, grid.spacing, grid.is_slab),
-        (opened[0], opened[1], opened[2]),
-        np.full(grid.shape, grid.cell_volume),
-        none,
-        none,
-        none,
-        np.zeros(0),
-        np.zeros((0, 3)),
-        np.zeros((0, 3), np.int64),
-        np.zeros((0, 3)),
-        none,
-        none,
-        np.zeros((0, 3)),
-        np.zeros(1, np.int64),
-        none,
-        np.zeros(0),
-        skins_on(grid, Boundaries(), None, vertices),
-        Images(np.zeros(3), np.zeros((0, 3))),
     )

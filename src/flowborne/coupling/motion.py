@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.model import SolidModel
 
 
@@ -19,7 +18,7 @@ class Trajectory(Protocol):
     """
 
     @property
-    def dofs(self) -> NDArray[np.int64]: ...
+    def dofs(self) -> Integers: ...
 
     def position(self, time: float) -> Array:
         """(m,) the joints' entries of q at `time` (s): rad, m, unit quaternions."""
@@ -56,7 +55,7 @@ class JointCommand:
     torque_limit    (nv,) largest |generalised force| the drive may use; inf keeps the promise
     """
 
-    prescribed: NDArray[np.bool_]
+    prescribed: Mask
     rate: Array
     final_velocity: Array
     torque_limit: Array
@@ -71,7 +70,7 @@ class JointCommand:
 
     def set(
         self,
-        dofs: NDArray[np.int64] | NDArray[np.bool_],
+        dofs: Integers | Mask,
         rate: Array | float,
         final_velocity: Array | float,
         torque_limit: Array | float = np.inf,

@@ -18,7 +18,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from flowborne.coupling.fractions import Geometry
@@ -28,7 +27,7 @@ from flowborne.fluid.dye import Brought
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.far import Strength
 from flowborne.fluid.transport import NO_INLETS, Inlets
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Integers, Mask
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0
@@ -99,7 +98,7 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     rate = mouth.volume_rate * mouth.strength.at(time)
     bodies = len(pose.body_position)
     rows = np.flatnonzero(skin_of(mouth, cut.owner, bodies))
-    cells, row = np.unique(cut.cells[rows], return_inverse=True)
+    cells, row = np.unique(cut.rows[0][rows], return_inverse=True)
     at = np.stack(np.unravel_index(cells, grid.shape), axis=1)
     skin = np.zeros(len(cells))
     np.add.at(skin, row, -cut.area[rows] @ along)
@@ -125,7 +124,7 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     )
 
 
-def skin_of(mouth: Mouth, owner: Integers, bodies: int) -> NDArray[np.bool_]:
+def skin_of(mouth: Mouth, owner: Integers, bodies: int) -> Mask:
     """(n,) whether parts of skin belong to the mouth's body, or to flesh, which may be all around
     it; fleshes are numbered from `bodies` on."""
     return np.asarray((owner == mouth.body) | (owner >= bodies))

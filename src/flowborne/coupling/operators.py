@@ -15,7 +15,7 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import DenseTerm, Rows
+from flowborne.kernels.arrays import DenseTerm
 from flowborne.kernels.coupling_rows import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
@@ -53,37 +53,21 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
     """
     first = moving.size - geometry.skins.vertices.size
     carried = [opened * u for opened, u in zip(geometry.open, velocity, strict=True)]
+    twist, flesh = moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
     for axis in grid.axes:
-        add_body_velocity(
-            carried[axis],
-            axis,
-            geometry.axis,
-            geometry.face,
-            geometry.body,
-            geometry.closed,
-            geometry.place,
-            geometry.corner,
-            geometry.weight,
-            moving[:first].reshape(-1, 6),
-            moving[first:].reshape(-1, 3),
-        )
+        add_body_velocity(carried[axis], axis, geometry.closed, twist, flesh)
     return carried[0], carried[1], carried[2]
-
-
-def rows_of(geometry: Geometry) -> Rows:
-    """The rows of J."""
-    return geometry.cells, geometry.row_start, geometry.columns, geometry.values
 
 
 def add_flux(out: Array, geometry: Geometry, moving: Array) -> None:
     """Add the volume rate that the bodies' motion (k,) takes from each cell, J v, m^3/s."""
-    add_rows(out, rows_of(geometry), moving)
+    add_rows(out, geometry.rows, moving)
 
 
 def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
     """(size,) J^T p of a pressure field (nx, ny, nz): wrenches about the world origin on bodies and
     forces on vertices of flesh, N and N m (impulses for p^ = p dt)."""
-    return sum_rows(np.ascontiguousarray(pressure), rows_of(geometry), size)
+    return sum_rows(np.ascontiguousarray(pressure), geometry.rows, size)
 
 
 def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:

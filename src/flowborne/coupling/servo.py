@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.motion import JointCommand, Trajectory, velocity_after
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
@@ -107,7 +106,7 @@ class TrajectoryServo:
     servo: Servo
 
     @property
-    def dofs(self) -> NDArray[np.int64]:
+    def dofs(self) -> Integers:
         return self.trajectory.dofs
 
     def position(self, time: float) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.distance import SPHERE
-from flowborne.kernels.edge_crossings import Geometries
+from flowborne.kernels.edge_crossings import Placed
 from flowborne.shapes.mesh import ShapeThickened, smooth_sheets
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.model import SolidModel
@@ -55,10 +55,11 @@ class Shapes:
     pieces: dict[int, NDArray[np.int64]]
     sheets: NDArray[np.bool_]
 
-    def placed(self, position: Array, rotation: Array) -> Geometries:
+    def placed(self, position: Array, rotation: Array) -> list[Placed]:
         """The geometries at positions (ng, 3), m, and in rotations (ng, 3, 3), for kernels."""
-        samples = self.tables, self.table, self.corner, self.pitch
-        return Geometries(self.kind, self.size, position, rotation, *samples)
+        kinds, tables, pitches = self.kind.tolist(), [self.tables] * len(position), self.pitch
+        own = kinds, self.size, position, rotation, tables, self.table, self.corner, pitches
+        return [Placed(*each) for each in zip(*own, strict=True)]
 
     @cached_property
     def tips(self) -> Array:

@@ -22,7 +22,6 @@ import numpy as np
 
 from flowborne.coupling.cut import source_rate
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.friction import diffuse
 from flowborne.coupling.mouths import Jet, add_rates
 from flowborne.coupling.operators import (
     add_flux,
@@ -31,16 +30,16 @@ from flowborne.coupling.operators import (
     generalised,
     leak_proof,
     pressure_push,
-    rows_of,
     side_push,
 )
 from flowborne.coupling.report import Outcome, Timer
+from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Integers
 from flowborne.kernels.faces import largest_open
-from flowborne.kernels.projection import outflow
+from flowborne.kernels.projection import net_out
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.mobility import Mobility
@@ -187,7 +186,7 @@ def solve_together(
     timer.lap("projection")
     smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
     timer.lap("viscosity")
-    term = LowRankTerm(rows_of(cut), mobility)
+    term = LowRankTerm(cut.rows, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     carried = leak_proof(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
     floor = rounding_floor(carried, fluid.grid)
@@ -283,7 +282,7 @@ def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:
     """
     if mobility.is_dense:
         return NO_REACTION
-    random, cells = np.random.default_rng(0), cut.cells
+    random, cells = np.random.default_rng(0), cut.rows[0]
     room = np.zeros(grid.shape)
     for _ in range(PROBES):
         signs, moved = np.zeros(grid.shape), np.zeros(grid.shape)
@@ -300,7 +299,7 @@ def net_outflow(velocity: Faces, cut: Geometry, rate: Array, fluid: Fluid) -> Ar
     rate  (nx, ny, nz) volume that sources and mouths bring into each cell, m^3/s
     """
     net = np.empty(fluid.grid.shape)
-    outflow(net, *velocity, *cut.open)
+    net_out(net, *(part * u for part, u in zip(cut.open, velocity, strict=True)))
     net *= fluid.grid.face_area
     net -= rate
     return net

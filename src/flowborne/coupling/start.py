@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.bodies_step import position_velocity
+from flowborne.coupling.bodies_step import parts_of, position_velocity
 from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.parts import parts_of
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.servo import joint_command
 from flowborne.coupling.step import step_part

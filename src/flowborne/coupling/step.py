@@ -20,7 +20,8 @@ Deviations from the paper, and their reasons:
        cells' open volumes, which momentum and dye in flux form need (`leak_proof`).
     5  Momentum is advected in flux form: along particle paths the fluid loses a tenth of what a
        swimmer exchanges with it.
-    6  Viscosity is solved for first, with friction at bodies and the last pressure (`friction`).
+    6  Viscosity is solved for first, with friction at bodies and the last pressure
+       (`viscous_solve`).
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ import numpy as np
 from flowborne.coupling.bodies_step import (
     equations,
     move_bodies,
+    part_of,
+    parts_of,
     position_velocity,
     step_bodies,
 )
@@ -44,14 +47,19 @@ from flowborne.coupling.flow import (
 from flowborne.coupling.half_pressure import explicit_half_pressure
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised
-from flowborne.coupling.parts import joined, part_of, parts_of
 from flowborne.coupling.report import Outcome, StepReport, Timer
 from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_together
-from flowborne.coupling.step_report import blank, known_push, momentum_balance, report_coupled
+from flowborne.coupling.step_report import (
+    blank,
+    joined,
+    known_push,
+    momentum_balance,
+    report_coupled,
+)
 from flowborne.coupling.window import follow
 from flowborne.coupling.world import World
-from flowborne.fluid.momentum import face_masses
+from flowborne.fluid.control_volumes import face_masses
 from flowborne.solids.dynamics import kinematics
 
 

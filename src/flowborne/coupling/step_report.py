@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 
 from flowborne.coupling.flesh import hydrostatic_push
@@ -13,8 +15,8 @@ from flowborne.coupling.report import Momentum, Outcome, StepReport, Timer
 from flowborne.coupling.solve import Solved
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
+from flowborne.fluid.control_volumes import fluid_momentum, momentum_change
 from flowborne.fluid.grid import Array, Faces
-from flowborne.fluid.momentum import fluid_momentum, momentum_change
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.momentum import halfway_momentum
@@ -142,3 +144,36 @@ def momentum_balance(
 def linear(push: Array, first: int) -> Array:
     """(n, 3) the forces in a push (k,), with the wrenches on bodies before index `first`."""
     return np.concatenate([push[:first].reshape(-1, 6)[:, :3], push[first:].reshape(-1, 3)])
+
+
+def joined(reports: list[StepReport]) -> StepReport:
+    """The report of a step from those of its parts: means of forces, sums of what was exchanged,
+    and the state at the end."""
+    last = reports[-1]
+    if len(reports) == 1:
+        return last
+
+    budget = [report.momentum for report in reports]
+    sums = ("exchanged", "advection", "boundary", "crossed", "jet", "forces")
+    momentum = replace(
+        last.momentum,
+        **{name: np.sum([getattr(m, name) for m in budget], axis=0) for name in sums},
+        exchange_error=max(m.exchange_error for m in budget),
+        budget_error=max(m.budget_error for m in budget),
+    )
+    means = [f.name for f in fields(StepReport) if f.name.endswith("_wrench")]
+    means += ["actuator", "centre"]
+    return replace(
+        last,
+        dt=sum(report.dt for report in reports),
+        **{n: np.mean([getattr(r, n) for r in reports], axis=0) for n in means},
+        iterations=sum(r.iterations for r in reports),
+        divergence=max(r.divergence for r in reports),
+        fastest=max(r.fastest for r in reports),
+        momentum=momentum,
+        work=sum(r.work for r in reports),
+        expelled=sum(r.expelled for r in reports),
+        dye_error=max(r.dye_error for r in reports),
+        seconds={k: sum(r.seconds.get(k, 0.0) for r in reports) for k in last.seconds},
+        limited=np.unique(np.concatenate([r.limited for r in reports])),
+    )

@@ -9,9 +9,9 @@ import numpy as np
 
 from flowborne.coupling.cut import cut_by_bodies, volumes_of
 from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.control_volumes import face_masses, fluid_momentum
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array
-from flowborne.fluid.momentum import face_masses, fluid_momentum
 from flowborne.fluid.window import Window, moved_fluid
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel

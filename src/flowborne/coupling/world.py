@@ -143,7 +143,7 @@ class World:
     time    s
     steps   number of steps taken
     ahead   s by which v is ahead of the positions: half of the last part of a step of its own
-    parts   most parts that a step of the world itself has been divided into, see `parts`
+    parts   most parts that a step of the world itself has been divided into, see `bodies_step`
     memory  the controller's own arrays, by name
     cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
             and not part of it

@@ -14,10 +14,9 @@ import numpy as np
 from flowborne.fluid.dipoles import Dipoles, dipoles_of
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.sea import Sea, sea_of
-from flowborne.fluid.sides.closed import BoundaryClosed
+from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Boundary, Place
-from flowborne.kernels.arrays import Integers, Marks
-from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
+from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC, Integers, Marks
 
 WALL = BoundaryClosed()
 

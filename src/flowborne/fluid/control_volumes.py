@@ -1,4 +1,4 @@
-"""Control volumes of the faces, and the volumes that move with them.
+"""Control volumes of the faces, the volumes that move with them, and their mass and momentum.
 
 The control volume of a face reaches from the middle of one of its cells to that of the other,
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge, kernel_axes, plane, planes
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Array, Faces, Grid, faces_of, inner_product
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.control_volumes import (
     Closed,
@@ -31,6 +31,7 @@ from flowborne.kernels.control_volumes import (
     sort_faces,
 )
 from flowborne.kernels.face_masses import ROUNDS, share_out, with_neighbours
+from flowborne.kernels.faces import weighted_change
 
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
@@ -103,3 +104,42 @@ def moving_volumes(
     if ring:
         found[edge(component, -1)] = found[edge(component, 0)]
     return found, cut, closed, given
+
+
+def face_masses(volumes: ControlVolumes, density: float) -> Faces:
+    """Mass of the fluid that pressure on each face accelerates, kg; 0 at closed ones."""
+    return faces_of([density * v for v in volumes.moving])
+
+
+def each_once(axis: int, sides: Boundaries) -> tuple[int | slice, ...]:
+    """Index of the faces across an axis, without the last ones if they are the first ones."""
+    return edge(axis, slice(None, -1 if sides.periodic()[axis] else None))
+
+
+def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> Array:
+    """(3,) linear momentum of the fluid, N s."""
+    total = np.zeros(3)
+    for axis in grid.axes:
+        own = each_once(axis, sides)
+        total[axis] = inner_product(mass[axis][own], velocity[axis][own])
+    return total
+
+
+def momentum_change(
+    before: Faces, after: Faces, mass: Faces, grid: Grid, sides: Boundaries
+) -> tuple[Array, float]:
+    """(3,) what linear momentum changes by between two velocities, and the sum of its parts' sizes,
+    N s."""
+    total, size = np.zeros(3), 0.0
+    for axis in grid.axes:
+        own = each_once(axis, sides)
+        fields = (np.ascontiguousarray(f[axis][own]) for f in (mass, before, after))
+        total[axis], change = weighted_change(*fields)
+        size += change
+    return total, size
+
+
+def kinetic_energy(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> float:
+    """Kinetic energy of the fluid, J."""
+    squares = faces_of([0.5 * u * u for u in velocity])
+    return float(fluid_momentum(squares, mass, grid, sides).sum())

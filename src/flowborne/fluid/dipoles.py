@@ -18,12 +18,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.fluid.grid import Array
 from flowborne.fluid.sides.far import BoundaryFar, Centre
 from flowborne.fluid.sides.side import Boundary, Place
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class Dipoles:
         near = pressure.reshape(-1)[self.cells]
         return self._by_place((self.signs * (self.vectors @ near)) @ self.vectors)
 
-    def on(self, uncut: Sequence[NDArray[np.bool_]]) -> Dipoles:
+    def on(self, uncut: Sequence[Mask]) -> Dipoles:
         """E between the faces of each side that `uncut` says alone."""
         kept = np.concatenate([faces.reshape(-1) for faces in uncut])
         return self if kept.all() else replace(self, vectors=self.vectors * kept)

@@ -6,7 +6,7 @@ With the volume fluxes q of a leak-proof field, V^{n+1} - V^n = dt (rate - sum q
 
 Whole cells pass it on along one axis after the other, in an order that turns about (Strang 1968);
 see `kernels.dye`. Cut cells, and those that mouths and sources fill, come first; see
-`kernels.cut_dye`. No value leaves the bounds of what there is and what is brought.
+`kernels.dye`. No value leaves the bounds of what there is and what is brought.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import mark_cut
-from flowborne.kernels.cut_dye import CUT, WHOLE, list_flows, pass_on, sort_cells
-from flowborne.kernels.dye import sweep
+from flowborne.kernels.dye import CUT, WHOLE, list_flows, pass_on, sort_cells, sweep
 
 REACH = 2
 """Cells on both sides that the parabola in a cell is made from."""

@@ -19,7 +19,7 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.kernels.faces import accelerate, weigh
+from flowborne.kernels.faces import accelerate
 from flowborne.kernels.projection import subtract_gradient
 
 EVEN = 1e-9
@@ -42,10 +42,7 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
 
 def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
-    weights = faces_of([np.empty(o.shape) for o in opened])
-    for axis in range(3):
-        weigh(weights[axis], opened[axis], rate[axis], grid.face_area)
-    return weights
+    return faces_of([grid.face_area * o * r for o, r in zip(opened, rate, strict=True)])
 
 
 @dataclass(frozen=True)

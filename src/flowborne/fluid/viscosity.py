@@ -29,13 +29,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import CLOSED_BELOW
-from flowborne.kernels.corner_friction import AROUND, corner_stiffness, find_corners
+from flowborne.kernels.corner_friction import corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.viscosity import (
     INACTIVE,
@@ -68,12 +67,6 @@ class Corners(NamedTuple):
     node: Integers
 
 
-def no_corners(count: int) -> Corners:
-    """Room for some."""
-    faces, node = np.zeros((count, AROUND), np.int64), np.zeros(count, np.int64)
-    return Corners(faces, np.zeros((count, AROUND, AROUND)), node)
-
-
 @dataclass
 class ViscousFaces:
     """The viscous system of the faces across one axis; arrays have the shape of the faces.
@@ -92,7 +85,7 @@ class ViscousFaces:
     corners   what they add
     """
 
-    kind: NDArray[np.uint8]
+    kind: Marks
     mass: Array
     diagonal: Array
     links: Array
@@ -159,23 +152,9 @@ def assemble_viscosity(
         mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
         diagonal = np.where(kind == UNKNOWN, mass + friction, 0.0)
         links = np.zeros((3, *shape))
+        around = away, *edges, opened, centre, parts, velocity[axis], stiffness, diagonal
         for d in grid.axes:
-            link_faces(
-                axis,
-                d,
-                kind,
-                away,
-                *edges,
-                opened,
-                centre,
-                parts,
-                velocity[axis],
-                stiffness,
-                diagonal,
-                links[d],
-                given,
-                periodic[d],
-            )
+            link_faces(axis, d, kind, *around, links[d], given, periodic[d])
         beside = near[kind.reshape(-1)[near] == UNKNOWN]
         wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
         gap, place = np.zeros((beside.size, 3, 3)), np.zeros((beside.size, 3, 3))
@@ -184,13 +163,8 @@ def assemble_viscosity(
             wall, gap, place, node,
         )  # fmt: skip
         diagonal.reshape(-1)[beside] += wall.sum(axis=1)
-        corners = no_corners(len(found[0]))
-        count = corner_stiffness(
-            axis, *found, kind, opened, parts, links, beside, wall[:, 0], stiffness, wraps,
-            cut.distance, *corners,
-        )  # fmt: skip
-        faces, matrix, at = corners
-        corners = Corners(faces[:count], matrix[:count], at[:count])
+        walls = opened, parts, links, beside, wall[:, 0], stiffness, wraps, cut.distance
+        corners = Corners(*corner_stiffness(axis, *found, kind, *walls))
         np.add.at(diagonal.reshape(-1), corners.faces, np.einsum("nii->ni", corners.matrix))
         met = wall != 0.0
         beside = np.repeat(beside, met.sum(axis=1))
@@ -201,7 +175,7 @@ def assemble_viscosity(
 
 
 def stick_to_sides(
-    kind: NDArray[np.uint8],
+    kind: Marks,
     stiffness: float,
     grid: Grid,
     boundaries: Boundaries,

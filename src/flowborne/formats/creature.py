@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.recorder import on_skin
 from flowborne.scenes.bodies import load_model
@@ -19,9 +19,6 @@ from flowborne.scenes.load import read_scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import BALL, HINGE, SolidModel
 from flowborne.solids.skins import clad_bodies, skins_of
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 WORLD = "world"
 """Name of the bone of the world, if there is one."""

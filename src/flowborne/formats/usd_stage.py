@@ -25,11 +25,10 @@ from scipy.spatial.transform import Rotation
 from flowborne.files.colours import to_linear
 from flowborne.formats.creature import Creature, Mesh, Skeleton
 from flowborne.formats.morphs import strongest
+from flowborne.kernels.arrays import Array
 from flowborne.motion.quaternions import continuous
 from flowborne.runs.open_run import OpenRun
 from flowborne.version import __version__
-
-Array = NDArray[np.float64]
 
 ROOT = Sdf.Path("/Run")
 

@@ -8,11 +8,15 @@ from numpy.typing import NDArray
 ROUNDING = 1e-15
 """Relative size of what is a rounding error of numbers in double precision."""
 
+CLOSED, OPEN, PERIODIC = range(3)
+"""What a side is to the pressure: a wall or an inflow, p = 0, or the opposite side."""
+
 Array = NDArray[np.float64]
 Faces = tuple[Array, Array, Array]
 """One array per axis: u (nx+1, ny, nz), v (nx, ny+1, nz), w (nx, ny, nz+1)."""
 
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 Real = NDArray[np.floating]
 """Double precision, or single in the preconditioner."""
 

@@ -25,9 +25,9 @@ from flowborne.kernels.arrays import (
 )
 from flowborne.kernels.cholesky import respond
 from flowborne.kernels.jit import inlined, kernel
-from flowborne.kernels.laplacian import apply_laplacian, turn_and_apply
 from flowborne.kernels.levels import at_level, wrap_ghosts
 from flowborne.kernels.regions import remove_null
+from flowborne.kernels.smoothing import apply_laplacian, turn_and_apply
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
 from flowborne.kernels.vectors import descend, dot, in_order, scaled, true_residual, turn

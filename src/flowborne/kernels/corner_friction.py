@@ -16,9 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Marks
 from flowborne.kernels.cut_faces import (
     closed_face,
     crossings_on,
@@ -38,7 +37,7 @@ NARROW, BESIDE, BEYOND, NEXT, BEHIND, FLUX, SHEAR = range(7)
 """The faces around a corner: in its row before and beyond the line, beside each of these on the
 open side, and behind the end of the body; Q and d."""
 
-AROUND = 5
+AROUND = FLUX
 """How many faces."""
 
 
@@ -211,22 +210,22 @@ def wall_at(beside: Integers, wall: Array, f: int) -> float:
 
 @njit(nogil=True, cache=True)
 def corner_stiffness(
-    axis: int, cells: Integers, corner: Array, kind: NDArray[np.uint8], opened: Array, parts: Array,
+    axis: int, cells: Integers, corner: Array, kind: Marks, opened: Array, parts: Array,
     links: Array, beside: Integers, wall: Array, stiffness: float, wraps: Integers, distance: Array,
-    faces: Integers, matrix: Array, node: Integers,
-) -> int:  # fmt: skip
-    """What corners add to the matrix of the faces across `axis`; gives at how many they do: where
-    all faces around are unknown, and one wall is more along the axis and the other more across.
+) -> tuple[Integers, Array, Integers]:  # fmt: skip
+    """What corners add to the matrix of the faces across `axis`, those at which all faces around
+    are unknown, and one wall is more along the axis and the other more across.
 
     cells, corner  see `find_corners`;  kind, opened, parts, stiffness  see `link_faces`
     links          (3, ...) k to the next face along each axis, kg/s
     beside, wall   flat indices of the faces beside bodies, and W in their plane, kg/s
     wraps          see `face_at`
     distance       to the bodies at the nodes
-    faces, matrix  (n, AROUND) flat indices of the faces around, (n, AROUND, AROUND) kg/s;
-                   overwritten
-    node           (n,) flat index of the node of the cell nearest to a body; overwritten
+    returns        (n, AROUND) flat indices of the faces around; (n, AROUND, AROUND) kg/s; (n,) flat
+                   index of the node of the cell nearest to a body
     """
+    faces, node = np.empty((len(cells), AROUND), np.int64), np.empty(len(cells), np.int64)
+    matrix = np.zeros((len(cells), AROUND, AROUND))
     count, own, at = 0, np.empty(AROUND, np.int64), np.empty(3, np.int64)
     kinds, open_parts = kind.reshape(-1), opened.reshape(-1)
     _, nj, nk = kind.shape
@@ -267,7 +266,6 @@ def corner_stiffness(
         stays = upward * end[t] / abs(end[s]) * (1.0 - h) / (1.0 - b)
         if beyond < 1.0 or own[BEHIND] < 0:
             stays = 1.0
-        matrix[count] = 0.0
         for n in range(2):
             share = max(1.0 - stays, 0.0) if n == 0 else min(stays, 1.0)
             if share > 0.0:
@@ -278,4 +276,4 @@ def corner_stiffness(
         node[count] = nearest_node(distance, cells[c, 0], cells[c, 1], cells[c, 2], 1, 1, 1)
         faces[count] = own
         count += 1
-    return count
+    return faces[:count], matrix[:count], node[:count]

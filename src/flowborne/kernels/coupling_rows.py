@@ -3,6 +3,8 @@ the velocity that these give to closed parts of faces."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -14,6 +16,26 @@ Kinds = NDArray[np.int8]
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
 """Kinds of cells: closed in by bodies and solid sides of the domain; all faces closed by bodies; an
 open face, but none by half; a face open by half or more."""
+
+
+class ClosedParts(NamedTuple):
+    """What bodies close of faces, one entry per face and body.
+
+    axis, face      (n,) axis of the face, and its flat index among those across that axis
+    body, part      (n,) the body, and the fraction that it closes
+    place           (n, 3) centre of what bodies close of the face, that of the face where flesh does;
+                    at the body itself where an image closes it, m
+    corner, weight  (nf, 3) vertices that move the last nf of them, closed by flesh, and how much
+                    each does
+    """
+
+    axis: Integers
+    face: Integers
+    body: Integers
+    part: Array
+    place: Array
+    corner: Integers
+    weight: Array
 
 
 @inlined
@@ -183,24 +205,13 @@ def flesh_rows(
 
 @njit(nogil=True, cache=True)
 def add_body_velocity(
-    out: Array,
-    axis: int,
-    axes: Integers,
-    faces: Integers,
-    bodies: Integers,
-    closed: Array,
-    place: Array,
-    corner: Integers,
-    weight: Array,
-    twist: Array,
-    flesh: Array,
+    out: Array, axis: int, parts: ClosedParts, twist: Array, flesh: Array
 ) -> None:
     """Add closed fraction x body velocity on the faces across `axis`, at the centres of the parts.
 
-    place           (n, 3) these centres at the bodies themselves, m
-    corner, weight  (nf, 3) vertices that move the last nf parts
-    twist, flesh    (nbody, 6) of the bodies, (n, 3) velocity of the vertices
+    twist, flesh  (nbody, 6) of the bodies, (n, 3) velocity of the vertices
     """
+    axes, faces, bodies, closed, place, corner, weight = parts
     flat_out = out.reshape(-1)
     rigid = axes.size - len(corner)
     for n in range(axes.size):

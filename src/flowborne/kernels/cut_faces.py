@@ -44,6 +44,23 @@ def open_edge(phi: Array, found: Crossings, d: int, i: int, j: int, k: int) -> f
 
 
 @inlined
+def crossing_from(
+    found: Crossings, number: int, near: float, far: float, upper: bool
+) -> tuple[float, int]:
+    """Part of an edge that is open from one of its nodes on up to a crossing, and the number of
+    this; below 0 where there is none.
+
+    number     what is known of the edge, see `Crossings`
+    near, far  distances at this node and the other;  upper  whether this is the upper one
+    """
+    if near < 0.0 or (far >= 0.0 and number < 0):
+        return -1.0, -1
+    if far >= 0.0:
+        number += int(upper)
+    return found.part[number] if number >= 0 else near / (near - far), number
+
+
+@inlined
 def values_at(phi: Array, axis: int, i: int, j: int, k: int) -> Four:
     """Distance at the corners of face (i, j, k) across `axis` in turn."""
     s, t = other_axes(axis)
@@ -225,27 +242,19 @@ def closed_face(
         n, m, first = turn % 4, (turn + 1) % 4, turn < 4
         if not first and not waits:
             break
-        begins, ends, e = values[n] < 0.0, values[m] < 0.0, crossing[n]
+        begins, ends = values[n] < 0.0, values[m] < 0.0
+        ahead, f = crossing_from(found, crossing[n], values[n], values[m], n >= 2)
+        back, g = crossing_from(found, crossing[n], values[m], values[n], n < 2)
+        if not begins and ahead < 0.0:
+            continue
         c, o = corner_of(n), corner_of(m)
-        enters, leaves = c, o
-        f = g = e
-        if begins != ends:
-            outer, inner = (m, n) if begins else (n, m)
-            part = found.part[e] if e >= 0 else values[outer] / (values[outer] - values[inner])
-            if begins:
-                leaves = between(o, c, part)
-            else:
-                enters = between(c, o, part)
-        elif not begins:
-            if e < 0:
-                continue
-            f, g = e + int(n >= 2), e + int(n < 2)
-            enters, leaves = between(c, o, found.part[f]), between(o, c, found.part[g])
-            if not joined:
-                if first:
-                    add_line(sums, enters, leaves)
-                    corners += add_wall(sums, leaves, enters, g, f, found, s, t, straight)
-                continue
+        enters = c if begins else between(c, o, ahead)
+        leaves = o if ends else between(o, c, back)
+        if not (begins or ends or joined):
+            if first:
+                add_line(sums, enters, leaves)
+                corners += add_wall(sums, leaves, enters, g, f, found, s, t, straight)
+            continue
         if not begins and waits:
             corners += add_wall(sums, p, enters, exit, f, found, s, t, straight)
             waits = False

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 
 SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH = range(6)
 
@@ -35,7 +34,7 @@ def distance_in_table(
     y: float,
     z: float,
     tables: Array,
-    table: NDArray[np.int64],
+    table: Integers,
     corner: Array,
     pitch: float,
 ) -> float:
@@ -69,7 +68,7 @@ def signed_distance(
     y: float,
     z: float,
     tables: Array,
-    table: NDArray[np.int64],
+    table: Integers,
     corner: Array,
     pitch: float,
 ) -> float:

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.kernels.distance import BOX, CYLINDER, signed_distance
 from flowborne.kernels.jit import inlined
 
@@ -45,32 +44,19 @@ class Crossings(NamedTuple):
     piece   (n,) smooth piece of the surface; between two pieces there is an edge or a corner
     """
 
-    at: NDArray[np.int32]
+    at: Indices
     part: Array
     normal: Array
     piece: Integers
 
 
-class Geometries(NamedTuple):
-    """Geometries with a signed distance, see `coupling.shapes`, and where they are.
-
-    kind, size        (ng,), (ng, 3)
-    position          (ng, 3) m;  rotation  (ng, 3, 3) of their frames to the world's
-    tables, table, corner, pitch  of the sampled ones
-    """
-
-    kind: Integers
-    size: Array
-    position: Array
-    rotation: Array
-    tables: Array
-    table: Integers
-    corner: Array
-    pitch: Array
-
-
 class Placed(NamedTuple):
-    """One of them."""
+    """A geometry with a signed distance, see `coupling.shapes`, and where it is.
+
+    kind, size                    of it; (3,)
+    position, rotation            (3,) m; (3, 3) of its frame to the world's
+    tables, table, corner, pitch  of a sampled one
+    """
 
     kind: int
     size: Array
@@ -80,15 +66,6 @@ class Placed(NamedTuple):
     table: Integers
     corner: Array
     pitch: float
-
-
-@inlined
-def placed(bodies: Geometries, g: int) -> Placed:
-    """Geometry g."""
-    return Placed(
-        bodies.kind[g], bodies.size[g], bodies.position[g], bodies.rotation[g],
-        bodies.tables, bodies.table[g], bodies.corner[g], bodies.pitch[g],
-    )  # fmt: skip
 
 
 @inlined
@@ -161,14 +138,14 @@ def add_crossing(
 
 @njit(nogil=True, cache=True)
 def cross_geometry(
-    found: Crossings, used: Integers, phi: Array, box: Integers, bodies: Geometries, g: int,
+    found: Crossings, used: Integers, phi: Array, box: Integers, body: Placed, number: int,
     origin: Array, h: float, flat: bool,
 ) -> None:  # fmt: skip
-    """Note where edges cross a geometry of a body.
+    """Note where edges cross a geometry, this `number`, of a body.
 
     phi  distance to the body at the nodes of its box, m;  box  (3, 2) node ranges
     """
-    body, point, normal = placed(bodies, g), np.empty(3), np.empty(3)
+    point, normal = np.empty(3), np.empty(3)
     ni, nj, nk = phi.shape
     for i in range(ni):
         for j in range(nj):
@@ -200,7 +177,7 @@ def cross_geometry(
                         step = goal - point[d]
                         part = abs(step) / h * root(body, point, d, step, ROOT * h)
                         if part >= 0.0:
-                            piece = int(g) * PIECES + surface_at(body, point, SHIFT * h, normal)
+                            piece = number * PIECES + surface_at(body, point, SHIFT * h, normal)
                             at_upper = twice and upper > 0
                             add_crossing(
                                 found, used, d, i, j, k, twice, at_upper, part, normal, piece
@@ -240,7 +217,7 @@ def dip(body: Placed, point: Array, d: int, h: float) -> float:
 
 @njit(nogil=True, cache=True)
 def merge_crossings(
-    at: NDArray[np.int32], part: Array, distance: Array, own: NDArray[np.int32], phi: Array,
+    at: Indices, part: Array, distance: Array, own: Indices, phi: Array,
     box: Integers, first: int,
 ) -> None:  # fmt: skip
     """Let each edge in a body's box keep the crossings that leave the least of it open.

@@ -56,15 +56,6 @@ def accelerate(out: Array, opened: Array, mass: Array, area: float) -> None:
 
 
 @kernel
-def weigh(out: Array, opened: Array, rate: Array, area: float) -> None:
-    """a A rate."""
-    weight, part, rates = flat(out), flat(opened), flat(rate)
-    for i in prange(weight.shape[0]):
-        for k in range(weight.shape[1]):
-            weight[i, k] = area * part[i, k] * rates[i, k]
-
-
-@kernel
 def mean_flux(
     flux: Array,
     weight: Array,
@@ -90,16 +81,6 @@ def mean_flux(
             mean = 0.5 * (one[i, k] + other[i, k])
             w[i, k] = whole * mean
             q[i, k] = area * mean * (u[i, k] + 0.5 * du[i, k])
-
-
-@kernel
-def fill_empty_faces(field: Array, volume: Array, inside: Array) -> None:
-    """Give faces whose control volume holds nothing the value of another field, in place."""
-    values, part, given = flat(field), flat(volume), flat(inside)
-    for i in prange(values.shape[0]):
-        for k in range(values.shape[1]):
-            value = values[i, k]
-            values[i, k] = given[i, k] if part[i, k] == 0.0 else value
 
 
 @kernel

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers, Mask
 
 
 @njit(nogil=True, cache=True)
@@ -36,8 +35,8 @@ def momentum_impulse(
     centre: Array,
     given: Array,
     later: Array,
-    body: NDArray[np.int64],
-    conserved: NDArray[np.bool_],
+    body: Integers,
+    conserved: Mask,
     gained: Array,
     still: Array,
     bias: Array,

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.edge_crossings import Geometries, distance_to, placed
+from flowborne.kernels.edge_crossings import Placed, distance_to
 from flowborne.kernels.jit import kernel
 
 BAND = 4.0
@@ -48,26 +48,17 @@ def node_box(
 
 
 @njit(nogil=True, cache=True)
-def sample_body(
-    phi: Array,
-    box: Integers,
-    geoms: Integers,
-    bodies: Geometries,
-    origin: Array,
-    h: float,
-    flat: bool,
+def lower_to_body(
+    phi: Array, box: Integers, body: Placed, origin: Array, h: float, flat: bool
 ) -> None:
-    """Distance to one body at the nodes of its box; a slab's nodes lie at z = 0."""
-    phi[:] = BAND * h
-    for g in geoms:
-        body = placed(bodies, g)
-        for i in range(phi.shape[0]):
-            x = origin[0] + h * (box[0, 0] + i)
-            for j in range(phi.shape[1]):
-                y = origin[1] + h * (box[1, 0] + j)
-                for k in range(1 if flat else phi.shape[2]):
-                    z = 0.0 if flat else origin[2] + h * (box[2, 0] + k)
-                    phi[i, j, k] = min(phi[i, j, k], distance_to(body, x, y, z))
+    """Lower the distance at the nodes of a box to that of a geometry; a slab's lie at z = 0."""
+    for i in range(phi.shape[0]):
+        x = origin[0] + h * (box[0, 0] + i)
+        for j in range(phi.shape[1]):
+            y = origin[1] + h * (box[1, 0] + j)
+            for k in range(1 if flat else phi.shape[2]):
+                z = 0.0 if flat else origin[2] + h * (box[2, 0] + k)
+                phi[i, j, k] = min(phi[i, j, k], distance_to(body, x, y, z))
     if flat:
         phi[:, :, 1:] = phi[:, :, :1]
 

@@ -1,30 +1,14 @@
-"""Divergence and pressure gradient on cut cells."""
+"""Divergence and pressure gradient on cut cells, and the pressure of cells that have opened."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
-from numpy.typing import NDArray
+from numba import njit, prange
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Faces, Integers
+from flowborne.kernels.control_volumes import across_axis, neighbour
+from flowborne.kernels.dye import face_of
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.sides import CLOSED, PERIODIC
-
-
-@kernel
-def outflow(out: Array, u: Array, v: Array, w: Array, ax: Array, ay: Array, az: Array) -> None:
-    """Net volume that leaves each cell per area of a full face: sum of a (u . outward), m/s."""
-    for i in prange(out.shape[0]):
-        for j in range(out.shape[1]):
-            for k in range(out.shape[2]):
-                out[i, j, k] = (
-                    ax[i + 1, j, k] * u[i + 1, j, k]
-                    - ax[i, j, k] * u[i, j, k]
-                    + ay[i, j + 1, k] * v[i, j + 1, k]
-                    - ay[i, j, k] * v[i, j, k]
-                    + az[i, j, k + 1] * w[i, j, k + 1]
-                    - az[i, j, k] * w[i, j, k]
-                )
 
 
 @kernel
@@ -50,7 +34,7 @@ def subtract_gradient(
     pressure: Array,
     axis: int,
     scale: float,
-    codes: NDArray[np.int64],
+    codes: Integers,
 ) -> None:
     """Subtract scale rate (p_upper - p_lower) from the velocity of the faces across `axis`.
 
@@ -85,3 +69,34 @@ def subtract_gradient(
                             - pressure[i - di, j - dj, k - dk]
                         )
                 velocity[i, j, k] -= scale * rate[i, j, k] * difference
+
+
+@njit(nogil=True, cache=True)
+def fill_fresh(pressure: Array, opened: Faces, fresh: Integers, wraps: Integers) -> None:
+    """Give cells without a pressure the mean of those beside them, weighted by the open parts of
+    the faces between them, in place; from there on to the cells behind them.
+
+    pressure  of each cell, 0 where there is none
+    opened    open part of each face
+    fresh     (n,) flat indices of the cells without one
+    wraps     (3,) number of cells along each periodic axis, else 0
+    """
+    flat, shape, found = pressure.reshape(-1), np.array(pressure.shape), np.zeros(fresh.size)
+    spread = True
+    while spread:
+        spread, found[:] = False, 0.0
+        for n in range(fresh.size):
+            total, weight = 0.0, 0.0
+            for way in range(6 if flat[fresh[n]] == 0.0 else 0):
+                to = neighbour(shape, wraps, fresh[n], way)
+                if to < 0 or flat[to] == 0.0:
+                    continue
+                face = face_of(shape, way // 2, fresh[n], way % 2)
+                part = across_axis(opened, way // 2).reshape(-1)[face]
+                total += part * flat[to]
+                weight += part
+            if weight > 0.0:
+                found[n] = total / weight
+        for n in range(fresh.size):
+            if found[n] != 0.0:
+                flat[fresh[n]], spread = found[n], True

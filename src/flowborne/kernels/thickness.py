@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers, Point
+from flowborne.kernels.arrays import Array, Integers, Mask, Point
 from flowborne.kernels.skin import ON_SKIN
 from flowborne.kernels.triangles import (
     closest_on_triangle,
@@ -98,7 +97,7 @@ def by_cells(vertices: Array, triangles: Integers) -> Cells:
 
 def any_within(
     places: Array, radius: float, vertices: Array, triangles: Integers, cells: Cells
-) -> NDArray[np.bool_]:
+) -> Mask:
     """(m,) whether a triangle is within `radius` m of each of places (m, 3).
 
     The nearest cells first: where there is one, most of the others are not looked into.
@@ -113,7 +112,7 @@ def any_within(
 @njit(nogil=True, cache=True)
 def _any_within(
     places: Array, radius: float, vertices: Array, triangles: Integers, cells: Cells
-) -> NDArray[np.bool_]:
+) -> Mask:
     low, edge, counts, start, listed = cells
     found = np.zeros(len(places), np.bool_)
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)

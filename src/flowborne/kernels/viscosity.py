@@ -1,4 +1,5 @@
-"""Finite volumes of the viscous system around the faces across one axis (see `fluid.viscosity`).
+"""Finite volumes of the viscous system around the faces across one axis (see `fluid.viscosity`),
+and its links on a vector of faces.
 
 The velocity of a face is that at the centre of its open part; `centre` holds how far that is from
 the centre of the whole face along the two other axes, in cells.
@@ -8,13 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers, Marks
 from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.sides import CLOSED, PERIODIC
 
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
@@ -44,9 +43,7 @@ def face_distances(distance: Array, axis: int, out: Array) -> None:
 
 
 @kernel
-def classify(
-    kind: NDArray[np.uint8], opened: Array, axis: int, codes: Integers, touching: float
-) -> None:
+def classify(kind: Marks, opened: Array, axis: int, codes: Integers, touching: float) -> None:
     """Kind of every face across `axis` from its open part."""
     last = kind.shape[axis] - 1
     for i in prange(kind.shape[0]):
@@ -146,7 +143,7 @@ def nearest_node(distance: Array, i: int, j: int, k: int, ni: int, nj: int, nk: 
 def link_faces(
     axis: int,
     d: int,
-    kind: NDArray[np.uint8],
+    kind: Marks,
     away: Array,
     distance: Array,
     crossings: Crossings,
@@ -205,7 +202,7 @@ def link_faces(
 @kernel
 def meet_walls(
     axis: int,
-    kind: NDArray[np.uint8],
+    kind: Marks,
     distance: Array,
     crossings: Crossings,
     opened: Array,
@@ -305,3 +302,30 @@ def meet_walls(
                 where = min(max((mine - yours) / (own - other), -0.5), 0.5)
                 place[n, entry, others[m]] = where
                 gap[n, entry, others[m]] = centre[m, i, j, k] - where
+
+
+@kernel
+def apply_component(out: Array, x: Array, scale: Array, links: Array, wraps: Integers) -> None:
+    """out = x - scale sum of links (scale x) of the neighbours, for one component.
+
+    wraps  (3,) number of distinct faces along each axis where the domain is periodic, else 0
+    """
+    _, ni, nj, nk = links.shape
+    steps = nj * nk, nk, 1
+    link = links.reshape(3, -1)
+    for plane in prange(ni):
+        i = np.int64(plane)
+        for j in range(nj):
+            for k in range(nk):
+                f = i * steps[0] + j * steps[1] + k
+                total = 0.0
+                for d in range(3):
+                    at = i if d == 0 else (j if d == 1 else k)
+                    around = steps[d] * (wraps[d] - 1)
+                    if link[d, f] != 0.0:
+                        g = f - around if at + 1 == wraps[d] else f + steps[d]
+                        total += link[d, f] * scale[g] * x[g]
+                    if at != wraps[d]:
+                        g = f - steps[d] if at > 0 else f + around
+                        total += link[d, g] * scale[g] * x[g]
+                out[f] = x[f] - scale[f] * total

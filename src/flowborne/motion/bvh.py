@@ -11,16 +11,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.files.atomic import write_atomically, write_text
+from flowborne.kernels.arrays import Array, Mask
 from flowborne.motion.bvh_file import BvhFile, BvhJoint, angles_of, load_bvh, quaternions_of
 from flowborne.motion.clip import Clip
 from flowborne.motion.quaternions import angle, inverse, product, rotated
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _Z_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -12,15 +12,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
 from flowborne.files.given import read_file
+from flowborne.kernels.arrays import Array, Mask
 from flowborne.motion.quaternions import about, product
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MAX_NUMBER = 1e9
 """Largest number of a clip, in its unit of length or degrees: beyond any creature in any unit."""

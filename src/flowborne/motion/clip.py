@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.quaternions import product, rotated
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +27,7 @@ class Clip:
     """
 
     names: tuple[str, ...]
-    parents: NDArray[np.int64]
+    parents: Integers
     offsets: Array
     ends: Mapping[str, Array]
     frame_time: float
@@ -71,7 +69,7 @@ class Clip:
             numbers.append(int(self.parents[numbers[-1]]))
         return numbers
 
-    def poses(self, frame: int | slice | NDArray[np.int64] = slice(None)) -> tuple[Array, Array]:
+    def poses(self, frame: int | slice | Integers = slice(None)) -> tuple[Array, Array]:
         """World poses of the joints, in one frame or in several.
 
         returns  (..., n, 3) positions, m, and (..., n, 4) rotations, unit quaternions; without the

@@ -12,19 +12,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.clip import Clip
 from flowborne.motion.quaternions import about, angle, continuous, inverse, product, rotated, twist
 from flowborne.phrases import suggestion
 from flowborne.solids import geoms
 from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
-
-Array = NDArray[np.float64]
-
-Integers = NDArray[np.int64]
 
 UP = np.array([0.0, 0.0, 1.0])
 

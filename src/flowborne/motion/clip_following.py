@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import (
     MAX_CYCLE_MISMATCH,
@@ -24,8 +24,6 @@ from flowborne.motion.clip_curves import (
 from flowborne.motion.clip_motion import TrajectoryClip, normalise
 from flowborne.motion.quaternions import about, continuous, inverse, product, twist
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 MAX_SEAM_SPEED_RATIO = 5.0
 """Largest speed of a joint in the seam of a loop, relative to the rest of the loop."""

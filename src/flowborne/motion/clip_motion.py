@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.clip_curves import Columns, Stride
 from flowborne.motion.quaternions import inverse, product
 from flowborne.solids.model import SolidModel
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Rows = tuple[Array, Array]
 """A row of joint positions (see Columns), unit quaternions, and its derivative."""
 

@@ -9,9 +9,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array
 from flowborne.motion.bvh import TO_WORLD, check_rigid, clip_of
 from flowborne.motion.bvh_file import BvhFile, load_bvh
 from flowborne.motion.clip import Clip
@@ -22,8 +22,6 @@ from flowborne.motion.human.skeleton import JOINTS, Skeleton, nearest_parent
 from flowborne.motion.human.soles import with_soles_on_floor
 from flowborne.motion.mapping import mapping_of
 from flowborne.phrases import suggestion
-
-Array = NDArray[np.float64]
 
 MIN_LEG_LENGTH, MAX_LEG_LENGTH = 0.2, 2.0
 """m from hip to ankle, limits for any person."""

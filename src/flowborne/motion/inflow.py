@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.motion.formula import Formula
 from flowborne.motion.tracks import Curve
-
-Array = NDArray[np.float64]
 
 Span = tuple[int, float, float]
 """Axis, and the two ends of the side along it in m."""

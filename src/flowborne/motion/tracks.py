@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.formula import Formula
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 SPEED_SAMPLES = 200
 """Number of times in a run at which the speed of a motion is evaluated."""

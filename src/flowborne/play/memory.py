@@ -6,15 +6,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.play.playing import Moment, Play
 from flowborne.running import write_state_alone
 from flowborne.runs.run_folder import RunFolder
 from flowborne.runs.states import DYE
 from flowborne.view.run import Run, State
-
-Array = NDArray[np.float64]
 
 MEMORY = 2_000_000_000
 """Bytes of frames that are kept."""

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.world import Setup
+from flowborne.kernels.arrays import Array
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array
 from flowborne.play.memory import PlayedRun
 from flowborne.play.panel import RECORD, PlayPanel
 from flowborne.play.playing import Moment, Play
@@ -32,8 +32,6 @@ from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:
     from viser import ViserServer
-
-Array = NDArray[np.float64]
 
 RATED = 2.0
 """s over which frames a second are counted."""

@@ -7,11 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.report import StepReport
-
-Array = NDArray[np.float64]
+from flowborne.fluid.grid import Array
 
 PARTS = ("advection", "viscosity", "projection", "geometry", "solids", "control")
 """Where the time of a frame goes."""

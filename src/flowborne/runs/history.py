@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.files.atomic import write_text
 from flowborne.files.given import MOST_BYTES, check_file
-
-Array = NDArray[np.float64]
+from flowborne.fluid.grid import Array
 
 UNITS = {
     "s": "s",

@@ -13,15 +13,13 @@ from numpy.typing import NDArray
 
 from flowborne.extras import optional
 from flowborne.files.given import read_json
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.runs.history import history_arrays, history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import DYE, Arrays, StateArray, quantity, read_state
 
 if TYPE_CHECKING:
     import xarray
-
-Array = NDArray[np.float64]
 
 
 class OpenRun:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.world import Setup, World
 from flowborne.files.atomic import sync_files, write_atomically, write_json
+from flowborne.fluid.grid import Array
 from flowborne.runs.run_folder import RunFolder
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
@@ -18,8 +19,6 @@ from flowborne.solids.flesh import Flesh
 from flowborne.solids.geoms import rest_poses
 from flowborne.solids.model import SolidModel
 from flowborne.solids.skins import clad_bodies, skins_of
-
-Array = NDArray[np.float64]
 
 BYTES_PER_MEMBER = 300
 """Overhead of an array in an npz file: two headers and two names."""

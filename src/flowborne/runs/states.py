@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flowborne.files.arrays import read_arrays, said_of
 from flowborne.files.given import check_file
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 
 IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
@@ -21,8 +21,6 @@ IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
 
 NUMBERS = "biuf"
 """Kinds of the NumPy types in a state."""
-
-Array = NDArray[np.float64]
 
 Arrays = Mapping[str, NDArray[np.floating]]
 

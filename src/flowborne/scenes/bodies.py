@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.errors import SceneError
+from flowborne.fluid.grid import Array
 from flowborne.phrases import suggestion
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.draft import Draft
@@ -36,8 +36,6 @@ from flowborne.solids.joint_kinds import (
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-
-Array = NDArray[np.float64]
 
 
 def load_model(scene: Scene) -> SolidModel:

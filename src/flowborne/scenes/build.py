@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cache
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flowborne.control.controller import Controller
 from flowborne.control.executors import Mapper, Serial
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
@@ -61,9 +58,6 @@ def surroundings_of(
         is_slab=scene.is_slab,
         unread=unread,
     )
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass

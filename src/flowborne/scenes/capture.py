@@ -6,9 +6,9 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
+from flowborne.fluid.grid import Array
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.clip_motion import TrajectoryClip
 from flowborne.motion.clip_reading import Capture, Reading, read_clip, with_held_joints
@@ -19,8 +19,6 @@ from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import ClipTable, HumanTable
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 
 def capture_of(scene: Scene) -> Capture | None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.cut import cut_at
 from flowborne.coupling.world import Setup
+from flowborne.fluid.grid import Array
 from flowborne.phrases import listed
 from flowborne.scenes.bodies import displace_of, initial_state
 from flowborne.scenes.schema import Scene
@@ -16,8 +17,6 @@ from flowborne.solids.dynamics import kinematics
 from flowborne.solids.geoms import solid_geoms
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import Outline
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

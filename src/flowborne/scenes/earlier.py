@@ -9,12 +9,12 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flowborne.errors import SceneError
 from flowborne.files.arrays import read_arrays
 from flowborne.files.given import read_json
+from flowborne.fluid.grid import Array
 from flowborne.motion.clip_curves import columns_of, row_of
 from flowborne.motion.clip_motion import TrajectoryClip
 from flowborne.motion.quaternions import continuous
@@ -24,8 +24,6 @@ from flowborne.runs.states import read_state
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 EARLIER_FILE = "earlier.npz"
 """File in a run folder with the motion from an earlier run."""

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.servo import Servo, ServoExact, ServoPD, driven
+from flowborne.fluid.grid import Array
 from flowborne.scenes.schema import Scene
 from flowborne.solids.actuators import actuators
 from flowborne.solids.model import BALL, HINGE, SLIDE, SolidModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

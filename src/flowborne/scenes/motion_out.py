@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from flowborne.errors import SceneError
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.bvh import write_bvh, write_clip
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import UP
@@ -26,8 +26,6 @@ from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.joint_kinds import FREE, joint_kind
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 
 def export_bvh(run: Path, path: Path) -> str:
@@ -101,7 +99,7 @@ def _in_file(capture: Capture, bone: str, rotations: Array) -> Array:
 
 
 def _unplaced(
-    scene: Scene, capture: Capture, frames: NDArray[np.int64], places: Array, rotations: Array
+    scene: Scene, capture: Capture, frames: Integers, places: Array, rotations: Array
 ) -> tuple[Array, Array]:
     """(frames, 3) and (frames, 4) a root's places, m, and rotations where the clip's file has it,
     before heading, offset and floor."""
@@ -143,7 +141,7 @@ def _poses(states: list[Path]) -> tuple[Array, Array]:
     return times, np.array([state["q"] for state in found], float)
 
 
-def _frames(scene: Scene, clip: Clip, simulated: float) -> tuple[NDArray[np.int64], int]:
+def _frames(scene: Scene, clip: Clip, simulated: float) -> tuple[Integers, int]:
     """Frames of the clip that were simulated, and the file's number of the first."""
     assert scene.clip is not None
     start, stop = scene.clip.start, scene.clip.stop
@@ -199,9 +197,7 @@ def _mapped(model: SolidModel, capture: Capture, body: int) -> list[str]:
     return [name for name in names if name in capture.mapping]
 
 
-def _between(
-    capture: Capture, model: SolidModel, joint: str, frames: NDArray[np.int64]
-) -> Rotation:
+def _between(capture: Capture, model: SolidModel, joint: str, frames: Integers) -> Rotation:
     """What the clip's joints between a joint and the one above it turn by together."""
     clip, above = capture.clip, _above(model, capture, joint)
     stop = -1 if above is None else clip.names.index(capture.mapping[above])

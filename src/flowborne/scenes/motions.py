@@ -14,6 +14,7 @@ from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.servo import ServoExact, ServoPD, driven
 from flowborne.errors import SceneError
+from flowborne.fluid.grid import Array
 from flowborne.motion.formula import RESERVED, Formula
 from flowborne.motion.tracks import (
     Curve,
@@ -36,7 +37,6 @@ from flowborne.tables import (
     check_keyframes,
 )
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
+from flowborne.fluid.grid import Array
 from flowborne.shapes.own import SHAPES, PlacedShape
 from flowborne.tables import (
     FileName,
@@ -28,8 +28,6 @@ from flowborne.tables import (
     WholeNumber,
     check_interval,
 )
-
-Array = NDArray[np.float64]
 
 
 class DisplaceTable(Table):

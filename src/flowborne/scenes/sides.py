@@ -8,12 +8,14 @@ from typing import Annotated, ClassVar, Literal
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sea import stream_problem
-from flowborne.fluid.sides.closed import BoundaryClosed
 from flowborne.fluid.sides.far import CHANNEL, ONE_SEA, BoundaryFar, centre_among, in_channel
-from flowborne.fluid.sides.inflow import BoundaryInflow
-from flowborne.fluid.sides.no_slip import BoundaryNoSlip
-from flowborne.fluid.sides.open import BoundaryOpen
-from flowborne.fluid.sides.periodic import BoundaryPeriodic
+from flowborne.fluid.sides.kinds import (
+    BoundaryClosed,
+    BoundaryInflow,
+    BoundaryNoSlip,
+    BoundaryOpen,
+    BoundaryPeriodic,
+)
 from flowborne.fluid.sides.side import Boundary
 from flowborne.motion.inflow import InflowProfile
 from flowborne.scenes.domain import Domain

@@ -8,10 +8,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup
+from flowborne.fluid.grid import Array
 from flowborne.fluid.transport import EXTRAPOLATION_COURANT
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import initial_state
@@ -20,8 +20,6 @@ from flowborne.scenes.schema import Scene
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.surfaces import Outline
 from flowborne.tables import MOST_STEPS
-
-Array = NDArray[np.float64]
 
 BODY_CELLS = 1.0
 """Cells that a body may cross in a step. A faster body jumps over cells, and their fluid passes

@@ -10,10 +10,9 @@ from scipy.sparse.csgraph import connected_components
 
 from flowborne.kernels.distance import MESH
 from flowborne.kernels.node_distance import BAND
-from flowborne.kernels.sheets import lower_to_sheets
 from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.thickness import way_inward
-from flowborne.kernels.triangles import crossings, distances_to_mesh
+from flowborne.kernels.triangles import crossings, distances_to_mesh, lower_to_sheets
 from flowborne.shapes.section import Section, cross
 from flowborne.shapes.shape import (
     DIRECTIONS,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.thickness import Cells, any_within, by_cells, way_inward
 
 RIM_SHARE = 0.05
@@ -43,7 +42,7 @@ def thin_parts(
     vertices: Array,
     triangles: Integers,
     width: float,
-    thickened: NDArray[np.bool_] | None = None,
+    thickened: Mask | None = None,
 ) -> float:
     """Length of the tips of a body along its surface, where no ball of diameter `width` m fits, m.
 
@@ -77,7 +76,7 @@ def thin_parts(
 
 def ball_fits(
     facets: Array, vertices: Array, triangles: Integers, cells: Cells, width: float
-) -> NDArray[np.bool_]:
+) -> Mask:
     """(k,) whether a ball of diameter `width` m beneath the middle of a facet clears the surface.
 
     facets               (k, 3, 3) corners of pieces of its triangles, m
@@ -118,7 +117,7 @@ def sides(vertices: Array, triangles: Integers) -> Integers:
     return triangles[~across(outward(vertices[triangles]))]
 
 
-def across(normal: Array) -> NDArray[np.bool_]:
+def across(normal: Array) -> Mask:
     """(k,) whether triangles of normals (k, 3) lie across z."""
     return np.asarray(np.abs(normal[:, 2]) > 0.5 * np.linalg.norm(normal, axis=1))
 

@@ -8,10 +8,9 @@ from functools import cache, cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.constraints import Rows, rows_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import Halfway, halfway
@@ -57,7 +56,7 @@ class Kinematics:
     mass_centre: Array
     cdof: Array
     dof_centre: Array
-    moves: NDArray[np.bool_]
+    moves: Mask
     vertices: Array
     vertex_jacobian: csr_array
 

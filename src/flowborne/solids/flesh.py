@@ -13,12 +13,11 @@ from typing import Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.phrases import location
 from flowborne.shapes.mesh import smooth_sheets
 from flowborne.shapes.thickness import thinnest
@@ -69,7 +68,7 @@ class Flesh:
     surface: Integers
     of_surface: Integers
     of_element: Integers
-    dofs: NDArray[np.bool_]
+    dofs: Mask
     moved: Integers
     carried: Array
     elasticity: Elasticity
@@ -132,7 +131,7 @@ class Flesh:
         return spread
 
     @cached_property
-    def positions(self) -> NDArray[np.bool_]:
+    def positions(self) -> Mask:
         """(nq,) the entries of q that belong to nodes of flesh."""
         mj = self.model.mj
         own = np.zeros(mj.nq, bool)
@@ -208,7 +207,7 @@ def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
     )
 
 
-def points_of_flesh(mj: mujoco.MjModel, grown: Sequence[Grown]) -> NDArray[np.bool_]:
+def points_of_flesh(mj: mujoco.MjModel, grown: Sequence[Grown]) -> Mask:
     """(nbody of MuJoCo,) bodies that are free nodes of flesh."""
     own = np.zeros(mj.nbody, bool)
     for g in grown:

@@ -11,10 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, dia_array
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.solids.constraints import rows_of
 from flowborne.solids.dynamics import System, centred
 from flowborne.solids.model import SolidModel
@@ -136,7 +135,7 @@ def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float
     return csr_array(tendons + _diagonal(part(data.efm_diag, data.efm_ck, dt)))
 
 
-def _tendons(s: Scratch, strength: Array, active: NDArray[np.int32]) -> csr_array:
+def _tendons(s: Scratch, strength: Array, active: Indices) -> csr_array:
     """Sum of strength J^T J over the active tendons."""
     mj, data = s.mj, s.data
     if active.size == 0:
@@ -152,5 +151,5 @@ def _diagonal(values: Array) -> dia_array:
     return dia_array((values, 0), shape=(len(values), len(values)))
 
 
-def _starts(counts: NDArray[np.int32]) -> Integers:
+def _starts(counts: Indices) -> Integers:
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])

@@ -37,9 +37,8 @@ from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import FleshSystem
 from flowborne.solids.model import SolidModel
 from flowborne.solids.prescribed import Driven, Mask
-from flowborne.solvers.answers import Drag, SparseAnswer
 from flowborne.solvers.cholesky import Cholesky, Ordering, cholesky, ordering_of
-from flowborne.solvers.mobility import Mobility, factored_mobility
+from flowborne.solvers.mobility import Drag, Mobility, SparseAnswer, factored_mobility
 
 DAMPED_SHARE, DAMPING_ORDER = 0.25, 3
 """Share that a step takes from unresolved vibrations, and how sharply it selects them."""

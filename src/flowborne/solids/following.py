@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import mass_matrix, mass_times
@@ -69,7 +68,7 @@ def rigidify(
     model: SolidModel,
     state: SolidState,
     dofs: Integers,
-    fixed: NDArray[np.bool_] | None = None,
+    fixed: Mask | None = None,
 ) -> SolidState:
     """State in which the joints `dofs` do not move, by impulses at these joints only.
 

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.triangles import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
@@ -192,17 +191,17 @@ class SolidModel:
         return displacement
 
     @cached_property
-    def moving(self) -> NDArray[np.bool_]:
+    def moving(self) -> Mask:
         """(nbody,) whether any dof moves a body."""
         return np.asarray(self.moves.any(axis=1))
 
     @cached_property
-    def met(self) -> NDArray[np.bool_]:
+    def met(self) -> Mask:
         """(nbody,) whether a body has a geometry that displaces fluid."""
         return np.isin(np.arange(self.nbody), self.geom_body)
 
     @cached_property
-    def outboard(self) -> NDArray[np.bool_]:
+    def outboard(self) -> Mask:
         """(m, m) whether a dof (column) belongs to a descendant of the body that another dof (row)
         moves, for the dofs of bones, which are the first m."""
         on = self.dof_body[self.dof_body < self.nbody]
@@ -280,12 +279,12 @@ class SolidModel:
         self.dof_names = tuple(names)
         self.dof_body: Integers = np.array(mj.dof_bodyid, dtype=np.int64)
         self.dof_root: Integers = mj.body_rootid[self.dof_body].astype(np.int64)
-        self.moves: NDArray[np.bool_] = np.zeros((self.nbody, self.nv), bool)
+        self.moves: Mask = np.zeros((self.nbody, self.nv), bool)
         for body in range(1, self.nbody):
             self.moves[body] = self.moves[mj.body_parentid[body]] | (self.dof_body == body)
         self.armature: Array = np.array(mj.dof_armature)
         self.conserved = _conserved(mj)
-        self.locked: NDArray[np.bool_] = np.zeros(self.nv, bool)
+        self.locked: Mask = np.zeros(self.nv, bool)
         if self.slab:
             self.locked = _locked(mj, self.dof_names)
 
@@ -303,7 +302,7 @@ class SolidModel:
         rotations = [geoms.rotation_of(mj.geom_quat[g]) for g in chosen]
         self.geom_rotation: Array = np.array(rotations).reshape(-1, 3, 3)
         self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
-        self.geom_covered: NDArray[np.bool_] = np.zeros(self.ngeom, bool)
+        self.geom_covered: Mask = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
             _, _, position, rotation = geoms.rest_poses(mj)
             for n, (shape, g) in enumerate(zip(self.geom_shape, chosen, strict=True)):
@@ -362,7 +361,7 @@ def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
     return numbers[name]
 
 
-def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
+def _conserved(mj: mujoco.MjModel) -> Mask:
     """Dofs whose motion carries a whole tree rigidly along a symmetry of its kinetic energy.
 
     They are, on children of the world: free joints, a first ball or hinge, slides that follow only
@@ -393,7 +392,7 @@ def _conserved(mj: mujoco.MjModel) -> NDArray[np.bool_]:
     return conserved
 
 
-def _locked(mj: mujoco.MjModel, names: tuple[str, ...]) -> NDArray[np.bool_]:
+def _locked(mj: mujoco.MjModel, names: tuple[str, ...]) -> Mask:
     """Dofs that leave the plane z = 0. Raises ValueError when one leaves it partly.
 
     A hinge must be along z and a slide across z to be free. A ball or free joint rotates about the

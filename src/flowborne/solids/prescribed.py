@@ -15,18 +15,14 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from flowborne.errors import BreakdownError
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics, SolidSystem, System, assemble
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-from flowborne.solvers.answers import Answering, DenseAnswer, Drag
-from flowborne.solvers.mobility import Mobility, dense_mobility
-
-Mask = NDArray[np.bool_]
+from flowborne.solvers.mobility import Answering, DenseAnswer, Drag, Mobility, dense_mobility
 
 MOST_ROUNDS = 50
 """Most changes of the set of active contacts and limits."""

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.geoms import element_name, rest_poses
 
 
@@ -42,13 +41,13 @@ def skinned(vertices: Array, weights: Array, turn: Array, shift: Array) -> Array
     return np.asarray(np.einsum("kij,kj->ki", blended, vertices) + weights @ shift)
 
 
-def clad_bodies(mj: mujoco.MjModel) -> NDArray[np.bool_]:
+def clad_bodies(mj: mujoco.MjModel) -> Mask:
     """(nbody,) bodies that a skin covers: it follows them, or bodies that are rigid with them."""
     carrying = np.zeros(mj.nbody, bool)
     for skin in skins_of(mj):
         carrying |= skin.weights.any(axis=0)
     carrying[0] = False
-    found: NDArray[np.bool_] = np.isin(mj.body_weldid, mj.body_weldid[carrying])
+    found: Mask = np.isin(mj.body_weldid, mj.body_weldid[carrying])
     found[0] = False
     return found
 

@@ -13,9 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, DenseTerm, Faces, Integers, Real, Rows
+from flowborne.kernels.arrays import Array, DenseTerm, Faces, Indices, Integers, Real, Rows
 from flowborne.kernels.conjugate_gradients import solve
 from flowborne.kernels.levels import at_level
 from flowborne.kernels.regions import region_loads
@@ -176,7 +175,7 @@ class PressureSystem:
         pressure = x[inside].copy().reshape(self.shape)
         return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
 
-    def closed_regions(self) -> NDArray[np.int32]:
+    def closed_regions(self) -> Indices:
         """(nx, ny, nz) number of the region without an open side of each cell, -1 in all others."""
         label = self.buffers.label
         inner = label[(slice(None) if self.slab else slice(1, -1), slice(1, -1), slice(1, -1))]

@@ -18,12 +18,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flowborne.errors import PartError, SceneError, described
 from flowborne.files.atomic import write_atomically, write_json
 from flowborne.files.given import read_json
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import kernel_threads
 from flowborne.running import COMPLETE, RunOutcome, run
 from flowborne.runs.history import history_columns, read_history
@@ -31,8 +29,6 @@ from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.save import scene_files
 from flowborne.version import __version__
-
-Array = NDArray[np.float64]
 
 FAILED = "failed"
 """Outcome of a member without a run: its scene is wrong, or its process died."""

@@ -16,13 +16,13 @@ from flowborne.error_bars import Refinement
 from flowborne.errors import SceneError
 from flowborne.extras import optional
 from flowborne.files.atomic import replaced_whole
+from flowborne.kernels.arrays import Array
 from flowborne.phrases import suggestion
 from flowborne.runs.history import unit_of
 from flowborne.studies.members import Ended, Members
 from flowborne.studies.sampling import Sample
 from flowborne.studies.schema import MeasureTable, Study, toml_text
 
-Array = NDArray[np.float64]
 Column = NDArray[Any]
 
 TAKEN: dict[str, Callable[[Array], Any]] = {

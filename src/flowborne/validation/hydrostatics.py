@@ -67,14 +67,14 @@ def displaced(world: World) -> tuple[Array, Array]:
     returns  (nbody, 3) m^3; (nbody, 3, 3) centroid of that volume for each axis, m
     """
     fluid, _ = world.flow()
-    grid, cut = fluid.grid, cut_by_bodies(world)
+    grid, closed = fluid.grid, cut_by_bodies(world).closed
     count = len(world.setup.solid.body_names)
     volume, moment = np.zeros((count, 3)), np.zeros((count, 3, 3))
     for axis in grid.axes:
-        across = cut.axis == axis
-        part = grid.cell_volume * cut.closed[across]
-        np.add.at(volume[:, axis], cut.body[across], part)
-        np.add.at(moment[:, axis], cut.body[across], part[:, None] * cut.place[across])
+        across = closed.axis == axis
+        part = grid.cell_volume * closed.part[across]
+        np.add.at(volume[:, axis], closed.body[across], part)
+        np.add.at(moment[:, axis], closed.body[across], part[:, None] * closed.place[across])
     return volume, moment / np.where(volume > 0.0, volume, 1.0)[:, :, None]
 
 

@@ -11,14 +11,12 @@ from contextlib import closing
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.kernels.jit import cores as cores_here
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
-
-Pixels = NDArray[np.uint8]
+from flowborne.view.style import Pixels
 
 START_TIME = 4.0
 """Time that further processes take to start, s; they are used only if they save more."""

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
+from flowborne.view.style import Pixels
 
-Array = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
 Scale = tuple[Array, float, float, str]
 """Colours from lowest to highest (k, 3), lowest value, highest value, name."""
 Legend = Sequence[tuple[str, str]]

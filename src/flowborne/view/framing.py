@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.shapes.shape import DIRECTIONS
 from flowborne.view.fields import SAMPLES
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.paths import domain_shown, smoothed
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
-
-Array = NDArray[np.float64]
 
 MAX_WHOLE_DOMAIN = 6.0
 """Largest fluid domain that is shown whole, in sizes of the volume swept by the bodies."""

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.view.run import Run, State
-
-Array = NDArray[np.float64]
 
 HEAD_LENGTH = 3.6
 HEAD_WIDTH = 3.0

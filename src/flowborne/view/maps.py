@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.path import Path
-from numpy.typing import NDArray
 from PIL import Image
 
+from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.fields import Legend, Scale, faded, field_of, over
 from flowborne.view.framing import windows
@@ -27,8 +27,6 @@ from flowborne.view.space.visible import visible_of
 
 if TYPE_CHECKING:
     from flowborne.view.space.stage import Stage
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-6
 """Share of a pixel that an image may lack and still fills it."""

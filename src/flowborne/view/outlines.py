@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.section import Section
 from flowborne.view.run import Run, State
-
-Array = NDArray[np.float64]
 
 ARC = 72
 """Corners of the outline of a full circle."""
@@ -63,7 +61,7 @@ def _loop(cut: Section) -> Array:
     return np.asarray(segments[longest, 0])
 
 
-def skin_loops(vertices: Array, triangles: NDArray[np.int64]) -> list[Array]:
+def skin_loops(vertices: Array, triangles: Integers) -> list[Array]:
     """Closed outlines (k, 2) of the cut of a skin with the plane z = 0, m; flesh is on their left.
 
     A vertex in the plane counts as above it, so that every outline is closed.

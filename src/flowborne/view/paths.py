@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from flowborne.kernels.arrays import Array
 from flowborne.view.run import Run
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 0.4
 """Standard deviation of the Gaussian that smooths the camera's path, s."""

@@ -15,6 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
@@ -28,8 +29,6 @@ from flowborne.view.plots import (
 )
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
-
-Array = NDArray[np.float64]
 
 FIGURE_SPACE = "\u2007"
 """As wide as a digit, so that text does not move when its numbers change."""

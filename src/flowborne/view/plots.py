@@ -13,13 +13,11 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
-from numpy.typing import NDArray
 
 from flowborne.files.atomic import write_atomically
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.view import style
 from flowborne.view.run import Run
-
-Array = NDArray[np.float64]
 
 MAX_CURVES = 6
 """Maximum number of curves in a strip."""
@@ -291,7 +289,7 @@ class Points:
 
 
 def plot_points(
-    points: Points, labels: tuple[str, str], front: NDArray[np.int64], path: Path | str | IO[bytes]
+    points: Points, labels: tuple[str, str], front: Integers, path: Path | str | IO[bytes]
 ) -> None:
     """Plot one number of many runs against another.
 

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
@@ -19,7 +20,6 @@ from flowborne.solids.skins import skinned
 from flowborne.view import style
 from flowborne.view.shot import Shot
 
-Array = NDArray[np.float64]
 State = dict[str, NDArray[Any]]
 """Arrays of one file of states/, by name."""
 

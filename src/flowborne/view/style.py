@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flowborne.kernels.arrays import Array
+
 Pixels = NDArray[np.uint8]
 
 PAPER = "#0a121c"

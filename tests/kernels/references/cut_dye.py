@@ -1,10 +1,10 @@
-"""The kernels of `cut_dye` in NumPy: slower, and nearer to what they mean."""
+"""The kernels for dye in cut cells in NumPy: slower, and nearer to what they mean."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.cut_dye import CUT, EMPTY, WHOLE, Array, Integers, Marks
+from flowborne.kernels.dye import CUT, EMPTY, WHOLE, Array, Integers, Marks
 
 from .control_volumes import neighbours_reference
 

@@ -1,4 +1,4 @@
-"""The kernels of `laplacian` in NumPy: slower, and nearer to what they mean."""
+"""The kernels for the Laplacian in NumPy: slower, and nearer to what they mean."""
 
 from __future__ import annotations
 

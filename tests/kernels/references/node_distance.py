@@ -39,7 +39,7 @@ def sample_body_reference(
     h: float,
     flat: bool,
 ) -> Array:
-    """`sample_body` in NumPy: the distances."""
+    """`lower_to_body` in NumPy for some geometries: the distances."""
     shape = box[:, 1] - box[:, 0]
     x = origin + h * (np.moveaxis(np.indices(tuple(shape)), 0, -1).reshape(-1, 3) + box[:, 0])
     if flat:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
-from flowborne.kernels.sides import CLOSED, OPEN, PERIODIC
+from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC, Array
 
 
 def subtract_gradient_reference(

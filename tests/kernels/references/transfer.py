@@ -1,4 +1,4 @@
-"""The kernels of `transfer` in NumPy: slower, and nearer to what they mean."""
+"""The kernels for transfer between levels in NumPy: slower, and nearer to what they mean."""
 
 from __future__ import annotations
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.sides import CLOSED, PERIODIC
+from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
 from flowborne.kernels.viscosity import (
     GIVEN,
     INACTIVE,

@@ -1,4 +1,4 @@
-"""The kernels of `viscous_operator` in NumPy: slower, and nearer to what they mean."""
+"""The kernels for viscous links in NumPy: slower, and nearer to what they mean."""
 
 from __future__ import annotations
 

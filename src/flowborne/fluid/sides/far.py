@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sides.open import BoundaryOpen
+from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.sides.side import Boundary, Pair, Place
 
 Centre = tuple[float | None, float | None, float | None]

@@ -14,10 +14,9 @@ from enum import IntEnum
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.kernels import elastic
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.phrases import location
 from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.elements import lumped, measures, with_middles
@@ -83,7 +82,7 @@ class Grown:
     nodes: Array
     elements: Integers
     bodies: tuple[str, ...]
-    free: NDArray[np.bool_]
+    free: Mask
     tissue: Tissue
 
 

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from flowborne.extras import flesh_library
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import surface_of
 from flowborne.solids.tissue.bones import Bones, signed_distance
@@ -59,7 +58,7 @@ class Chamber:
         self,
         points: Array,
         elements: Integers,
-        wanted: NDArray[np.bool_],
+        wanted: Mask,
         surface: Mesh,
         tolerance: float,
     ) -> tuple[Array, Integers]:
@@ -87,7 +86,7 @@ class Chamber:
         unfolded[turned] = unfolded[turned][..., MIRRORED_CORNERS]
         return images.reshape(-1, 3)[first], unfolded.reshape(-1, 4)
 
-    def _joined(self, on_wall: NDArray[np.bool_], count: int) -> Integers:
+    def _joined(self, on_wall: Mask, count: int) -> Integers:
         """(g, count) numbers of the images of points; two images share the points on the wall
         between them."""
         numbers = np.arange(len(self.images) * count).reshape(-1, count)
@@ -99,9 +98,7 @@ class Chamber:
             graph = graph + coo_array((np.ones(pair[0].size), pair), shape=graph.shape)
         return np.asarray(connected_components(graph, directed=False)[1]).reshape(-1, count)
 
-    def _on_walls(
-        self, points: Array, elements: Integers, surface: Mesh, tolerance: float
-    ) -> NDArray[np.bool_]:
+    def _on_walls(self, points: Array, elements: Integers, surface: Mesh, tolerance: float) -> Mask:
         """(k, n) for each wall, the points of faces that lie in it.
 
         These are the faces near the wall with a middle no closer to the surface. The normals of

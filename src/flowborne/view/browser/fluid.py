@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.runs.states import cell_velocity
 from flowborne.view import style
 from flowborne.view.browser.meshes import Mesh, joined, nothing, show_mesh
@@ -32,12 +32,11 @@ from flowborne.view.shot import Shot
 from flowborne.view.space.fluid import VortexSurfaces
 from flowborne.view.space.lighting import scattered
 from flowborne.view.space.visible import VisibleDye, VisibleVortices
+from flowborne.view.style import Pixels
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
-Array = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
 
 MIN_IMAGE_SIDE = 768
 """Minimum longer side of the image that is sent, pixels, unless it has to be fast."""

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
+
+from flowborne.kernels.arrays import Array, Integers
 
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Mesh = tuple[Array, Integers]
 """Vertices (n, 3) m and triangles (m, 3) of them, outward."""
 

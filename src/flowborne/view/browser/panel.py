@@ -7,8 +7,8 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.viewpoint import FilmView
@@ -19,8 +19,6 @@ from flowborne.view.run import Run
 
 if TYPE_CHECKING:
     from viser import GuiApi
-
-Array = NDArray[np.float64]
 
 COLOUR_STOPS = 24
 """Number of colours in the bar of a scale."""

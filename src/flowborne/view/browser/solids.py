@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.browser.meshes import (
     Mesh,
@@ -27,8 +27,6 @@ from flowborne.view.space.surfaces import Outside, colour_of, creased, force_arr
 
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
-
-Array = NDArray[np.float64]
 
 SLAB_THICKNESS = 0.02
 """Thickness of drawn slabs, in smaller sides of the view."""

@@ -6,9 +6,8 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
 from flowborne.view.browser.meshes import add_mesh
 from flowborne.view.browser.viewpoint import FilmView
@@ -20,8 +19,6 @@ from flowborne.view.space.surroundings import SQUARE, stands_on_ground
 
 if TYPE_CHECKING:
     from viser import LineSegmentsHandle, SceneApi
-
-Array = NDArray[np.float64]
 
 MOTES = 20_000
 """Number of motes in a cube around the domain."""

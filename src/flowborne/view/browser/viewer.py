@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from flowborne.errors import SceneError
 from flowborne.extras import optional
+from flowborne.kernels.arrays import Array
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.view.browser.fluid import MIN_IMAGE_SIDE, Fluid
@@ -27,8 +28,6 @@ from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:
     from viser import ViserServer
-
-Array = NDArray[np.float64]
 
 
 class GrowingRun(Run):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.view.framing import windows
 from flowborne.view.outlines import Outlines
 from flowborne.view.run import Run
@@ -15,8 +15,6 @@ from flowborne.view.space.camera import camera_of
 
 if TYPE_CHECKING:
     from viser import ClientHandle, GuiMarkdownHandle
-
-Array = NDArray[np.float64]
 
 ASPECT = 0.75
 """Approximate height over width of the part of a browser's window that shows the run."""

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.view import style
 from flowborne.view.glyphs import HEAD_LENGTH, HEAD_WIDTH
 from flowborne.view.run import Run
 from flowborne.view.space.camera import Camera
-
-Array = NDArray[np.float64]
 
 SIDES = 16
 """Number of sides of a shaft."""
@@ -69,7 +67,7 @@ def arrows(tails: Array, vectors: Array, width: float) -> Array:
     return np.concatenate(rings, axis=1)
 
 
-def arrow_mesh(tails: Array, vectors: Array, width: float) -> tuple[Array, NDArray[np.int64]]:
+def arrow_mesh(tails: Array, vectors: Array, width: float) -> tuple[Array, Integers]:
     """Vertices (k, 3) m and triangles (m, 3), outward, of the same arrows."""
     corners = arrows(tails, vectors, width)
     triangles = np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
@@ -81,7 +79,7 @@ _TURN = 2.0 * np.pi * np.arange(SIDES) / SIDES
 _CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
 
-def _faces() -> NDArray[np.int64]:
+def _faces() -> Integers:
     """(m, 4) corners of the faces between successive rings of an arrow."""
     corner = np.arange(SIDES)
     following = np.roll(corner, -1)

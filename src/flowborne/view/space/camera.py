@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.view.framing import followed, radius_of
 from flowborne.view.paths import domain_shown
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
-
-Array = NDArray[np.float64]
 
 FILLED, FILLED_BY_FLUID = 0.8, 0.9
 """Maximum part of the map that the bodies, or the domain of a fluid, fill."""

@@ -13,7 +13,7 @@ from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkVolume, vtkVolumeProperty
 from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
 from flowborne.view.fields import FieldNumber
 from flowborne.view.run import State
@@ -21,9 +21,7 @@ from flowborne.view.space.camera import Camera
 from flowborne.view.space.lighting import scattered
 from flowborne.view.space.surfaces import LIT
 from flowborne.view.space.visible import Visible, VisibleDye, VisibleVortices
-
-Array = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
+from flowborne.view.style import Pixels
 
 SMOKE_DEPTH = 0.016
 """Depth of full smoke that transmits 1/e of the light, in heights of the picture, or in sides of a

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.view import style
 
-Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
 KEY = (0.1, 0.75, -1.25)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves
 from flowborne.view.paths import through_window, window_path
@@ -26,9 +25,7 @@ from flowborne.view.space.surfaces import (
 )
 from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground, water_of
 from flowborne.view.space.visible import Visible
-
-Array = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
+from flowborne.view.style import Pixels
 
 MULTI_SAMPLES = 8
 """Samples per pixel of anti-aliasing."""

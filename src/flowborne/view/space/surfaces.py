@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from flowborne.kernels.arrays import Array
 from flowborne.shapes.shape import unit
 from flowborne.view import style
 from flowborne.view.glyphs import Forces
 from flowborne.view.run import Geom, Skin, State
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 SHARP = 35.0

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.spatial import ConvexHull, QhullError
 
+from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.framing import swept
 from flowborne.view.glyphs import motes, round_number
 from flowborne.view.run import Run
-
-Array = NDArray[np.float64]
 
 MAX_STANDING_GAP = 0.11
 """Maximum distance of the lowest point of standing bodies from z = 0, in heights of the bodies."""

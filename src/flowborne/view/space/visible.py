@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.runs.states import cell_vorticity, velocity_gradients
 from flowborne.view import style
 from flowborne.view.fields import NUMBERS, FieldNumber, Legend, Scale, dye_colours, side_weight
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 
-Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
 SAMPLES = 12
