@@ -23,8 +23,8 @@ class ClosedParts(NamedTuple):
 
     axis, face      (n,) axis of the face, and its flat index among those across that axis
     body, part      (n,) the body, and the fraction that it closes
-    place           (n, 3) centre of what bodies close of the face, that of the face where flesh does;
-                    at the body itself where an image closes it, m
+    place           (n, 3) centre of what bodies close of the face, of the whole face where flesh
+                    does; at the body itself where an image closes it, m
     corner, weight  (nf, 3) vertices that move the last nf of them, closed by flesh, and how much
                     each does
     """
