@@ -186,17 +186,22 @@ def weights(system: ViscousFaces, tied: Array) -> csr_array:
     return csr_array((np.concatenate(values), np.concatenate(places), starts), (total, total))
 
 
-def between_faces(walls: Walls, scale: Array) -> tuple[Integers, csr_array]:
+def between_faces(systems: list[ViscousFaces], scale: Array) -> tuple[Integers, csr_array]:
     """The faces that corners couple, and what W has between them, scaled on both sides.
 
-    scale  (n,) of the faces beside each wall
+    scale  of the concatenated faces
     """
-    beyond = (walls.weight - diags_array(walls.weight.diagonal())).tocoo()
-    kept = beyond.data != 0.0
-    row, column, value = beyond.row[kept], beyond.col[kept], beyond.data[kept]
-    faces, place = np.unique(walls.index[[row, column]], return_inverse=True)
-    between = value * scale[row] * scale[column]
-    return faces, csr_array((between, place.reshape(2, -1)), (faces.size, faces.size))
+    sizes = [0, *(system.kind.size for system in systems)]
+    each = zip(systems, np.cumsum(sizes), strict=False)
+    around = np.concatenate([first + system.corners.faces for system, first in each])
+    between = np.concatenate([system.corners.matrix for system in systems])
+    between = between * (1.0 - np.eye(AROUND))
+    between *= scale[around][:, :, None]
+    between *= scale[around][:, None, :]
+    faces, place = np.unique(around, return_inverse=True)
+    row = np.repeat(place.reshape(-1, AROUND, 1), AROUND, axis=2)
+    at = row.ravel(), row.swapaxes(1, 2).ravel()
+    return faces, csr_array((between.ravel(), at), (faces.size, faces.size))
 
 
 class ViscousSystem:
@@ -234,7 +239,7 @@ class ViscousSystem:
         pull = scale[:, None] * (self.loose @ walls.arm)
         starts = np.arange(0, count * entries + 1, entries)
         self.rows = walls.index, starts, walls.columns.ravel(), pull.ravel()
-        self.corner_faces, self.corners = between_faces(walls, scale)
+        self.corner_faces, self.corners = between_faces(systems, self.scale)
 
     def at_walls(self, twist: Array) -> Array:
         """(n,) B s: velocity of the bodies at the wall faces, m/s."""

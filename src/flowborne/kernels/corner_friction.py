@@ -263,14 +263,13 @@ def corner_stiffness(
             wall_at(beside, wall, own[NARROW]) / stiffness,
             wall_at(beside, wall, own[BEYOND]) / stiffness,
         )
-        stays = upward * end[t] / abs(end[s]) * (1.0 - h) / (1.0 - b)
+        stays = min(max(upward * end[t] / abs(end[s]) * (1.0 - h) / (1.0 - b), 0.0), 1.0)
         if beyond < 1.0 or own[BEHIND] < 0:
             stays = 1.0
-        for n in range(2):
-            share = max(1.0 - stays, 0.0) if n == 0 else min(stays, 1.0)
+        for in_row, share in ((False, 1.0 - stays), (True, stays)):
             if share > 0.0:
-                form = corner_form(narrow, beyond, volume, b, h, n == 1, known, walls)
-                matrix[count] += min(share, 1.0) * stiffness * form[:AROUND, :AROUND]
+                form = corner_form(narrow, beyond, volume, b, h, in_row, known, walls)
+                matrix[count] += share * stiffness * form[:AROUND, :AROUND]
         if own[BEHIND] < 0:
             own[BEHIND] = own[BEYOND]  # to which nothing is added
         node[count] = nearest_node(distance, cells[c, 0], cells[c, 1], cells[c, 2], 1, 1, 1)

@@ -218,8 +218,8 @@ def closed_face(
     The sum over what bodies take of the edges and the walls from where the way around the face
     leaves bodies to where it next enters one (Green's theorem). So corners inside across a diagonal
     are joined: a thin body stays in one piece. Of several geometries what closes the middle of an
-    edge stays by itself. A `straight` wall is the chord from crossing to
-    crossing. In a slab, `flat`, a face across x or y is an edge.
+    edge stays by itself. A `straight` wall is the chord from crossing to crossing. In a slab,
+    `flat`, a face across x or y is an edge.
     """
     s, t = other_axes(axis)
     if flat and axis < 2:
