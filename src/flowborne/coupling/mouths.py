@@ -210,12 +210,7 @@ def cells_with_inlets(jets: tuple[Jet, ...], sources: Array) -> Integers:
 
 
 def inlets_across(
-    axis: int,
-    cells: Integers,
-    jets: tuple[Jet, ...],
-    sources: Array,
-    grid: Grid,
-    sides: Boundaries,
+    axis: int, cells: Integers, jets: tuple[Jet, ...], sources: Array, grid: Grid, sides: Boundaries
 ) -> Inlets:
     """What mouths and sources bring to the control volumes of the faces across `axis`.
 

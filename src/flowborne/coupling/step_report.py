@@ -104,11 +104,7 @@ def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
 
 
 def momentum_balance(
-    world: World,
-    mass: Faces,
-    half: HalfPressure,
-    advected: AdvectionResult,
-    solved: Solved,
+    world: World, mass: Faces, half: HalfPressure, advected: AdvectionResult, solved: Solved
 ) -> Momentum:
     """The fluid's budget of a step that ends with the masses `mass` of the faces."""
     fluid, _ = world.flow()

@@ -63,11 +63,7 @@ class Dyed:
     error: float
 
 
-def carry_dye(
-    scalars: dict[str, Array],
-    passage: Passage,
-    sources: tuple[Source, ...],
-) -> Dyed:
+def carry_dye(scalars: dict[str, Array], passage: Passage, sources: tuple[Source, ...]) -> Dyed:
     """The scalars a step later."""
     time, later, error = passage.transport.time + passage.transport.dt, {}, 0.0
     for name, values in scalars.items():
@@ -91,12 +87,7 @@ class Passage:
     """
 
     def __init__(
-        self,
-        transport: Transport,
-        brought: Brought,
-        grid: Grid,
-        sides: Boundaries,
-        backwards: bool,
+        self, transport: Transport, brought: Brought, grid: Grid, sides: Boundaries, backwards: bool
     ) -> None:
         self.transport, self.brought, self.backwards = transport, brought, backwards
         self.grid, self.sides = grid, sides

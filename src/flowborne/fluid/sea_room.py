@@ -128,11 +128,7 @@ def grouped(line: WakeLine, bins: Array) -> Groups:
     circulation, moment = bins[:, :3], bins[:, 3:].reshape(-1, 3, 3)
     off = line.length * (np.arange(BINS) + 0.5 - np.repeat(middle, GROUPS))
     shifted = moment + np.einsum("k,j,ki->kji", off, line.along, circulation)
-    return (
-        line.at(middle),
-        np.add.reduceat(circulation, first),
-        np.add.reduceat(shifted, first),
-    )
+    return (line.at(middle), np.add.reduceat(circulation, first), np.add.reduceat(shifted, first))
 
 
 def potential(groups: Groups, edges: Array, axis: int) -> Array:

@@ -28,14 +28,7 @@ from flowborne.fluid.control_volumes import NOTHING, ControlVolumes
 from flowborne.fluid.ghosts import edge, kernel_axes, packed_sides, plane, planes
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
-from flowborne.kernels.carry import (
-    Fluxes,
-    Inflows,
-    Scratch,
-    Volumes,
-    carry,
-    prepare,
-)
+from flowborne.kernels.carry import Fluxes, Inflows, Scratch, Volumes, carry, prepare
 from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.flux import GHOSTS, largest_crossing
 

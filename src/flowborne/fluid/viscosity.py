@@ -175,12 +175,7 @@ def assemble_viscosity(
 
 
 def stick_to_sides(
-    kind: Marks,
-    stiffness: float,
-    grid: Grid,
-    boundaries: Boundaries,
-    axis: int,
-    time: float,
+    kind: Marks, stiffness: float, grid: Grid, boundaries: Boundaries, axis: int, time: float
 ) -> tuple[Array, Array]:
     """Friction of the domain's sides on the faces across `axis`, kg/s, and the force of moving
     ones, N."""

@@ -75,10 +75,7 @@ def dense_mobility(matrix: Array) -> Mobility:
 
 
 def factored_mobility(
-    jacobian: csr_array,
-    factor: Cholesky,
-    taken: Array,
-    compliant: Array,
+    jacobian: csr_array, factor: Cholesky, taken: Array, compliant: Array
 ) -> Mobility:
     """Of a factorised matrix.
 
