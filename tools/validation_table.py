@@ -9,7 +9,7 @@ from typing import Any
 
 from failing import REPORT, ROOT
 from failing import number as shown
-from flowborne.validation.case import entry
+from flowborne.validation.case import THE_RUN, entry
 from flowborne.validation.report import (
     code,
     failures,
@@ -105,7 +105,9 @@ def failing() -> str:
 
 
 def off(finding: dict[str, Any]) -> float:
-    """Distance from the reference over its size; infinite where that is 0."""
+    """Distance from the reference over its size; infinite where that is 0, or the run broke down."""
+    if finding["quantity"] == THE_RUN:
+        return math.inf
     value, reference = float(finding["value"]), float(finding["reference"])
     return abs(value - reference) / abs(reference) if reference else math.inf
 
