@@ -74,9 +74,10 @@ def test_parts_of_a_frame_add_up():
 
 
 def test_memory_of_a_run_does_not_grow():
-    """After thirty frames, when NumPy has filled its caches of small blocks: 0.1 MB of 3.6."""
+    """After sixty frames, when NumPy has filled its caches of small blocks: 0.04 MB of 3.9 in
+    thirty more, and less in each thirty after."""
     scene = load_scene(frame_costs.BLOCK, COARSE)
-    per_cell, growth = frame_costs.footprint(scene, early=30, late=60)
+    per_cell, growth = frame_costs.footprint(scene, early=60, late=90)
     assert 100.0 < per_cell.value < 100_000.0
     assert growth.verdict == "pass", growth
     assert growth.value > 0.0
