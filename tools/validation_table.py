@@ -105,7 +105,7 @@ def failing() -> str:
 
 
 def off(finding: dict[str, Any]) -> float:
-    """Distance from the reference over its size; infinite where that is 0, or the run broke down."""
+    """Distance from the reference over its size; infinite where that is 0, and of a broken run."""
     if finding["quantity"] == THE_RUN:
         return math.inf
     value, reference = float(finding["value"]), float(finding["reference"])
