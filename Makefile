@@ -11,8 +11,8 @@ demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
 
 lint: $(VENV)/installed-test
-	$(BIN)/ruff check src tests tools docs
-	$(BIN)/ruff format --check src tests tools docs
+	$(BIN)/ruff check src validation tests tools docs
+	$(BIN)/ruff format --check src validation tests tools docs
 	$(BIN)/mypy
 
 test: lint
@@ -79,14 +79,14 @@ baselines: $(VENV)/installed-test
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/installed: pyproject.toml $(VENV)/bin/python
+$(VENV)/installed: pyproject.toml validation/pyproject.toml $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable '.[film]'
+	$(BIN)/python -m pip install --quiet --editable '.[film]' --editable ./validation
 	touch $@
 
-$(VENV)/installed-test: pyproject.toml $(VENV)/bin/python
+$(VENV)/installed-test: pyproject.toml validation/pyproject.toml $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable '.[test,bench]'
+	$(BIN)/python -m pip install --quiet --editable '.[test]' --editable './validation[bench]'
 	touch $@ $(VENV)/installed
 
 clean:

@@ -8,8 +8,8 @@ import pytest
 from flowborne import Grid, SceneError, Simulation, load_scene, step
 from flowborne.bodies import TrajectorySinusoid, WindForce
 from flowborne.body_measures import BodyMeasures
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
+from flowborne_validation.worlds import mjcf
 
 BALL = (
     '<body name="ball" pos="0.1 0 0"><joint name="along" type="slide" axis="1 0 0"{spring}/>'

@@ -310,12 +310,12 @@ def cases(monkeypatch):
         return chosen
 
     for module, name, stands_in in (
-        ("validation", "case_ids", lambda: tuple(results)),
-        ("validation.running", "run_cases", run_all),
-        ("bench", "bench_names", lambda: tuple(results)),
-        ("bench", "run_benches", run_all),
+        (".cases", "case_ids", lambda: tuple(results)),
+        (".running", "run_cases", run_all),
+        (".bench", "bench_names", lambda: tuple(results)),
+        (".bench", "run_benches", run_all),
     ):
-        monkeypatch.setattr(f"flowborne.{module}.{name}", stands_in)
+        monkeypatch.setattr(f"flowborne_validation{module}.{name}", stands_in)
     return asked
 
 
@@ -340,14 +340,14 @@ def test_an_interrupted_validation_says_how_it_goes_on(command, cases, monkeypat
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flowborne.validation.running.run_cases", interrupted)
+    monkeypatch.setattr("flowborne_validation.running.run_cases", interrupted)
     code, out, err = command("validate", "--report", "kept")
     assert (code, out) == (130, "")
     assert err == "flowborne: interrupted; kept has the finished cases; run again to continue\n"
 
 
 def test_a_validation_says_which_cases_of_its_report_are_of_other_code(command, cases, monkeypatch):
-    monkeypatch.setattr("flowborne.validation.report.of_other_code", lambda _: ["B1 (all)", "B2"])
+    monkeypatch.setattr("flowborne_validation.report.of_other_code", lambda _: ["B1 (all)", "B2"])
     code, _, err = command("validate", "--case", "K1", "--report", "kept")
     assert (code, err) == (0, "kept: measured with other code: B1 (all), B2\n")
 
@@ -379,10 +379,10 @@ def figures(monkeypatch):
             raise ArithmeticError("ns-block-effort: frame 3, step 1: the fluid blew up")
         (out / "figure-2.csv").write_text("run\n")
 
-    stand_in = ModuleType("flowborne.validation.figures")
+    stand_in = ModuleType("flowborne_validation.figures")
     stand_in.make_figures = make_figures
     stand_in.figure_names = lambda: ("2", "10")
-    monkeypatch.setitem(sys.modules, "flowborne.validation.figures", stand_in)
+    monkeypatch.setitem(sys.modules, "flowborne_validation.figures", stand_in)
     return asked
 
 

@@ -11,14 +11,30 @@ from pathlib import Path
 
 import pytest
 
-from dist import ROOT, SUPPORTED, build, environment, flowborne, install, interpreters, members
+from dist import (
+    ROOT,
+    SUPPORTED,
+    VALIDATION,
+    build,
+    environment,
+    flowborne,
+    install,
+    interpreters,
+    members,
+)
 
-DATA = {
-    path.relative_to(ROOT / "src").as_posix()
-    for path in (ROOT / "src" / "flowborne").rglob("*")
-    if path.is_file() and path.suffix in (".toml", ".xml", ".npz", ".json", ".gz")
-}
-"""Scenes, models, meshes, references and measurements."""
+
+def files(source: Path, *kinds: str) -> set[str]:
+    """Files of a source tree with these suffixes, by their paths in its package."""
+    return {
+        path.relative_to(source / "src").as_posix()
+        for path in (source / "src").rglob("*")
+        if path.is_file() and path.suffix in kinds
+    }
+
+
+DATA = files(ROOT, ".toml", ".xml", ".npz")
+"""Scenes, models and meshes."""
 
 FOUND = interpreters()
 PRESENT = f"{sys.version_info.major}.{sys.version_info.minor}"
@@ -28,6 +44,12 @@ PRESENT = f"{sys.version_info.major}.{sys.version_info.minor}"
 def archives(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """sdist and wheel of this tree."""
     return build(tmp_path_factory.mktemp("dist"))
+
+
+@pytest.fixture(scope="module")
+def validation(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """sdist and wheel of the validation."""
+    return build(tmp_path_factory.mktemp("validation"), VALIDATION)
 
 
 @pytest.fixture(scope="module")
@@ -50,13 +72,24 @@ def test_the_wheel_holds_the_package_and_its_data(archives: tuple[Path, Path]) -
     held = members(archives[1])
     assert len(DATA) > 40
     assert held >= DATA
-    code = {path.relative_to(ROOT / "src").as_posix() for path in ROOT.glob("src/**/*.py")}
-    assert held >= code
     described = {name for name in held if ".dist-info/" in name}
-    packed = {f"flowborne/validation/{robot}/LICENSE" for robot in ("fishrobot", "rexeel")}
-    assert held - described == code | DATA | packed
-    licences = {name.partition("/licenses/")[2] for name in described if "/licenses/" in name}
-    assert licences == {"LICENSE", *(f"src/{name}" for name in packed)}
+    assert held - described == files(ROOT, ".py") | DATA
+    assert licences(held) == {"LICENSE"}
+
+
+def test_the_wheel_of_the_validation_holds_its_cases(validation: tuple[Path, Path]) -> None:
+    held = members(validation[1])
+    described = {name for name in held if ".dist-info/" in name}
+    packed = {f"flowborne_validation/{robot}/LICENSE" for robot in ("fishrobot", "rexeel")}
+    data = files(VALIDATION, ".json", ".gz")
+    assert len(data) > 5
+    assert held - described == files(VALIDATION, ".py") | data | packed
+    assert licences(held) == {"LICENSE", *(f"src/{name}" for name in packed)}
+
+
+def licences(held: set[str]) -> set[str]:
+    """Those that a wheel's description lists."""
+    return {found for name in held if (found := name.partition("/licenses/")[2])}
 
 
 def test_the_sdist_holds_the_sources_and_no_tests(archives: tuple[Path, Path]) -> None:
@@ -75,6 +108,19 @@ def test_the_wheel_works_in_a_fresh_environment(
     assert "\nnothing wrong\n" in flowborne(fresh, tmp_path, "check", "block-effort-wind")
     assert f"flowborne {version}" in flowborne(fresh, tmp_path, "doctor")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_validation_is_found_when_it_is_installed(
+    validation: tuple[Path, Path], fresh: str, tmp_path: Path
+) -> None:
+    """Without it the command says in one line what to install."""
+    with pytest.raises(RuntimeError, match=r"flowborne: validate is a command of .*\n$") as missing:
+        flowborne(fresh, tmp_path, "validate")
+    assert missing.value.args[0].endswith("with: pip install ./validation\n")
+    install(fresh, validation[1], "--no-deps", "--no-index", "--no-compile")
+    with pytest.raises(RuntimeError, match="flowborne: --case F0: there is no such case; did you"):
+        flowborne(fresh, tmp_path, "validate", "--case", "F0")
+    assert "Measure the speed" in flowborne(fresh, tmp_path, "bench", "--help")
 
 
 @pytest.mark.parametrize("version", [v for v in SUPPORTED if v != PRESENT])

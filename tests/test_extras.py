@@ -10,7 +10,7 @@ import pytest
 
 from flowborne import extras
 from flowborne.errors import SceneError
-from flowborne.validation.page import curves_of
+from flowborne_validation.page import curves_of
 from fuzz_judge import command
 
 HEAVY = [*extras.DRAWING, "vtkmodules", "pytetwild", "viser"]
@@ -55,7 +55,7 @@ def test_a_film_is_refused_with_what_to_install(
 
 
 def test_a_report_without_matplotlib_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flowborne.validation.page.find_spec", lambda name: None)
+    monkeypatch.setattr("flowborne_validation.page.find_spec", lambda name: None)
     assert "pip install 'flowborne[film]'" in curves_of({"x": "s", "y": "m", "curves": []})
 
 
@@ -70,11 +70,12 @@ class Barred:
             raise ModuleNotFoundError(name)
 sys.meta_path.insert(0, Barred())
 import flowborne
-rooms = "fluid kernels solvers shapes solids coupling control motion scenes runs files validation"
-for room in rooms.split():
-    package = importlib.import_module("flowborne." + room)
+rooms = "fluid kernels solvers shapes solids coupling control motion scenes runs files"
+rooms = ["flowborne." + room for room in rooms.split()] + ["flowborne_validation"]
+for room in rooms:
+    package = importlib.import_module(room)
     for found in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
-        if found.name != "flowborne.validation.figures":
+        if found.name != "flowborne_validation.figures":
             importlib.import_module(found.name)
 import flowborne.cli, flowborne.running, flowborne.worlds
 """

@@ -14,8 +14,8 @@ from flowborne.bodies import SolidState, TrajectorySinusoid, kinetic_energy, pot
 from flowborne.joint_measures import JointMeasures
 from flowborne.measures import Measures
 from flowborne.scenes.build import build
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
+from flowborne_validation.worlds import mjcf
 
 NOTHING = np.zeros(0, np.int64)
 PERIOD = 0.8

@@ -4,8 +4,8 @@ import pytest
 from flowborne import FrameReport, Grid, Setup, SolidModel, World, step
 from flowborne.measures import Measures
 from flowborne.solids.geoms import quaternion_of
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, cut_by_bodies, make_world
+from flowborne_validation.worlds import mjcf
 
 MODEL = """
 <mujoco>

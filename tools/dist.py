@@ -1,7 +1,7 @@
-"""Builds sdist and wheel, and tries the wheel in fresh environments: `make dist`.
+"""Builds sdists and wheels, and tries the wheels in fresh environments: `make dist`.
 
 Every Python of those that flowborne supports and that this machine has gets an environment of its
-own, with all that the wheel depends on.
+own, with all that the wheel of flowborne depends on, then that of its validation.
 """
 
 from __future__ import annotations
@@ -28,6 +28,10 @@ COMMANDS = (
 )
 """What a fresh environment must be able to do."""
 
+VALIDATION = ROOT / "validation"
+CASES = (("validate", "--case", "F6"), ("bench", "--help"))
+"""And with the wheel of the validation."""
+
 
 def interpreters() -> dict[str, str]:
     """Version -> path of its interpreter, where it is on the PATH or kept by pyenv."""
@@ -48,12 +52,12 @@ def _places(name: str, version: str) -> Iterator[str]:
     yield from (str(path) for path in sorted(kept.glob(f"{version}.*/bin/{name}")))
 
 
-def build(folder: Path) -> tuple[Path, Path]:
-    """(sdist, wheel) of this tree, put into `folder`; the wheel is built from the sdist.
+def build(folder: Path, source: Path = ROOT) -> tuple[Path, Path]:
+    """(sdist, wheel) of a source tree, put into `folder`; the wheel is built from the sdist.
 
     What builds them is that of this environment: nothing is fetched.
     """
-    command = ["-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    command = ["-m", "build", "--no-isolation", "--outdir", str(folder), str(source)]
     _run([sys.executable, *command], ROOT)
     (sdist,), (wheel,) = folder.glob("*.tar.gz"), folder.glob("*.whl")
     return sdist, wheel
@@ -99,15 +103,17 @@ def _run(command: list[str], folder: Path) -> str:
 
 def main() -> None:
     """Build into dist/, then try the wheel in one environment after the other."""
-    folder = ROOT / "dist"
-    shutil.rmtree(folder, ignore_errors=True)
-    sdist, wheel = build(folder)
-    print(f"{sdist.name}\n{wheel.name}")
+    shutil.rmtree(ROOT / "dist", ignore_errors=True)
+    sdist, wheel = build(ROOT / "dist" / "flowborne")
+    its_sdist, its_wheel = build(ROOT / "dist" / "validation", VALIDATION)
+    print(*(file.name for file in (sdist, wheel, its_sdist, its_wheel)), sep="\n")
     for version, interpreter in interpreters().items():
         with TemporaryDirectory() as place:
             python = environment(interpreter, Path(place) / "environment")
             install(python, wheel)
-            for arguments in COMMANDS:
+            for arguments in (*COMMANDS, *CASES):
+                if arguments is CASES[0]:
+                    install(python, its_wheel)
                 print(f"Python {version}: flowborne {' '.join(arguments)}", flush=True)
                 flowborne(python, Path(place), *arguments)
 

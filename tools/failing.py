@@ -5,8 +5,8 @@ from __future__ import annotations
 import textwrap
 from pathlib import Path
 
-from flowborne.validation.case import entry
-from flowborne.validation.report import failures, read_report, verdicts
+from flowborne_validation.case import entry
+from flowborne_validation.report import failures, read_report, verdicts
 from marked import with_part
 
 ROOT = Path(__file__).parents[1]

@@ -6,8 +6,8 @@ from typing import Any
 
 from failing import REPORT, ROOT
 from failing import number as shown
-from flowborne.validation.case import reference
-from flowborne.validation.report import Data, grid_of, read_report, tier_of
+from flowborne_validation.case import reference
+from flowborne_validation.report import Data, grid_of, read_report, tier_of
 from markdown_text import plain, table
 from marked import with_part
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from failing import REPORT
-from flowborne.validation.case import Tier
-from flowborne.validation.report import Data, read_report
+from flowborne_validation.case import Tier
+from flowborne_validation.report import Data, read_report
 
 ACCEPTED = 0.01
 """Difference of a figure over its size."""

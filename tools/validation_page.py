@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from failing import REPORT
-from flowborne.validation.page import curves_of, drag_over_reynolds, plots_of
-from flowborne.validation.report import Data, read_report, tier_of
+from flowborne_validation.page import curves_of, drag_over_reynolds, plots_of
+from flowborne_validation.report import Data, read_report, tier_of
 
 DRAG = "drag"
 """Plot that several cases share."""

@@ -9,8 +9,9 @@ from typing import Any
 
 from failing import REPORT, ROOT
 from failing import number as shown
-from flowborne.validation.case import THE_RUN, entry
-from flowborne.validation.report import (
+from flowborne.version import __version__
+from flowborne_validation.case import THE_RUN, entry
+from flowborne_validation.report import (
     code,
     failures,
     grid_of,
@@ -21,7 +22,6 @@ from flowborne.validation.report import (
     verdict_of,
     verdicts,
 )
-from flowborne.version import __version__
 from markdown_text import plain, table
 from validation_page import DRAG, Picture, pictures
 

@@ -7,15 +7,14 @@ is one message on stderr.
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
-from difflib import get_close_matches
 from functools import wraps
+from importlib.metadata import entry_points
 from inspect import Parameter, signature
 from pathlib import Path
 from time import perf_counter
@@ -29,13 +28,12 @@ from flowborne.console import (
     check_lines,
     complain,
     fault_of,
-    result_printer,
     run_lines,
     sentence_of,
 )
 from flowborne.errors import PartError, SceneError
 from flowborne.extras import check_drawing, missing_to_draw, optional
-from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, make_folder
+from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write
 from flowborne.version import __version__
 
 log = logging.getLogger("flowborne")
@@ -45,6 +43,12 @@ FAILED, WRONG, WARNED, INTERRUPTED = 1, 2, 3, 130
 
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Our solves are small: more threads in BLAS are slower, and their sums differ."""
+
+ADDED = "flowborne.commands"
+"""Group of the entry points that add commands."""
+
+OF_VALIDATION = ("validate", "bench", "figures")
+INSTALL_VALIDATION = "install it from a copy of the repository with: pip install ./validation"
 
 FILE_KEYS = ("clip.file", "earlier.run", "solids.model")
 """Keys of scenes that name files or folders: paths in a command start from the current folder."""
@@ -59,7 +63,14 @@ class StoppedError(Exception):
 
 
 class _Commands(TyperGroup):
-    """The commands; an interruption of one is a StoppedError."""
+    """The commands, and those that other distributions add (see `_added`); an interruption of one
+    is a StoppedError."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [*super().list_commands(ctx), *(found.name for found in entry_points(group=ADDED))]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        return super().get_command(ctx, cmd_name) or _added(cmd_name)
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -77,6 +88,35 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+
+def _added(name: str) -> Any:
+    """The command of another distribution, None if there is none: an entry point of the group
+    ADDED, a function with typer's annotations that raises ValueError for wrong input and OSError
+    for what cannot be written.
+
+    raises  InputError for a command of flowborne-validation where that is not installed
+    """
+    found = entry_points(group=ADDED, name=name)
+    if not found:
+        if name in OF_VALIDATION:
+            raise InputError(f"{name} is a command of flowborne-validation; {INSTALL_VALIDATION}")
+        return None
+    run = found[name].load()
+
+    @wraps(run)
+    def command(**given: Any) -> None:
+        try:
+            run(**given)
+        except ValueError as error:
+            raise InputError(str(error)) from error
+        except OSError as error:
+            raise cannot_write(Path(error.filename or "."), error) from error
+
+    one = typer.Typer(add_completion=False, rich_markup_mode=None)
+    one.command(name)(command)
+    return typer.main.get_command(one)
+
+
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 """What typer raises when the command line itself is wrong."""
 
@@ -88,7 +128,6 @@ def _set(help: str) -> Any:
 
 SceneOption = Annotated[list[str] | None, _set("Change a value of the scene.")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print only a JSON list of results.")]
 
 
 def _version(wanted: bool) -> None:
@@ -470,85 +509,6 @@ def import_(
 
 
 @app.command()
-def validate(
-    case: Annotated[
-        list[str] | None, typer.Option(metavar="ID", help="Only this case; may be repeated.")
-    ] = None,
-    tier: Annotated[
-        str,
-        typer.Option(metavar="TIER", help="minute, half-hour or all: how long it may take."),
-    ] = "minute",
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder of a report; cases that it contains are not run again.",
-        ),
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Compare with analytic and published cases."""
-    from flowborne.validation import Tier, case_ids
-    from flowborne.validation.report import of_other_code, read_report
-    from flowborne.validation.running import run_cases
-
-    ids = _known(case or [], case_ids(), "case", "--case")
-    (wanted,) = _known([tier], tuple(Tier), "tier", "--tier")
-    show = None if as_json else result_printer("id", "reference", "tolerance")
-    if report is not None:
-        make_folder(report)
-    try:
-        with _writing(report or Path(), ValueError):
-            results = run_cases(ids or None, Tier(wanted), on_result=show, report=report)
-    except KeyboardInterrupt as stop:
-        kept = "" if report is None else f"; {report} has the finished cases; run again to continue"
-        raise StoppedError(f"interrupted{kept}") from stop
-    if report is not None and (stale := of_other_code(read_report(report))):
-        print(f"{report}: measured with other code: {', '.join(stale)}", file=sys.stderr)
-    _report(results, as_json)
-
-
-@app.command()
-def bench(
-    names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Only these benches.")
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure the speed of flowborne."""
-    from flowborne.bench import bench_names, run_benches
-
-    chosen = _known(names or [], bench_names(), "bench", "NAME")
-    show = None if as_json else result_printer("name", "target")
-    _report(run_benches(chosen or None, on_result=show), as_json)
-
-
-@app.command()
-def figures(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Only these figures; all by default."),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("figures"),
-) -> None:
-    """Reproduce Figures 2, 7, 9b, 10 and 11 of the paper, as tables and pictures."""
-    from flowborne.extras import check_drawing
-    from flowborne.simulation import BlowUpError
-
-    check_drawing()
-    from flowborne.validation.figures import figure_names, make_figures
-
-    chosen = _known(names or [], figure_names(), "figure", "NAME")
-    make_folder(out)
-    try:
-        make_figures(out, chosen or None)
-    except (ArithmeticError, BlowUpError, OSError, ValueError) as error:
-        complain(str(error))
-        raise typer.Exit(FAILED) from error
-    print(f"written: {', '.join(str(path) for path in sorted(out.glob('figure-*')))}")
-
-
-@app.command()
 def doctor() -> None:
     """Check that this machine has what flowborne needs, and say how to install what is missing."""
     from flowborne.doctor import findings
@@ -638,21 +598,3 @@ def _overrides(settings: list[str] | None) -> dict[str, str]:
             value = str(Path(value).absolute())
         overrides[key] = value
     return overrides
-
-
-def _known(asked: list[str], known: Sequence[str], kind: str, option: str) -> list[str]:
-    """The names asked for. Raises InputError if one of them does not exist."""
-    for name in asked:
-        if name not in known:
-            near = get_close_matches(name, known, n=1, cutoff=0.4)
-            guess = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
-            raise InputError(f"{option} {name}: there is no such {kind}; {guess}")
-    return asked
-
-
-def _report(results: Sequence[Any], as_json: bool) -> None:
-    """Print all results as JSON if asked to; exit with 1 if one has failed."""
-    if as_json:
-        print(json.dumps([result.as_dict() for result in results], indent=2))
-    if any(result.verdict == "fail" for result in results):
-        raise typer.Exit(FAILED)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flowborne.errors import described
 from flowborne.phrases import listed
@@ -18,23 +17,6 @@ if TYPE_CHECKING:
 
 LONGEST = 1000
 """Letters of a message, of which more are left out in its middle."""
-
-
-def result_printer(name: str, *columns: str) -> Callable[[Any], None]:
-    """Function that prints a result of a validation or a bench as it comes."""
-
-    def show(result: Any) -> None:
-        shown = "  ".join(f"{c} {_number(getattr(result, c))}" for c in ("value", *columns))
-        print(f"{result.verdict.upper():<4}  {getattr(result, name)}  {result.title}  {shown}")
-        for line in result.lines:
-            print(f"        {line}")
-        sys.stdout.flush()
-
-    return show
-
-
-def _number(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def run_lines(result: RunResult) -> str:

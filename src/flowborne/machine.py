@@ -1,4 +1,4 @@
-"""Resources of a run: threads, memory, seconds by part, and executors of trials."""
+"""Resources of a run: threads, memory, seconds by part, executors of trials, what is installed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from flowborne.control.executors import (
     end_with_parent,
     mapper,
 )
+from flowborne.extras import check_drawing
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.kernels.vectors import turn
 from flowborne.runs.checkpoint import state_bytes
@@ -30,6 +31,7 @@ __all__ = [
     "Processes",
     "Serial",
     "Threads",
+    "check_drawing",
     "cores",
     "end_with_parent",
     "kernel_threads",

@@ -6,14 +6,14 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from flowborne import bench
-from flowborne.bench import pressure
-from flowborne.bench.timing import Result, timed, verdict
+from flowborne_validation import bench
+from flowborne_validation.bench import pressure
+from flowborne_validation.bench.timing import Result, timed, verdict
 
 
 @pytest.mark.parametrize("name", bench.bench_names())
 def test_every_bench_can_be_measured(name):
-    module = import_module(f"flowborne.bench.{bench.MODULES[name]}")
+    module = import_module(f"flowborne_validation.bench.{bench.MODULES[name]}")
     assert callable(getattr(module, name.replace("-", "_")))
 
 

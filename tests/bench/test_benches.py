@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flowborne import Simulation, load_scene
-from flowborne.bench import frame_costs, speed, startup
-from flowborne.bench.timing import frame_times
 from flowborne.machine import PARTS, cores
+from flowborne_validation.bench import frame_costs, speed, startup
+from flowborne_validation.bench.timing import frame_times
 
 COARSE = {"domain.resolution": "16", "controller.settle_steps": "0"}
 

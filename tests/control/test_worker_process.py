@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 BUSY = """
-from flowborne.validation.running import side_by_side
+from flowborne_validation.running import side_by_side
 
 if __name__ == "__main__":
     tasks = "__import__('os').getpid()", "__import__('time').sleep(600)"

@@ -9,8 +9,8 @@ import pytest
 
 from flowborne import Grid
 from flowborne.coupling.fractions import Geometry
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, cut_by_bodies, make_world
+from flowborne_validation.worlds import mjcf
 
 from .meshes import meshed_mjcf
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import trimesh
 
-from flowborne.validation.worlds import mjcf
+from flowborne_validation.worlds import mjcf
 
 Model = Callable[..., str]
 """MJCF elements -> a model of them."""

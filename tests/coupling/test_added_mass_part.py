@@ -6,8 +6,8 @@ import pytest
 from flowborne import FrameReport, Grid
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.step import step
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, make_world
+from flowborne_validation.worlds import mjcf
 
 BALL = (
     '<body name="ball"><joint name="along" type="slide" axis="1 0 0"/>'

@@ -7,8 +7,8 @@ import pytest
 
 from flowborne import Grid, Outcome, step
 from flowborne.bodies import JointCommand
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryNoSlip, make_world
+from flowborne_validation.worlds import mjcf
 
 STICKS = Boundaries(*(BoundaryNoSlip(),) * 4)
 LINK = mjcf(

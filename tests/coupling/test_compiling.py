@@ -13,8 +13,8 @@ from flowborne.coupling.compiling import (
 from flowborne.kernels import conjugate_gradients, jit
 from flowborne.kernels.carry import carry
 from flowborne.kernels.jit import compilation_watched
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world, step
+from flowborne_validation.worlds import mjcf
 
 
 def test_kernels_are_counted_once_and_only_while_watching():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, World
-from flowborne.validation.worlds import NOWHERE, PERIODIC, mjcf, recorded
 from flowborne.worlds import (
     Boundaries,
     BoundaryClosed,
@@ -14,6 +13,7 @@ from flowborne.worlds import (
     BoundaryOpen,
     set_velocity,
 )
+from flowborne_validation.worlds import NOWHERE, PERIODIC, mjcf, recorded
 
 RE, CELLS = 20.0, 6
 """Reynolds number, and cells along the side of a square."""

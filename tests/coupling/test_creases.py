@@ -12,9 +12,9 @@ from flowborne.coupling.operators import twists
 from flowborne.fluid.control_volumes import face_masses
 from flowborne.fluid.projection import accelerated, face_weights
 from flowborne.kernels.closed_fractions import CREASE
-from flowborne.validation.swimmers import BOX, LINK, PERIOD, swimmer
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import advance, cut_by_bodies, make_world
+from flowborne_validation.swimmers import BOX, LINK, PERIOD, swimmer
+from flowborne_validation.worlds import mjcf
 
 
 def fastest_end(world: World) -> float:

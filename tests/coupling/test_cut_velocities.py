@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -15,6 +14,7 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.worlds import mjcf
 
 RADIUS, HALF = 0.5, 1.5
 """m, of the circle and of the square domain around it."""

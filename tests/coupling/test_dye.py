@@ -13,8 +13,8 @@ from flowborne.coupling import flow
 from flowborne.coupling.leak_proof import leak_proof_flux
 from flowborne.coupling.mouths import Mouth
 from flowborne.motion.inflow import FactorSteady
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryOpen, cut_by_bodies, make_world
+from flowborne_validation.worlds import mjcf
 
 from .meshes import Model, meshed_mjcf
 

@@ -11,7 +11,6 @@ from flowborne import Array, Grid, Simulation, World, load_scene, step
 from flowborne.bodies import TrajectorySinusoid, momentum
 from flowborne.coupling.cut import volumes_of
 from flowborne.fluid.control_volumes import face_masses, fluid_momentum
-from flowborne.validation.worlds import RING, mjcf
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -21,6 +20,7 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.worlds import RING, mjcf
 
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))
 CUBE = Grid((16, 16, 16), 1.0 / 16, (0.0, 0.0, 0.0))

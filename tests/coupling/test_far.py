@@ -13,8 +13,6 @@ from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.simulation import Snapshot
 from flowborne.solvers.pressure import PressureSolution, PressureSystem
-from flowborne.validation.far_sides import box
-from flowborne.validation.worlds import Uniform, mjcf, start_at_once
 from flowborne.worlds import (
     Boundaries,
     Boundary,
@@ -28,6 +26,8 @@ from flowborne.worlds import (
     make_world,
     start,
 )
+from flowborne_validation.far_sides import box
+from flowborne_validation.worlds import Uniform, mjcf, start_at_once
 
 FAR, OPEN, CLOSED, RING = BoundaryFar(), BoundaryOpen(), BoundaryClosed(), BoundaryPeriodic()
 AROUND = Boundaries(*(FAR,) * 6)

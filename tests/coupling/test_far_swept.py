@@ -7,7 +7,6 @@ import pytest
 
 from flowborne import Array, Grid, Outcome, StepReport, World, step
 from flowborne.bodies import JointCommand
-from flowborne.validation.worlds import RING, mjcf
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -18,6 +17,7 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.worlds import RING, mjcf
 
 LONG = 0.2
 """m, half the length of the plate across its way, or all of it from its hinge."""

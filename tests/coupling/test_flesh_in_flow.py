@@ -21,7 +21,7 @@ from flowborne.solids.dynamics import kinematics
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Law, Tissue, add_flesh
-from flowborne.validation.flesh_bars import bar_mesh
+from flowborne_validation.flesh_bars import bar_mesh
 
 Array = NDArray[np.float64]
 

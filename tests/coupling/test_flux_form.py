@@ -30,8 +30,6 @@ from flowborne.fluid import control_volumes as of_fluid
 from flowborne.fluid.control_volumes import face_masses
 from flowborne.motion.inflow import FactorSteady
 from flowborne.solids.tissue.growth import Law, add_flesh
-from flowborne.validation.flesh_bars import bar_mesh
-from flowborne.validation.worlds import PERIODIC, RING, mjcf
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -41,6 +39,8 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.flesh_bars import bar_mesh
+from flowborne_validation.worlds import PERIODIC, RING, mjcf
 
 from ..kernels.references.faces import face_means
 

@@ -8,8 +8,8 @@ import pytest
 from flowborne import Array, Grid, World, step
 from flowborne.coupling.cut import departure
 from flowborne.coupling.half_pressure import explicit_half_pressure, pressure_increment_ratio
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryOpen, make_world, set_velocity
+from flowborne_validation.worlds import mjcf
 
 DT = 1.0 / 64
 SQUARE = Grid.slab(32, 32, 1.0 / 32, (0.0, 0.0))

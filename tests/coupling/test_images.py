@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Grid, Outcome, World, step
-from flowborne.validation.worlds import PLANAR, RING, mjcf
 from flowborne.worlds import cut_by_bodies, make_world
+from flowborne_validation.worlds import PLANAR, RING, mjcf
 
 from .test_far_swept import AROUND
 from .test_flesh_in_flow import leg

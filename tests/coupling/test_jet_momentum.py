@@ -10,8 +10,8 @@ import pytest
 from flowborne import Array, Grid, World, step
 from flowborne.coupling.mouths import Mouth
 from flowborne.motion.inflow import FactorPulse
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryOpen, make_world
+from flowborne_validation.worlds import mjcf
 
 RADIUS, HALF, RATE, DURATION = 0.2, 0.1, 0.1, 1.0
 SQUARE = Grid.slab(48, 48, 2.0 / 48.0, (-1.0, -1.0))

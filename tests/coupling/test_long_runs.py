@@ -11,7 +11,6 @@ from flowborne.coupling.cut import volumes_of
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid import control_volumes as of_fluid
 from flowborne.fluid.control_volumes import face_masses
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -20,6 +19,7 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.worlds import mjcf
 
 from .meshes import Model, meshed_mjcf
 

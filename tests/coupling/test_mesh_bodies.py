@@ -8,7 +8,6 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from flowborne import Grid, World
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -18,6 +17,7 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.worlds import mjcf
 
 from .meshes import mesh_asset
 

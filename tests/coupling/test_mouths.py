@@ -15,9 +15,9 @@ from flowborne.fluid.control_volumes import face_masses, fluid_momentum
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorSteady
 from flowborne.solids.tissue.growth import Law, add_flesh
-from flowborne.validation.flesh_bars import bar_mesh
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import Boundaries, BoundaryOpen, advance, cut_by_bodies, make_world
+from flowborne_validation.flesh_bars import bar_mesh
+from flowborne_validation.worlds import mjcf
 
 OPEN = BoundaryOpen()
 RADIUS, HALF, RATE = 0.2, 0.1, 0.1

@@ -22,8 +22,8 @@ from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
+from flowborne_validation.worlds import mjcf
 
 from .test_flesh_in_flow import leg
 

@@ -11,9 +11,6 @@ import flowborne as fb
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Grid
 from flowborne.simulation import Snapshot
-from flowborne.validation.far_sides import box
-from flowborne.validation.shedding import UNBOUNDED, cylinder
-from flowborne.validation.worlds import Uniform, force_on, mjcf, start_at_once
 from flowborne.worlds import (
     Boundaries,
     Boundary,
@@ -26,6 +23,9 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.far_sides import box
+from flowborne_validation.shedding import UNBOUNDED, cylinder
+from flowborne_validation.worlds import Uniform, force_on, mjcf, start_at_once
 
 CLOSED = BoundaryClosed()
 

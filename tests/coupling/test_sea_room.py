@@ -10,8 +10,6 @@ from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.induced import pooled
 from flowborne.simulation import Snapshot
-from flowborne.validation.far_sides import box
-from flowborne.validation.worlds import Uniform, force_on, mjcf, start_at_once
 from flowborne.worlds import (
     Boundaries,
     BoundaryClosed,
@@ -21,6 +19,8 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.far_sides import box
+from flowborne_validation.worlds import Uniform, force_on, mjcf, start_at_once
 
 SPHERE, CLOSED = '<geom type="sphere" size="0.5"/>', BoundaryClosed()
 

@@ -6,8 +6,8 @@ import pytest
 from flowborne import Grid, load_scene
 from flowborne.coupling.seen import Seen, seen_bodies
 from flowborne.scenes.build import build
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
+from flowborne_validation.worlds import mjcf
 
 CUBE = Grid((20, 20, 20), 0.05, (-0.5, -0.5, -0.5))
 FINE = Grid((64, 64, 64), 1.0 / 64.0, (-0.5, -0.5, -0.5))

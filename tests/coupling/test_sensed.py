@@ -3,8 +3,8 @@ import pytest
 
 import flowborne as fb
 from flowborne.coupling.stream import flow_at
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world, set_velocity
+from flowborne_validation.worlds import mjcf
 
 BLOCK = '<body name="block"><geom type="box" size=".2 .2 .2"/></body>'
 

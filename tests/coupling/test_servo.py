@@ -16,8 +16,8 @@ from flowborne.bodies import (
     TrajectoryServo,
     TrajectorySinusoid,
 )
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import advance, make_world
+from flowborne_validation.worlds import mjcf
 
 
 @given(st.floats(-3, 3), st.integers(1, 40), st.floats(1e-4, 0.1))

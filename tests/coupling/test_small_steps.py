@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne import Grid, Simulation, load_scene
-from flowborne.validation.controller_in_flow import hold_all
-from flowborne.validation.shedding import cylinder
-from flowborne.validation.worlds import Uniform
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -16,6 +13,9 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
+from flowborne_validation.controller_in_flow import hold_all
+from flowborne_validation.shedding import cylinder
+from flowborne_validation.worlds import Uniform
 
 
 def drag(steps: int) -> float:

@@ -9,7 +9,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import flowborne as fb
-from flowborne.validation.worlds import RING, Uniform, mjcf
 from flowborne.worlds import (
     Boundaries,
     BoundaryInflow,
@@ -21,6 +20,7 @@ from flowborne.worlds import (
     set_velocity,
     start,
 )
+from flowborne_validation.worlds import RING, Uniform, mjcf
 
 BALL = '<body name="ball"><freejoint/><geom type="sphere" size=".2" density="1"/></body>'
 CHAIN = (

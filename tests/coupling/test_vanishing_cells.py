@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import flowborne as fb
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import advance, make_world, set_going
+from flowborne_validation.worlds import mjcf
 
 H = 1.0 / 32.0
 """m, side of a cell."""

@@ -15,8 +15,8 @@ from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
 from flowborne.kernels.viscosity import TIED, UNKNOWN
 from flowborne.solvers.conjugate_gradients import spread
 from flowborne.solvers.mobility import DenseAnswer
-from flowborne.validation.worlds import PERIODIC, RING, mjcf
 from flowborne.worlds import Boundaries, BoundaryNoSlip, cut_by_bodies, faces_of, make_world
+from flowborne_validation.worlds import PERIODIC, RING, mjcf
 
 DENSITY, VISCOSITY = 1.3, 0.7
 """kg/m^3 and Pa s."""

@@ -13,7 +13,6 @@ from flowborne.coupling.step import step
 from flowborne.coupling.window import cells_to_follow, follow
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Grid
-from flowborne.validation.worlds import Uniform, mjcf
 from flowborne.worlds import (
     Boundaries,
     Boundary,
@@ -28,6 +27,7 @@ from flowborne.worlds import (
     set_velocity,
     start,
 )
+from flowborne_validation.worlds import Uniform, mjcf
 
 FAR = BoundaryFar()
 SEA = Boundaries(*(FAR,) * 4)

@@ -9,8 +9,8 @@ from flowborne import Array, Faces, Grid
 from flowborne.fluid.control_volumes import fluid_momentum, kinetic_energy
 from flowborne.fluid.eddies import damp_eddies
 from flowborne.fluid.transport import Transport
-from flowborne.validation.worlds import RING
 from flowborne.worlds import Boundaries
+from flowborne_validation.worlds import RING
 
 from ..kernels.test_face_masses import BODIES, GRIDS, volumes_at
 

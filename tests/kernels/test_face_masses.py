@@ -9,8 +9,8 @@ from flowborne import Grid
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.face_masses import add_transfers, even_out
-from flowborne.validation.worlds import RING, mjcf
 from flowborne.worlds import Boundaries, cut_by_bodies, make_world
+from flowborne_validation.worlds import RING, mjcf
 
 from .references.faces import face_means
 

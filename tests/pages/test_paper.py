@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import paper
-from flowborne.validation.report import read_report, tier_of
+from flowborne_validation.report import read_report, tier_of
 
 DATA = read_report(paper.REPORT)
 

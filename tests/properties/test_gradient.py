@@ -12,8 +12,8 @@ from flowborne import Array, Controller, Hypothesis, Measurement, World, step
 from flowborne.bodies import WindForce
 from flowborne.machine import Serial
 from flowborne.parts import GradientCentral, ObjectiveCallable, ObjectiveSum
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import make_world
+from flowborne_validation.worlds import mjcf
 
 from .worlds import UNSHRUNK
 

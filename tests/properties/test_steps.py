@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flowborne import Array, World, step
-from flowborne.validation.worlds import start_at_once
 from flowborne.worlds import kinetic_energy
+from flowborne_validation.worlds import start_at_once
 
 from .worlds import DT, UNSHRUNK, WALLS, H, cases
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flowborne import step
-from flowborne.validation.worlds import start_at_once
+from flowborne_validation.worlds import start_at_once
 
 from .worlds import (
     DT,

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from flowborne import Array, Grid, World
-from flowborne.validation.worlds import mjcf
 from flowborne.worlds import (
     Boundaries,
     Boundary,
@@ -23,6 +22,7 @@ from flowborne.worlds import (
     BoundaryPeriodic,
     make_world,
 )
+from flowborne_validation.worlds import mjcf
 
 H = 0.125
 """m, edge of a cell; a domain's middle is the origin."""

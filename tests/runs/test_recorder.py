@@ -13,7 +13,7 @@ from flowborne.runs.states import read_state
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
-from flowborne.validation.flesh_bars import bar_mesh
+from flowborne_validation.flesh_bars import bar_mesh
 
 DISC = """
 <mujoco>

@@ -9,7 +9,7 @@ from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
-from flowborne.validation import fishrobot
+from flowborne_validation import fishrobot
 
 COARSE = {"domain.resolution": "45"}
 """Cells of 2 cm."""

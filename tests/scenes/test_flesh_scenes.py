@@ -18,7 +18,7 @@ from flowborne.simulation import BlowUpError, Simulation
 from flowborne.solids.flesh import inversion
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_file import mesh_bytes
-from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
+from flowborne_validation.flesh_bars import bar_mesh, flat_mesh
 
 MODEL = """<mujoco><default><joint damping="3" limited="true" range="-1 1"/>
 <geom type="capsule" fromto="0 0 0 .3 0 0" size=".08" contype="0" conaffinity="0"/></default>

@@ -13,7 +13,7 @@ from flowborne.motion.quaternions import twist
 from flowborne.scenes.load import load_scene
 from flowborne.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
-from flowborne.validation.figures import posture
+from flowborne_validation.figures import posture
 
 TWO_STRIDES, ONE_STRIDE = (80, 55), (54, 28)
 """Frames that are run, and of them the last, over which means are taken: arms have settled after

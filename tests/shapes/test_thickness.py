@@ -11,7 +11,7 @@ from flowborne.shapes.own import ShapeOwn
 from flowborne.shapes.primitives import PRIMITIVES, shape_of
 from flowborne.shapes.thickness import sides, thin_parts, thinnest
 from flowborne.solids.elements import outer_surface
-from flowborne.validation.flesh_bars import bar_mesh
+from flowborne_validation.flesh_bars import bar_mesh
 
 
 def test_thickness_of_simple_bodies() -> None:

@@ -15,7 +15,7 @@ from flowborne.solids.elements import (
     shape_gradients,
     with_middles,
 )
-from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
+from flowborne_validation.flesh_bars import bar_mesh, flat_mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -20,8 +20,8 @@ from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import scratch
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
-from flowborne.validation.flag_in_channel import flag_of, flag_tissue
-from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
+from flowborne_validation.flag_in_channel import flag_of, flag_tissue
+from flowborne_validation.flesh_bars import bar_mesh, flat_mesh
 
 Array = NDArray[np.float64]
 

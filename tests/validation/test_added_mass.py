@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation import added_mass as case
-from flowborne.validation.case import table
-from flowborne.validation.worlds import square
+from flowborne_validation import added_mass as case
+from flowborne_validation.case import table
+from flowborne_validation.worlds import square
 
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5])

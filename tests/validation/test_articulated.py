@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation import articulated
-from flowborne.validation.case import table
+from flowborne_validation import articulated
+from flowborne_validation.case import table
 
 
 @pytest.mark.parametrize("degrees", [10.0, 90.0, 170.0])

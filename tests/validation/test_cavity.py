@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-import flowborne.validation.cavity
-from flowborne.validation import case
-from flowborne.validation.cavity import cavity, primary_vortex, profiles, stream_function
+import flowborne_validation.cavity
 from flowborne.worlds import advance, set_velocity
+from flowborne_validation.cases import case
+from flowborne_validation.cavity import cavity, primary_vortex, profiles, stream_function
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def ran():
         return worlds[cells]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(flowborne.validation.cavity, "cavity", kept)
+        patch.setattr(flowborne_validation.cavity, "cavity", kept)
         found = {result.quantity: result for result in case("F2").run(quick=True)}
     return found, worlds
 

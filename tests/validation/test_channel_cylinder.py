@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation.channel_cylinder import (
+from flowborne.worlds import set_velocity, start_from
+from flowborne_validation.channel_cylinder import (
     CENTRE,
     DIAMETER,
     DURATION,
@@ -16,9 +17,8 @@ from flowborne.validation.channel_cylinder import (
     pulsed_inflow,
     steady_flow,
 )
-from flowborne.validation.shedding import backflow
-from flowborne.validation.worlds import ORIGIN, PLACES, Parabola, Place
-from flowborne.worlds import set_velocity, start_from
+from flowborne_validation.shedding import backflow
+from flowborne_validation.worlds import ORIGIN, PLACES, Parabola, Place
 
 
 def test_B1_repeats_its_own_figures_on_ten_cells_across_D():

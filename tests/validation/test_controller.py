@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from flowborne.validation import case
+from flowborne_validation.cases import case
 
 
 @pytest.mark.parametrize("name", ["K1", "K2", "K3", "K4"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation import controller_in_flow as case
+from flowborne_validation import controller_in_flow as case
 
 
 def test_K6_law_of_the_frames() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import validation_page
 from failing import README, REPORT, with_section
-from flowborne.validation.report import read_report
+from flowborne_validation.report import read_report
 
 
 def test_the_readme_names_what_fails_in_the_committed_report() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flowborne.validation import far_sides as case
+from flowborne_validation import far_sides as case
 
 
 def test_I10_is_met() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from flowborne.validation import controller_in_flow, figures
-from flowborne.validation.figures import blocked_rows
+from flowborne_validation import controller_in_flow, figures
+from flowborne_validation.figures import blocked_rows
 
 
 def test_figures_are_written_and_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation.fishrobot import (
+from flowborne_validation.fishrobot import (
     COUNTED,
     FRAMES,
     HEAD,

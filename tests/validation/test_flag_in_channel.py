@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flowborne.validation import case
-from flowborne.validation import flag_in_channel as flags
-from flowborne.validation.worlds import Parabola
 from flowborne.worlds import set_velocity
+from flowborne_validation import flag_in_channel as flags
+from flowborne_validation.cases import case
+from flowborne_validation.worlds import Parabola
 
 
 def test_D2_CFD1_on_44_cells() -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from flowborne.validation import case, flag_lift
-from flowborne.validation.flag_in_channel import END, HEIGHT, channel
+from flowborne_validation import flag_lift
+from flowborne_validation.cases import case
+from flowborne_validation.flag_in_channel import END, HEIGHT, channel
 
 
 @pytest.mark.parametrize("behind", flag_lift.PLACES)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation.case import reference
-from flowborne.validation.flapping_ellipse import (
+from flowborne_validation.case import reference
+from flowborne_validation.flapping_ellipse import (
     FASTEST,
     LIFT,
     apart,

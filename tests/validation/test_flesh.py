@@ -8,9 +8,9 @@ from scipy.sparse import csc_array
 
 from flowborne.solids.flesh_dynamics import static_forces
 from flowborne.solvers.cholesky import symmetric_factor
-from flowborne.validation import flesh as case
-from flowborne.validation.flesh_bars import bar_of, tissue_table
-from flowborne.validation.worlds import NOWHERE
+from flowborne_validation import flesh as case
+from flowborne_validation.flesh_bars import bar_of, tissue_table
+from flowborne_validation.worlds import NOWHERE
 
 
 def test_D1_comes_near_and_nearer() -> None:

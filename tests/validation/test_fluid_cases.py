@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation import case
-from flowborne.validation.fluid_cases import DISSIPATION, ENERGY, carried_body, decay
+from flowborne_validation.cases import case
+from flowborne_validation.fluid_cases import DISSIPATION, ENERGY, carried_body, decay
 
 
 @pytest.fixture(scope="module")

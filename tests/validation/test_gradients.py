@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flowborne.validation import gradients
+from flowborne_validation import gradients
 
 
 def test_K7_order_of_the_differences() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flowborne import load_scene
-from flowborne.validation import case
-from flowborne.validation.human import BACK, SPREAD, G, Load, human, settled, standing
+from flowborne_validation.cases import case
+from flowborne_validation.human import BACK, SPREAD, G, Load, human, settled, standing
 
 
 @pytest.mark.parametrize("name", ["K8", "K9", "K10"])

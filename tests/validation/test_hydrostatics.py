@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flowborne import Grid
-from flowborne.validation import case
-from flowborne.validation.hydrostatics import BOX, SLAB, displaced, fixed_bodies
 from flowborne.worlds import make_world
+from flowborne_validation.cases import case
+from flowborne_validation.hydrostatics import BOX, SLAB, displaced, fixed_bodies
 
 
 def test_F5_fluid_and_bodies_stay_at_rest():

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation import inviscid as case
-from flowborne.validation.worlds import PERIODIC
 from flowborne.worlds import Boundaries, BoundaryOpen
+from flowborne_validation import inviscid as case
+from flowborne_validation.worlds import PERIODIC
 
 
 def test_I4_neutrally_buoyant_bodies_stay() -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation import case
-from flowborne.validation.case import reference
-from flowborne.validation.moving_cylinder import (
+from flowborne.worlds import advance
+from flowborne_validation.case import reference
+from flowborne_validation.cases import case
+from flowborne_validation.moving_cylinder import (
     CURVE,
     INNER,
     MASS,
@@ -19,7 +20,6 @@ from flowborne.validation.moving_cylinder import (
     morison,
     sprung,
 )
-from flowborne.worlds import advance
 
 
 def test_V3_repeats_its_own_second_cycle_on_four_cells():

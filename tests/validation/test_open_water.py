@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from flowborne import Array
-from flowborne.validation import case
-from flowborne.validation.open_water import (
+from flowborne.worlds import advance, set_velocity
+from flowborne_validation.cases import case
+from flowborne_validation.open_water import (
     BACK,
     BETWEEN,
     LONGEST,
@@ -18,9 +19,8 @@ from flowborne.validation.open_water import (
     recirculation,
     separation,
 )
-from flowborne.validation.shedding import STREAM, UNBOUNDED, backflow
-from flowborne.validation.worlds import ORIGIN, PLACES, Place
-from flowborne.worlds import advance, set_velocity
+from flowborne_validation.shedding import STREAM, UNBOUNDED, backflow
+from flowborne_validation.worlds import ORIGIN, PLACES, Place
 
 ASIDE = (0.0, 1.0, 0.0)
 

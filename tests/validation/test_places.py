@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flowborne.validation import worlds
-from flowborne.validation.findings import Grids, near
-from flowborne.validation.worlds import PLACES, over_places
+from flowborne_validation import worlds
+from flowborne_validation.findings import Grids, near
+from flowborne_validation.worlds import PLACES, over_places
 
 
 @pytest.mark.parametrize("axis", [0, 1])

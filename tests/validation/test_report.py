@@ -10,11 +10,12 @@ import pytest
 from typer.testing import CliRunner
 
 from flowborne.cli import app
-from flowborne.validation import case, case_ids, report
-from flowborne.validation.case import THE_RUN, Result, Tier
-from flowborne.validation.findings import Curve, GridSeries, Plot, Verdict
-from flowborne.validation.page import PAGE, write_page
-from flowborne.validation.report import (
+from flowborne_validation import report
+from flowborne_validation.case import THE_RUN, Result, Tier
+from flowborne_validation.cases import case, case_ids
+from flowborne_validation.findings import Curve, GridSeries, Plot, Verdict
+from flowborne_validation.page import PAGE, write_page
+from flowborne_validation.report import (
     DATA,
     add_to_report,
     already_there,

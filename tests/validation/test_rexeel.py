@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from flowborne.validation import rexeel
-from flowborne.validation.rexeel import (
+from flowborne_validation import rexeel
+from flowborne_validation.rexeel import (
     LINK_LENGTH,
     MASS,
     TIMES,

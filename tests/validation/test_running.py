@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from flowborne.machine import cores
-from flowborne.validation import Tier, case, case_ids
-from flowborne.validation.case import THE_RUN, Case, Result
-from flowborne.validation.findings import Finding, GridSeries
-from flowborne.validation.page import PAGE
-from flowborne.validation.report import read_report
-from flowborne.validation.running import batches, run_cases, side_by_side
+from flowborne_validation.case import THE_RUN, Case, Result, Tier
+from flowborne_validation.cases import case, case_ids
+from flowborne_validation.findings import Finding, GridSeries
+from flowborne_validation.page import PAGE
+from flowborne_validation.report import read_report
+from flowborne_validation.running import batches, run_cases, side_by_side
 
 MINUTE, HALF_HOUR, ALL = Tier
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flowborne.validation.report import Case, Data
+from flowborne_validation.report import Case, Data
 from same_figures import differences
 
 

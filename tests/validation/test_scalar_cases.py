@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from flowborne import Grid
-from flowborne.validation import case
-from flowborne.validation.scalar_cases import Blob, Swirl, Turn, carried_back
+from flowborne_validation.cases import case
+from flowborne_validation.scalar_cases import Blob, Swirl, Turn, carried_back
 
 
 @pytest.fixture(scope="module")

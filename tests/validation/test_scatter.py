@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne import Array
-from flowborne.validation import controller_in_flow, scatter
+from flowborne_validation import controller_in_flow, scatter
 
 
 def test_K12_scatter_is_what_no_smooth_curve_has() -> None:

@@ -6,9 +6,9 @@ from functools import partial
 
 import pytest
 
-from flowborne.validation import sea as case
-from flowborne.validation.case import reference
-from flowborne.validation.shedding import shed
+from flowborne_validation import sea as case
+from flowborne_validation.case import reference
+from flowborne_validation.shedding import shed
 
 
 def test_B8_falls_short_of_the_published_drag_by_less_than_a_tenth_on_8_cells() -> None:

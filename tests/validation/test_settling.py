@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flowborne.validation import case
-from flowborne.validation.settling import (
+from flowborne.worlds import advance
+from flowborne_validation.cases import case
+from flowborne_validation.settling import (
     CYLINDER_GRAVITY,
     DENSITY,
     FALLS,
@@ -18,7 +19,6 @@ from flowborne.validation.settling import (
     fastest,
     quarter,
 )
-from flowborne.worlds import advance
 
 
 def test_V2_largest_velocities_are_measured_ones_and_the_curves_those_of_six_cells():

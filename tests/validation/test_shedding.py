@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flowborne.validation.shedding import Oscillation, amplitude, crest
+from flowborne_validation.shedding import Oscillation, amplitude, crest
 
 PERIOD, DT = 0.317, 0.004
 

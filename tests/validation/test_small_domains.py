@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flowborne.validation import small_domains as case
+from flowborne_validation import small_domains as case
 
 
 def test_I12_is_met() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.validation import swimmers
-from flowborne.validation.swimmers import LINKS, direction, half_width, swim, tank
+from flowborne_validation import swimmers
+from flowborne_validation.swimmers import LINKS, direction, half_width, swim, tank
 
 
 def test_S5_what_the_creature_gains_the_fluid_loses() -> None:

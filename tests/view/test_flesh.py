@@ -19,13 +19,13 @@ from flowborne.runs.run_folder import RunFolder
 from flowborne.solids.elements import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
-from flowborne.validation.flesh_bars import bar_mesh, flat_mesh
 from flowborne.view import style
 from flowborne.view.maps import MapSlab
 from flowborne.view.outlines import skin_loops
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
+from flowborne_validation.flesh_bars import bar_mesh, flat_mesh
 
 Pixels = np.ndarray
 

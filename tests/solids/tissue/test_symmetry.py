@@ -22,7 +22,7 @@ from flowborne.solids.tissue.bones import bones_of, contour
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import ASTRAY, FIDELITY, FleshMesh, skin_mesh
 from flowborne.solids.tissue.symmetry import Chamber, chamber_of, reflection
-from flowborne.validation.creatures import held
+from flowborne_validation.creatures import held
 
 BONES = ("trunk", "left", "right")
 TURN = np.array([[0.96, 0.28, 0.0], [-0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])

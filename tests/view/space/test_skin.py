@@ -25,7 +25,6 @@ from flowborne.shapes.primitives import ShapeBox
 from flowborne.solids.elements import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
-from flowborne.validation.flesh_bars import bar_mesh
 from flowborne.view import style
 from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
@@ -42,6 +41,7 @@ from flowborne.view.space.surfaces import (
     normals,
 )
 from flowborne.view.space.surroundings import stands_on_ground
+from flowborne_validation.flesh_bars import bar_mesh
 
 from .projecting import project
 

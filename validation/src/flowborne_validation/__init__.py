@@ -1,0 +1,1 @@
+"""Comparison of flowborne with analytic and published cases, and its benchmarks."""
