@@ -72,7 +72,7 @@ what needs little of it, and neither compiles what the other does."""
 DRY = (
     "characters",
     "solids",
-    "files",
+    "base",
     "runs",
     "motion",
     "scenes/test_load.py",

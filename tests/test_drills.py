@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 import flowborne
-from flowborne import cli, running
+from flowborne.base.errors import WorkerError
+from flowborne.cli import main as cli
 from flowborne.control.executors import Processes
-from flowborne.errors import WorkerError
-from flowborne.running import RunInterrupted, RunOutcome
 from flowborne.runs.run_folder import LOCK_NAME, RunFolder, RunFolderError
-from flowborne.simulation import BlowUpError, Simulation
+from flowborne.sim import running
+from flowborne.sim.running import RunInterrupted, RunOutcome
+from flowborne.sim.simulation import BlowUpError, Simulation
 
 from .made_runs import numbers, run, start, summary_of, wait_for_rows
 
@@ -238,7 +239,7 @@ def test_ctrl_c_between_the_frames_and_the_film_draws_none(small_scene, tmp_path
 
 def test_a_number_that_is_not_finite_never_ends_well(small_scene, tmp_path, monkeypatch):
     """Not even one that no solver needs."""
-    from flowborne.measures import Measures
+    from flowborne.sim.measures import Measures
 
     values = Measures.values
 

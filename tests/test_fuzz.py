@@ -9,7 +9,7 @@ import pytest
 
 import flowborne as fb
 import fuzz_judge
-from flowborne import cli
+from flowborne.cli import main as cli
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.save import scene_files
 from fuzz import COUNTS, attack, run_folder

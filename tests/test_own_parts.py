@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import flowborne as fb
-from flowborne.python_function import WindFunction
+from flowborne.control.python_function import WindFunction
 from flowborne.scenes.load import check_scene, library
 from flowborne.scenes.plugins import LOADED
 

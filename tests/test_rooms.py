@@ -14,15 +14,15 @@ ROOMS = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
 MODULES = of_modules()
 
 BELOW = {
-    "files": set(),
+    "base": set(),
     "kernels": set(),
     "solvers": {"kernels"},
-    "fluid": {"kernels", "solvers"},
-    "shapes": {"kernels"},
-    "solids": {"files", "kernels", "solvers", "shapes"},
-    "coupling": {"kernels", "solvers", "fluid", "shapes", "solids"},
-    "motion": {"files", "kernels", "shapes", "solids"},
-    "runs": {"files", "kernels", "fluid", "shapes", "solids", "coupling"},
+    "fluid": {"base", "kernels", "solvers"},
+    "shapes": {"base", "kernels"},
+    "solids": {"base", "kernels", "solvers", "shapes"},
+    "coupling": {"base", "kernels", "solvers", "fluid", "shapes", "solids"},
+    "motion": {"base", "kernels", "shapes", "solids"},
+    "runs": {"base", "kernels", "fluid", "shapes", "solids", "coupling"},
 }
 """Rooms that each of these may import from, besides itself; single modules are free."""
 

@@ -1,4 +1,4 @@
-"""Baselines of the environments of flowborne.gym, in docs/learning.md: `make baselines`.
+"""Baselines of the environments of flowborne.play.gym, in docs/learning.md: `make baselines`.
 
 In each environment stand side by side: the motion that training starts from, the scene's gradient
 controller, and policies of a few numbers, each trained with a seed of its own on the first grid by
@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 from flowborne import Measurement, Scene, Simulation, load_scene
 from flowborne.control.controller import Controller
 from flowborne.control.executors import Serial
-from flowborne.gym import ENVIRONMENTS, SceneEnv
-from flowborne.joint_measures import drive_means
+from flowborne.play.gym import ENVIRONMENTS, SceneEnv
 from flowborne.runs.frame_report import FrameReport
+from flowborne.sim.joint_measures import drive_means
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]

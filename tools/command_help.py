@@ -6,7 +6,7 @@ from typing import Any
 
 import typer
 
-from flowborne.cli import app
+from flowborne.cli.main import app
 from markdown_text import plain, table
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import NamedTuple
 
-from flowborne import cli
+from flowborne.cli import main as cli
 from fuzz_bases import Broken
 from fuzz_changes import LONG, SECRET
 from fuzz_folders import damage

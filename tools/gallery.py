@@ -20,10 +20,10 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
-from flowborne.running import RunOutcome, run
 from flowborne.scenes.load import load_scene, read_scene, scene_names
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.window import followed_by
+from flowborne.sim.running import RunOutcome, run
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from baselines import DOCS, GAIT, TASKS, Data, Outcome, read, scene_of
-from flowborne.gym import SceneEnv
+from flowborne.play.gym import SceneEnv
 from markdown_text import table
 from marked import with_part
 

@@ -13,10 +13,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from docstrings import meanings, prose
+from flowborne.base.tables import Corner, JointValues, OwnTable, Table, Vector
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_film import Pixels
 from flowborne.studies.schema import Study
-from flowborne.tables import Corner, JointValues, OwnTable, Table, Vector
 from markdown_text import plain, table
 
 NAMED = {

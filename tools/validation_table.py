@@ -9,7 +9,7 @@ from typing import Any
 
 from failing import REPORT, ROOT
 from failing import number as shown
-from flowborne.version import __version__
+from flowborne.base.version import __version__
 from flowborne_validation.case import THE_RUN, entry
 from flowborne_validation.report import (
     code,

@@ -3,7 +3,7 @@
 The public names are here and in these modules:
 
     bodies     models, poses, momentum and energy, flesh, prescribed motions, simple winds
-    gym        Gymnasium environments of scenes
+    play.gym   Gymnasium environments of scenes
     machine    threads, memory, seconds by part, executors
     parts      objectives, rules, gradients, shapes and exporters, and how to add your own
     pictures   pictures and plots
@@ -16,11 +16,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from flowborne.version import __version__
+from flowborne.base.version import __version__
 
 if TYPE_CHECKING:
-    from flowborne.batch_page import Batch, ClipRun
-    from flowborne.batches import run_clips
+    from flowborne.base.errors import PartError, SceneError
     from flowborne.characters.folder import Imported, import_character
     from flowborne.control.commands import Control, Position, Torque, Velocity
     from flowborne.control.controller import Controller, Decision, StrengthInPhase
@@ -31,21 +30,22 @@ if TYPE_CHECKING:
     from flowborne.coupling.step import step
     from flowborne.coupling.stream import FlowState
     from flowborne.coupling.world import Fluid, Setup, World
-    from flowborne.error_bars import ErrorBar, Refinement, error_bar
-    from flowborne.errors import PartError, SceneError
-    from flowborne.exporting import export
     from flowborne.fluid.grid import Array, Faces, Grid
     from flowborne.fluid.state import FluidState
-    from flowborne.running import RunInterrupted, RunResult, run
+    from flowborne.formats.exporting import export
     from flowborne.runs.frame_report import FrameReport
     from flowborne.runs.open_run import OpenRun, open_run
     from flowborne.runs.run_folder import RunFolderError
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.schema import Scene
-    from flowborne.simulation import BlowUpError, Simulation, Snapshot
+    from flowborne.sim.running import RunInterrupted, RunResult, run
+    from flowborne.sim.simulation import BlowUpError, Simulation, Snapshot
     from flowborne.solids.model import SolidModel
     from flowborne.solids.state import SolidState
     from flowborne.solids.tissue.growth import Tissue
+    from flowborne.studies.batch_page import Batch, ClipRun
+    from flowborne.studies.batches import run_clips
+    from flowborne.studies.error_bars import ErrorBar, Refinement, error_bar
     from flowborne.studies.result import StudyResult
     from flowborne.studies.running import study
     from flowborne.worlds import advance, make_world
@@ -116,7 +116,7 @@ __all__ = [
 PAGES = (
     "parts",
     "bodies",
-    "gym",
+    "play.gym",
     "machine",
     "pictures",
     "worlds",
@@ -125,14 +125,14 @@ PAGES = (
 
 _PLACES = {
     "Array": "flowborne.fluid.grid",
-    "Batch": "flowborne.batch_page",
-    "BlowUpError": "flowborne.simulation",
+    "Batch": "flowborne.studies.batch_page",
+    "BlowUpError": "flowborne.sim.simulation",
     "BodyState": "flowborne.coupling.named",
     "Control": "flowborne.control.commands",
-    "ClipRun": "flowborne.batch_page",
+    "ClipRun": "flowborne.studies.batch_page",
     "Controller": "flowborne.control.controller",
     "Decision": "flowborne.control.controller",
-    "ErrorBar": "flowborne.error_bars",
+    "ErrorBar": "flowborne.studies.error_bars",
     "Faces": "flowborne.fluid.grid",
     "FlowState": "flowborne.coupling.stream",
     "Fluid": "flowborne.coupling.world",
@@ -146,17 +146,17 @@ _PLACES = {
     "Momentum": "flowborne.coupling.report",
     "OpenRun": "flowborne.runs.open_run",
     "Outcome": "flowborne.coupling.report",
-    "PartError": "flowborne.errors",
+    "PartError": "flowborne.base.errors",
     "Position": "flowborne.control.commands",
-    "Refinement": "flowborne.error_bars",
+    "Refinement": "flowborne.studies.error_bars",
     "RunFolderError": "flowborne.runs.run_folder",
-    "RunInterrupted": "flowborne.running",
-    "RunResult": "flowborne.running",
+    "RunInterrupted": "flowborne.sim.running",
+    "RunResult": "flowborne.sim.running",
     "Scene": "flowborne.scenes.schema",
-    "SceneError": "flowborne.errors",
+    "SceneError": "flowborne.base.errors",
     "Setup": "flowborne.coupling.world",
-    "Simulation": "flowborne.simulation",
-    "Snapshot": "flowborne.simulation",
+    "Simulation": "flowborne.sim.simulation",
+    "Snapshot": "flowborne.sim.simulation",
     "SolidModel": "flowborne.solids.model",
     "SolidState": "flowborne.solids.state",
     "StepReport": "flowborne.coupling.report",
@@ -168,14 +168,14 @@ _PLACES = {
     "Velocity": "flowborne.control.commands",
     "World": "flowborne.coupling.world",
     "advance": "flowborne.worlds",
-    "error_bar": "flowborne.error_bars",
-    "export": "flowborne.exporting",
+    "error_bar": "flowborne.studies.error_bars",
+    "export": "flowborne.formats.exporting",
     "import_character": "flowborne.characters.folder",
     "load_scene": "flowborne.scenes.load",
     "make_world": "flowborne.worlds",
     "open_run": "flowborne.runs.open_run",
-    "run": "flowborne.running",
-    "run_clips": "flowborne.batches",
+    "run": "flowborne.sim.running",
+    "run_clips": "flowborne.studies.batches",
     "step": "flowborne.coupling.step",
     "study": "flowborne.studies.running",
 }

@@ -1,5 +1,5 @@
 """`python -m flowborne` is the command `flowborne`."""
 
-from flowborne.cli import main
+from flowborne.cli.main import main
 
 main()

@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from flowborne.base.extras import check_drawing
 from flowborne.control.executors import (
     GRACE,
     Foreign,
@@ -16,7 +17,6 @@ from flowborne.control.executors import (
     end_with_parent,
     mapper,
 )
-from flowborne.extras import check_drawing
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.kernels.vectors import turn
 from flowborne.runs.checkpoint import state_bytes

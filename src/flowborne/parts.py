@@ -23,6 +23,7 @@ in Python `PlacedShape(Torus(0.3, 0.1), "ring")` is one of the `shapes` of `Soli
 
 from __future__ import annotations
 
+from flowborne.base.atomic import replaced_whole, write_atomically
 from flowborne.control.gradients import (
     GRADIENTS,
     Estimate,
@@ -61,7 +62,6 @@ from flowborne.control.rules import (
     Rule,
     descent,
 )
-from flowborne.files.atomic import replaced_whole, write_atomically
 from flowborne.runs.exporters import EXPORTERS, Exporter, Written, endings
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.states import StateArray

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.division import MIN_VOLUME, WELD_DISTANCE, divided
 from flowborne.characters.model import model_files
 from flowborne.characters.rig import Rig, Surface
 from flowborne.characters.source import read_source
-from flowborne.errors import SceneError
 from flowborne.shapes.closing import is_closed
 from flowborne.shapes.mesh import ShapeMesh
 

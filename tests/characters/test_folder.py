@@ -11,12 +11,12 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 import flowborne as fb
-from flowborne import cli
+from flowborne.base.colours import to_linear
 from flowborne.characters.gltf import GltfSource
 from flowborne.characters.model import as_cycle, posed
 from flowborne.characters.rig import Z_UP, Action, Rig, Surface
 from flowborne.characters.source import read_source
-from flowborne.files.colours import to_linear
+from flowborne.cli import main as cli
 from flowborne.formats.creature import Creature
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip import Clip

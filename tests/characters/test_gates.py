@@ -18,12 +18,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import flowborne as fb
+from flowborne.base.errors import SceneError
 from flowborne.characters.division import closed
 from flowborne.characters.gltf_document import inside
 from flowborne.characters.limits import check_frames, check_size, check_work
 from flowborne.characters.rig import Surface, own_names
 from flowborne.characters.source import read_source
-from flowborne.errors import SceneError
 
 from . import rigged
 

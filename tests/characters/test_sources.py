@@ -10,11 +10,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from flowborne.base.colours import to_srgb
+from flowborne.base.errors import SceneError
 from flowborne.characters.model import MAX_COLOURS, few_colours
 from flowborne.characters.rig import Z_UP
 from flowborne.characters.source import Source, clip_number, read_source
-from flowborne.errors import SceneError
-from flowborne.files.colours import to_srgb
 
 from . import rigged
 

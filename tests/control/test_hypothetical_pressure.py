@@ -11,7 +11,7 @@ from flowborne.control.controller import Controller
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 
 BLOCK = {"domain.resolution": "64"}
 FLYER = {"domain.resolution": "20"}

@@ -23,7 +23,7 @@ from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]

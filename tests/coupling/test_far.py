@@ -11,7 +11,7 @@ import flowborne as fb
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
-from flowborne.simulation import Snapshot
+from flowborne.sim.simulation import Snapshot
 from flowborne.solvers.pressure import PressureSolution, PressureSystem
 from flowborne.worlds import (
     Boundaries,

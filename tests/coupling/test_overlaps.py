@@ -20,7 +20,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 from flowborne.worlds import make_world
 from flowborne_validation.worlds import mjcf

@@ -10,7 +10,7 @@ import pytest
 import flowborne as fb
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Grid
-from flowborne.simulation import Snapshot
+from flowborne.sim.simulation import Snapshot
 from flowborne.worlds import (
     Boundaries,
     Boundary,

@@ -9,7 +9,7 @@ import flowborne as fb
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.induced import pooled
-from flowborne.simulation import Snapshot
+from flowborne.sim.simulation import Snapshot
 from flowborne.worlds import (
     Boundaries,
     BoundaryClosed,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from flowborne import Grid, load_scene
-from flowborne.coupling.seen import Seen, seen_bodies
 from flowborne.scenes.build import build
+from flowborne.scenes.seen import Seen, seen_bodies
 from flowborne.worlds import make_world
 from flowborne_validation.worlds import mjcf
 

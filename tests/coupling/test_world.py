@@ -12,7 +12,7 @@ from flowborne.coupling import cut
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Setup, World
-from flowborne.simulation import Simulation, Snapshot
+from flowborne.sim.simulation import Simulation, Snapshot
 from flowborne.solids.dynamics import Kinematics
 
 SMALL = {"domain.resolution": "32", "time.frames": "4"}

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 import flowborne as fb
-from flowborne.files.colours import to_linear
+from flowborne.base.colours import to_linear
 from flowborne.formats.creature import Creature
 
 pytest.importorskip("pxr")

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.bvh import TO_WORLD, read_bvh
 from flowborne.motion.bvh_file import load_bvh
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from numpy.testing import assert_allclose
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion import bvh
 from flowborne.motion.bvh import read_bvh, write_bvh, write_clip
 from flowborne.motion.bvh_file import load_bvh

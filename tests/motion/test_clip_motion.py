@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from flowborne.base.errors import SceneError
 from flowborne.coupling.motion import Trajectory
-from flowborne.errors import SceneError
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.clip_motion import MAX_CACHED_TIMES, TrajectoryClip

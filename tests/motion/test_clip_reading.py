@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.bvh import TO_WORLD
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_reading import check_scale, leg_length, likely_unit, standing_axis

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.formula import Formula
 
 CONSTANTS = {"amplitude": 20.0, "rate": -0.7}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.skeleton import JOINTS
 from flowborne.motion.mapping import REQUIRED, SIDED, families, mapping_of

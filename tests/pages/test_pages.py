@@ -21,7 +21,7 @@ from types import ModuleType
 
 import pytest
 
-from flowborne import cli
+from flowborne.cli import main as cli
 from flowborne.scenes.load import library
 from flowborne.scenes.plugins import LOADED
 from flowborne.scenes.schema import Scene

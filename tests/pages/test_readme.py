@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from flowborne import cli
+from flowborne.cli import main as cli
 from flowborne.scenes.load import check_scene, scene_names
 
 from .blocks import blocks_of

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.cli import main
+from flowborne.cli.main import main
 
 pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from flowborne.base import array_file as arrays_file
+from flowborne.base.array_file import read_arrays
 from flowborne.coupling.world import Fluid, Setup, World
-from flowborne.files import arrays as arrays_file
-from flowborne.files.arrays import read_arrays
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes

@@ -25,7 +25,7 @@ from flowborne.motion.inflow import FactorSteady
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.wind import Gusts
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.wind import WindFaces, WindForce
 
 Write = Callable[..., Path]

@@ -20,7 +20,7 @@ from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.notes import clip_notes, notes_of
 from flowborne.scenes.save import HUMAN_FILE, scene_files
 from flowborne.scenes.warn import lying
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 
 from .saved import save_scene
 

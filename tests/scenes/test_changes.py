@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.running import run
 from flowborne.scenes.changes import ChangeTable, values_at
-from flowborne.simulation import Simulation
+from flowborne.sim.running import run
+from flowborne.sim.simulation import Simulation
 
 
 def bits(simulation: Simulation) -> dict[str, bytes]:

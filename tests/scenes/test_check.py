@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.scenes.load import check_scene, load_scene
 
 Write = Callable[..., Path]

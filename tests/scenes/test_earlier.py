@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flowborne import cli
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
+from flowborne.cli import main as cli
 from flowborne.motion.quaternions import inverse, product
 from flowborne.scenes.bodies import trajectories_of
 from flowborne.scenes.build import build

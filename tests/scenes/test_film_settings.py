@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.runs.run_folder import RunFolder
 from flowborne.scenes.scene_copy import film_settings
 from flowborne.scenes.schema_film import FilmTable

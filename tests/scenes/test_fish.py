@@ -8,7 +8,7 @@ import pytest
 import fish
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.elements import measures
 from flowborne.solids.tissue.mesh_file import read_mesh
 

@@ -7,7 +7,7 @@ import pytest
 
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 from flowborne_validation import fishrobot
 

@@ -14,7 +14,7 @@ from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.save import scene_files
 from flowborne.scenes.scene_copy import scene_to_resume, write_scene
-from flowborne.simulation import BlowUpError, Simulation
+from flowborne.sim.simulation import BlowUpError, Simulation
 from flowborne.solids.flesh import inversion
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_file import mesh_bytes

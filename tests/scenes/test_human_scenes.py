@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flowborne.motion.human.skeleton import SIDES
 from flowborne.motion.quaternions import twist
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 from flowborne_validation.figures import posture
 

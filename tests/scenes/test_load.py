@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import tomli_w
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.scenes.load import (
     check_scene,
     library,

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.bvh import TO_WORLD, read_bvh, write_clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import standard_skeleton
 from flowborne.motion.quaternions import angle, inverse, product
-from flowborne.running import run
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.motion_out import export_bvh
+from flowborne.sim.running import run
 
 from .plain_bvh import plain
 from .rigs import Way, rig

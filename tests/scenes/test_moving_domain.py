@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.scenes.warn_bodies import fixed_outside
 from flowborne.scenes.window import window_notes
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.running import run
-from flowborne.simulation import Simulation
+from flowborne.sim.running import run
+from flowborne.sim.simulation import Simulation
 
 STEER = """
 import numpy as np

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flowborne.coupling.seen import Seen
 from flowborne.coupling.world import TRIAL_TOLERANCE
 from flowborne.scenes import warn, warn_bodies
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
+from flowborne.scenes.seen import Seen
 from flowborne.scenes.warn import warnings_of
 from flowborne.scenes.warn_speed import rigid_part
 

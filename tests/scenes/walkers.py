@@ -11,7 +11,7 @@ import numpy as np
 from flowborne.motion.bvh import TO_WORLD
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 
 from .plain_bvh import plain

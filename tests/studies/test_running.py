@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne import cli
-from flowborne.progress import RunProgress
+from flowborne.base.progress import RunProgress
+from flowborne.cli import main as cli
 from flowborne.studies import workers
 from flowborne.studies.members import Ended, run_member
 

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 from typer.testing import CliRunner
 
-from flowborne.cli import app
+from flowborne.cli.main import app
 from flowborne_validation import report
 from flowborne_validation.case import THE_RUN, Result, Tier
 from flowborne_validation.cases import case, case_ids

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from flowborne.cli import main
+from flowborne.cli.main import main
 from flowborne.coupling.world import Setup, World
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model

@@ -18,8 +18,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.rig import PLAIN, Array, Integers, Rig, Surface
-from flowborne.errors import SceneError
 from flowborne.shapes.closing import SMALL_HOLE, across_of, fans, loops_of, rims_of, wound
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.division import Division, divided
 from flowborne.characters.limits import check_work
 from flowborne.characters.model import as_cycle, clip_of, model_files, posed
@@ -22,7 +23,6 @@ from flowborne.characters.rig import (
     size_notes,
 )
 from flowborne.characters.source import clip_number, read_source
-from flowborne.errors import SceneError
 from flowborne.motion.bvh import bvh_text
 from flowborne.motion.clip import Clip
 from flowborne.scenes.build import build

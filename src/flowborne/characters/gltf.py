@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.gltf_buffers import Accessors, Colours
 from flowborne.characters.gltf_document import Node, Primitive, Skin, read_document
 from flowborne.characters.gltf_gate import WIDTH, check_document, joint_sets
@@ -32,7 +33,6 @@ from flowborne.characters.rig import (
     sampled_action,
     unique_names,
 )
-from flowborne.errors import SceneError
 
 PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 """Extensions that compress the arrays."""

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from flowborne.base.colours import to_linear, to_srgb
+from flowborne.base.errors import SceneError
 from flowborne.characters.gltf_document import (
     Accessor,
     Document,
@@ -24,8 +26,6 @@ from flowborne.characters.gltf_document import (
     embedded,
 )
 from flowborne.characters.rig import PLAIN, Array, Integers
-from flowborne.errors import SceneError
-from flowborne.files.colours import to_linear, to_srgb
 
 KINDS = {
     5120: np.int8,

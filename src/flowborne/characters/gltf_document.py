@@ -15,9 +15,9 @@ from urllib.parse import unquote, unquote_to_bytes, urlsplit
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, model_validator
 from pydantic.alias_generators import to_camel
 
+from flowborne.base.errors import SceneError
+from flowborne.base.given import check_file
 from flowborne.characters.limits import MAX_FILE_BYTES
-from flowborne.errors import SceneError
-from flowborne.files.given import check_file
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 

@@ -11,10 +11,10 @@ from math import hypot
 
 import numpy as np
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.gltf_buffers import Accessors, within, wrong
 from flowborne.characters.gltf_document import Document, Primitive, Sampler, Skin
 from flowborne.characters.rig import Array
-from flowborne.errors import SceneError
 
 MAX_NODES = 10_000
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array
 
 MAX_FILE_BYTES = 1 << 30

@@ -10,6 +10,7 @@ from itertools import count
 
 import numpy as np
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.limits import (
     MAX_NAME_LENGTH,
     check_frames,
@@ -17,7 +18,6 @@ from flowborne.characters.limits import (
     check_poses,
     check_surface,
 )
-from flowborne.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers
 
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
+from flowborne.base.errors import SceneError
+from flowborne.base.extras import optional
 from flowborne.characters.rig import Action, Rig, Surface
-from flowborne.errors import SceneError
-from flowborne.extras import optional
 
 GLTF, USD = (".glb", ".gltf"), (".usd", ".usda", ".usdc", ".usdz")
 

@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade, UsdSkel
 
+from flowborne.base.colours import to_srgb
+from flowborne.base.errors import SceneError
 from flowborne.characters.limits import check_size
 from flowborne.characters.rig import (
     PLAIN,
@@ -40,8 +42,6 @@ from flowborne.characters.usd_gate import (
     points_of,
     reading_usd,
 )
-from flowborne.errors import SceneError
-from flowborne.files.colours import to_srgb
 
 Result = TypeVar("Result")
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.limits import MAX_FILE_BYTES, MAX_POSES
 from flowborne.characters.rig import Array, Integers
-from flowborne.errors import SceneError
 
 MAX_LAYERS = 1000
 MAX_PRIMS = 100_000

@@ -6,8 +6,8 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from flowborne.base.errors import SceneError
 from flowborne.characters.usd import UsdSource
-from flowborne.errors import SceneError
 
 MAX_MEMORY = 8 << 30
 """Limit of the address space, bytes; Windows has no such limit."""

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.base.errors import SceneError
 from flowborne.control.creature import within_range
 from flowborne.coupling.motion import Told, Trajectory, TrajectoryKnots
 from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo, driven
 from flowborne.coupling.world import Setup, World
-from flowborne.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.actuators import actuators
 from flowborne.solids.model import FREE, SolidModel

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flowborne.base.errors import PartError
 from flowborne.control import creature
 from flowborne.control.course import Course, Step, Trials
 from flowborne.control.executors import Mapper, Threads
@@ -28,7 +29,6 @@ from flowborne.control.trial import Hypothesis, PoseCourse, without_scalars
 from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import BREAKDOWNS, StepReport
 from flowborne.coupling.servo import Servo, ServoExact
-from flowborne.errors import PartError
 from flowborne.kernels.arrays import Array, Integers, Mask
 
 if TYPE_CHECKING:

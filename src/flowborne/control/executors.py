@@ -21,7 +21,7 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import chain
 from typing import Any, Protocol, TypeVar
 
-from flowborne.errors import WorkerError
+from flowborne.base.errors import WorkerError
 from flowborne.kernels.jit import allowed_threads, cores, kernel_threads
 
 Task = TypeVar("Task")

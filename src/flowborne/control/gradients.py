@@ -8,9 +8,9 @@ from typing import Annotated, Literal, Protocol, Self
 import numpy as np
 from pydantic import Field, Tag
 
+from flowborne.base.registry import Registry
+from flowborne.base.tables import BUILT_IN, OWN, OwnTable, Table, by_kind_or_own
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.registry import Registry
-from flowborne.tables import BUILT_IN, OWN, OwnTable, Table, by_kind_or_own
 
 
 class Poses(Protocol):

@@ -13,17 +13,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, Tag, model_validator
 
-from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallable
-from flowborne.control.phases import PhaseTable
-from flowborne.control.surroundings import Surroundings
-from flowborne.coupling.motion import Trajectory
-from flowborne.kernels.arrays import Array, Integers
-from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
-from flowborne.python_function import with_parameters
-from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind
-from flowborne.solids.model import SolidModel
-from flowborne.tables import (
+from flowborne.base.tables import (
     BUILT_IN,
     FUNCTION,
     OWN,
@@ -38,6 +28,16 @@ from flowborne.tables import (
     check_keyframes,
     triple,
 )
+from flowborne.control.measurement import Measurement
+from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallable
+from flowborne.control.phases import PhaseTable
+from flowborne.control.python_function import with_parameters
+from flowborne.control.surroundings import Surroundings
+from flowborne.coupling.motion import Trajectory
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
+from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind
+from flowborne.solids.model import SolidModel
 
 Direction = tuple[float, float, float]
 Names = Annotated[tuple[Text, ...], Field(min_length=1)]

@@ -12,11 +12,11 @@ from typing import Protocol, SupportsFloat
 
 import numpy as np
 
+from flowborne.base.errors import PartError
+from flowborne.base.registry import Registry
 from flowborne.control.measurement import Measurement
 from flowborne.control.phases import PhaseAlways, Phases
-from flowborne.errors import PartError
 from flowborne.kernels.arrays import Integers
-from flowborne.registry import Registry
 
 
 class Objective(Protocol):

@@ -9,11 +9,11 @@ from typing import Annotated, Literal, Protocol
 import numpy as np
 from pydantic import Field, Tag
 
+from flowborne.base.registry import Registry
+from flowborne.base.tables import BUILT_IN, OWN, OwnTable, Positive, Steps, Table, by_kind_or_own
 from flowborne.control.gradients import Poses
 from flowborne.control.surroundings import Surroundings
 from flowborne.kernels.arrays import Array
-from flowborne.registry import Registry
-from flowborne.tables import BUILT_IN, OWN, OwnTable, Positive, Steps, Table, by_kind_or_own
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 

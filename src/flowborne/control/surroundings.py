@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
+from flowborne.control.python_function import with_parameters
 from flowborne.coupling.motion import Trajectory
-from flowborne.errors import SceneError
 from flowborne.kernels.arrays import Integers
-from flowborne.phrases import suggestion
-from flowborne.python_function import with_parameters
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.model import SolidModel
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from flowborne.base.errors import BreakdownError
 from flowborne.coupling.fractions import Geometry
-from flowborne.errors import BreakdownError
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dye import Brought
 from flowborne.fluid.grid import Array, Grid

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from flowborne.errors import BreakdownError, PartError, WorkerError
+from flowborne.base.errors import BreakdownError, PartError, WorkerError
 from flowborne.kernels.arrays import Array, Integers
 
 BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError

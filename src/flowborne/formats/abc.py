@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.extras import optional
-from flowborne.files.atomic import replaced_whole
+from flowborne.base.atomic import replaced_whole
+from flowborne.base.extras import optional
+from flowborne.base.version import __version__
 from flowborne.formats.creature import Array, Creature, Integers
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
-from flowborne.version import __version__
 
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Rotation from z up to y up."""

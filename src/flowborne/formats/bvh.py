@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.formats.creature import Array, Creature
 from flowborne.motion.bvh import write_clip
 from flowborne.motion.clip import Clip

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.recorder import on_skin

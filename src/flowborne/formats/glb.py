@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from flowborne.extras import optional
-from flowborne.files.atomic import replaced_whole
+from flowborne.base.atomic import replaced_whole
+from flowborne.base.extras import optional
 from flowborne.formats.creature import Creature
 from flowborne.formats.morphs import morphed
 from flowborne.runs.exporters import Written, provided

@@ -11,11 +11,11 @@ import pygltflib as gl
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flowborne.files.colours import to_linear
+from flowborne.base.colours import to_linear
+from flowborne.base.version import __version__
 from flowborne.formats.creature import Array, Bound, Creature, Integers, Mesh, Skin, Surface
 from flowborne.formats.morphs import MorphedSkin, strongest
 from flowborne.motion.quaternions import continuous
-from flowborne.version import __version__
 
 Y_UP = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
 """Rotation from z up to y up, as a quaternion (x, y, z, w)."""

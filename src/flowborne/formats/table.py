@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.extras import optional
-from flowborne.files.atomic import replaced_whole, write_text
+from flowborne.base.atomic import replaced_whole, write_text
+from flowborne.base.extras import optional
 from flowborne.runs.exporters import provided
 from flowborne.runs.history import unit_of
 from flowborne.runs.open_run import OpenRun

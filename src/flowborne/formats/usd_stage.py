@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, UsdVol, Vt
 from scipy.spatial.transform import Rotation
 
-from flowborne.files.colours import to_linear
+from flowborne.base.colours import to_linear
+from flowborne.base.version import __version__
 from flowborne.formats.creature import Creature, Mesh, Skeleton
 from flowborne.formats.morphs import strongest
 from flowborne.kernels.arrays import Array
 from flowborne.motion.quaternions import continuous
 from flowborne.runs.open_run import OpenRun
-from flowborne.version import __version__
 
 ROOT = Sdf.Path("/Run")
 

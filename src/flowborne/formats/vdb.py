@@ -21,8 +21,8 @@ from uuid import NAMESPACE_URL, uuid5
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.errors import SceneError
-from flowborne.files.atomic import write_atomically
+from flowborne.base.atomic import write_atomically
+from flowborne.base.errors import SceneError
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.states import cell_velocity

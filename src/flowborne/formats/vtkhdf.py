@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.extras import optional
-from flowborne.files.atomic import replaced_whole
+from flowborne.base.atomic import replaced_whole
+from flowborne.base.extras import optional
 from flowborne.formats.creature import Array, Creature, Integers, has_bodies
 from flowborne.kernels.elastic import STABLE_NEO_HOOKEAN
 from flowborne.runs.exporters import provided

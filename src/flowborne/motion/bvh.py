@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flowborne.errors import SceneError
-from flowborne.files.atomic import write_atomically, write_text
+from flowborne.base.atomic import write_atomically, write_text
+from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array, Mask
 from flowborne.motion.bvh_file import BvhFile, BvhJoint, angles_of, load_bvh, quaternions_of
 from flowborne.motion.clip import Clip

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flowborne.errors import SceneError
-from flowborne.files.given import read_file
+from flowborne.base.errors import SceneError
+from flowborne.base.given import read_file
 from flowborne.kernels.arrays import Array, Mask
 from flowborne.motion.quaternions import about, product
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.clip import Clip
 from flowborne.motion.quaternions import about, angle, continuous, inverse, product, rotated, twist
-from flowborne.phrases import suggestion
 from flowborne.solids import geoms
 from flowborne.solids.model import BALL, FREE, HINGE, SLIDE, SolidModel
 

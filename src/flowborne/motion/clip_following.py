@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import (

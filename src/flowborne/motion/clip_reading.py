@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array
 from flowborne.motion.bvh import TO_WORLD, check_rigid, clip_of
 from flowborne.motion.bvh_file import BvhFile, load_bvh
@@ -21,7 +22,6 @@ from flowborne.motion.human.segments import Sex
 from flowborne.motion.human.skeleton import JOINTS, Skeleton, nearest_parent
 from flowborne.motion.human.soles import with_soles_on_floor
 from flowborne.motion.mapping import mapping_of
-from flowborne.phrases import suggestion
 
 MIN_LEG_LENGTH, MAX_LEG_LENGTH = 0.2, 2.0
 """m from hip to ankle, limits for any person."""

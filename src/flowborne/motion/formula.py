@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from textwrap import shorten
 
-from flowborne.errors import SceneError
-from flowborne.phrases import suggestion
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.skeleton import JOINTS, SIDES, nearest_parent
-from flowborne.phrases import suggestion
 
 SIDED = ("hip", "knee", "ankle", "toes", "clavicle", "shoulder", "elbow", "wrist")
 """Joints of the limbs, without their side."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flowborne.phrases import and_more
+from flowborne.base.phrases import and_more
 from flowborne.play.groups import Group
 from flowborne.scenes.schema import Scene
 from flowborne.solids.joint_kinds import SLIDE, joint_kind

@@ -9,9 +9,9 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array
 from flowborne.play.playing import Moment, Play
-from flowborne.running import write_state_alone
 from flowborne.runs.run_folder import RunFolder
 from flowborne.runs.states import DYE
+from flowborne.sim.running import write_state_alone
 from flowborne.view.run import Run, State
 
 MEMORY = 2_000_000_000

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.base.progress import RunProgress
 from flowborne.play.controls import Controls, Settings, Values
 from flowborne.play.groups import with_choices
 from flowborne.play.reference import InputMotion
-from flowborne.progress import RunProgress
-from flowborne.running import RunOutcome, run
 from flowborne.runs.checkpoint import load_checkpoint
 from flowborne.runs.recorder import Recorder
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.scenes.changes import ChangeTable
 from flowborne.scenes.scene_copy import with_frames
 from flowborne.scenes.schema import Scene
-from flowborne.simulation import Simulation, Snapshot
+from flowborne.sim.running import RunOutcome, run
+from flowborne.sim.simulation import Simulation, Snapshot
 from flowborne.view.run import PLOTTED
 
 State = dict[str, NDArray[Any]]

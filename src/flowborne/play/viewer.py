@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
+from flowborne.base.progress import RunProgress
 from flowborne.kernels.arrays import Array
 from flowborne.play.memory import PlayedRun
 from flowborne.play.panel import RECORD, PlayPanel
 from flowborne.play.playing import Moment, Play
-from flowborne.progress import RunProgress
 from flowborne.runs.run_folder import RunFolderError
 from flowborne.scenes.schema import Scene
-from flowborne.simulation import BlowUpError
+from flowborne.sim.simulation import BlowUpError
 from flowborne.view.browser.settings import Settings
 from flowborne.view.browser.solids import Bodies
 from flowborne.view.browser.surroundings import show_wind

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.base.array_file import read_arrays
+from flowborne.base.atomic import write_atomically
 from flowborne.coupling.named import Sensed
 from flowborne.coupling.world import Setup, World
-from flowborne.files.arrays import read_arrays
-from flowborne.files.atomic import write_atomically
 from flowborne.fluid.state import under
 
 SENSED = "sensed/"

@@ -9,7 +9,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import NamedTuple, Protocol, TypeVar
 
-from flowborne.registry import Registry
+from flowborne.base.registry import Registry
 from flowborne.runs.open_run import OpenRun
 
 Class = TypeVar("Class", bound=type)

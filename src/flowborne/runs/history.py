@@ -12,8 +12,8 @@ from typing import IO, NamedTuple
 
 import numpy as np
 
-from flowborne.files.atomic import write_text
-from flowborne.files.given import MOST_BYTES, check_file
+from flowborne.base.atomic import write_text
+from flowborne.base.given import MOST_BYTES, check_file
 from flowborne.fluid.grid import Array
 
 UNITS = {

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.extras import optional
-from flowborne.files.given import read_json
+from flowborne.base.extras import optional
+from flowborne.base.given import read_json
 from flowborne.fluid.grid import Array, Grid
 from flowborne.runs.history import history_arrays, history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.base.atomic import sync_files, write_atomically, write_json
 from flowborne.coupling.world import Setup, World
-from flowborne.files.atomic import sync_files, write_atomically, write_json
 from flowborne.fluid.grid import Array
 from flowborne.runs.run_folder import RunFolder
 from flowborne.shapes.mesh import ShapeMesh

@@ -23,10 +23,10 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from flowborne.errors import SceneError
-from flowborne.files.atomic import partial_name, write_json
-from flowborne.files.given import possible_name, read_json, read_toml
-from flowborne.version import __version__
+from flowborne.base.atomic import partial_name, write_json
+from flowborne.base.errors import SceneError
+from flowborne.base.given import possible_name, read_json, read_toml
+from flowborne.base.version import __version__
 
 MARK = "flowborne"
 """Key of summary.json that marks a run folder."""

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flowborne.base.version import __version__
 from flowborne.runs.history import history_columns, history_rows
-from flowborne.version import __version__
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import Fluid

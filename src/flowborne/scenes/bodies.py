@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
 from flowborne.coupling.motion import Trajectory
-from flowborne.errors import SceneError
 from flowborne.fluid.grid import Array
-from flowborne.phrases import suggestion
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints, earlier_motion

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.fluid.grid import Array
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.clip_motion import TrajectoryClip

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from flowborne.tables import NotNegative, Table
+from flowborne.base.tables import NotNegative, Table
 
 CHANGEABLE = ("wind", "boundaries", "objectives", "control", "controller")
 """Tables whose values may change in a run: winds, streams, objectives, weights and strengths."""

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.base.errors import SceneError
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.world import Setup
-from flowborne.errors import SceneError
 from flowborne.scenes.bodies import check_initial, initial_state, load_model
 from flowborne.scenes.build import mouths_of, surroundings_of
 from flowborne.scenes.check_clip import check_clip, check_followers

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.scenes.bodies import check_initial, posed
 from flowborne.scenes.capture import capture_of, clip_motion

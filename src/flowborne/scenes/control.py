@@ -9,11 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.control.gradients import AnyGradient, GradientCentralTable
-from flowborne.control.phases import PhaseTable
-from flowborne.control.rules import AnyRule, RuleFixed
-from flowborne.scenes.motions import EXACT, ServoTable
-from flowborne.tables import (
+from flowborne.base.tables import (
     Count,
     Positive,
     Steps,
@@ -21,6 +17,10 @@ from flowborne.tables import (
     Table,
     Text,
 )
+from flowborne.control.gradients import AnyGradient, GradientCentralTable
+from flowborne.control.phases import PhaseTable
+from flowborne.control.rules import AnyRule, RuleFixed
+from flowborne.scenes.motions import EXACT, ServoTable
 
 
 class StrengthInPhaseTable(Table):

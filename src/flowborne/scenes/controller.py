@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.base.phrases import suggestion
 from flowborne.control.controller import Controller, StrengthInPhase
 from flowborne.control.executors import Mapper
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
@@ -16,7 +17,6 @@ from flowborne.control.plan import Horizon
 from flowborne.control.surroundings import Surroundings
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.motion import Trajectory
-from flowborne.phrases import suggestion
 from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.motions import out_of_plane

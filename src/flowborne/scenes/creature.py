@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.base.phrases import listed
 from flowborne.coupling.cut import cut_at
 from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Array
-from flowborne.phrases import listed
 from flowborne.scenes.bodies import displace_of, initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from flowborne.base.tables import Corner, Count, NotNegative, Places, Positive, Table, Text, Vector
 from flowborne.fluid.grid import Grid
 from flowborne.runs.summary import machine_memory
-from flowborne.tables import Corner, Count, NotNegative, Places, Positive, Table, Text, Vector
 
 FEWEST_CELLS = 4
 """Cells that a domain has at least along each axis."""

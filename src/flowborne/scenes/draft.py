@@ -8,11 +8,11 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic_core import ErrorDetails
 
+from flowborne.base.phrases import suggestion
+from flowborne.base.tables import BUILT_IN, OWN, OwnTable, Table
 from flowborne.control.surroundings import unknown_bodies, unknown_joints
-from flowborne.phrases import suggestion
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model import SolidModel
-from flowborne.tables import BUILT_IN, OWN, OwnTable, Table
 
 Key = str | int
 

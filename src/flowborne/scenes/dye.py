@@ -7,12 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
-from flowborne.fluid.boundary import Source
-from flowborne.fluid.grid import Grid
-from flowborne.motion.inflow import Bands, even_bands
-from flowborne.scenes.domain import Domain
-from flowborne.scenes.sides import BoundariesTable, Side
-from flowborne.tables import (
+from flowborne.base.tables import (
     ByKind,
     Number,
     Places,
@@ -24,6 +19,11 @@ from flowborne.tables import (
     check_interval,
     triple,
 )
+from flowborne.fluid.boundary import Source
+from flowborne.fluid.grid import Grid
+from flowborne.motion.inflow import Bands, even_bands
+from flowborne.scenes.domain import Domain
+from flowborne.scenes.sides import BoundariesTable, Side
 
 MOST_BANDS = 1000
 """Bands of dye through a side."""

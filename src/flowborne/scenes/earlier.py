@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flowborne.errors import SceneError
-from flowborne.files.arrays import read_arrays
-from flowborne.files.given import read_json
+from flowborne.base.array_file import read_arrays
+from flowborne.base.errors import SceneError
+from flowborne.base.given import read_json
+from flowborne.base.phrases import suggestion
 from flowborne.fluid.grid import Array
 from flowborne.motion.clip_curves import columns_of, row_of
 from flowborne.motion.clip_motion import TrajectoryClip
 from flowborne.motion.quaternions import continuous
-from flowborne.phrases import suggestion
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.scenes.draft import Draft

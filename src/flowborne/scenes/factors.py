@@ -6,9 +6,9 @@ from typing import Self
 
 from pydantic import model_validator
 
+from flowborne.base.tables import NotNegative, Number, Table, check_keyframes
 from flowborne.motion.inflow import Factor, FactorKeyframes, FactorRamp, FactorSteady
 from flowborne.motion.tracks import Curve
-from flowborne.tables import NotNegative, Number, Table, check_keyframes
 
 
 class FactorsTable(Table):

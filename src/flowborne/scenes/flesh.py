@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from flowborne.base.tables import FileName, NotNegative, Places, PlainName, Positive, Table, Text
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.sides import BoundariesTable
 from flowborne.solids.compiler import MjSpec
@@ -33,7 +34,6 @@ from flowborne.solids.tissue.mesh import (
 from flowborne.solids.tissue.mesh_file import read_mesh, recipe_of
 from flowborne.solids.tissue.surface_file import surface_bytes
 from flowborne.solids.tissue.symmetry import SAME
-from flowborne.tables import FileName, NotNegative, Places, PlainName, Positive, Table, Text
 
 LAWS = {
     "neo-hookean": Law.STABLE_NEO_HOOKEAN,

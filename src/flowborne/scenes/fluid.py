@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from flowborne.base.tables import triple
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
@@ -14,7 +15,6 @@ from flowborne.scenes.dye import DyeBands, DyeBox, check_bands, check_boxes
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import DyeValue, check_outlet, check_sides
 from flowborne.scenes.window import check_window
-from flowborne.tables import triple
 
 NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")
 

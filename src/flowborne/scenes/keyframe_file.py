@@ -13,9 +13,9 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from flowborne.errors import SceneError
-from flowborne.files.given import possible_name, read_file
-from flowborne.phrases import suggestion
+from flowborne.base.errors import SceneError
+from flowborne.base.given import possible_name, read_file
+from flowborne.base.phrases import suggestion
 from flowborne.scenes.draft import place
 
 

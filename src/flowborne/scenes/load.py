@@ -13,10 +13,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from flowborne.errors import SceneError
-from flowborne.files.given import read_file
+from flowborne.base.errors import SceneError
+from flowborne.base.given import read_file
+from flowborne.base.phrases import suggestion
 from flowborne.motion.human.skeleton import SIDES
-from flowborne.phrases import suggestion
 from flowborne.runs.run_folder import reading
 from flowborne.scenes.bodies import with_steps
 from flowborne.scenes.changes import CHANGEABLE

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.bvh import write_bvh, write_clip
 from flowborne.motion.clip import Clip

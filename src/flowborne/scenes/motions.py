@@ -10,23 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from flowborne.control.surroundings import Surroundings
-from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import ServoExact, ServoPD, driven
-from flowborne.errors import SceneError
-from flowborne.fluid.grid import Array
-from flowborne.motion.formula import RESERVED, Formula
-from flowborne.motion.tracks import (
-    Curve,
-    TrajectoryConstant,
-    TrajectoryFormula,
-    TrajectoryKeyframes,
-    TrajectorySinusoid,
-)
-from flowborne.phrases import suggestion
-from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind, joint_unit
-from flowborne.solids.model import SolidModel
-from flowborne.tables import (
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
+from flowborne.base.tables import (
     ByKind,
     FileName,
     Number,
@@ -36,6 +22,20 @@ from flowborne.tables import (
     Text,
     check_keyframes,
 )
+from flowborne.control.surroundings import Surroundings
+from flowborne.coupling.motion import Trajectory
+from flowborne.coupling.servo import ServoExact, ServoPD, driven
+from flowborne.fluid.grid import Array
+from flowborne.motion.formula import RESERVED, Formula
+from flowborne.motion.tracks import (
+    Curve,
+    TrajectoryConstant,
+    TrajectoryFormula,
+    TrajectoryKeyframes,
+    TrajectorySinusoid,
+)
+from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind, joint_unit
+from flowborne.solids.model import SolidModel
 
 Indices = NDArray[np.int64]
 

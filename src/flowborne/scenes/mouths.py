@@ -8,6 +8,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
+from flowborne.base.tables import Number, Places, Positive, Table, Text, Vector
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.cut import cut_by_bodies, jets_at
 from flowborne.coupling.mouths import Mouth
@@ -18,7 +19,6 @@ from flowborne.motion.inflow import FactorFormula, FactorPulse, FactorSteady
 from flowborne.scenes.factors import FactorsTable
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
-from flowborne.tables import Number, Places, Positive, Table, Text, Vector
 
 
 class PulseTable(Table):

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.base.phrases import listed
 from flowborne.control.rules import RuleFixed
 from flowborne.motion.bvh import MAX_BONE_STRETCH
 from flowborne.motion.clip_reading import (
@@ -17,7 +18,6 @@ from flowborne.motion.clip_reading import (
 )
 from flowborne.motion.human.clip_skeleton import lost_bones
 from flowborne.motion.human.skeleton import PARENTS
-from flowborne.phrases import listed
 from flowborne.scenes.bodies import own_pose, posed, spec_of
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.earlier import earlier_of

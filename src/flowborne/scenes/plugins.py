@@ -8,8 +8,8 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
-from flowborne.errors import PartError, SceneError
-from flowborne.files.given import read_file
+from flowborne.base.errors import PartError, SceneError
+from flowborne.base.given import read_file
 
 LOADED: dict[str, bytes] = {}
 """Module -> text of the file that it was made from."""

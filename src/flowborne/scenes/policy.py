@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from flowborne.base.errors import PartError
+from flowborne.base.tables import Table, Text
 from flowborne.control.objective_kinds import FUNCTION, Parameters
+from flowborne.control.python_function import with_parameters
 from flowborne.control.surroundings import Surroundings
-from flowborne.errors import PartError
-from flowborne.python_function import with_parameters
-from flowborne.tables import Table, Text
 
 
 class PolicyTable(Table):

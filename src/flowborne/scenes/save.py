@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from flowborne.errors import SceneError
-from flowborne.files.given import read_file
+from flowborne.base.errors import SceneError
+from flowborne.base.given import read_file
 from flowborne.runs.run_folder import OWN_NAMES
 from flowborne.scenes.bodies import bones_of, packages_of
 from flowborne.scenes.capture import human_of

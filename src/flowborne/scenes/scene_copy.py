@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from flowborne.errors import SceneError
-from flowborne.files.atomic import write_atomically
+from flowborne.base.atomic import write_atomically
+from flowborne.base.errors import SceneError
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.scenes.draft import explain
 from flowborne.scenes.load import load_scene, override

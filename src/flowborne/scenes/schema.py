@@ -11,6 +11,18 @@ import tomli_w
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
+from flowborne.base.tables import (
+    Count,
+    FileName,
+    Number,
+    PlainName,
+    Positive,
+    Steps,
+    SwitchOrNames,
+    Table,
+    Text,
+    Vector,
+)
 from flowborne.control.objective_kinds import AnyObjective
 from flowborne.runs.exporters import EXPORTERS, can_write, endings
 from flowborne.runs.run_folder import FIXED_NAMES
@@ -32,18 +44,6 @@ from flowborne.scenes.schema_bodies import (
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.sides import BoundariesTable
 from flowborne.scenes.wind import WindTable
-from flowborne.tables import (
-    Count,
-    FileName,
-    Number,
-    PlainName,
-    Positive,
-    Steps,
-    SwitchOrNames,
-    Table,
-    Text,
-    Vector,
-)
 
 
 class TimeTable(Table):

@@ -12,9 +12,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
-from flowborne.fluid.grid import Array
-from flowborne.shapes.own import SHAPES, PlacedShape
-from flowborne.tables import (
+from flowborne.base.tables import (
     FileName,
     JointValues,
     NotNegative,
@@ -28,6 +26,8 @@ from flowborne.tables import (
     WholeNumber,
     check_interval,
 )
+from flowborne.fluid.grid import Array
+from flowborne.shapes.own import SHAPES, PlacedShape
 
 
 class DisplaceTable(Table):

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
-from flowborne.tables import Number, Positive, Table, Text, Vector
+from flowborne.base.tables import Number, Positive, Table, Text, Vector
 
 Pixels = Annotated[int, Strict(), Field(ge=64)]
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, ClassVar, Literal
 
+from flowborne.base.tables import ByKind, Places, Table, Vector, triple
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sea import stream_problem
 from flowborne.fluid.sides.far import CHANNEL, ONE_SEA, BoundaryFar, centre_among, in_channel
@@ -20,7 +21,6 @@ from flowborne.fluid.sides.side import Boundary
 from flowborne.motion.inflow import InflowProfile
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.factors import RampTable
-from flowborne.tables import ByKind, Places, Table, Vector, triple
 
 DyeValue = Callable[[Array, Array, Array, float], Array]
 Side = Literal["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]

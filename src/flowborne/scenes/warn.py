@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from flowborne.base.phrases import listed, rounded_up
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import TRIAL_TOLERANCE, Setup
 from flowborne.motion.clip_reading import MIN_STANDING_COSINE, standing_axis
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.phrases import listed, rounded_up
 from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.controller import input_motions

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.coupling.seen import Seen, seen_bodies
+from flowborne.base.phrases import and_more, listed, rounded_down, rounded_up
 from flowborne.coupling.world import Fluid, Setup
-from flowborne.phrases import and_more, listed, rounded_down, rounded_up
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.creature import counted_bodies, creature_extent, unmet_bodies
 from flowborne.scenes.domain import Domain, fits_memory
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.seen import Seen, seen_bodies
 from flowborne.solids.geoms import floors, geom_name, kind_of, rest_poses
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import geom_boxes

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.base.tables import MOST_STEPS
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Array
@@ -19,7 +20,6 @@ from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.surfaces import Outline
-from flowborne.tables import MOST_STEPS
 
 BODY_CELLS = 1.0
 """Cells that a body may cross in a step. A faster body jumps over cells, and their fluid passes

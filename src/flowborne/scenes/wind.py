@@ -9,14 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from flowborne.control.surroundings import Surroundings
-from flowborne.coupling.stream import WindStream
-from flowborne.fluid.grid import Array
-from flowborne.motion.inflow import Factor, FactorSteady
-from flowborne.python_function import WindFunction, with_parameters
-from flowborne.scenes.factors import FactorsTable
-from flowborne.solids.wind import Wind, WindFaces, WindForce
-from flowborne.tables import (
+from flowborne.base.tables import (
     FUNCTION,
     ByKind,
     NotNegative,
@@ -27,6 +20,13 @@ from flowborne.tables import (
     Vector,
     triple,
 )
+from flowborne.control.python_function import WindFunction, with_parameters
+from flowborne.control.surroundings import Surroundings
+from flowborne.coupling.stream import WindStream
+from flowborne.fluid.grid import Array
+from flowborne.motion.inflow import Factor, FactorSteady
+from flowborne.scenes.factors import FactorsTable
+from flowborne.solids.wind import Wind, WindFaces, WindForce
 
 
 @dataclass(frozen=True)

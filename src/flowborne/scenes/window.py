@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.base.phrases import listed
 from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.grid import Array
 from flowborne.fluid.window import crosses
-from flowborne.phrases import listed
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.dye import DyeBox
 from flowborne.scenes.schema import Scene

@@ -7,10 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
-from flowborne.errors import PartError
-from flowborne.extras import optional
+from flowborne.base.errors import PartError
+from flowborne.base.extras import optional
+from flowborne.base.registry import Registry
 from flowborne.kernels.node_distance import BAND, allow_for_curvature
-from flowborne.registry import Registry
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Array, Integers, Mesh, Samples, Shape, lattice, lattice_points

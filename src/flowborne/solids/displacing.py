@@ -17,7 +17,7 @@ from fnmatch import fnmatchcase
 import mujoco
 import numpy as np
 
-from flowborne.phrases import listed
+from flowborne.base.phrases import listed
 from flowborne.shapes.closing import is_closed
 from flowborne.solids.geoms import (
     HIDDEN_GROUP,

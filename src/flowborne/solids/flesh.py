@@ -17,8 +17,8 @@ from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vst
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
+from flowborne.base.phrases import location
 from flowborne.kernels.arrays import Array, Integers, Mask
-from flowborne.phrases import location
 from flowborne.shapes.mesh import smooth_sheets
 from flowborne.shapes.thickness import thinnest
 from flowborne.solids.elasticity import Elasticity

@@ -20,7 +20,7 @@ from xml.sax.saxutils import escape
 
 import mujoco
 
-from flowborne.files.given import read_file
+from flowborne.base.given import read_file
 from flowborne.solids.model_checks import check_kind, check_mesh
 
 ATTRIBUTE = re.compile(rb"\s+([^\s=/>]+)\s*=\s*(\"[^\"]*\"|'[^']*')")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from flowborne.phrases import listed
+from flowborne.base.phrases import listed
 
 REPLACED = {
     "integrator": mujoco.mjtIntegrator,

@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
-from flowborne.errors import BreakdownError
+from flowborne.base.errors import BreakdownError
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics, SolidSystem, System, assemble
 from flowborne.solids.model import SolidModel

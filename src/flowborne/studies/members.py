@@ -18,17 +18,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
-from flowborne.errors import PartError, SceneError, described
-from flowborne.files.atomic import write_atomically, write_json
-from flowborne.files.given import read_json
+from flowborne.base.atomic import write_atomically, write_json
+from flowborne.base.errors import PartError, SceneError, described
+from flowborne.base.given import read_json
+from flowborne.base.version import __version__
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import kernel_threads
-from flowborne.running import COMPLETE, RunOutcome, run
 from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.save import scene_files
-from flowborne.version import __version__
+from flowborne.sim.running import COMPLETE, RunOutcome, run
 
 FAILED = "failed"
 """Outcome of a member without a run: its scene is wrong, or its process died."""

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from flowborne.extras import optional
+from flowborne.base.extras import optional
 from flowborne.studies.sampling import Sample
 from flowborne.studies.schema import Study, VaryTable
 

@@ -10,7 +10,7 @@ from itertools import islice, product
 
 import numpy as np
 
-from flowborne.files.atomic import write_text
+from flowborne.base.atomic import write_text
 from flowborne.studies.result import BAR, StudyResult
 from flowborne.studies.schema import Study
 from flowborne.view import style

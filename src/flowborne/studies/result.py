@@ -12,13 +12,13 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.error_bars import Refinement
-from flowborne.errors import SceneError
-from flowborne.extras import optional
-from flowborne.files.atomic import replaced_whole
+from flowborne.base.atomic import replaced_whole
+from flowborne.base.errors import SceneError
+from flowborne.base.extras import optional
+from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array
-from flowborne.phrases import suggestion
 from flowborne.runs.history import unit_of
+from flowborne.studies.error_bars import Refinement
 from flowborne.studies.members import Ended, Members
 from flowborne.studies.sampling import Sample
 from flowborne.studies.schema import MeasureTable, Study, toml_text

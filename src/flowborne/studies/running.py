@@ -10,12 +10,13 @@ from time import perf_counter
 
 from filelock import FileLock, Timeout
 
-from flowborne.extras import optional
-from flowborne.files.atomic import write_text
-from flowborne.progress import RunProgress
+from flowborne.base.atomic import write_text
+from flowborne.base.extras import optional
+from flowborne.base.progress import RunProgress
+from flowborne.base.version import __version__
 from flowborne.runs.run_folder import LOCK_NAME, RunFolderError, check_name, make_folder
 from flowborne.scenes.load import load_scene
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.studies.members import Members, member_id, scene_digest
 from flowborne.studies.optimising import Optimiser
 from flowborne.studies.page import write_page
@@ -29,7 +30,6 @@ from flowborne.studies.sampling import (
 )
 from flowborne.studies.schema import MeasureTable, Study, load_study, toml_text
 from flowborne.studies.workers import DaskWorkers, Task, Workers
-from flowborne.version import __version__
 
 COPY, TABLE, MEMBERS = "study.toml", "result.parquet", "members"
 """Files in the folder of a study: its copy, which marks the folder, the table, the runs."""

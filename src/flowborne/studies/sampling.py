@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.studies.schema import OPTIMISERS, Study, VaryTable
 
 MOST_RUNS = 100_000

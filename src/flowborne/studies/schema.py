@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal, Self
 import tomli_w
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from flowborne.errors import SceneError
-from flowborne.phrases import suggestion
+from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
+from flowborne.base.tables import Count, Number, PlainName, Positive, Table, Text, WholeNumber
 from flowborne.scenes.draft import explain
 from flowborne.scenes.load import load_scene, read_tables
-from flowborne.tables import Count, Number, PlainName, Positive, Table, Text, WholeNumber
 
 OPTIMISERS = ("nsga-ii", "tpe")
 """Kinds of sampling that look for the goals."""

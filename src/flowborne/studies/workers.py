@@ -17,8 +17,8 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
-from flowborne.errors import SceneError, said_by
-from flowborne.extras import optional
+from flowborne.base.errors import SceneError, said_by
+from flowborne.base.extras import optional
 from flowborne.kernels.jit import cores
 from flowborne.machine import end_with_parent
 from flowborne.studies.members import FAILED, Ended, run_member

@@ -12,7 +12,7 @@ import imageio_ffmpeg  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.files.atomic import partial_name, write_atomically
+from flowborne.base.atomic import partial_name, write_atomically
 from flowborne.runs.run_folder import RunFolder
 from flowborne.view.drawing import drawn_frames
 from flowborne.view.pictures import Picture

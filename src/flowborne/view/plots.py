@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
-from flowborne.files.atomic import write_atomically
+from flowborne.base.atomic import write_atomically
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.view import style
 from flowborne.view.run import Run

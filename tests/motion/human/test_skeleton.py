@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.body import human_mjcf

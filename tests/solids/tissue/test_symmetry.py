@@ -15,7 +15,7 @@ from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import load_scene
 from flowborne.shapes.closing import is_closed
 from flowborne.shapes.shape import Mesh
-from flowborne.simulation import Simulation
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.elements import measures, outer_surface
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.bones import bones_of, contour

@@ -16,9 +16,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flowborne as fb
-from flowborne.cli import main
-from flowborne.errors import SceneError
-from flowborne.files.colours import to_linear
+from flowborne.base.colours import to_linear
+from flowborne.base.errors import SceneError
+from flowborne.cli.main import main
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.runs.states import cell_velocity
 from flowborne.scenes.schema_film import FilmTable

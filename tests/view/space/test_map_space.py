@@ -13,7 +13,7 @@ import pytest
 
 import flowborne
 from flowborne.fluid.grid import Grid
-from flowborne.running import RunOutcome
+from flowborne.sim.running import RunOutcome
 from flowborne.view import style
 from flowborne.view.film import make_preview
 from flowborne.view.maps import MapSpace

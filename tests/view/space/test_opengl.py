@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import flowborne
-from flowborne.cli import main
-from flowborne.running import RunOutcome
+from flowborne.cli.main import main
+from flowborne.sim.running import RunOutcome
 from flowborne.view.space import opengl
 
 MISSING = "neither libEGL nor libOSMesa works here; install OpenGL"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flowborne.errors import SceneError
+from flowborne.base.errors import SceneError
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.skeleton import SIDES, Array, standard_skeleton
 from flowborne.motion.quaternions import angle, inverse, product, rotated

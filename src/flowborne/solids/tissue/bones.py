@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from flowborne.extras import flesh_library
+from flowborne.base.extras import flesh_library
+from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array
-from flowborne.phrases import suggestion
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh, Shape
 from flowborne.solids.compiler import compiled_quietly

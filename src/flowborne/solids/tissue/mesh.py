@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from flowborne.extras import check_mesher
+from flowborne.base.extras import check_mesher
+from flowborne.base.phrases import location, rounded_up
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.jit import numba_thread_count
-from flowborne.phrases import location, rounded_up
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import (
     connected,

@@ -10,9 +10,9 @@ import numpy as np
 import trimesh
 from trimesh.exchange.load import mesh_formats
 
-from flowborne.extras import flesh_library
-from flowborne.files.given import read_file
-from flowborne.phrases import location
+from flowborne.base.extras import flesh_library
+from flowborne.base.given import read_file
+from flowborne.base.phrases import location
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.tissue.bones import Bones, contour, signed_distance
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from flowborne.extras import flesh_library
+from flowborne.base.extras import flesh_library
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.shapes.shape import Mesh
 from flowborne.solids.elements import surface_of

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.errors import SceneError
-from flowborne.extras import optional
+from flowborne.base.errors import SceneError
+from flowborne.base.extras import optional
 from flowborne.kernels.arrays import Array
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state

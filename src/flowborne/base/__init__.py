@@ -1,0 +1,1 @@
+"""Errors, words, tables, progress, and files within limits. Knows nothing of physics."""

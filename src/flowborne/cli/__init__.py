@@ -1,0 +1,1 @@
+"""The command `flowborne`, and what it prints."""

@@ -1,0 +1,240 @@
+"""Gymnasium environments: a policy of one's own moves the controlled joints of a scene.
+
+    import gymnasium
+    import flowborne.play.gym
+
+    env = gymnasium.make("flowborne/eel-v0")
+
+The environment has the scene's joints, strengths, time and objectives, so that a learned policy
+stands beside the gradient controller on the same task.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import numpy as np
+
+from flowborne.base.errors import SceneError
+from flowborne.base.extras import optional
+from flowborne.control.commands import (
+    Command,
+    Position,
+    Torque,
+    Velocity,
+    servo_of,
+    torque_limit,
+)
+from flowborne.control.measurement import Measurement
+from flowborne.kernels.arrays import Array
+from flowborne.runs.frame_report import FrameReport
+from flowborne.scenes.load import load_scene
+from flowborne.scenes.schema import Scene
+from flowborne.sim.simulation import BlowUpError, Simulation
+from flowborne.solids.model import SLIDE
+
+__all__ = ["ENVIRONMENTS", "SceneEnv"]
+
+gymnasium = optional("gymnasium", "Gymnasium", "gym", "environments")
+
+ENVIRONMENTS = {
+    "eel": "eel-free",
+    "block": "ns-block-drag-max",
+    "walker": "human-wind-drag",
+    "swimmer": "swimmer",
+    "eel-sea": "eel-sea",
+    "swimmer-sea": "swimmer-sea",
+    "flyer": "flyer-air",
+}
+"""Name of an environment -> its scene."""
+
+Kind = Literal["velocity", "position", "torque"]
+Reward = Callable[[Simulation, FrameReport], float]
+
+
+class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
+    """A scene whose controlled joints, or some of them, are told by a policy.
+
+    An action has a number from -1 to 1 for each dof of these joints: part of its strength in the
+    scene ("velocity"), a place in its range ("position"), or part of its torque limit ("torque").
+    An observation has, for each of them, position (scalar joints), velocity and drive force, then
+    velocity and angular velocity of the body that carries the creature in its own axes; see
+    `observed`. It is zero before the first frame where only a step can tell.
+
+    scene        a Scene, the name of a built-in one, or the path of a scene file
+    joints       those that the policy tells; all controlled ones when None. The controller decides
+                 for the others
+    kind         what an action means
+    every        frames for which an action holds
+    reward       of a frame; by default minus the scene's objectives, in the mean over the frames of
+                 an action
+    observe      another observation, (n,) numbers
+    render_mode  "rgb_array", or None
+    raises       SceneError for a wrong scene, joints without a limit that `kind` needs, and without
+                 objectives or a reward
+
+    simulation  the Simulation
+    observed    names of the numbers of an observation
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | Path,
+        *,
+        joints: tuple[str, ...] | None = None,
+        kind: Kind = "velocity",
+        every: int = 1,
+        reward: Reward | None = None,
+        observe: Callable[[Simulation], Array] | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self.scene = load_scene(scene) if isinstance(scene, str | Path) else scene
+        self.simulation = Simulation(self.scene, workers=1)
+        self._joints = self._told(joints)
+        self._kind, self._every, self.render_mode = kind, every, render_mode
+        self._objective, self._own_observe = reward or self._minus_objectives, observe
+        self._low, self._high = self._limits()
+        self.observed = tuple(self._observed())
+        self._start = self.simulation.snapshot()
+        rate = self.scene.time.frames_per_second / every
+        self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": rate}
+        box, inf = gymnasium.spaces.Box, np.inf
+        self.action_space = box(-1.0, 1.0, self._low.shape, np.float32)
+        self.observation_space = box(-inf, inf, self._observation().shape, np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start again; `options` are ignored. A scene has no chance in it, so `seed` is only that
+        of `np_random`."""
+        super().reset(seed=seed)
+        self.simulation.restore(self._start)
+        return self._observation(), {}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Tell the joints, for `every` frames. `terminated` says that the run broke down, for the
+        cause in the info; `truncated` that the scene is at its end."""
+        simulation, rewards, info = self.simulation, list[float](), dict[str, Any]()
+        terminated = False
+        try:
+            for _ in range(self._every):
+                report = simulation.advance_frame(self._commands(np.asarray(action, np.float64)))
+                rewards.append(float(self._objective(simulation, report)))
+                info["beyond"] = report.beyond
+        except BlowUpError as error:
+            terminated, info["broke_down"] = True, str(error)
+        truncated = simulation.frame >= self.scene.time.frames
+        reward = float(np.mean(rewards)) if rewards else 0.0
+        return self._observation(), reward, terminated, truncated, info
+
+    def render(self) -> Any:
+        """(height, width, 3) uint8 picture of the state, as in the scene's film without curves;
+        None without a render mode."""
+        return None if self.render_mode is None else picture_of(self.simulation)
+
+    def close(self) -> None:
+        self.simulation.close()
+
+    def _told(self, joints: tuple[str, ...] | None) -> tuple[str, ...]:
+        controlled = self.scene.controlled_joints()
+        found = controlled if joints is None else tuple(joints)
+        others = [joint for joint in found if joint not in controlled]
+        if not found or others:
+            which = f"joint '{others[0]}'" if others else "what a policy is to move"
+            raise SceneError(
+                f"scene {self.scene.name}: {which} is not among the controlled ones. "
+                "Name in [[control]] the joints that a policy is to move."
+            )
+        return found
+
+    def _limits(self) -> tuple[Array, Array]:
+        """(n,) what -1 and 1 mean."""
+        setup, controller = self.simulation.setup, self.simulation.controller
+        model, ends = setup.solid, list[Array]()
+        assert controller is not None
+        for joint in self._joints:
+            dofs = model.dofs_of(joint)
+            own = np.isin(controller.dofs, dofs)
+            if self._kind == "velocity":
+                high = controller.greatest_strength()[own]
+                low = -high
+            elif self._kind == "position":
+                low, high = model.dof_range[dofs].T
+            else:
+                servo = servo_of(dofs, [(controller.dofs, controller.servo)])
+                high = np.broadcast_to(torque_limit(model, joint, servo), dofs.shape)
+                low = -high
+            if not (np.isfinite(low).all() and np.isfinite(high).all()):
+                key = "range" if self._kind == "position" else "actuatorfrcrange"
+                raise SceneError(
+                    f"scene {self.scene.name}: joint '{joint}' has no limit for actions of kind "
+                    f"'{self._kind}'. Give it a {key} in the model, or take another kind."
+                )
+            ends.append(np.array([low, high]))
+        both = np.concatenate(ends, axis=1)
+        return both[0], both[1]
+
+    def _commands(self, action: Array) -> dict[str, Command]:
+        """Commands of an action, clipped to [-1, 1]."""
+        part = 0.5 * (1.0 + np.clip(action, -1.0, 1.0))
+        wanted, commands, first = self._low + part * (self._high - self._low), {}, 0
+        make = {"velocity": Velocity, "position": Position, "torque": Torque}[self._kind]
+        for joint in self._joints:
+            count = self.simulation.setup.solid.dofs_of(joint).size
+            commands[joint] = make(wanted[first : first + count])
+            first += count
+        return commands
+
+    def _observed(self) -> list[str]:
+        model, found = self.simulation.setup.solid, list[str]()
+        for joint in self._joints:
+            scalar, dofs = model.positions_of(joint).size == 1, model.dofs_of(joint)
+            unit = "m" if model.mj.jnt_type[model.joint(joint)] == SLIDE else "rad"
+            found += [f"position_{joint}_{unit}"] if scalar else []
+            for name in ("velocity", "drive"):
+                found += [f"{name}_{model.dof_names[dof]}" for dof in dofs]
+        found += [f"velocity_{axis}_m/s" for axis in "xyz"]
+        return found + [f"turn_{axis}_rad/s" for axis in "xyz"]
+
+    def _observation(self) -> Array:
+        simulation = self.simulation
+        if self._own_observe is not None:
+            return np.asarray(self._own_observe(simulation), np.float32)
+        model, found = simulation.setup.solid, list[Array]()
+        for joint in self._joints:
+            state = simulation.joint(joint)
+            found += [state.position] if state.position.size == 1 else []
+            found += [state.velocity, state.drive]
+        root = simulation.body(model.body_names[int(model.moving.argmax())])
+        found += [root.velocity @ root.rotation, root.angular_velocity @ root.rotation]
+        return np.nan_to_num(np.concatenate(found)).astype(np.float32)
+
+    def _minus_objectives(self, simulation: Simulation, report: FrameReport) -> float:
+        controller = simulation.controller
+        assert controller is not None
+        return -controller.objective.value(Measurement(simulation.world, report.step))
+
+
+def picture_of(simulation: Simulation) -> Any:
+    """(height, width, 3) uint8 picture of the state of a simulation."""
+    from flowborne.runs.run_folder import RunFolder
+    from flowborne.sim.running import write_state_alone
+    from flowborne.view.pictures import Picture
+    from flowborne.view.run import Run
+
+    with TemporaryDirectory() as folder:
+        write_state_alone(RunFolder(Path(folder) / "run"), simulation)
+        run = Run(Path(folder) / "run")
+        with closing(Picture(run, 1.0, replace(run.shot, plots=False))) as picture:
+            return picture.draw(len(run) - 1)[:, :, :3].copy()
+
+
+for _name, _scene in ENVIRONMENTS.items():
+    gymnasium.register(
+        f"flowborne/{_name}-v0", "flowborne.play.gym:SceneEnv", kwargs={"scene": _scene}
+    )

@@ -1,0 +1,485 @@
+"""The simulation of a scene, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from flowborne.base.errors import PartError, SceneError, described
+from flowborne.control.commands import Commands, Drives, drives_of, told_by
+from flowborne.coupling.named import BodyState, JointState, Named, Sensed
+from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
+from flowborne.coupling.stream import FlowState, flow_at
+from flowborne.coupling.world import Setup, World
+from flowborne.fluid.boundary import SIDES
+from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.kernels.jit import cores, kernel_threads
+from flowborne.runs.frame_report import PARTS, FrameReport
+from flowborne.runs.summary import BUDGET_OPEN
+from flowborne.scenes.changes import ChangeTable, values_at
+from flowborne.sim.measures import Measures
+from flowborne.solids.flesh import inversion
+from flowborne.solids.model import FREE, SLIDE
+from flowborne.solids.surfaces import geom_boxes
+
+if TYPE_CHECKING:
+    from flowborne.control.controller import Controller
+    from flowborne.coupling.motion import JointCommand
+    from flowborne.scenes.schema import Scene
+    from flowborne.solids.model import SolidModel
+
+Step = Callable[[World, float, "JointCommand | None"], StepReport]
+
+MAX_INVERTED = 0.02
+"""Largest share of the elements of flesh that may be inside out for a while."""
+
+LISTED = 4
+"""Maximum number of dofs named in a message."""
+
+
+class BlowUpError(Exception):
+    """The simulation cannot go on.
+
+    frame  the frame that could not be finished, counted from 1
+    step   the step in it, counted from 1
+    cause  what happened, a sentence without a full stop
+    fault  whether that was an internal error
+    """
+
+    def __init__(self, frame: int, step: int, cause: str, fault: bool = False) -> None:
+        super().__init__(f"frame {frame}, step {step}: {cause}")
+        self.frame, self.step, self.cause, self.fault = frame, step, cause, fault
+
+    def __reduce__(self) -> tuple[type[BlowUpError], tuple[int, int, str, bool]]:
+        return BlowUpError, (self.frame, self.step, self.cause, self.fault)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The state after some frames, and what the last one said of bodies and joints."""
+
+    world: World
+    frame: int
+    report: FrameReport | Sensed | None
+
+
+class Simulation:
+    """A world and its controller, advanced frame by frame.
+
+    scene     a Scene, or the name of a built-in one, or the path of a scene file
+    workers   number of trials of the controller that run at once; by default that of the trials,
+              at most that of the cores. Results do not depend on it
+    executor  "serial", "threads" (default), "processes", or an object with submit() or map()
+    raises    SceneError if the scene is wrong or does not fit into memory; ValueError for
+              workers < 1
+
+    scene            the Scene
+    controller       the Controller, or None
+    frame_time       duration of a frame, s
+    steps_per_frame  physics steps in a frame
+    frames           number of frames of the scene; `advance_frame` does not stop there
+    measures         columns of the history
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | Path,
+        workers: int | None = None,
+        executor: str | object | None = None,
+    ) -> None:
+        from flowborne.control.executors import mapper
+        from flowborne.coupling.compiling import compile_beside
+        from flowborne.coupling.step import step
+        from flowborne.scenes.build import build
+        from flowborne.scenes.load import load_scene
+
+        if workers is not None and workers < 1:
+            raise ValueError(f"workers is {workers}; give 1 or more")
+        self.scene: Scene = load_scene(scene) if isinstance(scene, str | Path) else scene
+        if self.scene.has_fluid:
+            compile_beside()
+        count = workers or default_workers(
+            len(self.scene.controlled_joints()), self.scene.has_fluid
+        )
+        kind = ("serial" if count == 1 else "threads") if executor is None else executor
+        with _enough_memory(self.scene):
+            self._executor = mapper(kind, count)
+            built = build(self.scene, self._executor)
+        self.controller: Controller | None = built.controller
+        self.frame_time = built.frame_time
+        self.steps_per_frame = built.steps_per_frame
+        self.frames = built.frames
+        output, stream = self.scene.output, self.scene.stream()
+        told = () if self.scene.policy is None else self.scene.policy.joints
+        self.measures = Measures(
+            built.world.setup, self.controller, stream, output.bodies, output.joints, told
+        )
+        self._changes: tuple[ChangeTable, ...] = self.scene.changes
+        self._values: dict[str, Any] = {}
+        self._policy = None if self.scene.policy is None else self.scene.policy.build()
+        self._moment = Snapshot(built.world, 0, None)
+        self._started = False
+        self._step: Step = step
+
+    @property
+    def world(self) -> World:
+        """The state after `frame` frames, a new World for each.
+
+        raises  SceneError if the bodies and the fluid cannot be started, on the first use
+        """
+        if not self._started:
+            self._start()
+        return self._moment.world
+
+    @property
+    def setup(self) -> Setup:
+        """The constant part of the world."""
+        return self._moment.world.setup
+
+    @property
+    def frame(self) -> int:
+        """Number of frames done."""
+        return self._moment.frame
+
+    @property
+    def time(self) -> float:
+        """s since the start."""
+        return self.world.time
+
+    @property
+    def report(self) -> FrameReport | None:
+        """Report of the last frame; None before the first, and when going on from a checkpoint."""
+        report = self._moment.report
+        return report if isinstance(report, FrameReport) else None
+
+    @property
+    def changes(self) -> tuple[ChangeTable, ...]:
+        """All changes of keys so far and to come: those of the scene, and those of `change`. In
+        [[changes]] of the scene they give the same run."""
+        return self._changes
+
+    def change(self, values: Mapping[str, Any], over: float = 0.0) -> None:
+        """Give keys of the scene other values from now on: winds, streams, objectives, weights,
+        strengths.
+
+        values  dotted key -> value, as {"wind.0.velocity": [0.0, 5.0, 0.0]}
+        over    s in which numbers go there evenly
+        raises  SceneError for a key that is unknown or cannot change, or a wrong value
+        """
+        from flowborne.scenes.load import with_values
+
+        with_values(self.scene, values)
+        earlier = (change for change in self._changes if change.time <= self.time)
+        self._changes = (*earlier, ChangeTable(time=self.time, over=over, values=dict(values)))
+
+    def snapshot(self) -> Snapshot:
+        """The state now. A frame makes a new one, so it costs nothing to keep."""
+        return replace(self._moment, world=self.world)
+
+    def restore(self, snapshot: Snapshot, changes: Iterable[ChangeTable] | None = None) -> None:
+        """Continue from a state of the same scene, to the same bits.
+
+        changes  all changes of keys, in place of those known now, of which later ones stay
+        """
+        if changes is not None:
+            self._changes = tuple(changes)
+        world = replace(snapshot.world, setup=self.setup.where(snapshot.world.setup))
+        self._moment, self._started = replace(snapshot, world=world), True
+
+    def advance_frame(self, commands: Commands | None = None) -> FrameReport:
+        """Decide, then take the steps of one frame, on all cores unless a context allows fewer.
+
+        commands  what joints are told by their names: Position, Velocity or Torque. The scene's
+                  motions and its controller move the others. By default the scene's policy tells
+        raises    BlowUpError if a step or the policy fails or a measure is not a finite number;
+                  SceneError for a wrong command. After any error the state is that before the frame
+        """
+        self._apply_changes()
+        world = self.world.copy()
+        if commands is None and self._policy is not None:
+            try:
+                commands = self._policy(self)
+            except PartError as error:
+                raise BlowUpError(self.frame + 1, 1, str(error)) from error
+        beyond: tuple[str, ...] = ()
+        if commands:
+            told, beyond = told_by(commands, world, self.frame_time, self._drives())
+            world.setup = world.setup.but(told=told)
+        with _one_blas_thread(), kernel_threads():
+            report = replace(
+                self._advance(world, self.frame + 1), beyond=beyond, values=self._values
+            )
+        if commands:
+            world.setup = self.setup.where(world.setup)
+        lost = self.measures.lost(self.measures.values(world, report.frame, report))
+        if lost:
+            raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")
+        self._moment = Snapshot(world, report.frame, report)
+        return report
+
+    def flow_at(self, body: str, points: Array) -> FlowState:
+        """The fluid now at points (n, 3) that ride on a body, in m from the origin of its frame and
+        along its axes.
+
+        raises  ValueError for an unknown name, and without a fluid
+        """
+        state = self.body(body)
+        return flow_at(self.world, state.position + np.atleast_2d(points) @ state.rotation.T)
+
+    def body(self, name: str) -> BodyState:
+        """Pose and velocity of a body now and the frame's mean force, in SI units; see `BodyState`.
+
+        raises  ValueError for an unknown name
+        """
+        return self._named().body(name)
+
+    def joint(self, name: str) -> JointState:
+        """Position, velocity and drive force of a joint now, in SI units; see `JointState`.
+
+        raises  ValueError for an unknown name
+        """
+        return self._named().joint(name)
+
+    def _named(self) -> Named:
+        return Named.after(self.world, self._moment.report)
+
+    def _apply_changes(self) -> None:
+        """Remake setup and controller where the coming frame has other values than the last one."""
+        from flowborne.scenes.build import changed
+        from flowborne.scenes.load import at, with_values
+
+        if not (self._changes or self._values):
+            return
+        start = {key: at(self._raw, key) for change in self._changes for key in change.values}
+        values = values_at(self._changes, start, self.time, self.frame_time)
+        if values == self._values:
+            return
+        scene = with_values(self.scene, values, check=False)
+        setup, controller = changed(scene, self.setup, self._executor)
+        self._moment = replace(self._moment, world=replace(self.world, setup=setup))
+        self.controller, self._values = controller, values
+
+    @cached_property
+    def _raw(self) -> dict[str, Any]:
+        """The scene as its file has it."""
+        from flowborne.scenes.load import raw_of
+
+        return raw_of(self.scene)
+
+    def _drives(self) -> Drives:
+        """Those of the scene itself."""
+        controller = self.controller
+        own = [] if controller is None else [(controller.dofs, controller.servo)]
+        return drives_of(self.setup, own)
+
+    def measure(self) -> dict[str, float]:
+        """A row of the history for the present state: column -> value.
+
+        Values that only a step can give are nan before the first frame.
+        """
+        return self.measures.values(self.world, self.frame, self.report)
+
+    def close(self) -> None:
+        """Stop the controller's workers."""
+        if self.controller is not None:
+            self.controller.close()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.close()
+
+    def _start(self) -> None:
+        """Start bodies and fluid; controlled joints keep their velocity until a decision."""
+        from flowborne.coupling.motion import JointCommand
+        from flowborne.coupling.start import start
+
+        world, scene = self._moment.world, self.scene
+        model = world.setup.solid
+        free = model.mj.jnt_type[model.mj.dof_jntid] == FREE
+        given = np.ones(free.size, bool) if scene.initial.impulse == "given" else ~free
+        held = JointCommand.none(free.size)
+        if self.controller is not None:
+            dofs = np.asarray(self.controller.dofs)
+            held.set(dofs, world.solid.v[dofs], world.solid.v[dofs])
+        try:
+            with _one_blas_thread(), kernel_threads(), _enough_memory(scene):
+                start(world, self.frame_time / self.steps_per_frame, given, held)
+        except PartError as error:
+            raise SceneError(f"scene {scene.name}: {error}") from error
+        except BREAKDOWNS as error:
+            raise SceneError(
+                f"scene {scene.name}, [initial]: {error}. Look for bodies that are in each other "
+                "or in a side of the domain, for velocities that are too large, and refine the "
+                "grid where bodies close off a pocket of few cells."
+            ) from error
+        self._started = True
+
+    def _advance(self, world: World, frame: int) -> FrameReport:
+        """Advance `world` by a frame, in place."""
+        started = perf_counter()
+        controller, dt = self.controller, self.frame_time / self.steps_per_frame
+        end = world.time + self.frame_time
+        seconds = dict.fromkeys(PARTS, 0.0)
+        nothing = np.zeros(0)
+        gradient, targets, objective, decided = nothing, nothing, np.nan, False
+        terms: dict[str, float] = {}
+        reports = []
+        number = 1
+        try:
+            if controller is not None:
+                decision = controller.decide(world, self.frame_time, self._step)
+                gradient, decided = decision.gradient, decision.decided
+                objective = decision.objective
+                seconds["control"] = perf_counter() - started
+            for number in range(1, self.steps_per_frame + 1):
+                command = None if controller is None else controller.command(world, end, dt)
+                reports.append(self._step(world, dt, command))
+                cause = trouble(world, reports[-1])
+                if cause:
+                    raise BlowUpError(frame, number, cause)
+            if controller is not None:
+                terms, targets = controller.measure(world, reports[-1]), controller.targets(world)
+        except BREAKDOWNS as error:
+            raise BlowUpError(frame, number, str(error)) from error
+        except ValueError as error:
+            raise BlowUpError(frame, number, described(error), fault=True) from error
+        except MemoryError as error:
+            cause = f"the memory is full ({error})" if str(error) else "the memory is full"
+            raise BlowUpError(frame, number, cause) from error
+        for report in reports:
+            for part, spent in report.seconds.items():
+                seconds[part] = seconds.get(part, 0.0) + spent
+        seconds["total"] = perf_counter() - started
+        return FrameReport(
+            frame=frame,
+            time=world.time,
+            steps=tuple(reports),
+            objective=objective,
+            terms=terms,
+            gradient=gradient,
+            targets=targets,
+            decided=decided,
+            seconds=seconds,
+        )
+
+
+@contextmanager
+def _enough_memory(scene: Scene) -> Iterator[None]:
+    """Context in which a lack of memory is a SceneError."""
+    try:
+        yield
+    except MemoryError as error:
+        raise SceneError(
+            f"scene {scene.name} does not fit into the memory of this machine ({error}). "
+            "Make its grid coarser: lower [domain] resolution or cells."
+        ) from error
+
+
+def trouble(world: World, report: StepReport) -> str | None:
+    """Why the world cannot be advanced after the step of `report`, or None."""
+    if report.outcome is Outcome.PRESSURE_NOT_CONVERGED:
+        detail = f"relative residual {report.residual:.2g} after {report.iterations} iterations"
+        return f"{report.outcome.value} ({detail})"
+    if report.outcome is Outcome.NOT_SETTLED and report.unsettled.size:
+        return f"{report.outcome.value} (at {_listed(world, report.unsettled)})"
+    if report.outcome is not Outcome.DONE:
+        return report.outcome.value
+    solid, fluid, properties = world.solid, world.fluid, world.setup.fluid
+    if not (np.isfinite(solid.q).all() and np.isfinite(solid.v).all()):
+        return "a joint's position or velocity is not a finite number"
+    turn = np.abs(solid.v * report.dt) * turning_dofs(world.setup.solid)
+    if turn.size and turn.max() > np.pi:
+        name = world.setup.solid.dof_names[int(turn.argmax())]
+        return f"{name} turns by {turn.max():.3g} rad in one step, more than half a turn"
+    flesh = world.setup.solid.flesh
+    torn = None if flesh is None else inversion(flesh, solid.q)
+    if torn is not None and len(torn.elements) > MAX_INVERTED * torn.of:
+        return torn.sentence()
+    if fluid is None or properties is None:
+        return None
+    left = departed(world, report)
+    if left:
+        return left
+    grid = properties.grid
+    if not all(np.isfinite(values).all() for values in (*fluid.velocity, fluid.pressure)):
+        return Outcome.NOT_FINITE.value
+    longest, moved = max(grid.shape) * grid.spacing, report.fastest * report.dt
+    if moved > longest:
+        return (
+            f"the fluid moves {moved:.3g} m in one step, farther than the domain is long "
+            f"({longest:.3g} m)"
+        )
+    return None
+
+
+def departed(world: World, report: StepReport) -> str | None:
+    """Which body is where there is no fluid, beyond a side that lets nothing through, or None.
+
+    Its centre of mass is there, or it reaches there by more than a cell and momentum is lost.
+    """
+    model, fluid = world.setup.solid, world.setup.fluid
+    if fluid is None or fluid.one_way:
+        return None
+    grid, h = fluid.grid, fluid.grid.spacing
+    body, low = np.arange(model.nbody), report.centre
+    high = low
+    if report.momentum.budget_error > BUDGET_OPEN:
+        first, last = geom_boxes(model, world.solid.q)
+        body = np.append(body, model.geom_body)
+        low, high = np.concatenate([low, first + h]), np.concatenate([high, last - h])
+    met = (model.moving & (model.volume > 0.0))[body]
+    for axis in grid.axes:
+        gone = low[:, axis] < grid.origin[axis], high[:, axis] > grid.upper[axis]
+        for end, side in enumerate(fluid.boundaries.pair(axis)):
+            found = np.flatnonzero(met & gone[end])
+            if found.size and side.prescribes:
+                return (
+                    f"body '{model.body_names[body[found[0]]]}' has left the domain through its "
+                    f"{side.kind} side {SIDES[2 * axis + end]}; enlarge [domain], or put a plane "
+                    "with contact into the model where the side is"
+                )
+    return None
+
+
+def _listed(world: World, dofs: Integers) -> str:
+    """Names of the first few of some dofs."""
+    names = [world.setup.solid.dof_names[dof] for dof in dofs[:LISTED]]
+    more = len(dofs) - len(names)
+    return ", ".join(names) + (f" and {more} more" if more else "")
+
+
+def turning_dofs(model: SolidModel) -> Mask:
+    """(nv,) which dofs are rotations: hinges, balls and the last three of free joints."""
+    kind, first = model.mj.jnt_type[model.mj.dof_jntid], model.mj.jnt_dofadr[model.mj.dof_jntid]
+    of_free = np.arange(model.nv) - first >= 3
+    return np.asarray(np.where(kind == FREE, of_free, kind != SLIDE))
+
+
+def default_workers(joints: int, fluid: bool) -> int:
+    """Number of workers: that of the trials of a controller of some joints, at most that of cores.
+
+    Without a fluid it is 1, as a trial takes less time than passing it to a thread.
+    """
+    return max(1, min(2 * joints, cores())) if fluid else 1
+
+
+@lru_cache(maxsize=1)
+def _blas() -> ThreadpoolController:
+    """The loaded BLAS libraries: all of them, once a simulation has been built."""
+    return ThreadpoolController()
+
+
+def _one_blas_thread() -> AbstractContextManager[object]:
+    """Context in which BLAS uses one thread: small solves are faster, and sums reproducible."""
+    limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
+    return limit
