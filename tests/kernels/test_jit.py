@@ -2,14 +2,13 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numba import prange
 
 from flowborne.kernels import jit
-from flowborne.kernels.jit import LARGE, Comparison, allowed_threads, kernel, kernel_threads
+from flowborne.kernels.jit import LARGE, allowed_threads, kernel, kernel_threads
 
 
 @kernel
@@ -73,8 +72,6 @@ def test_a_context_allows_no_more_than_the_one_around(monkeypatch):
 
 def test_several_threads_may_run_twins_at_once(monkeypatch):
     monkeypatch.setattr(jit, "cores", lambda: 2)
-    monkeypatch.setattr(jit, "TURNS", (True,))
-    monkeypatch.setattr(jit, "AGAIN", 1)
 
     def worked(n):
         x = np.full(LARGE, float(n))
@@ -85,26 +82,6 @@ def test_several_threads_may_run_twins_at_once(monkeypatch):
 
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(worked, range(4))) == [(float(n), 0.0) for n in range(4)]
-
-
-@pytest.mark.parametrize("spread", [0.6, 1.6])
-def test_the_faster_version_is_taken_and_compared_again(monkeypatch, spread):
-    now, comparison = SimpleNamespace(seconds=3.0), Comparison()
-    monkeypatch.setattr(jit.time, "perf_counter", lambda: now.seconds)
-
-    def calls(n, spread):
-        taken = []
-        for call in range(n):
-            with comparison.timed() as threads:
-                now.seconds += (1.0 + 2.0 * (call % 2)) * (spread if threads else 1.0)
-            taken.append(threads)
-        return taken
-
-    tried = len(jit.TURNS)
-    assert calls(tried, spread) == list(jit.TURNS)
-    assert calls(jit.AGAIN - tried, spread) == [spread < 1.0] * (jit.AGAIN - tried)
-    assert calls(tried, 1.0 / spread) == list(jit.TURNS)
-    assert calls(4, 1.0) == [spread > 1.0] * 4
 
 
 def test_kernel_without_a_parallel_loop_has_no_twin():

@@ -65,7 +65,6 @@ def test_sums_have_the_same_bits_on_any_number_of_threads(
 ) -> None:
     """The bench `threads` compares the bits of a whole step, which takes minutes to compile."""
     monkeypatch.setattr(jit, "cores", lambda: threads)
-    monkeypatch.setattr(jit, "AGAIN", 1)
     x, r, p, q = fields((40, 52, 53), 4)
     assert x.size >= jit.LARGE
     b = np.zeros(x.shape, np.float32)

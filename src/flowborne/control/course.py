@@ -133,7 +133,7 @@ class Trials:
         """(k,) objective on courses displaced by the rows of (k, m). Raises TrialError."""
         trials = [self.course.trial(self.objective, self._full(row)) for row in displacements]
         self.evaluations += len(trials)
-        return np.array(self.mapper.map(methodcaller("run"), trials, self.course.world.setup))
+        return np.array(self.mapper.map(methodcaller("run"), trials))
 
     def _full(self, displacement: Array) -> Array:
         """(N,) a displacement (m,) of all decision variables."""

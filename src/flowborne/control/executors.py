@@ -7,11 +7,9 @@ the caller's kernels. The interfaces are those of `concurrent.futures`.
 
 from __future__ import annotations
 
-import io
 import math
 import multiprocessing
 import os
-import pickle
 import signal
 import threading
 import time
@@ -34,13 +32,8 @@ GRACE = 10.0
 class Mapper(Protocol):
     """Applies a function to every task."""
 
-    def map(
-        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
-    ) -> list[Answer]:
-        """Results in the order of the tasks; an exception in one is raised here.
-
-        shared  an object that tasks refer to and that stays the same from call to call
-        """
+    def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
+        """Results in the order of the tasks; an exception in one is raised here."""
         ...
 
     def close(self) -> None:
@@ -61,9 +54,7 @@ def collect(futures: list[Any]) -> list[Any]:
 class Serial:
     """One evaluation after the other, in the calling thread."""
 
-    def map(
-        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
-    ) -> list[Answer]:
+    def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         return [function(task) for task in tasks]
 
     def close(self) -> None:
@@ -103,9 +94,7 @@ class Pool:
 class Threads(Pool):
     """Threads of this process: a physics step releases the interpreter lock."""
 
-    def map(
-        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
-    ) -> list[Answer]:
+    def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         if self.workers == 1 or len(tasks) == 1:
             return [function(task) for task in tasks]
         if self._executor is None:
@@ -118,25 +107,18 @@ class Threads(Pool):
 class Processes(Pool):
     """Other processes of this machine, spawned: a fork would not copy the threads.
 
-    Each worker receives the shared object once, at its start; pickled tasks contain a mark in its
-    place. The tasks of a worker are pickled together, so that their common objects are sent once.
+    The tasks of a worker are pickled together, so that their common objects are sent once.
     The main script must guard its start by `__name__ == "__main__"`. If a worker dies, all are
     started again, once.
     """
 
-    def __init__(self, workers: int | None = None) -> None:
-        super().__init__(workers)
-        self._shared: object = None
-
-    def map(
-        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
-    ) -> list[Answer]:
+    def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         try:
-            return self._map(function, tasks, shared)
+            return self._map(function, tasks)
         except BrokenProcessPool:
             self.close()
         try:
-            return self._map(function, tasks, shared)
+            return self._map(function, tasks)
         except BrokenProcessPool as error:
             self.close()
             raise WorkerError(
@@ -145,23 +127,14 @@ class Processes(Pool):
                 'if __name__ == "__main__"'
             ) from error
 
-    def _map(
-        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object
-    ) -> list[Answer]:
-        if self._executor is not None and shared is not self._shared:
-            self.close()
+    def _map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         if self._executor is None:
-            self._shared = shared
-            self._executor = ProcessPoolExecutor(
-                self.workers,
-                mp_context=multiprocessing.get_context("spawn"),
-                initializer=begin_worker,
-                initargs=(pickle.dumps(shared),),
-            )
+            spawn = multiprocessing.get_context("spawn")
+            self._executor = ProcessPoolExecutor(self.workers, spawn, end_with_parent)
         size = math.ceil(len(tasks) / self.workers)
         parts = [tasks[n : n + size] for n in range(0, len(tasks), max(size, 1))]
         submit, threads = self._executor.submit, self.share(len(parts))
-        answers = collect([submit(run_packed, pack((function, p), shared), threads) for p in parts])
+        answers = collect([submit(run_all, threads, function, part) for part in parts])
         return list(chain.from_iterable(answers))
 
 
@@ -182,9 +155,7 @@ class Foreign:
             )
         self.executor = executor
 
-    def map(
-        self, function: Callable[[Task], Answer], tasks: Sequence[Task], shared: object = None
-    ) -> list[Answer]:
+    def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         if hasattr(self.executor, "submit"):
             return collect([self.executor.submit(function, task) for task in tasks])
         return list(self.executor.map(function, tasks))
@@ -213,48 +184,10 @@ def mapper(executor: str | object = "threads", workers: int | None = None) -> Ma
     )
 
 
-class _Packer(pickle.Pickler):
-    """Pickler that writes a mark in place of the shared object."""
-
-    def __init__(self, file: io.BytesIO, shared: object) -> None:
-        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
-        self._shared = shared
-
-    def persistent_id(self, obj: object) -> str | None:
-        return "shared" if self._shared is not None and obj is self._shared else None
-
-
-class _Unpacker(pickle.Unpickler):
-    """Unpickler that replaces the mark by this process's shared object."""
-
-    def persistent_load(self, pid: str) -> object:
-        return _received[pid]
-
-
-_received: dict[str, object] = {}
-
-
-def pack(item: object, shared: object) -> bytes:
-    """The pickled item, with a mark for each reference to `shared`."""
-    file = io.BytesIO()
-    _Packer(file, shared).dump(item)
-    return file.getvalue()
-
-
-def begin_worker(pickled: bytes) -> None:
-    """Initialise a worker process: watch its parent, and store the shared object."""
-    end_with_parent()
-    receive_shared(pickled)
-
-
-def receive_shared(pickled: bytes) -> None:
-    """Store the shared object."""
-    _received["shared"] = pickle.loads(pickled)
-
-
-def run_packed(packed: bytes, threads: int) -> list[Any]:
-    """Apply the packed function to each of the packed tasks in a worker process."""
-    function, tasks = _Unpacker(io.BytesIO(packed)).load()
+def run_all(
+    threads: int, function: Callable[[Task], Answer], tasks: Sequence[Task]
+) -> list[Answer]:
+    """Apply the function to each of the tasks, as `run_on`."""
     return [run_on(threads, function, task) for task in tasks]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, SupportsIndex
+from typing import Any
 
 import numpy as np
 
@@ -107,24 +107,13 @@ class Setup:
         return other
 
     def on(self, grid: Grid) -> Setup:
-        """The same on a grid that has moved. Workers that have this setup are not sent it again."""
+        """The same on a grid that has moved."""
         assert self.fluid is not None
-        if grid == self.fluid.grid:
-            return self
-        home: Setup = vars(self).get("home", self)
-        other = self.but(fluid=replace(self.fluid, grid=grid))
-        vars(other)["home"] = home
-        return other
+        return self if grid == self.fluid.grid else self.but(fluid=replace(self.fluid, grid=grid))
 
     def where(self, other: Setup) -> Setup:
         """The same on the grid of another."""
         return self if other.fluid is None else self.on(other.fluid.grid)
-
-    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
-        if "home" not in vars(self):
-            return super().__reduce_ex__(protocol)
-        assert self.fluid is not None
-        return Setup.on, (vars(self)["home"], self.fluid.grid)
 
     @cached_property
     def shapes(self) -> Shapes:

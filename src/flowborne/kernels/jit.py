@@ -11,8 +11,7 @@ iteration and added in order.
 Numba's threads come from TBB where that is installed: there the calling thread does what no other
 has begun, so that a busy machine slows a solve no more than it slows one thread. Elsewhere they
 come from OpenMP, and sleep while they wait: spinning ones take the core from the thread that they
-wait for, and a solve of 0.5 s beside another busy process took 9 s. Where the calling thread has
-waited for the others longer than they can have saved it, the next calls do without them.
+wait for, and a solve of 0.5 s beside another busy process took 9 s.
 """
 
 from __future__ import annotations
@@ -21,8 +20,6 @@ import ctypes
 import os
 import sys
 import threading
-import time
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -58,14 +55,6 @@ ONLY_PRANGE = {
 
 LARGE = 100_000
 """Fewest elements of a kernel's largest array for which threads are started."""
-
-TURNS = (True, False, True, False, False, True)
-"""With threads or without: the calls by which a kernel compares its versions. The first two, which
-may have to compile, are not timed; the others are in an order that favours neither version where
-every second call does more."""
-
-AGAIN = 400
-"""Calls from one comparison to the next."""
 
 _thread = threading.local()
 _workqueue = threading.Lock()
@@ -131,29 +120,6 @@ def numba_layer() -> str:
     return str(numba.threading_layer())
 
 
-class Comparison:
-    """Which version of a kernel is the faster one for arrays of about one size."""
-
-    def __init__(self) -> None:
-        self.calls = 0
-        self.seconds = {True: 0.0, False: 0.0}
-
-    @contextmanager
-    def timed(self) -> Iterator[bool]:
-        """Around the next call; yields whether it takes threads."""
-        turn = self.calls % AGAIN
-        self.calls += 1
-        comparing = turn < len(TURNS)
-        threads = TURNS[turn] if comparing else self.seconds[True] < self.seconds[False]
-        began = time.perf_counter()
-        yield threads
-        took = time.perf_counter() - began
-        if turn == 0:
-            self.seconds = {True: 0.0, False: 0.0}
-        elif comparing and turn > 1:
-            self.seconds[threads] += took
-
-
 @contextmanager
 def numba_threads(count: int) -> Iterator[bool]:
     """Within, Numba spreads `prange` over `count` threads; yields False where it cannot now.
@@ -185,19 +151,15 @@ class Kernel(Generic[P, R]):
         self.__wrapped__ = function
         self.serial: Any = njit(nogil=True, cache=True)(function)
         self._twin: Any = None
-        self._faster: defaultdict[int, Comparison] = defaultdict(Comparison)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         count = allowed_threads()
         size = largest_size(args) if count > 1 else 0
         if size < LARGE or self.parallel is self.serial:
             return cast(R, self.serial(*args, **kwargs))
-        with self._faster[size.bit_length()].timed() as threads:
-            if not threads:
-                return cast(R, self.serial(*args, **kwargs))
-            with numba_threads(count) as free:
-                version = self.parallel if free else self.serial
-                return cast(R, version(*args, **kwargs))
+        with numba_threads(count) as free:
+            version = self.parallel if free else self.serial
+            return cast(R, version(*args, **kwargs))
 
     @property
     def _numba_type_(self) -> Any:

@@ -96,7 +96,6 @@ class Simulation:
         executor: str | object | None = None,
     ) -> None:
         from flowborne.control.executors import mapper
-        from flowborne.coupling.compiling import compile_beside
         from flowborne.coupling.step import step
         from flowborne.scenes.build import build
         from flowborne.scenes.load import load_scene
@@ -104,8 +103,6 @@ class Simulation:
         if workers is not None and workers < 1:
             raise ValueError(f"workers is {workers}; give 1 or more")
         self.scene: Scene = load_scene(scene) if isinstance(scene, str | Path) else scene
-        if self.scene.has_fluid:
-            compile_beside()
         count = workers or default_workers(
             len(self.scene.controlled_joints()), self.scene.has_fluid
         )
