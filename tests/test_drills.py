@@ -239,14 +239,14 @@ def test_ctrl_c_between_the_frames_and_the_film_draws_none(small_scene, tmp_path
 
 def test_a_number_that_is_not_finite_never_ends_well(small_scene, tmp_path, monkeypatch):
     """Not even one that no solver needs."""
-    from flowborne.sim.measures import Measures
+    from flowborne.sim.columns import Columns
 
-    values = Measures.values
+    values = Columns.values
 
-    def spoilt(measures, world, frame, report):
-        return values(measures, world, frame, report) | ({"lift_N": np.nan} if frame == 5 else {})
+    def spoilt(columns, world, frame, report):
+        return values(columns, world, frame, report) | ({"lift_N": np.nan} if frame == 5 else {})
 
-    monkeypatch.setattr(Measures, "values", spoilt)
+    monkeypatch.setattr(Columns, "values", spoilt)
     result = run(small_scene, tmp_path / "run")
     assert result.outcome is RunOutcome.BLEW_UP
     assert "blew up in frame 5, step" in result.message

@@ -32,7 +32,7 @@ from flowborne.control.controller import Controller
 from flowborne.control.executors import Serial
 from flowborne.play.gym import ENVIRONMENTS, SceneEnv
 from flowborne.runs.frame_report import FrameReport
-from flowborne.sim.joint_measures import drive_means
+from flowborne.sim.columns import drive_means
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]

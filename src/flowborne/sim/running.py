@@ -167,7 +167,7 @@ class _Run:
         self.frames = simulation.frames
         self.taken = earlier_joints(simulation.scene)
         self.warnings = warnings_of(simulation.scene, simulation.setup)
-        self.columns = (*simulation.measures.columns, *(f"seconds_{p}" for p in ("total", *PARTS)))
+        self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
         self._signals = signals
@@ -232,7 +232,7 @@ class _Run:
                 values = self._record(report)
             except OSError as error:
                 return RunOutcome.NOT_WRITTEN, self._not_written(error)
-            joints = tuple((c, values[c]) for c in simulation.measures.controlled)
+            joints = tuple((c, values[c]) for c in simulation.columns.controlled)
             self._show("frame", objective=report.objective, joints=joints)
         try:
             self._save()
@@ -356,7 +356,7 @@ class _Run:
     def _summary(self, outcome: RunOutcome, message: str) -> dict[str, Any]:
         simulation = self.simulation
         world, scene = simulation.world, simulation.scene
-        strength = simulation.measures.strength_steps(simulation.frame_time)
+        strength = simulation.columns.strength_steps(simulation.frame_time)
         every = scene.controller.every if scene.can_settle else None
         creature = creature_of(scene, world.setup)
         cells = None if world.setup.fluid is None else prod(world.setup.fluid.grid.shape)
@@ -493,7 +493,7 @@ def write_state_alone(folder: RunFolder, simulation: Simulation) -> None:
     RunFolder.create(folder.path)
     write_scene(folder, scene_files(simulation.scene))
     _write_model_of(folder, simulation)
-    History.create(folder.history, simulation.measures.columns).close()
+    History.create(folder.history, simulation.columns.names).close()
     report = simulation.report
     force = None if report is None else report.drag()
     Recorder(folder).write(simulation.frame, simulation.world, force)

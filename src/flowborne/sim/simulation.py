@@ -25,7 +25,7 @@ from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.runs.frame_report import PARTS, FrameReport
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.changes import ChangeTable, values_at
-from flowborne.sim.measures import Measures
+from flowborne.sim.columns import Columns
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, SLIDE
 from flowborne.solids.surfaces import geom_boxes
@@ -86,7 +86,7 @@ class Simulation:
     frame_time       duration of a frame, s
     steps_per_frame  physics steps in a frame
     frames           number of frames of the scene; `advance_frame` does not stop there
-    measures         columns of the history
+    columns          of the history
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class Simulation:
         self.frames = built.frames
         output, stream = self.scene.output, self.scene.stream()
         told = () if self.scene.policy is None else self.scene.policy.joints
-        self.measures = Measures(
+        self.columns = Columns(
             built.world.setup, self.controller, stream, output.bodies, output.joints, told
         )
         self._changes: tuple[ChangeTable, ...] = self.scene.changes
@@ -216,7 +216,7 @@ class Simulation:
             )
         if commands:
             world.setup = self.setup.where(world.setup)
-        lost = self.measures.lost(self.measures.values(world, report.frame, report))
+        lost = self.columns.lost(self.columns.values(world, report.frame, report))
         if lost:
             raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")
         self._moment = Snapshot(world, report.frame, report)
@@ -282,7 +282,7 @@ class Simulation:
 
         Values that only a step can give are nan before the first frame.
         """
-        return self.measures.values(self.world, self.frame, self.report)
+        return self.columns.values(self.world, self.frame, self.report)
 
     def close(self) -> None:
         """Stop the controller's workers."""

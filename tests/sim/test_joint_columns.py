@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,7 @@ from numpy.testing import assert_allclose
 import flowborne as fb
 from flowborne.bodies import SolidState, TrajectorySinusoid, kinetic_energy, potential_energy
 from flowborne.scenes.build import build
-from flowborne.sim.joint_measures import JointMeasures
-from flowborne.sim.measures import Measures
+from flowborne.sim.columns import Columns
 from flowborne.worlds import make_world
 from flowborne_validation.worlds import mjcf
 
@@ -49,13 +48,13 @@ def missing_energy(steps: int) -> float:
     """Energy that a driven cart gains in half a period with no work of its drive to show, J."""
     drive = TrajectorySinusoid(np.array([0]), 0.3, PERIOD)
     world = make_world(CART, slab=False, gravity=(0.0, -9.81, 0.0), motions=(drive,))
-    measures = JointMeasures(world.setup, NOTHING, True)
+    columns = Columns(world.setup)
     frame_time, dt = PERIOD / 40, PERIOD / 40 / steps
     frame_of(world, dt, steps)
     before, work = energy(world, dt), 0.0
     for _ in range(20):
         frame = frame_of(world, dt, steps)
-        row = measures.values(world.solid.q, world.time, frame)
+        row = columns.values(world, 1, frame)
         assert frame_time * row["power_rail_W"] == pytest.approx(sum(s.work for s in frame.steps))
         work += frame_time * row["power_rail_W"]
     assert abs(work) > 0.5
@@ -73,7 +72,7 @@ def test_force_and_power_are_means_over_the_frame() -> None:
     drive = TrajectorySinusoid(np.array([0]), 0.3, PERIOD)
     world = make_world(CART, slab=False, motions=(drive,))
     frame = frame_of(world, 0.01, 5)
-    row = JointMeasures(world.setup, NOTHING, True).values(world.solid.q, world.time, frame)
+    row = Columns(world.setup).values(world, 1, frame)
     forces = [step.actuator[0] for step in frame.steps]
     assert row["force_rail_N"] == pytest.approx(np.mean(forces))
     assert np.ptp(forces) > 0.1 * abs(row["force_rail_N"])
@@ -99,9 +98,9 @@ class HeldBall:
 def test_a_ball_joint_has_three_torques() -> None:
     """3 kg, held 1 m to the side."""
     world = make_world(BALL, slab=False, gravity=(0.0, 0.0, -9.81), motions=(HeldBall(),))
-    measures = JointMeasures(world.setup, NOTHING, True)
-    row = measures.values(world.solid.q, world.time, frame_of(world, 0.01, 2))
-    assert list(row) == list(measures.columns)
+    columns = Columns(world.setup)
+    row = columns.values(world, 1, frame_of(world, 0.01, 2))
+    assert list(row) == list(columns.names)
     assert_allclose([row[f"torque_shoulder_{a}_Nm"] for a in "xyz"], [0.0, -29.43, 0.0], atol=1e-9)
     assert row["power_shoulder_W"] == 0.0
 
@@ -113,26 +112,26 @@ def test_two_joints_with_the_same_column_are_refused() -> None:
     )
     world = make_world(BALL.replace("</body>", arm, 1), slab=False)
     with pytest.raises(fb.SceneError, match="two columns 'torque_shoulder_x_Nm'"):
-        Measures(world.setup, None, None, (), ("shoulder", "shoulder_x"))
+        Columns(world.setup, joints=("shoulder", "shoulder_x"))
 
 
 def test_joints_are_chosen_as_the_scene_says() -> None:
     eel = build(fb.load_scene("eel", {"domain.resolution": "61"})).world
-    every = JointMeasures(eel.setup, NOTHING, True)
-    assert [c for c in every.columns if c.startswith("power_")] == [
+    every = Columns(eel.setup)
+    assert [c for c in every.names if c.startswith("power_")] == [
         f"power_joint_{n}_W" for n in range(1, 6)
     ]
-    none = JointMeasures(eel.setup, NOTHING, False)
-    assert set(none.columns) == set(every.positions)
-    named = JointMeasures(eel.setup, NOTHING, ("joint_2", "head_x"))
-    assert set(named.columns) - set(none.columns) == {
+    none = Columns(eel.setup, joints=False)
+    assert not [c for c in none.names if c.startswith(("target_", "torque_", "power_"))]
+    named = Columns(eel.setup, joints=("joint_2", "head_x"))
+    assert set(named.names) - set(none.names) == {
         "target_joint_2_rad",
         "torque_joint_2_Nm",
         "power_joint_2_W",
         "force_head_x_N",
         "power_head_x_W",
     }
-    row = every.values(eel.solid.q, 0.75, None)
+    row = every.values(replace(eel, time=0.75), 0, None)
     wave = np.radians(20.0) * (3 * 0.75**2 - 2 * 0.75**3)
     assert row["target_joint_3_rad"] == pytest.approx(wave * np.sin(2 * np.pi * (0.375 - 0.42)))
     assert np.isnan(row["torque_joint_3_Nm"])
@@ -142,7 +141,7 @@ def test_controlled_joints_have_their_target_in_any_case() -> None:
     for joints in ("true", "false", '["hinge"]'):
         scene = fb.load_scene("block-drag-max", {"output.joints": joints})
         with fb.Simulation(scene, workers=1) as simulation:
-            columns = simulation.measures.columns
+            columns = simulation.columns.names
         hinge = scene.controlled_joints()[0]
         assert f"target_{hinge}_rad" in columns
         assert (f"torque_{hinge}_Nm" in columns) == (joints != "false")
