@@ -359,9 +359,9 @@ class Counted(Serial):
     def __init__(self) -> None:
         self.trials = 0
 
-    def map(self, function: Any, tasks: Sequence[Any], shared: object = None) -> list[Any]:
+    def map(self, function: Any, tasks: Sequence[Any]) -> list[Any]:
         self.trials += len(tasks)
-        return super().map(function, tasks, shared)
+        return super().map(function, tasks)
 
 
 def scene_itself(name: str, grid: str, control: bool) -> Outcome:

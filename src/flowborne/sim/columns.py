@@ -228,12 +228,12 @@ def of_joints(
         named = driven[dofs].any() if isinstance(chosen, bool) else name in chosen
         named = bool(chosen and named)
         if (position := _position(model, name)) is not None:
-            target = f"target_{name}_{position.rpartition('_')[2]}"
+            column = f"target_{name}_{position.rpartition('_')[2]}"
             positions[position] = int(model.positions_of(name)[0])
             if position in places:
-                decided[target] = places[position]
+                decided[column] = places[position]
             elif named and prescribed[dofs[0]]:
-                followed[target] = positions[position]
+                followed[column] = positions[position]
         if named:
             force += _components(model, name)
             power[f"power_{name}_W"] = dofs

@@ -65,7 +65,7 @@ class Plan:
         samples = count_samples(study)
         settings = study.overrides()
         with Simulation(load_scene(study.scene, settings), workers=1) as simulation:
-            columns = simulation.measures.columns
+            columns = simulation.columns.names
         return cls(
             study,
             Path(file).name,
