@@ -27,7 +27,6 @@ from flowborne.solids.momentum import (
     momentum,
     potential_energy,
 )
-from flowborne.solids.prescribed import holding
 from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import FleshMesh
@@ -63,7 +62,6 @@ __all__ = [
     "assemble_flesh",
     "grow",
     "halfway_momentum",
-    "holding",
     "human_mjcf",
     "kinematics",
     "kinetic_energy",

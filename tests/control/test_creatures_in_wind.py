@@ -25,9 +25,10 @@ from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
 from flowborne.solids.model import SolidModel
-from flowborne.solids.prescribed import holding
 from flowborne.solids.state import SolidState
 from flowborne.solids.wind import Wind, WindFaces, WindForce
+
+from ..solids.held_pose import holding
 
 FRAME = 1.0 / 24.0
 STRENGTH = np.radians(1.0) / FRAME

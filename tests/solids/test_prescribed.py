@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from flowborne.solids.driven import within_limits
 from flowborne.solids.dynamics import assemble, kinematics
 from flowborne.solids.model import SolidModel
-from flowborne.solids.prescribed import PrescribedSystem, holding, prescribe
+from flowborne.solids.prescribed import PrescribedSystem, prescribe
 from flowborne.solids.state import SolidState
+
+from .held_pose import holding
 
 CREATURE = SolidModel.from_string("""<mujoco><worldbody><geom type="plane" size="5 5 .1"/>
 <body pos="0 0 .15"><freejoint name="root"/><geom type="box" size=".3 .2 .1" mass="2"/>

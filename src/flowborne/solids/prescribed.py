@@ -18,14 +18,9 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from flowborne.base.errors import BreakdownError
-from flowborne.kernels.arrays import Array, Integers, Mask
-from flowborne.solids.dynamics import Kinematics, SolidSystem, System, assemble
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.kernels.arrays import Array, Mask
+from flowborne.solids.dynamics import Kinematics, SolidSystem, System
 from flowborne.solvers.mobility import Answering, DenseAnswer, Drag, Mobility, dense_mobility
-
-MOST_ROUNDS = 50
-"""Most changes of the set of active contacts and limits."""
 
 
 @dataclass(frozen=True)
@@ -162,40 +157,3 @@ def symmetric_inverse(matrix: Array) -> Array:
     inverse = lower + lower.T  # dpotrf has cleared the upper triangle
     inverse.flat[:: len(inverse) + 1] *= 0.5
     return np.asarray(inverse)
-
-
-def holding(
-    model: SolidModel,
-    state: SolidState,
-    applied: Array,
-    dt: float,
-    dofs: Integers | None = None,
-) -> Array:
-    """Generalised force that keeps the present velocities of `dofs` against every other force.
-
-    The dofs do not accelerate, the others move freely (locked dofs of a slab stay locked). The
-    effort of eq. (1) is this force times dt, an impulse.
-
-    applied  (nv,) generalised force of fluid and wind; gravity, springs and contact are added
-    dt       s, for the implicit springs and the contacts
-    dofs     (k,) held dofs; every dof when None
-    returns  (nv,) N or N m, zero on dofs that are not held
-    raises   ValueError when contacts and limits find no consistent set
-    source   Lentine et al. 2011, section 2.3
-    """
-    held = np.ones(model.nv, bool)
-    if dofs is not None:
-        held[:] = False
-        held[dofs] = True
-    none = np.zeros(model.nv)
-    system = prescribe(assemble(model, state, applied, dt), held | model.locked, state.v)
-    for _ in range(MOST_ROUNDS):
-        v_plus = system.after(none)
-        changed = system.updated(v_plus)
-        if changed is None:
-            return np.where(held, system.actuator(v_plus, none), 0.0)
-        system = changed
-    raise ValueError(
-        f"contacts and limits still change after {MOST_ROUNDS} rounds of the held pose. "
-        "Use a shorter time step or softer contacts."
-    )

@@ -8,7 +8,6 @@ from flowborne import Array, SolidModel, SolidState, World
 from flowborne.bodies import (
     TrajectorySinusoid,
     halfway_momentum,
-    holding,
     kinematics,
     kinetic_energy,
     mass_matrix,
@@ -220,8 +219,7 @@ def static_chain(quick: bool) -> list[Finding]:
         exact = statics(model, q, weight)
         wrong = max(wrong, float(np.abs(held(dry.copy(), q, 0.01) - exact).max()))
         for dt in (1e-3, 0.05):
-            state = SolidState(q.copy(), np.zeros(LINKS))
-            impulse = dt * holding(model, state, np.zeros(LINKS), dt)
+            impulse = dt * held(dry.copy(), q, dt)
             effort = max(effort, float(np.abs(impulse - exact * dt).max()) / dt)
     findings = [
         at_most("error of tau_k over m g L", wrong / scale, 1e-6),
@@ -234,16 +232,17 @@ def static_chain(quick: bool) -> list[Finding]:
         float(np.abs(held(wet.copy(), q, 0.01) - statics(model, q, buoyed)).max()) for q in poses
     )
     findings.append(at_most("in fluid at rest, error of tau_k over m g L", wrong / scale, 1e-6))
-    balanced, leaning = balance(model, poses)
+    balanced, leaning = balance(dry, poses)
     title = "tau_k over m g L with the outboard centre of mass below joint k"
     findings.append(at_most(title, balanced, 1e-6))
     title = "least |tau_k| over m g L, 0.01 rad from there"
     return [*findings, Finding(title, leaning, "> 0", "not zero", leaning > 1e-4)]
 
 
-def balance(model: SolidModel, poses: Array) -> tuple[float, float]:
+def balance(world: World, poses: Array) -> tuple[float, float]:
     """Largest |tau_k| over m g L with the centre of mass of the bodies beyond joint k below it, and
     the least 0.01 rad from there; over all joints and poses."""
+    model = world.setup.solid
     mass = model.body_mass[1:]
     most, least = 0.0, np.inf
     for pose in poses:
@@ -254,16 +253,15 @@ def balance(model: SolidModel, poses: Array) -> tuple[float, float]:
             arm_of = centre - at.body_position[1 + k]
             q[k] += -0.5 * np.pi - np.arctan2(arm_of[1], arm_of[0])
             scale = G * float(mass[k:].sum()) * float(np.linalg.norm(arm_of[:2]))
-            there = torque_at(model, q, k)
+            there = torque_at(world, q, k)
             q[k] += 0.01
-            most, least = max(most, there / scale), min(least, torque_at(model, q, k) / scale)
+            most, least = max(most, there / scale), min(least, torque_at(world, q, k) / scale)
     return most, float(least)
 
 
-def torque_at(model: SolidModel, q: Array, joint: int) -> float:
+def torque_at(world: World, q: Array, joint: int) -> float:
     """|torque| that holds a joint, N m."""
-    state = SolidState(q, np.zeros(LINKS))
-    return abs(float(holding(model, state, np.zeros(LINKS), 0.01)[joint]))
+    return abs(float(held(world.copy(), q, 0.01)[joint]))
 
 
 def floating(flat: bool) -> str:
